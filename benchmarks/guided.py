@@ -29,7 +29,7 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.swing.rules import advance
+from lightpen.swing.rules import advance_swing
 from lightpen.swing.state import (
     Phase,
     SwingSetup,
@@ -122,7 +122,7 @@ def _swing(seed: int, kind: str) -> GuidedSwing:
         now = clock.now_ns() * 1e-9
         sighting = _sight(setup, operator, now, rng)
         start = time.thread_time()
-        state = advance(setup, state, sighting, now).state
+        state = advance_swing(setup, state, sighting, now).state
         slowest = max(slowest, time.thread_time() - start)
         if state.phase is not Phase.CAPTURING:
             continue

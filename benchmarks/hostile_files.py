@@ -33,7 +33,7 @@ from lightpen.formats.camera_files import read_camera, write_camera
 from lightpen.formats.decoding import read_image
 from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pen_files import read_pen, read_raw_pen, write_pen
-from lightpen.formats.videos import count_frames, frame_loaders
+from lightpen.formats.videos import count_frames_in_process, frame_loaders_in_process
 from lightpen.simulator.swings import paper_camera, paper_pen
 
 N_FILES = 20_000
@@ -214,7 +214,7 @@ def _video_samples(folder: Path) -> Iterator[Sample]:
 
 
 def _read_video(path: Path) -> None:
-    for load in frame_loaders(path, count_frames(path)):
+    for load in frame_loaders_in_process(path, count_frames_in_process(path)):
         try:
             load()
         except FileError:

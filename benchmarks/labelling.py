@@ -91,7 +91,7 @@ def random_view(rng: np.random.Generator, n_missing: int, n_lamps: int) -> Rando
     spot = np.full(PEN.n_leds, -1)
     spot[seen] = np.argsort(order)[: len(seen)]
     return RandomView(
-        _spots(np.array(centers)[order], np.array(shapes)[order]), spot, R, t
+        spots_at(np.array(centers)[order], np.array(shapes)[order]), spot, R, t
     )
 
 
@@ -131,7 +131,8 @@ def _random_pose(rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
             return R, t
 
 
-def _spots(centers: FloatArray, shapes: FloatArray) -> Spots:
+def spots_at(centers: FloatArray, shapes: FloatArray) -> Spots:
+    """Return whole, sharp spots with centres (N, 2), px, and shapes (N, 2, 2), px^2."""
     n = len(centers)
     return Spots(
         centers=centers,

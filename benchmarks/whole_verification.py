@@ -16,7 +16,7 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers, swing_poses
 from lightpen.simulator.toucher import Artefacts, Toucher
 from lightpen.verification.choices import TaskKind, VerificationChoices
-from lightpen.verification.session import advance
+from lightpen.verification.session import advance_session
 from lightpen.verification.session_state import SessionSetup, SessionState
 
 N_IMAGES = 60  # of the swing that the tip is by
@@ -61,7 +61,7 @@ def verified(seed: int = 1) -> Verified:
         toucher.follow(setup, state)
         frame = camera.read(1.0)
         before = look(frame.image, instrument.camera, instrument.pen, None, before)
-        transition = advance(setup, state, str(frame.seq), before)
+        transition = advance_session(setup, state, str(frame.seq), before)
         state = transition.state
         if transition.events and not first:
             first = clock.now_ns()

@@ -22,7 +22,7 @@ from benchmarks.hostile_records import IMAGE, NAMES
 from lightpen.formats.files import write_whole
 from lightpen.record.folder_archive import RECORDS, FolderArchive
 from lightpen.record.reading import open_record
-from lightpen.record.writing import RecordWriter, make_folder, note_taken_out
+from lightpen.record.writing import RecordWriter, make_record_folder, note_taken_out
 from lightpen_app.work.settings_store import Content, load, save
 
 N_ROWS = 20_000  # of a JSON that takes a while to be written
@@ -38,7 +38,7 @@ def swing(data: Path) -> None:
     """Begin swings, and keep three images of each."""
     model = open_record(data / RECORDS / "swing")
     for _ in count():
-        folder = make_folder(data / RECORDS, NAMES, datetime.now(UTC))
+        folder = make_record_folder(data / RECORDS, NAMES, datetime.now(UTC))
         with RecordWriter.create(folder, model.header) as writer:
             for image in model.images[:3]:
                 number = writer.append(

@@ -16,8 +16,9 @@ from lightpen.estimation.calibrate import calibrate, calibrate_rig
 from lightpen.estimation.joint import ContactModel, fit_contact, fit_joint
 from lightpen.estimation.pivot import fit_pivot
 from lightpen.estimation.priors import priors_of
+from lightpen.estimation.seat_forms import FORMS, lean_forms
 from lightpen.estimation.uncertainty import POSTURES, once_round
-from lightpen.estimation.unknowns import FORMS, lean_forms, led_basis
+from lightpen.estimation.unknowns import led_basis
 from lightpen.estimation.verdict import Grade, judge
 from lightpen.formats.observation_files import Centers
 from lightpen.model.assumptions import USUAL

@@ -53,10 +53,10 @@ from lightpen.swing.preparation import (
     Preparation,
 )
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.rules import advance
+from lightpen.swing.rules import advance_swing
 from lightpen.swing.state import SwingSetup, SwingState, start_swing
 from lightpen.verification.choices import TaskKind, VerificationChoices
-from lightpen.verification.session import advance as advance_session
+from lightpen.verification.session import advance_session
 from lightpen.verification.session_state import SessionSetup, SessionState
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.look.languages import Language
@@ -410,7 +410,7 @@ def _swing(setup: SwingSetup, scene: Scene) -> SwingState:
         t = scene.cone_cam + held.offsets - R @ scene.tip_pen
         pixels = simulate_centers(scene.camera, scene.pen, R, t, SIGMA, rng)
         sighting = sight_centers(scene.camera, scene.pen, pixels[0], R[0], t[0])
-        state = advance(setup, state, sighting, now).state
+        state = advance_swing(setup, state, sighting, now).state
         follower.follow(state)
     return state
 

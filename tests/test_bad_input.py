@@ -928,6 +928,7 @@ def test_a_corrupt_image_is_dropped_and_named_and_the_rest_used(
     frames = json.loads(file.read_text(encoding="utf-8"))["frames"]
     assert [frame["file"] for frame in frames if not frame["used"]] == [corrupt.name]
     assert frames[19]["reason"]
+    assert re.fullmatch(r"(image|read)\.[a-z-]+", frames[19]["detail_code"])
 
 
 def test_a_folder_of_nothing_but_corrupt_images_is_refused(
@@ -1290,6 +1291,32 @@ def test_a_record_that_cannot_be_written_is_refused_by_name(
     assert outcome.returncode == 2
     assert "Traceback" not in outcome.stderr
     assert Path(name).name in outcome.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("calibrate", "--from-record", "tip.json", "--json"),
+        ("export", "tip.json", "--for", "text"),
+        ("pen", "pen.csv"),
+        ("archive", "check", "--data"),
+        ("archive", "list", "--data"),
+        ("tips", "list", "--data"),
+    ],
+)
+def test_a_place_that_cannot_be_looked_at_is_refused_by_name(
+    arguments: tuple[str, ...], swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    """And the disk of what is printed is not blamed."""
+    shutil.copy(swing.pen, tmp_path / "pen.csv")
+    swing.calibrate(lightpen, "--json", tmp_path / "tip.json")
+    place = tmp_path / (300 * "x") / "out.csv"  # no system has names so long
+    words = [tmp_path / word if "." in word else word for word in arguments]
+    outcome = lightpen(*words, place)
+
+    assert outcome.returncode == 2
+    assert "xxx" in outcome.stderr
+    assert "printed" not in outcome.stderr
 
 
 def test_no_record_is_written_where_there_is_no_tip(

@@ -7,6 +7,7 @@ import re
 import shutil
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from io import FileIO
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -903,6 +904,13 @@ def test_a_file_alone_is_opened_in_the_window(tmp_path: Path, words: list[str]) 
 
     assert main([word.format(file) for word in words], desktop) == 0
     assert desktop.opened == [file]
+
+
+def test_a_name_that_cannot_be_looked_up_is_no_mistake_of_the_program() -> None:
+    name = 300 * "x"  # no system has names so long
+    with suppress(SystemExit):
+        assert main([name], desktop := WitnessingDesktop()) == 0
+        assert desktop.opened == [Path(name)]
 
 
 def test_a_record_on_paper_is_told_where_it_is(

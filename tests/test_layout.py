@@ -15,14 +15,18 @@ PACKAGES = {
     "lightpen_app": ROOT / "app" / "lightpen_app",
 }
 
+GIVEN = {"main", "upgrade"}  # where a program starts; what Alembic looks for
+
 
 def names_given_twice(folders: Iterable[Path]) -> dict[str, list[str]]:
-    """Return the public classes that share their name, each with its modules."""
+    """Return the public classes and functions that share a name, with their modules."""
     modules = defaultdict(list)
     for folder in folders:
         for path in sorted(folder.rglob("*.py")):
             for node in ast.parse(path.read_text(encoding="utf-8")).body:
-                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                if not isinstance(node, ast.ClassDef | ast.FunctionDef):
+                    continue
+                if node.name not in GIVEN and not node.name.startswith("_"):
                     modules[node.name].append(str(path.relative_to(folder.parent)))
     return {name: places for name, places in modules.items() if len(places) > 1}
 
@@ -32,7 +36,7 @@ def parts_of(folder: Path) -> set[str]:
     return {
         path.stem
         for path in folder.iterdir()
-        if path.suffix == ".py" or (path / "__init__.py").exists()
+        if path.suffix == ".py" or any(path.rglob("*.py"))
     } - {"__init__"}
 
 
@@ -51,15 +55,17 @@ def contracts() -> list[dict[str, Any]]:
     return found
 
 
-def test_a_class_is_found_by_its_name_alone() -> None:
+def test_a_class_and_a_function_are_found_by_their_name_alone() -> None:
     assert names_given_twice(PACKAGES.values()) == {}
 
 
 def test_a_name_given_twice_is_noticed(tmp_path: Path) -> None:
     for module in ("one", "other"):
-        (tmp_path / f"{module}.py").write_text("class Verdict: ...\nclass _Own: ...\n")
+        (tmp_path / f"{module}.py").write_text(
+            "class Verdict: ...\nclass _Own: ...\ndef judge(): ...\ndef main(): ...\n"
+        )
 
-    assert set(names_given_twice([tmp_path])) == {"Verdict"}
+    assert set(names_given_twice([tmp_path])) == {"Verdict", "judge"}
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -84,7 +90,7 @@ def test_every_step_is_among_those_that_know_no_other(
 def test_a_package_without_a_place_is_noticed(tmp_path: Path) -> None:
     for name in ("model", "formats", "forgotten"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "__init__.py").touch()
+        (tmp_path / name / "module.py").touch()
     (tmp_path / "cli.py").touch()
     contract = {"layers": ["cli", "formats | model"]}
 

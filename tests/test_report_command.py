@@ -9,7 +9,7 @@ import pytest
 
 from lightpen.commands.desktop import LANGUAGES
 from lightpen.errors import FileError
-from lightpen.estimation.report import record_bytes
+from lightpen.formats.json_records import record_bytes
 from lightpen_app.look.languages import Language
 from lightpen_app.reporting import write_paper
 

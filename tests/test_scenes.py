@@ -163,6 +163,32 @@ def test_good_images_of_a_hard_scene_are_used(
     assert not flags
 
 
+def test_good_images_of_a_hard_scene_are_used_with_their_leds(
+    hard: Path, record: Record, truth: Truth
+) -> None:
+    n_shown = n_missing = 0
+    for frame, answer in zip(
+        record(hard)["frames"], truth(hard)["frames"], strict=True
+    ):
+        if set(answer["flags"]) <= {"clutter", "dim"}:
+            shown = {led["led"] for led in answer["leds"] if led["visible"]}
+            used = {led["led"] for led in frame["leds"] if led["used"]}
+            n_shown += len(shown)
+            n_missing += len(shown - used)
+    assert n_shown >= 200
+    assert n_missing <= 0.01 * n_shown
+
+
+def test_two_leds_exchanged_in_one_image_would_be_noticed(
+    hard: Path, record: Record, truth: Truth
+) -> None:
+    fields = json.loads(json.dumps(record(hard)))
+    frame = next(frame for frame in fields["frames"] if len(frame["leds"]) == 10)
+    one, other = frame["leds"][2], frame["leds"][7]
+    one["led"], other["led"] = other["led"], one["led"]
+    assert len(wrong_leds(fields, truth(hard))) == 2
+
+
 def test_hard_images_in_any_order_give_the_same_labels(
     scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
 ) -> None:

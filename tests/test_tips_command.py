@@ -45,6 +45,14 @@ def test_a_tip_is_added_changed_retired_and_listed(
     assert events[-1].reason == "chipped"
 
 
+def test_a_library_without_anything_is_named(lightpen: Run, tmp_path: Path) -> None:
+    listed = lightpen("tips", "list", "--data", tmp_path / "elsewhere")
+
+    assert listed.returncode == 0
+    assert "Nothing is listed" in listed.stdout
+    assert "elsewhere" in listed.stdout
+
+
 def test_what_makes_no_sense_is_refused_and_nothing_is_kept(
     lightpen: Run, tmp_path: Path
 ) -> None:

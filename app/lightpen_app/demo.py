@@ -84,7 +84,7 @@ class Demo(QObject):
         status = self._workbench.run.status
         if status.result is not None:
             self._is_accepted = True
-            self._end(self._farewell() if self._is_watched else "")
+            self._end(self._farewell())
         elif self._has_failed() or self._n_ticks * TICK_MS > 1000 * LONGEST_S:
             self._end(self.tr("The demo ends here: there is no tip to accept."))
         elif key != "swing" or status.solution is not None:
@@ -124,6 +124,8 @@ class Demo(QObject):
         self._window.show_notice(words, Tone.ACTIVE)
 
     def _farewell(self) -> str:
+        if not self._is_watched:
+            return self.tr("The tip is accepted, and nothing of the demo is kept.")
         return self.tr(
             "That was the demo. Look around as long as you like; nothing of it is "
             "kept. Start the program without the demo to calibrate a tip."
@@ -131,6 +133,5 @@ class Demo(QObject):
 
     def _end(self, words: str) -> None:
         self._timer.stop()
-        if words:
-            self.told.emit(words)
         self.ended.emit()
+        self.told.emit(words)

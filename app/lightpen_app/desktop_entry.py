@@ -12,7 +12,8 @@ import sys
 from pathlib import Path
 
 from lightpen.errors import FileError, UsageError
-from lightpen.formats.files import printable, strerror, write_whole
+from lightpen.formats.files import printable, write_whole
+from lightpen.formats.system_reasons import strerror
 from lightpen.sentences import sentence
 from lightpen_app.look.theme import RESOURCES
 

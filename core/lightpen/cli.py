@@ -159,4 +159,9 @@ def _parser(
 
 def _is_file_to_open(given: Sequence[str], commands: Collection[str]) -> bool:
     """Return whether there is nothing but a file, as icons hand it over."""
-    return len(given) == 1 and given[0] not in commands and Path(given[0]).exists()
+    if len(given) != 1 or given[0] in commands:
+        return False
+    try:
+        return Path(given[0]).exists()
+    except OSError:  # it is not to be looked at, which the window says
+        return True

@@ -43,6 +43,7 @@ from PySide6.QtWidgets import (
 from pytestqt.exceptions import TimeoutError as WaitedInVain
 from pytestqt.qtbot import QtBot
 from pytestqt.wait_signal import SignalBlocker
+from tests.app.disk import disk_watch
 from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
@@ -116,6 +117,14 @@ def collected(kept_to_one_thread: None) -> Iterator[None]:
     forget_layout_items()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     collect_if_due()
+
+
+@pytest.fixture(autouse=True)
+def window_off_the_disk() -> Iterator[None]:
+    """A disk that does not answer stops no window: its thread touches no file."""
+    disk_watch().take()
+    yield
+    assert disk_watch().take() == []
 
 
 @pytest.fixture(autouse=True)

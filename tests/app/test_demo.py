@@ -56,6 +56,9 @@ def test_the_demo_plays_without_a_screen_in_1_5_gb_and_prints_the_tip(
 
     assert outcome.returncode == 0, outcome.stderr
     assert outcome.stdout.count("Demo: ") == 5  # one for each step
+    assert outcome.stdout.endswith(
+        "The tip is accepted, and nothing of the demo is kept.\n"
+    )
     tip = [float(number) for number in JOINT.findall(outcome.stdout)[0]]
     assert np.linalg.norm(np.array(tip) - Scene().tip_pen) <= 0.005
     assert list(tmp_path.rglob("*")) == []  # nothing of it is kept

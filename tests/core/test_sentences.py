@@ -20,6 +20,7 @@ CORE = Path(lightpen.__path__[0])
 COMMAND_LINE = (CORE / "cli.py", *(CORE / "commands").glob("*.py"))
 SOURCES = {path: path.read_text("utf-8") for path in sorted(CORE.rglob("*.py"))}
 CODE = r"[a-z]+(-[a-z]+)*\.[a-z0-9]+(-[a-z0-9]+)*"
+WORDS = re.compile("[A-Za-z]{4}|[A-Za-z] [A-Za-z]")  # no axes, nor names of numbers
 OF_THE_COMMAND_LINE = r"(^|\W)--[a-z]|\blightpen [a-z]|\b[A-Z]+\.[a-z]+\b"
 
 
@@ -88,7 +89,21 @@ def bare_words_in(source: str) -> list[str]:
     """Words that reach a user without a template: of errors, and among values."""
     handed = [call.args[0] for call in calls(source, error_names()) if call.args]
     handed += [each.value for c in calls(source, {"sentence"}) for each in c.keywords]
-    return [ast.unparse(node) for node in handed if has_words(node)]
+    return [
+        ast.unparse(node)
+        for node in handed
+        if has_words(node) or any(map(WORDS.search, texts_in(node)))
+    ]
+
+
+def texts_in(node: ast.AST) -> Iterator[str]:
+    """All texts of an expression, but those of sentences in it."""
+    if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "sentence":
+        return
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    for child in ast.iter_child_nodes(node):
+        yield from texts_in(child)
 
 
 def has_words(node: ast.expr) -> bool:
@@ -181,7 +196,11 @@ def test_words_without_a_template_are_noticed() -> None:
     assert bare_words_in("raise FileError('It is damaged.')")
     assert bare_words_in("raise DeviceLost(f'{name} is damaged.')")
     assert bare_words_in("sentence('a.b', '{found}', found=f'{angle:.1f} degrees')")
+    assert bare_words_in("sentence('a.b', '{found}', found='many' if n else 'few')")
+    assert bare_words_in("raise StreamError(_not_open(place, 'it is taken'))")
     assert not bare_words_in("sentence('a.b', '{size}', size=f'{width}:{height}')")
+    assert not bare_words_in("sentence('a.b', '{axis}', axis='xyz'[worst])")
+    assert not bare_words_in("FileError(sentence('a.b', 'It is damaged.'))")
 
 
 def test_only_the_command_line_names_its_options() -> None:

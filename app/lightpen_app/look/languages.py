@@ -32,8 +32,7 @@ class LanguageSwitch(QObject):
         super().__init__(application)
         self._application = application
         self._language = Language.ENGLISH
-        self._read: dict[str, QTranslator] = {}
-        self._installed: list[QTranslator] = []
+        self._translators: list[QTranslator] = []
 
     def language(self) -> Language:
         """Return the language in use."""
@@ -50,16 +49,13 @@ class LanguageSwitch(QObject):
 
     def remove(self) -> None:
         """Take the translations out; the texts in the program itself are left."""
-        for translator in self._installed:
+        for translator in self._translators:
             self._application.removeTranslator(translator)
-        self._installed.clear()
+            translator.deleteLater()
+        self._translators.clear()
 
     def _install(self, name: str, folder: str) -> None:
-        """Use translations, which are read once."""
-        translator = self._read.get(name)
-        if translator is None:
-            translator = self._read[name] = QTranslator()
-            translator.load(name, folder)
-        if not translator.isEmpty():
+        translator = QTranslator(self)
+        if translator.load(name, folder):
             self._application.installTranslator(translator)
-            self._installed.append(translator)
+        self._translators.append(translator)

@@ -10,7 +10,6 @@ from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
 from lightpen.record.decision_rule import decision_rule
 from lightpen.record.results import Since
 from lightpen.record.statement import StatedCalibration, Statement
-from lightpen_app.look.kept_words import worded_anew
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.paper.charts import row_of_charts
@@ -25,6 +24,7 @@ from lightpen_app.paper.pieces import (
     subheading,
     table,
 )
+from lightpen_app.paper.recorded_words import worded_anew
 
 translate = QCoreApplication.translate
 

@@ -10,7 +10,6 @@ from PySide6.QtGui import QPainter
 from lightpen.estimation.verdict import Grade
 from lightpen.record.retraced import Retraced
 from lightpen.record.statement import Entered, Statement
-from lightpen_app.look.kept_words import worded_anew
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.theme import LIGHT
 from lightpen_app.paper.evidence import file_pieces, image_pieces, led_pieces
@@ -28,6 +27,7 @@ from lightpen_app.paper.pieces import (
     printed_text,
     text_height,
 )
+from lightpen_app.paper.recorded_words import worded_anew
 
 translate = QCoreApplication.translate
 
@@ -61,7 +61,7 @@ def title_text() -> str:
     return translate("paper", "Calibration record")
 
 
-def moment_text(moment: datetime) -> str:
+def zoned_moment_text(moment: datetime) -> str:
     """Return a moment with the time zone that it was written in."""
     return moment.isoformat(sep=" ", timespec="seconds")
 
@@ -135,12 +135,14 @@ def _items(statement: Statement) -> Iterable[Piece]:
             ),
             (
                 translate("paper", "Computed"),
-                moment_text(calibration.created),
+                zoned_moment_text(calibration.created),
             ),
             (translate("paper", "Cone"), _stated(names.cone)),
             (
                 translate("paper", "Accepted"),
-                translate("paper", "no") if accepted is None else moment_text(accepted),
+                translate("paper", "no")
+                if accepted is None
+                else zoned_moment_text(accepted),
             ),
             (translate("paper", "Images are"), origin_text(statement.origin)),
             (

@@ -1,5 +1,7 @@
 """The foot of the window: the status line, Back, and the main button."""
 
+from collections.abc import Callable
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QVBoxLayout, QWidget
 
@@ -28,6 +30,7 @@ class ActionBar(Translated, QFrame):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("bottom_bar")
+        self._status_holds: Callable[[], bool] | None = None
 
         # Widgets
         self._why_not = text_label(TextSize.BODY, Tone.WARN)
@@ -68,11 +71,17 @@ class ActionBar(Translated, QFrame):
         self._main.setAccessibleDescription(action.why_not)
         self._why_not.setText(action.why_not)
         self._why_not.setVisible(bool(action.why_not))
+        if self._status_holds is not None and not self._status_holds():
+            self.set_status("")
         self._refresh_status()
         self._back.setVisible(can_go_back)
 
-    def set_status(self, text: str) -> None:
-        """Show a sentence in the status line, or none."""
+    def set_status(self, text: str, holds: Callable[[], bool] | None = None) -> None:
+        """Show a sentence in the status line, or none.
+
+        It stays until there is another, or as long as it ``holds``.
+        """
+        self._status_holds = holds
         self._status.setText(text)
         self._status.setAccessibleName(text)
         self._refresh_status()

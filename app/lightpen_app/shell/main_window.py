@@ -97,9 +97,6 @@ class MainWindow(Rearranged, QMainWindow):
         self._pages = tuple(pages)
         self._settings = settings
         self._now = 0
-        self._notice_is_of_page = False
-        self._unwritable = self._trouble = ""  # the data folder, and why
-        self._status_holds: Callable[[], bool] | None = None  # None: until another
         self._asks = True
 
         # Widgets: the order of making them is the order of the Tab key
@@ -167,13 +164,14 @@ class MainWindow(Rearranged, QMainWindow):
         why_closed = self._pages[index].why_closed()
         if why_closed:
             asked = self._pages[index]
-            self._say_while(why_closed, lambda: asked.why_closed() == why_closed)
+            self._action_bar.set_status(
+                why_closed, lambda: asked.why_closed() == why_closed
+            )
             return
         self.page().left()
         self._now = index
-        self._set_status("")
-        if self._notice_is_of_page:
-            self._notice.clear()
+        self._action_bar.set_status("")
+        self._notice.clear_page()
         self._area.show_page(self.page())
         self._tell_attention()
         self.page().entered()
@@ -196,41 +194,15 @@ class MainWindow(Rearranged, QMainWindow):
 
     def show_notice(self, text: str, tone: Tone = Tone.BAD) -> None:
         """Show a sentence until the user has read it."""
-        self._tell(text, tone)
-
-    def _tell(self, text: str, tone: Tone = Tone.BAD, *, of_page: bool = False) -> None:
-        """Show a notice, but none more on the data folder while that is told of."""
-        told, is_of_folder = self._notice.text(), self._with_way(text) != text
-        if is_of_folder and told == self._with_way(self._trouble):
-            return
-        self._notice_is_of_page = of_page
-        self._notice.show_text(self._with_way(text), tone)
+        self._notice.show_text(text, tone)
 
     def drop_notice(self, text: str) -> None:
         """Take a sentence away whose cause is gone, and no other."""
-        if self._notice.text() in (text, self._with_way(text)):
-            self._notice.clear()
+        self._notice.drop(text)
 
     def set_unwritable(self, folder: str, trouble: str) -> None:
-        """Say why nothing can be kept in the data folder, until that is empty.
-
-        Whatever is told of the folder meanwhile says where another one is chosen.
-        """
-        if trouble:
-            self._unwritable, self._trouble = folder, trouble
-            self.show_notice(trouble)
-        else:
-            self.drop_notice(self._trouble)
-            self._unwritable = self._trouble = ""
-
-    def _with_way(self, text: str) -> str:
-        """Return a sentence, of an unwritable data folder with the way to another."""
-        if not self._unwritable or self._unwritable not in text:
-            return text
-        way = self.tr(
-            "The data folder is chosen at the step Start, or in the options (F10)."
-        )
-        return f"{text} {way}"
+        """Say why nothing can be kept in the data folder, until that is empty."""
+        self._notice.set_unwritable(folder, trouble)
 
     def show_crash_report(self, path: str) -> None:
         """Tell that the program met a bug of its own; path "" if none is written."""
@@ -339,7 +311,7 @@ class MainWindow(Rearranged, QMainWindow):
         page.changed.connect(self._refresh)
         page.advance_requested.connect(self.advance)
         page.step_requested.connect(self._on_step_requested)
-        page.status_changed.connect(self._set_status)
+        page.status_changed.connect(self._action_bar.set_status)
         page.notice_raised.connect(self._on_notice_raised)
         page.operator_value_changed.connect(self._operator_view.set_value)
         page.data_folder_requested.connect(self._on_data_folder_asked)
@@ -421,20 +393,8 @@ class MainWindow(Rearranged, QMainWindow):
         self._sidebar.set_steps(list_steps(statuses, self._now))
         self._area.set_heading(page.title(), page.lead(), page.lead_tone())
         self._action_bar.set_action(page.main_action(), can_go_back=self._now > 0)
-        if self._status_holds is not None and not self._status_holds():
-            self._set_status("")
         for each in self._hands_free_actions:
             each.setEnabled(page.is_hands_free())
-
-    def _set_status(self, text: str) -> None:
-        """Show a sentence in the status line until there is another."""
-        self._status_holds = None
-        self._action_bar.set_status(text)
-
-    def _say_while(self, text: str, holds: Callable[[], bool]) -> None:
-        """Show a sentence in the status line as long as it is true."""
-        self._set_status(text)
-        self._status_holds = holds
 
     def _focus_page(self) -> None:
         """Put the focus on the control that the page chose, or on its first one."""
@@ -477,7 +437,9 @@ class MainWindow(Rearranged, QMainWindow):
         """Do as a presenter's remote asks, unless someone must be at the screen."""
         if self.page().main_action().at_screen:
             words = self.tr("Press this button at the screen.")
-            self._say_while(words, lambda: self.page().main_action().at_screen)
+            self._action_bar.set_status(
+                words, lambda: self.page().main_action().at_screen
+            )
         else:
             self._action_bar.press_main()
 
@@ -493,9 +455,9 @@ class MainWindow(Rearranged, QMainWindow):
 
     def _on_notice_raised(self, text: str) -> None:
         if text:
-            self._tell(text, of_page=True)
-        elif self._notice_is_of_page:
-            self._notice.clear()
+            self._notice.show_text(text, of_page=True)
+        else:
+            self._notice.clear_page()
 
     def _on_space_pressed(self) -> None:
         """Press the button that has the focus; pause where none has."""
@@ -534,7 +496,7 @@ class MainWindow(Rearranged, QMainWindow):
 
     def _on_mute_toggled(self, muted: bool) -> None:
         words = self.tr("Sounds are off.") if muted else self.tr("Sounds are on.")
-        self._set_status(words)
+        self._action_bar.set_status(words)
 
     def _on_data_folder_asked(self) -> None:
         dialog = QFileDialog(self, self.tr("Data folder"))
@@ -575,4 +537,4 @@ class MainWindow(Rearranged, QMainWindow):
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Pen tip calibration"))
-        self._set_status("")  # it was said in the language before
+        self._action_bar.set_status("")  # it was said in the language before

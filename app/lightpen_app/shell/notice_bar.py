@@ -1,6 +1,6 @@
 """A sentence over the page that waits to be read, and stops nothing."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QCoreApplication, Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
 from lightpen_app.look.announcements import announce
@@ -11,6 +11,9 @@ from lightpen_app.widgets.translated import Translated
 
 class NoticeBar(Translated, QFrame):
     """Hidden until it has something to say; Close puts it away.
+
+    While nothing can be kept in the data folder, whatever is told of it says where
+    another one is chosen, and is told once.
 
     Signals
     -------
@@ -23,6 +26,8 @@ class NoticeBar(Translated, QFrame):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("area", "notice")
+        self._is_of_page = False
+        self._unwritable = self._trouble = ""  # the data folder, and why
 
         # Widgets
         self._text = text_label(TextSize.BODY)
@@ -46,12 +51,15 @@ class NoticeBar(Translated, QFrame):
         """Return what it says; empty while it is hidden."""
         return self._text.text()
 
-    def close_text(self) -> str:
-        """Return the word on the button that puts it away."""
-        return self._close.text()
-
-    def show_text(self, text: str, tone: Tone = Tone.BAD) -> None:
-        """Say a sentence, instead of an earlier one."""
+    def show_text(
+        self, text: str, tone: Tone = Tone.BAD, *, of_page: bool = False
+    ) -> None:
+        """Say a sentence, instead of an earlier one; of a page until another shows."""
+        told, is_of_folder = self.text(), self._with_way(text) != text
+        if is_of_folder and told == self._with_way(self._trouble):
+            return
+        self._is_of_page = of_page
+        text = self._with_way(text)
         self._text.setText(text)
         self._text.setAccessibleName(text)
         set_tone(self, tone)
@@ -59,11 +67,40 @@ class NoticeBar(Translated, QFrame):
         announce(self, text)
         self.value_changed.emit(text)
 
+    def drop(self, text: str) -> None:
+        """Take a sentence away whose cause is gone, and no other."""
+        if self.text() in (text, self._with_way(text)):
+            self.clear()
+
+    def clear_page(self) -> None:
+        """Say nothing of the page that was shown."""
+        if self._is_of_page:
+            self.clear()
+
+    def set_unwritable(self, folder: str, trouble: str) -> None:
+        """Say why nothing can be kept in the data folder, until that is empty."""
+        if trouble:
+            self._unwritable, self._trouble = folder, trouble
+            self.show_text(trouble)
+        else:
+            self.drop(self._trouble)
+            self._unwritable = self._trouble = ""
+
     def clear(self) -> None:
         """Say nothing."""
         self._text.clear()
         self.hide()
         self.value_changed.emit("")
+
+    def _with_way(self, text: str) -> str:
+        """Return a sentence, of an unwritable data folder with the way to another."""
+        if not self._unwritable or self._unwritable not in text:
+            return text
+        way = QCoreApplication.translate(
+            "MainWindow",
+            "The data folder is chosen at the step Start, or in the options (F10).",
+        )
+        return f"{text} {way}"
 
     def _retranslate(self) -> None:
         self._close.setText(self.tr("Close"))

@@ -6,7 +6,6 @@ Making a plot anew costs fifty times more than `setData` on one that is there.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
@@ -26,7 +25,6 @@ from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.formats.files import write_whole
 from lightpen_app.look.theme import (
     GRID,
     Colors,
@@ -157,16 +155,6 @@ class Plot(QWidget):
         self._restyle()
         self.titled.emit()
 
-    def save_png(self, path: Path, mark: str = "") -> None:
-        """Write the plot as a picture, see `png`.
-
-        Raises
-        ------
-        FileError
-            The file cannot be written.
-        """
-        write_whole(path, self.png(mark))
-
     def png(self, mark: str = "") -> bytes:
         """Return the plot as a picture, at twice the size on the screen.
 
@@ -197,20 +185,14 @@ class Plot(QWidget):
         image.save(buffer, "PNG")  # type: ignore[call-overload]
         return bytes(data.data())
 
-    def save_csv(self, path: Path) -> None:
-        """Write the numbers behind the plot, one column each.
-
-        Raises
-        ------
-        FileError
-            The file cannot be written.
-        """
+    def csv(self) -> bytes:
+        """Return the numbers behind the plot, one column each."""
         n_rows = max((len(column) for column in self._columns.values()), default=0)
         lines = [",".join(self._columns)]
         for row in range(n_rows):
             values = (_cell(column, row) for column in self._columns.values())
             lines.append(",".join(values))
-        write_whole(path, ("\n".join(lines) + "\n").encode())
+        return ("\n".join(lines) + "\n").encode()
 
     def columns(self) -> Mapping[str, Column]:
         """Return what is shown, by the name of their column in the CSV file."""

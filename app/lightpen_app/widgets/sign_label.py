@@ -50,7 +50,7 @@ class SignLabel(QWidget):
         self._value = Remark()
 
         # Widgets
-        self._mark = _Mark()
+        self._mark = _SignMark()
         self._words = text_label(TextSize.BODY)
         self._words.setWordWrap(wraps)
 
@@ -79,7 +79,7 @@ class SignLabel(QWidget):
         self.setVisible(bool(value.text))
 
 
-class _Mark(QWidget):
+class _SignMark(QWidget):
     """The sign alone, as high as the first line of the words."""
 
     def __init__(self) -> None:

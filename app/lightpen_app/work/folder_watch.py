@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
 
 from lightpen.record.data_folder import check_writable
 from lightpen.record.presence import Presence
@@ -53,8 +53,8 @@ class FolderWatch(QObject):
         self._timer.stop()
 
     def leave(self) -> None:
-        """Let the others know that this window is gone."""
-        self._presence.leave()
+        """Let the others know that this window is gone, on a thread of the pool."""
+        QThreadPool.globalInstance().start(self._presence.leave)
 
     def _look(self) -> None:
         if self._counter is not None:  # a disk that does not answer is asked once

@@ -17,7 +17,7 @@ from lightpen.cameras.protocol import (
     ImageCamera,
     Stats,
 )
-from lightpen.cameras.worker import (
+from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
     Ended,
@@ -121,7 +121,7 @@ class LiveView(QObject):
         self._aim = Aim()
         self._is_watched = True
         self._operator: Operator | None = None
-        self._teller: _Teller | None = None
+        self._listener: _QueuedListener | None = None
         self._closing: list[Thread] = []
 
     def open(
@@ -140,12 +140,12 @@ class LiveView(QObject):
         self._operator = first.operator if isinstance(first, SimulatedCamera) else None
         self._chosen = min(self._chosen, len(cameras) - 1)
         self._states = [_CameraState() for _ in cameras]
-        self._teller = teller = _Teller(self)
-        teller.camera = self._chosen
-        teller.image_shown.connect(self.image_shown)
-        teller.told.connect(self._on_told)
+        self._listener = listener = _QueuedListener(self)
+        listener.camera = self._chosen
+        listener.image_shown.connect(self.image_shown)
+        listener.told.connect(self._on_told)
         self._live = live = Live(
-            *(cameras, settings, teller, self._run.runner, clock, known),
+            *(cameras, settings, listener, self._run.runner, clock, known),
             verifier=self._verification.runner,
             stream=self._stream,
         )
@@ -160,17 +160,17 @@ class LiveView(QObject):
         swing that is captured waits for the next camera.
         """
         live, self._live = self._live, None
-        teller, self._teller = self._teller, None
-        if live is None or teller is None:
+        listener, self._listener = self._listener, None
+        if live is None or listener is None:
             return
-        teller.blockSignals(True)
+        listener.blockSignals(True)
         self._relieve()
         self.set_following(False)
         self.set_touching(False)
         self._operator = None
         self._closing = [thread for thread in self._closing if thread.is_alive()]
         thread = Thread(
-            target=self._stop, args=(live, teller), name="closing", daemon=True
+            target=self._stop, args=(live, listener), name="closing", daemon=True
         )
         self._closing.append(thread)
         thread.start()
@@ -211,8 +211,8 @@ class LiveView(QObject):
         if camera == self._chosen or camera >= self.n_cameras:
             return
         self._chosen = camera
-        if self._teller is not None:
-            self._teller.camera = camera
+        if self._listener is not None:
+            self._listener.camera = camera
         state = self._states[camera]
         self.connection_changed.emit(state.connection)
         if state.settings is not None:
@@ -315,13 +315,13 @@ class LiveView(QObject):
         operator = self._operator
         self._verification.toucher = Toucher(operator) if touches and operator else None
 
-    def _stop(self, live: Live, teller: "_Teller") -> None:
+    def _stop(self, live: Live, listener: "_QueuedListener") -> None:
         try:
             live.stop()
         except DeviceLost as error:
             self.troubled.emit(worded(error.sentence))
         else:
-            teller.deleteLater()
+            listener.deleteLater()
 
     def _set_connection(self, camera: int, connection: Connection) -> None:
         state = self._states[camera]
@@ -397,7 +397,7 @@ _WORST_FIRST = (
 )
 
 
-class _Teller(QObject):
+class _QueuedListener(QObject):
     """Takes what happens on the threads of a camera to that of the GUI.
 
     Its public signals are emitted on the thread of the GUI, so that one who blocks them

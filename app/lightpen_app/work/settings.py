@@ -25,7 +25,7 @@ from lightpen.sentences import Sentence
 from lightpen.streaming.server import StreamPlace
 from lightpen_app.look.languages import Language
 from lightpen_app.look.theme import Appearance
-from lightpen_app.work.settings_store import Changes, Content, load, merged, save
+from lightpen_app.work.settings_store import Changes, Content, load, save, with_changes
 
 AGAIN_MS = 5000  # after which what could not be written is tried again
 
@@ -299,7 +299,7 @@ class Settings(QObject):
         known = self._content.get(section, {})
         new = {n: e for n, e in entries.items() if n not in known or known[n] != e}
         changes = {(section, name): entry for name, entry in new.items()}
-        self._content = merged(self._content, changes)
+        self._content = with_changes(self._content, changes)
         with self._lock:
             self._changes.update(changes)
         self._write_soon()

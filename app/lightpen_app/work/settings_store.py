@@ -19,12 +19,12 @@ from lightpen.formats.files import (
     MEGABYTE,
     printable,
     read_bytes,
-    strerror,
     sync_folder,
     write_whole,
 )
-from lightpen.formats.own_json import DamagedError, parse_json
+from lightpen.formats.own_json import DamagedError, parse_own_json
 from lightpen.formats.part_files import sweep_parts
+from lightpen.formats.system_reasons import strerror
 from lightpen.sentences import Sentence, sentence
 
 WHAT = sentence("file.settings", "settings file")
@@ -56,7 +56,7 @@ def load(file: Path) -> Loaded:
         return Loaded({}, error.sentence)
 
 
-def merged(content: Content, changes: Changes) -> Content:
+def with_changes(content: Content, changes: Changes) -> Content:
     """Return settings with what was changed."""
     sections = {name: dict(entries) for name, entries in content.items()}
     for (section, name), entry in changes.items():
@@ -83,7 +83,7 @@ def save(file: Path, content: Content, changes: Changes) -> Sentence | None:
             trouble = None if is_alone else _held(file)
             if file.exists():
                 try:
-                    content = merged(_read(file), changes)
+                    content = with_changes(_read(file), changes)
                 except DamagedError:
                     trouble = _set_aside(file)
             write_whole(file, json.dumps(content, ensure_ascii=True, indent=1).encode())
@@ -94,7 +94,7 @@ def save(file: Path, content: Content, changes: Changes) -> Sentence | None:
 
 
 def _read(file: Path) -> Content:
-    return parse_json(read_bytes(file, WHAT, LIMIT), dict[str, dict[str, Any]])
+    return parse_own_json(read_bytes(file, WHAT, LIMIT), dict[str, dict[str, Any]])
 
 
 def _of_version_0_1(file: Path) -> Content:

@@ -182,21 +182,20 @@ class Workbench(QObject):
         """Go by what supervisors have laid down, from now on."""
         self._supervision = supervision
         before = self._preparation
-        self._preparation = replace(before, limits=self._limits_for(before))
+        self._preparation = replace(before, limits=self._limits_for(before).swing)
         self._choices = self._limited(self._choices)
         self._remember()
         self._follow(before)
 
-    def _limits_for(self, preparation: Preparation) -> SwingLimits:
-        """Return the limits of a swing: those laid down, or those that are chosen."""
-        laid_down = self._supervision.limits.get(preparation.names.station)
-        return preparation.limits if laid_down is None else laid_down.swing
+    def _limits_for(self, preparation: Preparation) -> StationLimits:
+        """Return what holds at a station: its own limits, or what was chosen."""
+        chosen = StationLimits(preparation.limits, due=self._settings.due_rule())
+        return self._supervision.limits_at(preparation.names.station, chosen)
 
     def _limited(self, choices: VerificationChoices) -> VerificationChoices:
-        """Return choices with the limits that are laid down for the station."""
-        station = self._preparation.names.station
-        laid_down = self._supervision.limits.get(station, StationLimits())
-        return replace(choices, limits=laid_down.verification)
+        """Return choices with the limits of the station."""
+        limits = self._limits_for(self._preparation).verification
+        return replace(choices, limits=limits)
 
     @property
     def folder(self) -> Path:
@@ -248,7 +247,7 @@ class Workbench(QObject):
         before = self._preparation
         self._reading.relieve()
         chosen = preparation_of(name, station, before)
-        self._preparation = replace(chosen, limits=self._limits_for(chosen))
+        self._preparation = replace(chosen, limits=self._limits_for(chosen).swing)
         self._choices = self._limited(choices_of(station))
         self._open_files(station)
         self._remember_station()
@@ -311,8 +310,7 @@ class Workbench(QObject):
 
     def due_rule(self) -> DueRule:
         """Return how long a tip may be in force: as laid down, or as was chosen."""
-        laid_down = self._supervision.limits.get(self._preparation.names.station)
-        return self._settings.due_rule() if laid_down is None else laid_down.due
+        return self._limits_for(self._preparation).due
 
     def set_due_rule(self, rule: DueRule) -> None:
         """Remember how long a tip may be in force where nothing is laid down."""
@@ -367,7 +365,8 @@ class Workbench(QObject):
         self.run.runner.shut_down()
         self.verification.runner.shut_down()
         self.live.close()
-        jobs_ended = QThreadPool.globalInstance().waitForDone(round(1000 * timeout_s))
+        pool = QThreadPool.globalInstance()
+        jobs_ended = pool.waitForDone(round(1000 * timeout_s))
         # A dead camera may take longer, and has nothing to tell any more.
         of_camera = min(max(0.0, deadline - monotonic()), LONGEST_FAREWELL)
         has_closed = self.live.await_closed(of_camera)
@@ -377,6 +376,7 @@ class Workbench(QObject):
         )
         self.streaming.shut_down()
         self.folder_watch.leave()
+        pool.waitForDone(round(1000 * max(0.0, deadline - monotonic())))
         is_saved = self._settings.await_saved(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended and is_saved
 

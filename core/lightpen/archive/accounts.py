@@ -12,9 +12,10 @@ from msgspec.structs import replace
 
 from lightpen.archive.entries import Event, FileHash, Kind, text_sha256, this_program
 from lightpen.errors import FileError
-from lightpen.estimation.report import calibration_record, json_bytes
+from lightpen.estimation.report import calibration_record
 from lightpen.formats.files import read_bytes
 from lightpen.formats.files import sha256 as file_sha256
+from lightpen.formats.json_records import json_bytes
 from lightpen.record.assessment import Assessment
 from lightpen.record.folder_archive import LIMIT, WHAT, FolderArchive
 from lightpen.record.header import HEADER, copy_name

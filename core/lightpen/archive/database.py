@@ -44,7 +44,7 @@ from lightpen.archive import earlier
 from lightpen.archive.tables import METADATA
 from lightpen.archive.uses import Uses
 from lightpen.errors import ArchiveError, FileError, NoArchiveError
-from lightpen.formats.files import printable
+from lightpen.formats.files import A_FILE, printable, unreadable
 from lightpen.record.numbered_files import make_folder
 from lightpen.sentences import sentence
 
@@ -156,7 +156,9 @@ def open_file(path: Path) -> Database:
         It is not of this program, or cannot be used.
     """
     name = printable(str(path))
-    if path.exists():
+    with _looking_at(path):
+        is_there = path.exists()
+    if is_there:
         with closing(_read_only(path)) as database:  # which changes nothing
             _require_known(database)
     try:
@@ -184,7 +186,9 @@ def look_into(path: Path) -> Database:
         It is not of this program, or cannot be used.
     """
     database = _read_only(path)
-    if not path.is_file() or _require_known(database) is None:
+    with _looking_at(path):
+        is_there = path.is_file()
+    if not is_there or _require_known(database) is None:
         database.close()
         raise NoArchiveError(
             sentence(
@@ -198,8 +202,15 @@ def look_into(path: Path) -> Database:
 
 
 def is_open(path: Path) -> bool:
-    """Return whether a program has the archive in a file open, or was killed so."""
-    return Path(f"{path}-wal").exists()
+    """Return whether a program has the archive in a file open, or was killed so.
+
+    Raises
+    ------
+    ArchiveError
+        It may not be looked at.
+    """
+    with _looking_at(path):
+        return Path(f"{path}-wal").exists()
 
 
 def open_server(address: str) -> Database:
@@ -406,6 +417,15 @@ def _migrate(connection: Connection, found: str) -> None:
         for step in reversed(list(script.iterate_revisions("head", found))):
             step.module.upgrade()
     context.stamp(script, "head")
+
+
+@contextmanager
+def _looking_at(path: Path) -> Iterator[None]:
+    """Say that a file may not be looked at."""
+    try:
+        yield
+    except OSError as error:
+        raise ArchiveError(unreadable(path, A_FILE, error).sentence) from error
 
 
 @contextmanager

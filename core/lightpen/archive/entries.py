@@ -18,7 +18,13 @@ from typing import Annotated, TypeAlias
 from msgspec import Meta, Struct, to_builtins
 
 from lightpen.formats.files import printable
-from lightpen.formats.own_json import Digest, Moment, Vector, parse_json, require_usual
+from lightpen.formats.own_json import (
+    Digest,
+    Moment,
+    Vector,
+    parse_own_json,
+    require_usual,
+)
 from lightpen.model.origin import Origin
 from lightpen.record.assumed import Plain
 from lightpen.record.names import Names
@@ -218,7 +224,7 @@ def read_entry(text: str) -> Written:
         It holds none, or was not written so.
     """
     data = text.encode("utf-8", "surrogateescape")
-    return Written(parse_json(data, Entry), text, text_sha256(text))
+    return Written(parse_own_json(data, Entry), text, text_sha256(text))
 
 
 def since_us(moment: datetime) -> int:

@@ -29,8 +29,9 @@ from lightpen.archive.chains import (
 from lightpen.archive.database import Database
 from lightpen.archive.entries import Written, read_entry
 from lightpen.errors import FileError, NameTakenError
-from lightpen.formats.files import MEGABYTE, opened, printable, strerror
-from lightpen.formats.own_json import DamagedError, parse_json
+from lightpen.formats.files import MEGABYTE, opened, printable
+from lightpen.formats.own_json import DamagedError, parse_own_json
+from lightpen.formats.system_reasons import strerror
 from lightpen.sentences import sentence
 
 FORMAT = 2
@@ -39,16 +40,16 @@ DELIVERED = 20  # entries at one time: some MB, which a slow line carries in tim
 LIMIT = 10**6 * MEGABYTE  # it is read line by line
 
 
-class _Head(Struct):
+class _FirstLine(Struct):
     lightpen_archive: int
 
 
-class _Line(Struct):
+class _EntryLine(Struct):
     entry: str
     record: str | None = None
 
 
-class _End(Struct):
+class _LastLine(Struct):
     n_entries: int
     sha256: str
 
@@ -159,15 +160,17 @@ def _read(path: Path) -> Iterator[tuple[Written, str | None]]:
     with opened(path, WHAT, LIMIT) as stream:
         try:
             first = stream.readline()
-            if parse_json(first, _Head).lightpen_archive != FORMAT:
+            if parse_own_json(first, _FirstLine).lightpen_archive != FORMAT:
                 raise DamagedError("It is of another version.")
             checksum = sha256(first)
             for line in stream:
                 if line.startswith(b'{"n_entries"'):
-                    if parse_json(line, _End) != _End(n_read, checksum.hexdigest()):
+                    if parse_own_json(line, _LastLine) != _LastLine(
+                        n_read, checksum.hexdigest()
+                    ):
                         raise DamagedError("Lines are missing or changed.")
                     return
-                found = parse_json(line, _Line)
+                found = parse_own_json(line, _EntryLine)
                 yield read_entry(found.entry), found.record
                 checksum.update(line)
                 n_read += 1

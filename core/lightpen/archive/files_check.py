@@ -11,7 +11,7 @@ from msgspec import Struct
 from lightpen.archive.entries import Entry, FileHash, Written
 from lightpen.errors import FileError
 from lightpen.formats.files import A_FILE, printable, unreadable
-from lightpen.formats.own_json import DamagedError, parse_json
+from lightpen.formats.own_json import DamagedError, parse_own_json
 from lightpen.record.reading import IMAGES, open_record
 from lightpen.sentences import Sentence, sentence
 
@@ -105,7 +105,7 @@ class FilesCheck:
 def _images(swing: str, record: str | None) -> list[FileHash]:
     """Return the images that a record names."""
     try:
-        found = parse_json((record or "{}").encode(), _Record)
+        found = parse_own_json((record or "{}").encode(), _Record)
     except DamagedError:  # which is found where records are looked at
         return []
     return [

@@ -21,8 +21,8 @@ from lightpen.archive.database import Database, is_open
 from lightpen.archive.entries import Chain, Head, text_sha256
 from lightpen.archive.tables import ENTRIES
 from lightpen.errors import FileError
-from lightpen.estimation.report import json_bytes
 from lightpen.formats.files import MEGABYTE, printable, read_bytes, sha256, write_whole
+from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,

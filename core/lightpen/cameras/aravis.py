@@ -20,7 +20,7 @@ from lightpen.cameras.aravis_library import (
 )
 from lightpen.cameras.clock import Clock
 from lightpen.cameras.device_camera import Delivery, DeviceCamera
-from lightpen.cameras.device_errors import busy, lost, not_found, refused
+from lightpen.cameras.device_errors import busy, lost, not_found, setting_refused
 from lightpen.cameras.protocol import DeviceNotFound, Range
 from lightpen.cameras.source import FoundDevice, Needs, Source, SourcePlace
 from lightpen.sentences import Sentence, sentence
@@ -233,7 +233,7 @@ class AravisDevice:
             yield
         except AravisError as error:
             if not error.is_gone:
-                raise refused(self._serial, str(error)) from error
+                raise setting_refused(self._serial, str(error)) from error
             self._is_gone = True
             raise lost(self._serial, str(error)) from error
 

@@ -50,7 +50,7 @@ def lost(serial: str, why: str) -> DeviceLost:
     )
 
 
-def refused(serial: str, why: str) -> ConfigError:
+def setting_refused(serial: str, why: str) -> ConfigError:
     """Return the error of a setting that a camera does not take."""
     return ConfigError(
         sentence(
@@ -72,6 +72,6 @@ def in_sentences(
     try:
         yield
     except refusals as error:
-        raise refused(serial, str(error)) from error
+        raise setting_refused(serial, str(error)) from error
     except losses as error:
         raise lost(serial, str(error)) from error

@@ -25,7 +25,6 @@ GAINS = ("Gain", "GainAbs", "GainRaw")  # the last one in steps of the camera's 
 FRAME_RATES = ("AcquisitionFrameRate", "AcquisitionFrameRateAbs")
 FRAME_RATE_SWITCHES = ("AcquisitionFrameRateEnable", "AcquisitionFrameRateEnabled")
 AUTOMATICS = ("ExposureAuto", "GainAuto")  # would change what is measured
-SERIALS = ("DeviceSerialNumber", "DeviceID")
 PACKET_SIZE = "GevSCPSPacketSize"
 
 

@@ -1,10 +1,12 @@
 """Recorded images as a live camera, at the rate they were taken or as fast as asked."""
 
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
+from typing import Self
 
 from lightpen.arrays import Image
 from lightpen.cameras.clock import Clock, MachineClock
@@ -32,6 +34,21 @@ from lightpen.sentences import Sentence, sentence
 
 FRAME_RATE = Range(0.1, inf)  # inf: as fast as asked
 USUAL_FRAME_RATE = 20.0
+ALIKE = 2  # images that tell of what size and depth all are
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """What the images of one camera have in common; width and height in px."""
+
+    width: int
+    height: int
+    pixel_format: str
+
+    @classmethod
+    def of(cls, image: Image) -> Self:
+        height, width = image.shape
+        return cls(width, height, f"Mono{8 * image.itemsize}")
 
 
 class ReplayCamera:
@@ -91,15 +108,14 @@ class ReplayCamera:
             return
         try:
             source = self._find()
-            first = _first_image(source, self._where)
+            kind = _usual_kind(source, self._where)
         except FileError as error:
             raise DeviceNotFound(error.sentence) from error
-        height, width = first.shape
         self._source = source
         self._caps = Caps(
-            width=width,
-            height=height,
-            pixel_formats=(f"Mono{8 * first.itemsize}",),
+            width=kind.width,
+            height=kind.height,
+            pixel_formats=(kind.pixel_format,),
             frame_rate=FRAME_RATE,
             waits=True,
             n_images=len(source.names) if self._loops else None,
@@ -216,7 +232,7 @@ class ReplayCamera:
         self._next_seq += 1
         try:
             image = loader()
-            _check_like_first(image, self._name(seq), self.caps)
+            _check_like_others(image, self._name(seq), self.caps)
         except FileError as error:
             self._stats = replace(self._stats, incomplete=self._stats.incomplete + 1)
             self._n_unread += 1
@@ -260,10 +276,28 @@ def _bits(image: Image) -> int:
     return 12 if int(image.max(initial=0)) < 2**12 else 16
 
 
-def _first_image(source: ImageSource, where: str) -> Image:
+def _usual_kind(source: ImageSource, where: str) -> _Kind:
+    """Return the first kind that two images are of, so that a bad one spoils nothing.
+
+    Raises
+    ------
+    FileError
+        There is no image, or none can be read.
+    """
+    counts: Counter[_Kind] = Counter()
+    unread: FileError | None = None
     for loader in source.open():
-        return loader()
-    raise FileError(
+        try:
+            kind = _Kind.of(loader())
+        except FileError as error:
+            unread = unread or error
+            continue
+        counts[kind] += 1
+        if counts[kind] == ALIKE:
+            return kind
+    if counts:
+        return next(iter(counts))
+    raise unread or FileError(
         sentence(
             "replay.no-images",
             "{place} holds no images. Choose a recording that holds some.",
@@ -272,30 +306,31 @@ def _first_image(source: ImageSource, where: str) -> Image:
     )
 
 
-def _check_like_first(image: Image, name: str, caps: Caps) -> None:
-    height, width = image.shape
-    if (width, height) != (caps.width, caps.height):
+def _check_like_others(image: Image, name: str, caps: Caps) -> None:
+    kind = _Kind.of(image)
+    if (kind.width, kind.height) != (caps.width, caps.height):
         raise FileError(
             sentence(
                 "replay.other-size",
-                "{name} is {width} x {height} px, the first image is {first_width} "
-                "x {first_height} px. Replay only images of one camera together.",
+                "{name} is {width} x {height} px, the other images are {usual_width} "
+                "x {usual_height} px. Replay only images of one camera together.",
                 name=name,
-                width=width,
-                height=height,
-                first_width=caps.width,
-                first_height=caps.height,
+                width=kind.width,
+                height=kind.height,
+                usual_width=caps.width,
+                usual_height=caps.height,
             )
         )
-    if f"Mono{8 * image.itemsize}" not in caps.pixel_formats:
+    (usual,) = caps.pixel_formats
+    if kind.pixel_format != usual:
         raise FileError(
             sentence(
                 "replay.other-depth",
-                "{name} has {bits} bits, the first image is {first}. Replay only "
+                "{name} has {bits} bits, the other images are {usual}. Replay only "
                 "images of one camera together.",
                 name=name,
                 bits=8 * image.itemsize,
-                first=caps.pixel_formats[0],
+                usual=usual,
             )
         )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpen.cameras.clock import Clock
 from lightpen.cameras.device_camera import Delivery, DeviceCamera
-from lightpen.cameras.device_errors import lost, not_found, refused
+from lightpen.cameras.device_errors import lost, not_found, setting_refused
 from lightpen.cameras.protocol import Range
 from lightpen.cameras.source import FoundDevice, Needs, Source, SourcePlace
 from lightpen.sentences import sentence
@@ -47,18 +47,18 @@ class WebcamFeatures:
 
     def set_number(self, name: str, value: float) -> None:
         """Refuse."""
-        raise refused(self._place, name)
+        raise setting_refused(self._place, name)
 
     def choose(self, name: str, entry: str) -> None:
         """Take the only pixel format there is."""
 
     def switch_on(self, name: str) -> None:
         """Refuse."""
-        raise refused(self._place, name)
+        raise setting_refused(self._place, name)
 
     def execute(self, name: str) -> None:
         """Refuse."""
-        raise refused(self._place, name)
+        raise setting_refused(self._place, name)
 
 
 class WebcamDevice:

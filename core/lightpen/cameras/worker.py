@@ -5,17 +5,14 @@ for the newest one, for showing, and through a queue that loses nothing, for mea
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
-from enum import Enum, auto
+from dataclasses import fields, replace
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
-from typing import TypeAlias
 
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.frame_box import FrameBox, FrameQueue
 from lightpen.cameras.link_watch import LinkWatch
 from lightpen.cameras.protocol import (
-    CameraFailure,
     CameraSettings,
     Caps,
     ConfigError,
@@ -29,6 +26,17 @@ from lightpen.cameras.protocol import (
     FrameTimeout,
     ImageCamera,
     Stats,
+)
+from lightpen.cameras.worker_events import (
+    Connection,
+    ConnectionChanged,
+    Ended,
+    Failed,
+    FrameReady,
+    KeepsUp,
+    SettingsApplied,
+    Troubled,
+    WorkerEvent,
 )
 from lightpen.errors import LightpenError
 from lightpen.sentences import sentence
@@ -50,70 +58,6 @@ LONGEST_STOP = 10.0  # s; a dead camera may take 8 to close
 LEAST_SKIPPED = 20
 SKIPPED_SHARE = 0.05
 KEEPING_UP = 3.0  # s without a skipped image after which it is over
-
-
-class Connection(Enum):
-    """How a camera and its worker get on."""
-
-    OPENING = auto()
-    STREAMING = auto()
-    SILENT = auto()
-    LOST = auto()
-    CLOSED = auto()
-
-
-@dataclass(frozen=True)
-class FrameReady:
-    """A frame lies in the box, which was empty before."""
-
-
-@dataclass(frozen=True)
-class ConnectionChanged:
-    """The camera is in another state."""
-
-    connection: Connection
-
-
-@dataclass(frozen=True)
-class SettingsApplied:
-    """The camera has these settings in force."""
-
-    settings: CameraSettings
-
-
-@dataclass(frozen=True)
-class Troubled:
-    """Something went wrong; the worker carries on."""
-
-    error: CameraFailure
-
-
-@dataclass(frozen=True)
-class KeepsUp:
-    """No image is skipped any more, after it was told that they were."""
-
-
-@dataclass(frozen=True)
-class Failed:
-    """Something went wrong that ended the worker."""
-
-    error: LightpenError
-
-
-@dataclass(frozen=True)
-class Ended:
-    """The camera has no more images, which ended the worker."""
-
-
-WorkerEvent: TypeAlias = (
-    FrameReady
-    | ConnectionChanged
-    | SettingsApplied
-    | Troubled
-    | KeepsUp
-    | Failed
-    | Ended
-)
 
 
 class CameraWorker:
@@ -506,7 +450,7 @@ class CameraWorker:
         except ConfigError:
             self._start(before)
             raise
-        self._settings = merged(before, self._applied)
+        self._settings = merged_settings(before, self._applied)
 
     def _set_exposure(self, exposure_us: float) -> None:
         # Where the camera is lost over it, it is set when it comes back.
@@ -531,7 +475,7 @@ class CameraWorker:
             self._on_event(ConnectionChanged(connection))
 
 
-def merged(before: CameraSettings, now: CameraSettings) -> CameraSettings:
+def merged_settings(before: CameraSettings, now: CameraSettings) -> CameraSettings:
     """Return settings, and of what they leave open those before."""
     given = {f.name: getattr(now, f.name) for f in fields(now)}
     return replace(before, **{n: v for n, v in given.items() if v is not None})

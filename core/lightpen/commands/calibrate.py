@@ -37,7 +37,7 @@ from lightpen.estimation.second_cone import SecondSwing
 from lightpen.estimation.summary import calibration_text
 from lightpen.estimation.verdict import judge
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, kept
+from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, with_content
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pairing import pair_images
@@ -271,8 +271,8 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
         SwingLimits(),
         origin,
         lambda: Inputs(
-            camera=kept(options.camera),
-            pen=kept(options.pen),
+            camera=with_content(options.camera),
+            pen=with_content(options.pen),
             observations=all_hashed(files),
             nominal_tip=pen.nominal_tip,
             origin=origin,

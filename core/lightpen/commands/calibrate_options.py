@@ -6,8 +6,8 @@ from pathlib import Path
 
 from lightpen.commands.arguments import add_pen_options, finite, number_from
 from lightpen.errors import UsageError
+from lightpen.estimation.methods import METHODS
 from lightpen.estimation.priors import Separation
-from lightpen.estimation.report import METHODS
 from lightpen.model.assumptions import (
     COLDEST,
     USUAL,

@@ -17,10 +17,10 @@ from lightpen.detection.observations import observe_images
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contradictions import COEFFICIENTS
-from lightpen.estimation.report import plain
-from lightpen.estimation.rig_report import intrinsics_record
+from lightpen.estimation.rig_report import adjusted_intrinsics_record
 from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
 from lightpen.formats.images import find_images
+from lightpen.formats.json_records import plain
 from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
 from lightpen.model.camera_validity import doubts_about
@@ -64,7 +64,7 @@ def _check_camera(options: argparse.Namespace) -> None:
         record = {
             "kind": "camera check",
             "agrees": not denied,
-            "intrinsics": intrinsics_record(calibration, 0),
+            "intrinsics": adjusted_intrinsics_record(calibration, 0),
             "contradictions": [each.sentence for each in denied],
             "doubts": doubts,
         }

@@ -4,14 +4,14 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import wraps
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from lightpen.errors import UsageError
-from lightpen.estimation.report import record_bytes
-from lightpen.formats.files import printable, write_whole
+from lightpen.formats.files import A_FILE, printable, unreadable, write_whole
+from lightpen.formats.json_records import record_bytes
 from lightpen.sentences import sentence
 
 DONE, NO_TIP, BAD_INPUT = 0, 1, 2
@@ -26,7 +26,13 @@ def shown(text: str) -> str:
 
 
 def printing(command: Callable[[argparse.Namespace], None]) -> Command:
-    """Give a command an exit status also where its output cannot be written."""
+    """Give a command an exit status also where its output cannot be written.
+
+    Raises
+    ------
+    FileError
+        A file or a folder is not to be looked at.
+    """
 
     @wraps(command)
     def run(options: argparse.Namespace) -> int:
@@ -36,7 +42,9 @@ def printing(command: Callable[[argparse.Namespace], None]) -> Command:
                 sys.stdout.flush()
         except BrokenPipeError:  # its reader has seen enough
             _drop_output()
-        except OSError as error:  # files have errors of their own: this is our output
+        except OSError as error:
+            if error.filename is not None:
+                raise unreadable(Path(error.filename), A_FILE, error) from error
             _drop_output()
             print(
                 f"lightpen: The result cannot be printed: {error.strerror}. Free some "
@@ -83,7 +91,7 @@ def lacking(option: str) -> UsageError:
 
 def are_same(one: Path, other: Path) -> bool:
     """Return whether two paths lead to one file."""
-    if one.exists() and other.exists():
+    with suppress(OSError):  # one of them is not there, or is not to be looked at
         return one.samefile(other)
     return os.path.realpath(one) == os.path.realpath(other)
 

@@ -18,10 +18,10 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.errors import UsageError
-from lightpen.estimation.report import plain
 from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera, write_camera
 from lightpen.formats.files import printable
 from lightpen.formats.images import find_images
+from lightpen.formats.json_records import plain
 from lightpen.formats.pairing import pair_images
 from lightpen.formats.rig_files import write_rig
 from lightpen.intrinsics.boards import parse_board

@@ -15,6 +15,7 @@ from lightpen.errors import UsageError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import sha256
 from lightpen.formats.hashes import all_hashed
+from lightpen.formats.json_records import file_entry
 from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.record.calibrations import CalibrationFile, read_calibration
 from lightpen.sentences import sentence
@@ -74,12 +75,7 @@ def _verify_pen(options: argparse.Namespace) -> None:
             pen_health_entries(found),
             found.assessment,
             {"led_moved": MOVED, "relative_growth": GROWN},
-            {
-                "files": [
-                    {"file": file.path.name, "sha256": file.sha256}
-                    for file in all_hashed(files)
-                ]
-            },
+            {"files": [file_entry(file) for file in all_hashed(files)]},
         )
         write_record(options.json, record)
 

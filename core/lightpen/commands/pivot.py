@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lightpen.commands.console import printing, require_other_file, write_record
 from lightpen.estimation.pivot_calibration import calibrate_pivot
-from lightpen.estimation.report import pivot_record
+from lightpen.estimation.pivot_report import pivot_record
 from lightpen.estimation.summary import pivot_text
 from lightpen.formats.hashes import hashed
 from lightpen.formats.observation_files import read_poses

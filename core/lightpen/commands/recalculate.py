@@ -19,10 +19,10 @@ from lightpen.commands.console import (
 )
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.monte_carlo import MIN_TRIALS, MonteCarlo, run_monte_carlo
-from lightpen.estimation.report import plain
 from lightpen.estimation.workers import Map, cluster_workers, local_workers
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import printable, sha256
+from lightpen.formats.json_records import plain
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen

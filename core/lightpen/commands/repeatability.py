@@ -21,10 +21,11 @@ from lightpen.commands.console import (
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.report import result_of
+from lightpen.estimation.methods import result_of
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import printable
 from lightpen.formats.hashes import all_hashed
+from lightpen.formats.json_records import file_entry
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import VerificationLimits
@@ -119,12 +120,7 @@ def _repeatability(options: argparse.Namespace) -> None:
             repeatability_entries(found),
             found.assessment,
             {"repeatability": limits.repeatability},
-            {
-                "files": [
-                    {"file": file.path.name, "sha256": file.sha256}
-                    for file in all_hashed(files)
-                ]
-            },
+            {"files": [file_entry(file) for file in all_hashed(files)]},
         )
         write_record(options.json, record)
 

@@ -18,7 +18,8 @@ from lightpen.cameras.protocol import (
 from lightpen.cameras.replay import RECORDED, USUAL_FRAME_RATE, ReplayCamera
 from lightpen.cameras.source import SourcePlace
 from lightpen.cameras.sources import SOURCES, source_named
-from lightpen.cameras.worker import CameraWorker, Failed, Troubled, WorkerEvent
+from lightpen.cameras.worker import CameraWorker
+from lightpen.cameras.worker_events import Failed, Troubled, WorkerEvent
 from lightpen.commands.arguments import above_zero, add_pen_options, whole_number
 from lightpen.commands.console import lacking, printing, shown
 from lightpen.detection.aim import Aim

@@ -77,6 +77,8 @@ def _list(options: argparse.Namespace) -> None:
         return
     for record in records:
         print(shown(_line(record)))
+    if not records:
+        print(shown(f"Nothing is listed in the library of {data}."))
 
 
 @printing

@@ -27,6 +27,7 @@ from lightpen.commands.console import (
 from lightpen.commands.pen_health import add_verify_pen
 from lightpen.estimation.instrument import Instrument
 from lightpen.formats.hashes import all_hashed, hashed
+from lightpen.formats.json_records import file_entry
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.pen import Pen
@@ -39,7 +40,7 @@ from lightpen.verification.assessment import Conformity
 from lightpen.verification.circle import measure_circle
 from lightpen.verification.drift import measure_drift
 from lightpen.verification.fixed_point import measure_fixed_point
-from lightpen.verification.keeping import file_entry, viewer_entries
+from lightpen.verification.keeping import viewer_entries
 from lightpen.verification.length import measure_length
 from lightpen.verification.places import (
     TouchPlace,

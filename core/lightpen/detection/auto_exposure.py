@@ -66,7 +66,7 @@ class AutoExposure:
             CameraSettings(exposure_us=settings.exposure_us, gain_db=settings.gain_db)
         )
 
-    def fed(self, frame: Frame, spots: Spots, leds: Inspection, caps: Caps) -> Self:
+    def after(self, frame: Frame, spots: Spots, leds: Inspection, caps: Caps) -> Self:
         """Return the adjustment after another image, which was inspected."""
         if self.outcome is not Standing.ADJUSTING or not self._is_of_asked(frame):
             return self

@@ -189,7 +189,7 @@ class StraySearch:
         n_lit = sum(len(spots) > 0 for spots in self.images)
         return n_lit < max(STRAY_SHARE * len(self.images), 1)
 
-    def fed(self, spots: Spots, *, shows_pen: bool) -> Self:
+    def after(self, spots: Spots, *, shows_pen: bool) -> Self:
         """Return the search after another image."""
         return replace(
             self,

@@ -48,11 +48,11 @@ class RigReprojection:
         for camera, (turn, shift) in zip(self.cameras, places, strict=True):
             errors, J = camera.residuals_with_jacobian(turn @ R, t @ turn.T + shift)
             residuals.append(errors)
-            jacobians.append(in_rig(J, turn))
+            jacobians.append(derivatives_in_rig(J, turn))
         return np.concatenate(residuals, axis=1), np.concatenate(jacobians, axis=1)
 
 
-def in_rig(J: FloatArray, turn: FloatArray) -> FloatArray:
+def derivatives_in_rig(J: FloatArray, turn: FloatArray) -> FloatArray:
     """Return derivatives (..., 6) by a pose in a camera as those by it in the rig.
 
     Parameters

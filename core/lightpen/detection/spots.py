@@ -225,7 +225,7 @@ def _spots_of(
 
 
 @dataclass(frozen=True, eq=False)
-class _Scene:
+class _Survey:
     """An image, every `stride`-th pixel of it, and what is usual in it."""
 
     image: Image
@@ -242,7 +242,7 @@ class _Scene:
         return level + max(min(step, longest), 1.0)
 
 
-def _survey(image: Image, mask: FloatArray | None, stride: int) -> _Scene:
+def _survey(image: Image, mask: FloatArray | None, stride: int) -> _Survey:
     thinned = _thinned(image, stride)
     step = max(min(thinned.shape) // NOISE_SAMPLES, 1)
     few: MatLike = np.ascontiguousarray(thinned[::step, ::step])
@@ -258,7 +258,7 @@ def _survey(image: Image, mask: FloatArray | None, stride: int) -> _Scene:
         for x, y, radius in np.asarray(mask) / stride:
             center = (round(x), round(y))
             cv2.circle(thinned, center, ceil(radius), background, cv2.FILLED)
-    return _Scene(image, thinned, stride, background, noise, float(thinned.max()))
+    return _Survey(image, thinned, stride, background, noise, float(thinned.max()))
 
 
 def _quantile(values: MatLike, share: float) -> int:
@@ -267,7 +267,7 @@ def _quantile(values: MatLike, share: float) -> int:
     return int(np.partition(values, rank, axis=None)[rank])
 
 
-def _has_smears(scene: _Scene) -> bool:
+def _has_smears(scene: _Survey) -> bool:
     """Return whether an image without spots, nor uneven background, shows light."""
     level = scene.background + LEVEL_SIGMAS * scene.noise
     lit = cv2.countNonZero(cv2.threshold(scene.thinned, level, 1, cv2.THRESH_BINARY)[1])
@@ -305,7 +305,7 @@ def _thinned(image: Image, stride: int) -> MatLike:
     return pixels
 
 
-def _find_discs(scene: _Scene, budget: Iterator[int]) -> list[Disc]:
+def _find_discs(scene: _Survey, budget: Iterator[int]) -> list[Disc]:
     """Return whatever may be an LED, each once."""
     rise = scene.peak - scene.background
     level = scene.background + max(LEVEL_SIGMAS * scene.noise, LEVEL_OF_PEAK * rise)
@@ -331,7 +331,7 @@ def _find_discs(scene: _Scene, budget: Iterator[int]) -> list[Disc]:
 
 
 def _parted(
-    scene: _Scene, box: Box, level: float, disc: Disc | None, budget: Iterator[int]
+    scene: _Survey, box: Box, level: float, disc: Disc | None, budget: Iterator[int]
 ) -> list[Disc]:
     """Return the discs that a region parts into at higher levels, or itself."""
     if disc is not None:
@@ -369,7 +369,7 @@ def _unique(discs: list[Disc]) -> list[Disc]:
     return kept
 
 
-def _regions(scene: _Scene, box: Box, level: float) -> list[Box]:
+def _regions(scene: _Survey, box: Box, level: float) -> list[Box]:
     """Return the boxes of what exceeds a level and lies inside a box."""
     if level >= np.iinfo(scene.image.dtype).max:
         return []
@@ -407,13 +407,13 @@ def _is_textured(bright: MatLike) -> bool:
     return bool(changes > TEXTURED * bright.size)
 
 
-def _is_too_large(scene: _Scene, box: Box) -> bool:
+def _is_too_large(scene: _Survey, box: Box) -> bool:
     shorter_side: int = min(scene.image.shape)
     return box.size > max(MAX_DIAMETER * shorter_side, FINE_SIZE)
 
 
 def _measured(
-    scene: _Scene, box: Box, level: float, floor: float, budget: Iterator[int]
+    scene: _Survey, box: Box, level: float, floor: float, budget: Iterator[int]
 ) -> Iterator[Disc]:
     """Measure the region in a box, and others that coarse sampling took for one."""
     boxes = [box]

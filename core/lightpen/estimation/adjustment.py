@@ -21,10 +21,11 @@ from lightpen.estimation.contradictions import (
     deny,
     find_pen_contradictions,
 )
+from lightpen.estimation.information import inverse
 from lightpen.estimation.linearised import BundleState
 from lightpen.estimation.noise_correlation import Correlation, measure_correlation
 from lightpen.estimation.priors import Prior, Priors
-from lightpen.estimation.unknowns import forms_of, inverse
+from lightpen.estimation.seat_forms import forms_of
 from lightpen.estimation.variance_components import COUNTED, find_component
 
 RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit

@@ -26,6 +26,9 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.pose import NOISE_FLOOR, robust_sigma
 from lightpen.errors import CalibrationError
+from lightpen.estimation.component_search import find_components
+from lightpen.estimation.components import NO_COMPONENTS, Components
+from lightpen.estimation.information import inverse
 from lightpen.estimation.joint import gate
 from lightpen.estimation.linearised import (
     N_CONE,
@@ -38,14 +41,8 @@ from lightpen.estimation.linearised import (
     views_at,
 )
 from lightpen.estimation.priors import Priors
-from lightpen.estimation.unknowns import (
-    NO_COMPONENTS,
-    Columns,
-    Components,
-    Forms,
-    Unknowns,
-    inverse,
-)
+from lightpen.estimation.seat_forms import Forms
+from lightpen.estimation.unknowns import Columns, Unknowns
 from lightpen.estimation.variance_components import Jitter, find_jitter
 from lightpen.sentences import sentence
 
@@ -229,7 +226,9 @@ def fit_bundle(
         finding = 0 < n_pass <= FINDING_PASSES
         # The jitter first: without it, what other errors there are take it up.
         if finding and n_pass > 1:
-            components = unknowns.found(information + measured, right, components)
+            components = find_components(
+                unknowns, information + measured, right, components
+            )
         prior = unknowns.prior_information(components)
         covariance = inverse(information + prior + measured)
         values = covariance @ right

@@ -23,6 +23,7 @@ from lightpen.detection.observations import Observations
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.components import NONE
 from lightpen.estimation.disc_diameter import modelled_areas
 from lightpen.estimation.linearised import N_CONE, BundleState
 from lightpen.estimation.priors import Priors
@@ -32,7 +33,6 @@ from lightpen.estimation.uncertainty import (
     counted_drift,
     counted_seat,
 )
-from lightpen.estimation.unknowns import NONE
 from lightpen.estimation.workers import Map
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera

@@ -23,9 +23,11 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.pose import NOISE_FLOOR
 from lightpen.estimation.bundle import Z_99, Bundle
+from lightpen.estimation.component_search import find_components
+from lightpen.estimation.components import Components
 from lightpen.estimation.image_rows import Whitened, rows_of, summed_products
+from lightpen.estimation.information import inverse
 from lightpen.estimation.linearised import eliminate, views_at
-from lightpen.estimation.unknowns import Components, inverse
 
 TRIED = np.array([0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.94, 0.97, 0.99])
 NEGLIGIBLE = 1e-3  # how likely a coefficient is that is left out
@@ -171,7 +173,7 @@ def _noise_model(
     for _ in range(NOISE_PASSES):
         information = each.information / variance + measured
         both = right / variance + measured_right
-        components = unknowns.found(information, both, components)
+        components = find_components(unknowns, information, both, components)
         prior = unknowns.prior_information(components)
         covariance = inverse(information + prior)
         values = covariance @ both

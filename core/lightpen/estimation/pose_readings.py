@@ -37,7 +37,7 @@ MAX_SHARE = 0.4  # of the movement of the poses, that a tip leaves over
 
 
 @dataclass(frozen=True)
-class _Mistake:
+class _PoseMistake:
     """A usual mistake: how it is undone, and what is said of it."""
 
     undo: Callable[[FloatArray, FloatArray], Poses]
@@ -162,8 +162,8 @@ def _rotations(quaternions: FloatArray) -> FloatArray:
     return np.moveaxis(np.array(rows), 2, 0)
 
 
-def _flipped(axis: int) -> _Mistake:
-    return _Mistake(
+def _flipped(axis: int) -> _PoseMistake:
+    return _PoseMistake(
         lambda R, t: (R, t * np.where(np.arange(3) == axis, -1.0, 1.0)),
         lambda as_read, undone: sentence(
             "poses.flipped",
@@ -190,7 +190,7 @@ def _said_of_quaternions(as_read: float, undone: float) -> Sentence:
 
 
 _MISTAKES = (
-    _Mistake(
+    _PoseMistake(
         lambda R, t: (_transposed(R), t),
         lambda as_read, undone: sentence(
             "poses.transposed",
@@ -201,7 +201,7 @@ _MISTAKES = (
             undone=undone,
         ),
     ),
-    _Mistake(lambda R, t: (_with_scalar_moved(R, 1), t), _said_of_quaternions),
-    _Mistake(lambda R, t: (_with_scalar_moved(R, -1), t), _said_of_quaternions),
+    _PoseMistake(lambda R, t: (_with_scalar_moved(R, 1), t), _said_of_quaternions),
+    _PoseMistake(lambda R, t: (_with_scalar_moved(R, -1), t), _said_of_quaternions),
     *(_flipped(axis) for axis in range(3)),
 )

@@ -19,6 +19,9 @@ import numpy.typing as npt
 from lightpen.arrays import FloatArray
 from lightpen.estimation.adjustment import held_to_files
 from lightpen.estimation.bundle import Bundle, jitter_of
+from lightpen.estimation.component_search import find_components
+from lightpen.estimation.components import NO_COMPONENTS
+from lightpen.estimation.information import inverse
 from lightpen.estimation.joint import JointFit
 from lightpen.estimation.linearised import (
     N_CONE,
@@ -28,6 +31,7 @@ from lightpen.estimation.linearised import (
     views_at,
 )
 from lightpen.estimation.priors import Priors, priors_of
+from lightpen.estimation.seat_forms import forms_of
 from lightpen.estimation.uncertainty import (
     COVERAGE_FACTOR,
     IMAGES_SHRINK,
@@ -36,12 +40,7 @@ from lightpen.estimation.uncertainty import (
     ShareName,
     shares_of,
 )
-from lightpen.estimation.unknowns import (
-    NO_COMPONENTS,
-    Unknowns,
-    forms_of,
-    inverse,
-)
+from lightpen.estimation.unknowns import Unknowns
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
@@ -222,7 +221,7 @@ def _linear_bundle(
             else unknowns.system(_with_jitter(equations, jitter.covariance))
         )
         components = components._replace(jitter=jitter)
-        components = unknowns.found(information, right, components)
+        components = find_components(unknowns, information, right, components)
         if jitter.covariance is None:
             break
     prior = unknowns.prior_information(components)

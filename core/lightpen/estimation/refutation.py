@@ -17,7 +17,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle import Bundle
-from lightpen.estimation.unknowns import inverse, known_by
+from lightpen.estimation.information import inverse, known_by
 from lightpen.sentences import Sentence
 
 LIMIT = 3.0  # standard deviations
@@ -44,7 +44,7 @@ class FileNumber:
 
 
 @dataclass(frozen=True, eq=False)
-class _Solution:
+class _Estimate:
     """What file and images make of the file's unknowns, some numbers let go."""
 
     values: FloatArray
@@ -201,14 +201,14 @@ class FileFit:
         return tuple(i for i in let_go if self._is_beyond(i, let_go))
 
     @cached_property
-    def _as_stated(self) -> _Solution:
+    def _as_stated(self) -> _Estimate:
         return self._solved_with(self.stated)
 
     @cached_property
-    def _solutions(self) -> dict[tuple[int, ...], _Solution]:
+    def _solutions(self) -> dict[tuple[int, ...], _Estimate]:
         return {(): self._as_stated}
 
-    def _solved(self, let_go: tuple[int, ...]) -> _Solution:
+    def _solved(self, let_go: tuple[int, ...]) -> _Estimate:
         key = tuple(sorted(let_go))
         if key not in self._solutions:
             freed = self.stated
@@ -220,8 +220,8 @@ class FileFit:
             self._solutions[key] = self._solved_with(freed)
         return self._solutions[key]
 
-    def _solved_with(self, stated: FloatArray) -> _Solution:
+    def _solved_with(self, stated: FloatArray) -> _Estimate:
         covariance = inverse(self.information + inverse(stated))
         values = covariance @ self.right
         lasting = covariance @ self.lasting @ covariance
-        return _Solution(values, covariance, lasting, float(self.right @ values))
+        return _Estimate(values, covariance, lasting, float(self.right @ values))

@@ -1,11 +1,6 @@
 """A calibration as a JSON record."""
 
-import json
-from base64 import b64encode
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from importlib.metadata import version
-from math import isfinite
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -14,70 +9,23 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.instrument import instrument_record
-from lightpen.estimation.lamp_report import lamp_warnings, lamps_record
-from lightpen.estimation.linearised import N_CONE
-from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
+from lightpen.estimation.lamp_report import lamps_record
+from lightpen.estimation.methods import METHODS, result_of
+from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.rig_report import (
+    adjusted_intrinsics_record,
     count_dropped,
-    intrinsics_record,
     rig_record,
-    rig_warnings,
 )
 from lightpen.estimation.second_cone import SecondCone
-from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
-from lightpen.estimation.unknowns import FORMS
 from lightpen.estimation.verdict import judge
-from lightpen.formats.hashes import InputFile, Inputs
-from lightpen.formats.own_json import with_checksum
+from lightpen.formats.hashes import Inputs
+from lightpen.formats.json_records import file_entry, plain, record_heading
 from lightpen.local_time import local_now
 from lightpen.model.coverage import DIRECTION_NAMES
 from lightpen.model.limits import SwingLimits
-from lightpen.sentences import Sentence, sentence
-
-METHODS = ("joint", "two-stage")
-
-
-@dataclass(frozen=True, eq=False)
-class MethodResult:
-    """Tip and cone by one of the methods.
-
-    Attributes
-    ----------
-    tip_pen, cone_cam : (3,) array
-        mm.
-    covariance : (6, 6) array
-        Of both, mm^2.
-    rms_mm : float
-        Root mean square distance of the tip of single images from the cone point.
-    """
-
-    tip_pen: FloatArray
-    cone_cam: FloatArray
-    covariance: FloatArray
-    rms_mm: float
-
-    @property
-    def expanded_uncertainty(self) -> FloatArray:
-        """U (k = 2) of tip and cone, (6,), mm."""
-        return COVERAGE_FACTOR * np.sqrt(np.diag(self.covariance))
-
-
-def result_of(calibration: Calibration, method: str) -> MethodResult:
-    """Return tip and cone by ``"joint"`` or ``"two-stage"``."""
-    if method == "two-stage":
-        fit = calibration.two_stage
-        return MethodResult(
-            fit.tip_pen, fit.cone_cam, calibration.two_stage_covariance, fit.rms
-        )
-    joint = calibration.joint
-    deviations = calibration.tips_cam[calibration.used] - joint.cone_cam
-    return MethodResult(
-        joint.tip_pen,
-        joint.cone_cam,
-        calibration.budget.covariance,
-        float(np.sqrt(np.mean(np.sum(deviations**2, axis=1)))),
-    )
+from lightpen.sentences import Sentence
 
 
 def calibration_record(
@@ -101,8 +49,7 @@ def calibration_record(
     tip = result.tip_pen
     nominal = inputs.nominal_tip
     record = {
-        "program": _program(),
-        "created": local_now().isoformat(timespec="seconds"),
+        **record_heading(local_now()),
         "origin": None if inputs.origin is None else inputs.origin.value,
         "method": method,
         "tip_pen_mm": tip,
@@ -138,9 +85,9 @@ def calibration_record(
         "leds": _leds(calibration),
         **_rig(calibration),
         "inputs": {
-            "camera": _input(inputs.camera),
-            "pen": _input(inputs.pen),
-            "observations": [_input(file) for file in inputs.observations],
+            "camera": file_entry(inputs.camera),
+            "pen": file_entry(inputs.pen),
+            "observations": [file_entry(file) for file in inputs.observations],
             "units": inputs.units,
             "led_diameter_mm": inputs.led_diameter,
             **_rig_inputs(inputs),
@@ -150,190 +97,13 @@ def calibration_record(
     return {name: plain(entry) for name, entry in record.items()}
 
 
-def pivot_record(
-    calibration: PivotCalibration, poses: InputFile, least_squares: bool
-) -> dict[str, Any]:
-    """Return the record of a pivot calibration; README.md documents its entries."""
-    fit, groups = calibration.fit, calibration.groups
-    uncertainty = calibration.expanded_uncertainty
-    group = np.ones(len(fit.used), dtype=int) if groups is None else groups.group
-    record = {
-        "program": _program(),
-        "created": local_now().isoformat(timespec="seconds"),
-        "method": "least squares" if least_squares else "robust",
-        "tip_pen_mm": fit.tip_pen,
-        "pivot_cam_mm": fit.pivot_cam,
-        "covariance": calibration.covariance,
-        "expanded_uncertainty_mm": uncertainty[:3],
-        "pivot_expanded_uncertainty_mm": uncertainty[3:],
-        "coverage_factor": COVERAGE_FACTOR,
-        "uncertainty": {
-            "covers": str(COVERED),
-            "leaves_out": str(NOT_COVERED),
-            "independent_noise": fit.covariance,
-            "correlation_factor": calibration.correlation_factor,
-        },
-        "rms_mm": fit.rms,
-        "warnings": calibration.warnings,
-        "poses": {"total": len(fit.used), "used": int(fit.used.sum())},
-        "inputs": {"poses": _input(poses)},
-        "frames": [
-            {
-                "pose": i + 1,
-                "used": used,
-                "group": name or None,
-                "residual_mm": residual,
-            }
-            for i, (used, name, residual) in enumerate(
-                zip(
-                    fit.used.tolist(),
-                    group.tolist(),
-                    fit.residuals.tolist(),
-                    strict=True,
-                )
-            )
-        ],
-    }
-    return {name: plain(entry) for name, entry in record.items()}
-
-
-def record_bytes(record: Mapping[str, Any]) -> bytes:
-    """Return a record as JSON that tells when it was changed."""
-    return with_checksum(json_bytes(record)) + b"\n"
-
-
-def json_bytes(record: Mapping[str, Any]) -> bytes:
-    """Return a record as JSON, readable: one line an entry, and one an image.
-
-    The bytes of a file name that is no text in this system's encoding become JSON
-    escapes.
-    """
-    lines = []
-    for name, entry in record.items():
-        if name == "frames":
-            rows = ",\n    ".join(map(_dumps, entry))
-            lines.append(f'  "frames": [\n    {rows}\n  ]')
-        else:
-            lines.append(f"  {_dumps(name)}: {_dumps(entry)}")
-    text = "{\n" + ",\n".join(lines) + "\n}\n"
-    return text.encode("utf-8", "backslashreplace")
-
-
-def warnings_of(calibration: Calibration) -> list[Sentence]:
-    """Return what the user should look into, one sentence or two each."""
-    leds, sigma = calibration.leds, calibration.joint.sigma
-    warnings = [
-        *rig_warnings(calibration),
-        *(each.sentence for each in calibration.contradictions),
-        *lamp_warnings(calibration),
-        *_seat_warnings(calibration),
-    ]
-    warnings += [
-        sentence(
-            "warning.led-unseen",
-            "LED {led} was found in no image. A finger may cover it, it may be off, or "
-            "its place in the pen file may be wrong.",
-            led=int(led) + 1,
-        )
-        for led in np.flatnonzero(leds.n_seen == 0)
-    ]
-    warnings += [
-        sentence(
-            "warning.led-displaced",
-            "LED {led} sits {distance:.3f} mm off its place in the pen file. Check the "
-            "file, or measure the pen again.",
-            led=led,
-            distance=float(np.linalg.norm(leds.displacement[led - 1])),
-        )
-        for led in leds.displaced
-    ]
-    if sigma > USUAL_SIGMA:
-        warnings.append(
-            sentence(
-                "warning.large-residuals",
-                "The residuals are large: {sigma:.2f} px, {usual} px or less is usual. "
-                "Check that the camera file is of this camera, lens and focus, and the "
-                "pen file of this pen.",
-                sigma=sigma,
-                usual=USUAL_SIGMA,
-            )
-        )
-    return warnings
-
-
-def _seat_warnings(calibration: Calibration) -> list[Sentence]:
-    """Return what is told of a tip that did not rest where the model has it."""
-    bundle, found = calibration.bundle, calibration.bundle.counted
-    warnings = []
-    jitter = found.jitter.covariance
-    # Ball and cone that are as round as assumed move the tip by so much as well.
-    by_form = calibration.priors.form_error * float(np.sqrt(N_CONE * sum(FORMS)))
-    distance = 0.0 if jitter is None else float(np.sqrt(np.trace(jitter)))
-    if distance > by_form:
-        warnings.append(
-            sentence(
-                "warning.seat-jitter",
-                "The tip did not come to rest in the same place: it moved by "
-                "{distance:.4f} mm (standard deviation) from image to image. Clean tip "
-                "and cone, look for wear, and press the tip in. It is in the "
-                "uncertainty.",
-                distance=distance,
-            )
-        )
-    forms = (*found.seat, found.oval)
-    if any(form.is_significant for form in forms):
-        warnings.append(
-            sentence(
-                "warning.seat-form",
-                "The tip moved in its seat as the pen leant, by some {distance:.4f} "
-                "mm. Tip or cone may be out of round, worn or dirty. It is in the "
-                "uncertainty.",
-                distance=max(form.sigma for form in forms),
-            )
-        )
-    if found.drift.is_significant:
-        warnings.append(
-            sentence(
-                "warning.drift",
-                "The cone moved by {distance:.4f} mm against the camera during the "
-                "swing. Clamp both, let the camera warm up, and repeat. It is in the "
-                "uncertainty.",
-                distance=bundle.drift,
-            )
-        )
-    stated = calibration.priors.led_sigma
-    if stated is not None and found.leds.is_significant:
-        warnings.append(
-            sentence(
-                "warning.led-file-contradicted",
-                "The images contradict the LED file: its coordinates are off by "
-                "{found:.4f} mm (standard deviation), the file states {stated:.4f} mm. "
-                "Measure the pen again, or check that the file is of this pen.",
-                found=found.leds.sigma,
-                stated=stated,
-            )
-        )
-    return warnings
-
-
-def _program() -> dict[str, str]:
-    return {"name": "lightpen", "version": version("lightpen")}
-
-
-def _input(file: InputFile) -> dict[str, str]:
-    named = {"file": file.path.name, "sha256": file.sha256}
-    if file.content is not None:
-        named["base64"] = b64encode(file.content).decode()
-    return named
-
-
 def _rig_inputs(inputs: Inputs) -> dict[str, Any]:
     """Return the further files of several cameras; nothing of one camera."""
     if inputs.rig is None:
         return {}
     return {
-        "rig": _input(inputs.rig.rig),
-        "cameras": [_input(file) for file in inputs.rig.cameras],
+        "rig": file_entry(inputs.rig.rig),
+        "cameras": [file_entry(file) for file in inputs.rig.cameras],
     }
 
 
@@ -418,7 +188,7 @@ def _adjusted(calibration: Calibration) -> dict[str, Any]:
     prior = calibration.priors.cameras[0]
     reading = calibration.priors.reading
     return {
-        "intrinsics": intrinsics_record(calibration, 0),
+        "intrinsics": adjusted_intrinsics_record(calibration, 0),
         "intrinsics_uncertainty_assumed": prior.assumed,
         "scale_uncertainty_before": np.sqrt(calibration.stated.scale.covariance[0, 0]),
         "scale_uncertainty_assumed": calibration.priors.scale.assumed,
@@ -511,7 +281,7 @@ def _frames(calibration: Calibration) -> list[dict[str, Any]]:
                 "file": observations.names[i],
                 "used": reason is Reason.NONE,
                 "reason": str(reason),
-                "detail": str(observations.details[i] or ""),
+                **_detail_of(observations.details[i]),
                 "rms_px": rms[i],
                 "tip_cam_mm": tips[i],
                 "edge_width_px": observations.edge_widths[i],
@@ -541,24 +311,8 @@ def _camera_of(calibration: Calibration, c: int, moment: int) -> dict[str, Any]:
     return {"camera": names[c], "moment": moment + 1} if names else {}
 
 
-def _dumps(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
-
-
-def plain(value: Any) -> Any:
-    """Return arrays as lists, what is not a number as null, sentences with codes."""
-    if isinstance(value, Sentence):
-        value = {"code": value.code, "text": str(value), "values": value.values}
-    if isinstance(value, np.ndarray):
-        if value.dtype.kind == "f" and np.isfinite(value).all():
-            return value.tolist()
-        value = value.tolist()
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    if isinstance(value, dict):
-        return {name: plain(entry) for name, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(entry) for entry in value]
-    return value
+def _detail_of(detail: Sentence | None) -> dict[str, str]:
+    """Return what else there is to say of an image that is left out, and its code."""
+    if detail is None:
+        return {"detail": "", "detail_code": ""}
+    return {"detail": str(detail), "detail_code": detail.code}

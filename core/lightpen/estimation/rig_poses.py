@@ -44,7 +44,7 @@ def join_poses(
     n_cameras = np.bincount(np.concatenate(posed), minlength=n_moments)
     information = np.zeros((n_moments, 6, 6))
     for c, (at, each) in enumerate(zip(posed, poses, strict=True)):
-        R, t, covariances = in_rig(
+        R, t, covariances = poses_in_rig(
             rig, c, each.rotations, each.translations, each.covariances
         )
         new = np.isnan(translations[at, 0])
@@ -63,7 +63,7 @@ def join_poses(
     return RigPoses(rotations, translations)
 
 
-def in_rig(
+def poses_in_rig(
     rig: Rig,
     c: int,
     rotations: FloatArray,

@@ -45,7 +45,7 @@ class _Places(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Mistake:
+class _RigMistake:
     """A usual mistake: how it is undone, and what is said of it."""
 
     undo: Callable[[_Places], _Places]
@@ -211,7 +211,7 @@ def _scaled(
 
 
 _DIRECTIONS = (
-    _Mistake(
+    _RigMistake(
         _inverted,
         sentence(
             "rig.inverted",
@@ -220,7 +220,7 @@ _DIRECTIONS = (
             "translation t.",
         ),
     ),
-    _Mistake(
+    _RigMistake(
         _transposed,
         sentence(
             "rig.transposed",
@@ -228,7 +228,7 @@ _DIRECTIONS = (
             "row, as it is multiplied to a column vector.",
         ),
     ),
-    _Mistake(
+    _RigMistake(
         _from_position,
         sentence(
             "rig.position",
@@ -247,7 +247,7 @@ def _in_unit(unit: Sentence) -> Sentence:
     )
 
 
-def _in_unit_too(mistake: _Mistake, unit: Sentence) -> Sentence:
+def _in_unit_too(mistake: _RigMistake, unit: Sentence) -> Sentence:
     return sentence(
         "rig.direction-and-unit",
         "{direction} Its lengths seem to be in {unit}; millimetres are needed.",
@@ -259,11 +259,11 @@ def _in_unit_too(mistake: _Mistake, unit: Sentence) -> Sentence:
 _MISTAKES = (
     *_DIRECTIONS,
     *(
-        _Mistake(partial(_scaled, _as_read, factor), _in_unit(unit))
+        _RigMistake(partial(_scaled, _as_read, factor), _in_unit(unit))
         for unit, factor in UNITS
     ),
     *(
-        _Mistake(partial(_scaled, each.undo, factor), _in_unit_too(each, unit))
+        _RigMistake(partial(_scaled, each.undo, factor), _in_unit_too(each, unit))
         for each in _DIRECTIONS
         for unit, factor in UNITS
     ),

@@ -15,7 +15,7 @@ MAX_NAMED = 5  # images
 WIDTH = 10  # characters of a camera's name
 
 
-def intrinsics_record(calibration: Calibration, c: int) -> dict[str, Any]:
+def adjusted_intrinsics_record(calibration: Calibration, c: int) -> dict[str, Any]:
     """Return what the images made of the intrinsics of the c-th camera."""
     camera = calibration.bundle.state.rig.cameras[c]
     place = calibration.bundle.columns.cameras[c]
@@ -47,7 +47,7 @@ def rig_record(calibration: Calibration) -> dict[str, Any]:
                 },
                 "moments_without_image": images.reasons.count(Reason.ABSENT),
                 "rms_px": images.total_rms,
-                "intrinsics": intrinsics_record(calibration, c),
+                "intrinsics": adjusted_intrinsics_record(calibration, c),
                 "intrinsics_uncertainty_assumed": calibration.priors.cameras[c].assumed,
                 "cam_from_rig": _place_record(calibration, c),
             }

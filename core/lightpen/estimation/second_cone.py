@@ -13,12 +13,12 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations
 from lightpen.estimation.adjustment import Adjustment
 from lightpen.estimation.camera_path import pose_steadily
+from lightpen.estimation.information import inverse
 from lightpen.estimation.joint import ContactModel, JointFit, fit_contact
 from lightpen.estimation.linearised import BundleState
 from lightpen.estimation.priors import Separation
 from lightpen.estimation.single_images import require_fit
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR, Budget
-from lightpen.estimation.unknowns import inverse
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 

@@ -5,13 +5,9 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.lamp_report import lamp_lines
+from lightpen.estimation.methods import METHODS, MethodResult, result_of
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
-from lightpen.estimation.report import (
-    METHODS,
-    MethodResult,
-    result_of,
-    warnings_of,
-)
+from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.rig_report import count_dropped, named_images, rig_lines
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.estimation.verdict import Verdict

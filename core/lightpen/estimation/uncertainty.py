@@ -25,7 +25,8 @@ from lightpen.estimation.bundle import Z_99, Bundle
 from lightpen.estimation.joint import JointFit
 from lightpen.estimation.linearised import N_CONE
 from lightpen.estimation.priors import Priors
-from lightpen.estimation.unknowns import FORMS, axes_of_cone, whole_moves
+from lightpen.estimation.seat_forms import FORMS, axes_of_cone
+from lightpen.estimation.unknowns import whole_moves
 
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty
 MAX_BLOCKS = 10

@@ -13,6 +13,7 @@ from typing import BinaryIO
 from lightpen.errors import FileError, NameTakenError
 from lightpen.formats.file_locks import folder_locked
 from lightpen.formats.part_files import part_of, renamed, sweep_parts
+from lightpen.formats.system_reasons import strerror
 from lightpen.sentences import Sentence, sentence
 
 MEGABYTE = 1_000_000  # bytes
@@ -101,7 +102,7 @@ def opened(path: Path, what: Sentence, limit: int) -> Iterator[BinaryIO]:
     """
     shown = printable(str(path))
     try:
-        _check_readable(path.stat(), what, shown, limit)
+        _check_readable(_status(path, what), what, shown, limit)
         with path.open("rb") as stream:
             _check_readable(os.fstat(stream.fileno()), what, shown, limit)
             yield stream
@@ -316,9 +317,18 @@ def why_unwritten(error: OSError) -> Sentence:
     return _REASONS.get(error.errno or 0, other)
 
 
-def strerror(error: OSError) -> str:
-    """Return what the system says of an error."""
-    return error.strerror or type(error).__name__
+def _status(path: Path, what: Sentence) -> os.stat_result:
+    try:
+        return path.stat()
+    except ValueError as error:  # a null character in it, or half a letter
+        raise FileError(
+            sentence(
+                "read.no-name",
+                "The {what} {path} has a name that no file can have. Check the name.",
+                what=what,
+                path=printable(str(path)),
+            )
+        ) from error
 
 
 def _check_readable(

@@ -71,7 +71,7 @@ def hashed(path: Path) -> InputFile:
     return InputFile(path, sha256(path))
 
 
-def kept(path: Path) -> InputFile:
+def with_content(path: Path) -> InputFile:
     """Return a file with its hash and its content.
 
     Raises

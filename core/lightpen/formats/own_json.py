@@ -35,7 +35,7 @@ class DamagedError(ValueError):
     """A text is not as the program wrote it; who named the file says so to its user."""
 
 
-def parse_json(data: bytes, shape: type[T]) -> T:
+def parse_own_json(data: bytes, shape: type[T]) -> T:
     """Return what a text holds.
 
     Parameters
@@ -61,7 +61,7 @@ def parse_json(data: bytes, shape: type[T]) -> T:
 
 
 def parse_checked(data: bytes, shape: type[T]) -> T:
-    """Return what a text holds that has its checksum; see `parse_json`.
+    """Return what a text holds that has its checksum; see `parse_own_json`.
 
     Raises
     ------
@@ -70,11 +70,11 @@ def parse_checked(data: bytes, shape: type[T]) -> T:
     """
     if not has_checksum(data):
         raise DamagedError("There is no checksum.")
-    return parse_json(data, shape)
+    return parse_own_json(data, shape)
 
 
 def in_shape(tree: Any, shape: type[T], *, strict: bool = True) -> T:
-    """Return a value that was read as what it must be; see `parse_json`.
+    """Return a value that was read as what it must be; see `parse_own_json`.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def require_usual(moment: datetime) -> None:
     Raises
     ------
     ValueError
-        Also where `parse_json` makes the type that calls it.
+        Also where `parse_own_json` makes the type that calls it.
     """
     if not FIRST_YEAR <= moment.year <= LAST_YEAR:
         raise ValueError(f"{moment} is too far away.")

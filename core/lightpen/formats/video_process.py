@@ -5,7 +5,9 @@ may say anywhere that its frames are 16000 x 16000 px from here on, and a gigaby
 asked for before anyone can look. A decoder that crashes takes no other process with it.
 """
 
+import os
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -25,11 +27,12 @@ from lightpen.sentences import sentence
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
+STDERR = 2  # for what is not written by Python
 MAX_DECODER_MEMORY = 300_000_000  # bytes, beyond what Python and OpenCV take
 
 
 def count_frames(path: Path) -> int:
-    """Return how many frames a video has; see `videos.count_frames`.
+    """Return how many frames a video has; see `videos`.
 
     Raises
     ------
@@ -88,6 +91,8 @@ def _serve(
     to: "Connection", send: Callable[..., None], path: Path, *arguments: int
 ) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who asked hears it, and ends this
+    with suppress(OSError):  # a program with a window may have no console
+        _hush_decoders()
     keep_freed_memory()
     with suppress(OSError):  # a video that is sound needs none
         limit_memory(MAX_DECODER_MEMORY)
@@ -101,12 +106,20 @@ def _serve(
         return
 
 
+def _hush_decoders() -> None:
+    """Keep from the console what FFmpeg writes there, a line for each damaged block."""
+    sys.stderr = os.fdopen(os.dup(STDERR), "w")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, STDERR)
+    os.close(nowhere)
+
+
 def _send_count(to: "Connection", path: Path) -> None:
-    to.send(videos.count_frames(path))
+    to.send(videos.count_frames_in_process(path))
 
 
 def _send_frames(to: "Connection", path: Path, n_frames: int) -> None:
-    for load in videos.frame_loaders(path, n_frames):
+    for load in videos.frame_loaders_in_process(path, n_frames):
         try:
             to.send(load())
         except FileError as error:

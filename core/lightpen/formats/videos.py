@@ -27,7 +27,7 @@ CODECS = frozenset(
 )
 
 
-def count_frames(path: Path) -> int:
+def count_frames_in_process(path: Path) -> int:
     """Return how many frames a video has, which its header need not say truly.
 
     They are counted as they come, not decoded.
@@ -85,7 +85,9 @@ def count_frames(path: Path) -> int:
     return n_frames
 
 
-def frame_loaders(path: Path, n_frames: int) -> Iterator[Callable[[], Image]]:
+def frame_loaders_in_process(
+    path: Path, n_frames: int
+) -> Iterator[Callable[[], Image]]:
     """Yield a loader for each frame: it returns it in grey, or raises `FileError`."""
     stream = _opened_video(path)
     try:

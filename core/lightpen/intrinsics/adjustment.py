@@ -16,14 +16,22 @@ References
    298-372, section 6.
 """
 
-from dataclasses import dataclass
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.intrinsics.board_fit import (
+    N_POSE,
+    N_SHAPE,
+    BoardFit,
+    BoardState,
+    board_points,
+    deformations_of,
+    intrinsics_at,
+    places_at,
+)
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.start import BoardPoses
 from lightpen.intrinsics.views import BoardTolerances, Views
@@ -32,7 +40,6 @@ from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.rigid import rotation_from_vector, skew
 from lightpen.sentences import sentence
 
-N_POSE, N_SHAPE = 6, 5
 MAX_STEPS = 100
 MAX_DAMPING = 1e12
 FIRST_DAMPING = 1e-3
@@ -40,116 +47,6 @@ CONVERGED = 1e-7  # of the sum of squares; far below what changes a digit that i
 FINEST = 1e-4  # px; exact points that weigh more drown the priors in rounding
 NOISE_ROUNDS = 3
 VAGUE = 1e-13  # least eigenvalue of an information matrix scaled to ones
-
-
-@dataclass(frozen=True, eq=False)
-class BoardState:
-    """Everything that the points of the views depend on.
-
-    Attributes
-    ----------
-    cameras : tuple of Camera
-        C of them.
-    rotations, translations : (C, 3, 3) and (C, 3) array
-        Of cam_from_rig, mm.
-    poses : BoardPoses
-        Of rig_from_board.
-    shape : (5,) array
-        Stretch, shear, and three bends, mm.
-    """
-
-    cameras: tuple[Camera, ...]
-    rotations: FloatArray
-    translations: FloatArray
-    poses: BoardPoses
-    shape: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class BoardFit:
-    """A state that fits the views, and how well it is known.
-
-    Attributes
-    ----------
-    residuals : (V, C, N, 2) array
-        Observed minus modelled, px; NaN where not seen.
-    sigma : float
-        Noise of one coordinate, px.
-    information, scores : (V, p, p) and (V, p) array
-        Of each view about all but its pose, for points of 1 px noise; their gradient.
-    prior : (p, p) array
-        Information of the priors.
-    covariance : (p, p) array
-        Of the unknowns but the poses, noise being independent.
-    """
-
-    board: Board
-    state: BoardState
-    residuals: FloatArray
-    sigma: float
-    information: FloatArray
-    scores: FloatArray
-    prior: FloatArray
-    covariance: FloatArray
-
-    @property
-    def board_points(self) -> FloatArray:
-        """Points of the board as it was found to be, (N, 3), mm."""
-        return board_points(self.board, self.state.shape)
-
-    @property
-    def rms(self) -> float:
-        """Distance of the points from where they should be, px rms."""
-        squares = np.square(self.residuals).sum(axis=-1)
-        return float(np.sqrt(np.nanmean(squares)))
-
-    @property
-    def view_rms(self) -> FloatArray:
-        """The same of each view and camera, (V, C); NaN where nothing was seen."""
-        squares = np.square(self.residuals).sum(axis=-1)
-        counts = np.isfinite(squares).sum(axis=-1)
-        sums = np.nansum(squares, axis=-1)
-        return np.asarray(np.sqrt(sums / np.where(counts > 0, counts, np.nan)))
-
-    def of_intrinsics(self, camera: int) -> slice:
-        """Return where the intrinsics of a camera stand among the unknowns."""
-        return _intrinsics_at(self.state.cameras)[camera]
-
-    def prior_of(self, camera: int) -> FloatArray:
-        """Return the information that was assumed of a camera's intrinsics."""
-        at = self.of_intrinsics(camera)
-        return self.prior[at, at]
-
-    @property
-    def correlation(self) -> float:
-        """How many times the variance of independent noise the views vary by.
-
-        The scores of views scatter as the information of independent noise says, if it
-        is that; where they scatter more, residuals hang together within a view [1]_.
-
-        References
-        ----------
-        .. [1] K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized
-           linear models", Biometrika 73 (1986) 13-22.
-        """
-        S, weight = self.covariance, self.sigma**-2
-        information, scores = weight * self.information, weight * self.scores
-        found = np.einsum("vi,ij,vj->", scores, S, scores)
-        leverages = S @ information
-        expected = np.einsum("vii->", leverages)
-        expected -= np.einsum("vij,vji->", leverages, leverages)
-        return float(found / expected)
-
-    @property
-    def of_places(self) -> slice:
-        """Where the places of all cameras but the first stand."""
-        return _places_at(self.state.cameras)
-
-    @property
-    def of_shape(self) -> slice:
-        """Where the errors of the board stand."""
-        at = self.of_places
-        return slice(at.stop, at.stop + N_SHAPE)
 
 
 class _System(NamedTuple):
@@ -163,7 +60,7 @@ class _System(NamedTuple):
     own_right: FloatArray
 
 
-def adjust(
+def adjust_board(
     views: Views,
     start: BoardState,
     tolerances: BoardTolerances,
@@ -211,7 +108,7 @@ def adjust(
     )
 
 
-def fit_poses(views: Views, state: BoardState) -> FloatArray:
+def fit_board_poses(views: Views, state: BoardState) -> FloatArray:
     """Return the residuals of views of which only the poses are fitted.
 
     Parameters
@@ -254,11 +151,6 @@ def view_information(
     names = ("",) * len(pixels)
     views = Views(board, names, pixels, (image_size,))
     return _eliminated(_system(views, state, _residuals(views, state)))[0]
-
-
-def board_points(board: Board, shape: FloatArray) -> FloatArray:
-    """Return the points of a board as it is, (N, 3), mm."""
-    return np.asarray(board.points + _deformations(board) @ shape)
 
 
 def _settled(
@@ -373,10 +265,10 @@ def _away(state: BoardState, origin: BoardState) -> FloatArray:
 
 
 def _moved(state: BoardState, step: FloatArray, poses_step: FloatArray) -> BoardState:
-    places = _places_at(state.cameras)
+    places = places_at(state.cameras)
     cameras = tuple(
         camera.with_intrinsics(camera.intrinsics + step[at])
-        for camera, at in zip(state.cameras, _intrinsics_at(state.cameras), strict=True)
+        for camera, at in zip(state.cameras, intrinsics_at(state.cameras), strict=True)
     )
     extrinsics = np.zeros((len(cameras), N_POSE))
     extrinsics[1:] = step[places].reshape(-1, N_POSE)
@@ -433,10 +325,10 @@ def _residuals(views: Views, state: BoardState) -> FloatArray:
 
 def _system(views: Views, state: BoardState, residuals: FloatArray) -> _System:
     turned, points = _points_cam(views.board, state)
-    deformations = _deformations(views.board)
+    deformations = deformations_of(views.board)
     seen = views.seen
     n_views, _, n_points, _ = views.pixels.shape
-    intrinsics_at, places = _intrinsics_at(state.cameras), _places_at(state.cameras)
+    cameras_at, places = intrinsics_at(state.cameras), places_at(state.cameras)
     n_shared = places.stop + N_SHAPE
     total = _System(
         residuals,
@@ -450,9 +342,7 @@ def _system(views: Views, state: BoardState, residuals: FloatArray) -> _System:
         X, R = points[:, c], state.rotations[c]
         by_point = camera.project_with_jacobian(X).jacobian
         shared = np.zeros((n_views, n_points, 2, n_shared))
-        shared[..., intrinsics_at[c]] = camera.intrinsics_jacobian(
-            X[..., :2] / X[..., 2:]
-        )
+        shared[..., cameras_at[c]] = camera.intrinsics_jacobian(X[..., :2] / X[..., 2:])
         if c > 0:
             at = places.start + N_POSE * (c - 1)
             arms = X - state.translations[c]
@@ -477,29 +367,14 @@ def _system(views: Views, state: BoardState, residuals: FloatArray) -> _System:
     return total
 
 
-@cache
-def _deformations(board: Board) -> FloatArray:
-    """Return how each error of a board moves its points, (N, 3, 5)."""
-    points = board.points
-    x, y = points[:, 0], points[:, 1]
-    u, v = x / np.abs(x).max(), y / np.abs(y).max()
-    moves = np.zeros((len(points), 3, N_SHAPE))
-    moves[:, 0, 0], moves[:, 1, 0] = 0.5 * x, -0.5 * y
-    moves[:, 0, 1], moves[:, 1, 1] = 0.5 * y, 0.5 * x
-    for k, bend in enumerate((u * u, u * v, v * v), 2):
-        moves[:, 2, k] = bend - bend.mean()
-    moves.flags.writeable = False
-    return moves
-
-
 def _prior(
     start: BoardState,
     tolerances: BoardTolerances,
     stated: tuple[FloatArray | None, ...],
 ) -> FloatArray:
-    places = _places_at(start.cameras)
+    places = places_at(start.cameras)
     information = np.zeros((places.stop + N_SHAPE,) * 2)
-    for at, known in zip(_intrinsics_at(start.cameras), stated, strict=False):
+    for at, known in zip(intrinsics_at(start.cameras), stated, strict=False):
         if known is not None:
             information[at, at] = known
     sigmas = np.repeat([tolerances.squareness, tolerances.flatness], [2, 3])
@@ -543,13 +418,3 @@ def _inverse(information: FloatArray) -> FloatArray:
 def _rms(residuals: FloatArray) -> float:
     finite = residuals[np.isfinite(residuals)]
     return float(np.sqrt(np.mean(np.square(finite)))) if len(finite) else 0.0
-
-
-def _intrinsics_at(cameras: tuple[Camera, ...]) -> list[slice]:
-    ends = np.cumsum([len(camera.intrinsics) for camera in cameras]).tolist()
-    return [slice(b, e) for b, e in zip([0, *ends[:-1]], ends, strict=True)]
-
-
-def _places_at(cameras: tuple[Camera, ...]) -> slice:
-    begin = sum(len(camera.intrinsics) for camera in cameras)
-    return slice(begin, begin + N_POSE * (len(cameras) - 1))

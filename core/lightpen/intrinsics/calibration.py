@@ -14,7 +14,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import N_SHAPE, BoardFit
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit
 from lightpen.intrinsics.distortion import (
     FEW,
     Choice,
@@ -23,7 +23,7 @@ from lightpen.intrinsics.distortion import (
     folds,
     rms_together,
 )
-from lightpen.intrinsics.start import start_camera, start_poses
+from lightpen.intrinsics.start import start_board_poses, start_camera
 from lightpen.intrinsics.uncertainty_map import error_fields
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
@@ -126,7 +126,7 @@ def calibrate_camera(
     """
     require_views(views)
     start = start_camera(views, FEW)
-    placed = np.isfinite(start_poses(start, views).translations[:, 0])
+    placed = np.isfinite(start_board_poses(start, views).translations[:, 0])
     views, unplaced = _parted(views, placed)
     require_views(views)
     first = fit_camera(views, tolerances, start)

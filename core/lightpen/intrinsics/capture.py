@@ -7,13 +7,14 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import N_SHAPE, BoardState, adjust
+from lightpen.intrinsics.adjustment import adjust_board
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardState
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.calibration import MIN_VIEWS
 from lightpen.intrinsics.coverage import cells_of
 from lightpen.intrinsics.distortion import FEW
 from lightpen.intrinsics.next_view import choose_next_view, first_views
-from lightpen.intrinsics.start import start_camera, start_poses
+from lightpen.intrinsics.start import start_board_poses, start_camera
 from lightpen.intrinsics.views import BoardTolerances, Views
 
 STILL = 0.0015  # of the image's longer side, from one look to the next, rms
@@ -98,11 +99,11 @@ def wanted_outline(capture: Capture) -> FloatArray:
         (camera,),
         np.eye(3)[None],
         np.zeros((1, 3)),
-        start_poses(camera, views),
+        start_board_poses(camera, views),
         np.zeros(N_SHAPE),
     )
     try:
-        fitted = adjust(views, state, BoardTolerances())
+        fitted = adjust_board(views, state, BoardTolerances())
         return choose_next_view(fitted, capture.board).outline
     except CalibrationError:  # they are alike
         return guesses[views.n_views % MIN_VIEWS]

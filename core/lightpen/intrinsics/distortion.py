@@ -13,15 +13,9 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import (
-    FINEST,
-    N_SHAPE,
-    BoardFit,
-    BoardState,
-    adjust,
-    fit_poses,
-)
-from lightpen.intrinsics.start import BoardPoses, start_poses
+from lightpen.intrinsics.adjustment import FINEST, adjust_board, fit_board_poses
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
+from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.uncertainty_map import error_fields
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
@@ -145,7 +139,7 @@ def fit_camera(
     state = BoardState(
         *((near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE))
     )
-    return adjust(views, state, tolerances, (known,))
+    return adjust_board(views, state, tolerances, (known,))
 
 
 def folds(camera: Camera) -> bool:
@@ -211,7 +205,7 @@ def _held_out(views: Views, tolerances: BoardTolerances, found: _Drawn) -> Float
         others, own = views.chosen(fold_of != fold), views.chosen(fold_of == fold)
         fitted = fit_camera(others, tolerances, found.camera, found.pull).state
         poses = _rough_poses(found.camera, own)
-        residuals = fit_poses(own, replace(fitted, poses=poses))
+        residuals = fit_board_poses(own, replace(fitted, poses=poses))
         squares = np.square(residuals).sum(axis=-1)
         errors[fold_of == fold] = np.sqrt(np.nanmean(squares, axis=(1, 2)))
     return errors
@@ -220,7 +214,7 @@ def _held_out(views: Views, tolerances: BoardTolerances, found: _Drawn) -> Float
 def _rough_poses(near: Camera, views: Views) -> BoardPoses:
     """Return the poses of the views, also by a camera that folds them."""
     try:
-        return start_poses(near, views)
+        return start_board_poses(near, views)
     except CalibrationError:
         straight = replace(near, distortion=np.zeros_like(near.distortion))
-        return start_poses(straight, views)
+        return start_board_poses(straight, views)

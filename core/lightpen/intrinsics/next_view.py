@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.adjustment import BoardFit, view_information
+from lightpen.intrinsics.adjustment import view_information
+from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.start import USUAL_FOCAL_LENGTH, BoardPoses
 from lightpen.intrinsics.uncertainty_map import error_fields

@@ -11,15 +11,10 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import (
-    N_SHAPE,
-    BoardFit,
-    BoardState,
-    adjust,
-    stated_information,
-)
+from lightpen.intrinsics.adjustment import adjust_board, stated_information
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
-from lightpen.intrinsics.start import BoardPoses, start_poses
+from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 from lightpen.model.rig import Rig, of_camera
@@ -194,7 +189,7 @@ def calibrate_pair(
         poses,
         np.zeros(N_SHAPE),
     )
-    fitted = adjust(views, state, tolerances, stated)
+    fitted = adjust_board(views, state, tolerances, stated)
     correlation = fitted.correlation
     correlation = correlation if correlation > SIGNIFICANT else 1.0
     rig = _rig(fitted, names, tolerances, correlation)
@@ -250,13 +245,15 @@ def _ordered(
     CalibrationError
         The views do not agree on that.
     """
-    first = start_poses(cameras[0], views)
+    first = start_board_poses(cameras[0], views)
     turned = []
     for order in views.board.orders:
         pixels = views.pixels.copy()
         pixels[:, 1] = pixels[:, 1][:, order]
         turned.append(replace(views, pixels=pixels))
-    places = [_between((first, start_poses(cameras[1], each, 1))) for each in turned]
+    places = [
+        _between((first, start_board_poses(cameras[1], each, 1))) for each in turned
+    ]
     rotations = np.stack([each.rotations[both] for each in places])
     translations = np.stack([each.translations[both] for each in places])
     n_places = rotations.shape[1]
@@ -301,8 +298,8 @@ def _alike(
 
 def _poses(views: Views, cameras: tuple[Camera, ...], place: BoardPoses) -> BoardPoses:
     """Return the poses in the rig, by the second camera where the first saw nothing."""
-    first = start_poses(cameras[0], views)
-    second = start_poses(cameras[1], views, 1)
+    first = start_board_poses(cameras[0], views)
+    second = start_board_poses(cameras[1], views, 1)
     R, t = place.rotations[0], place.translations[0]
     missing = np.isnan(first.translations[:, 0])
     return BoardPoses(
@@ -319,7 +316,7 @@ def _lag(
     What it sees elsewhere than the first has it goes with how the board moves there.
     """
     state = fitted.state
-    first = start_poses(state.cameras[0], views)
+    first = start_board_poses(state.cameras[0], views)
     points = fitted.board_points
     in_first = points @ np.swapaxes(first.rotations, 1, 2)
     in_first += first.translations[:, None]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.intrinsics.adjustment import BoardFit
+from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.model.camera import Camera
 
 COLUMNS, ROWS = 4, 3

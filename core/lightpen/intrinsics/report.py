@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.adjustment import BoardFit
+from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.calibration import CameraCalibration
 from lightpen.intrinsics.coverage import BoardCoverage, cover
 from lightpen.intrinsics.next_view import choose_next_view

@@ -56,7 +56,7 @@ def start_camera(views: Views, n_coefficients: int) -> Camera:
     )
 
 
-def start_poses(camera: Camera, views: Views, which: int = 0) -> BoardPoses:
+def start_board_poses(camera: Camera, views: Views, which: int = 0) -> BoardPoses:
     """Return the poses of the board before one of the cameras.
 
     Of the two that a far plane may have, each is the one that fits better [1]_.

@@ -1,1 +1,1 @@
-"""The images of a camera as they come, and a swing captured from them."""
+"""The images of a camera as they come, each looked at and handed on."""

@@ -26,14 +26,8 @@ from lightpen.cameras.protocol import (
     ImageCamera,
     Stats,
 )
-from lightpen.cameras.worker import (
-    LONGEST_STOP,
-    CameraWorker,
-    Failed,
-    FrameReady,
-    Troubled,
-    WorkerEvent,
-)
+from lightpen.cameras.worker import LONGEST_STOP, CameraWorker
+from lightpen.cameras.worker_events import Failed, FrameReady, Troubled, WorkerEvent
 from lightpen.detection.aim import Aim
 from lightpen.detection.reasons import MISHAPS
 from lightpen.detection.sighting import Sighting, look

@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 
 from lightpen.errors import FileError
-from lightpen.estimation.report import warnings_of
+from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.verdict import (
     Change,
     Verdict,

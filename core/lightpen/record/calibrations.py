@@ -24,7 +24,7 @@ from lightpen.formats.own_json import (
     Vector,
     has_checksum,
     in_shape,
-    parse_json,
+    parse_own_json,
 )
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.record.results import Row, has_head, parse_result
@@ -283,7 +283,7 @@ def record_tree(data: bytes, path: Path) -> tuple[dict[str, Any], bool]:
     except DamagedError as error:
         raise _changed(path) from error
     try:
-        return parse_json(data, dict[str, Any]), is_checked
+        return parse_own_json(data, dict[str, Any]), is_checked
     except DamagedError as error:
         raise _changed(path) if is_checked else _other(path) from error
 

@@ -3,15 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from importlib.metadata import version
 from pathlib import Path
 
 from msgspec import Struct
 
 from lightpen.errors import FileError
-from lightpen.estimation.report import plain, record_bytes
 from lightpen.formats.files import MEGABYTE, printable
 from lightpen.formats.hashes import InputFile
+from lightpen.formats.json_records import plain, record_bytes, record_heading
 from lightpen.formats.own_json import (
     DamagedError,
     Moment,
@@ -98,8 +97,7 @@ def keep_camera_trial(
     if found is not None:
         intrinsics = plain(intrinsics_record(found, (), BoardTolerances()))
     record = {
-        "program": {"name": "lightpen", "version": version("lightpen")},
-        "created": now.isoformat(timespec="seconds"),
+        **record_heading(now),
         "outcome": trial.outcome.value,
         "station": names.station,
         "operator": names.operator,

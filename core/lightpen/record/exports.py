@@ -13,9 +13,10 @@ from itertools import chain, count
 from pathlib import Path
 
 from lightpen.errors import NameTakenError
-from lightpen.estimation.report import calibration_record, record_bytes
+from lightpen.estimation.report import calibration_record
 from lightpen.estimation.verdict import AXES
 from lightpen.formats.files import create_whole
+from lightpen.formats.json_records import record_bytes
 from lightpen.model.origin import Origin
 from lightpen.record.names import LONGEST_WORD, UNFIT, Names
 from lightpen.record.reading import open_record, recorded_limits

@@ -26,7 +26,7 @@ from lightpen.formats.own_json import (
     Moment,
     Vector,
     has_checksum,
-    parse_json,
+    parse_own_json,
     require_path,
     require_usual,
 )
@@ -184,12 +184,12 @@ def read_entries(folder: Path) -> HeaderEntries:
     data = read_bytes(path, sentence("file.header", "record's header"), HEADER_LIMIT)
     try:
         is_sound = has_checksum(data)
-        number = parse_json(data, _Format).format
+        number = parse_own_json(data, _Format).format
         if number > RIG_FORMAT:
             raise _of_later_version(path, number)
         if number >= FIRST_WITH_CHECKSUMS and not is_sound:
             raise DamagedError("There is no checksum.")
-        return parse_json(data, HeaderEntries)
+        return parse_own_json(data, HeaderEntries)
     except DamagedError as error:
         raise damaged_file(path) from error
 

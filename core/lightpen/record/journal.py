@@ -20,7 +20,7 @@ from lightpen.formats.own_json import (
     Length,
     Vector,
     has_checksum,
-    parse_json,
+    parse_own_json,
     with_checksum,
 )
 from lightpen.sentences import sentence
@@ -226,7 +226,7 @@ def _parse_line(line: bytes, has_checksum_always: bool) -> Line:
     if not has_checksum(line) and has_checksum_always:
         raise DamagedError("There is no checksum.")
     # A union of classes is a type, but no class.
-    parsed: Line = parse_json(line, Line)  # type: ignore[arg-type]
+    parsed: Line = parse_own_json(line, Line)  # type: ignore[arg-type]
     return parsed
 
 

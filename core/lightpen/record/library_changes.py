@@ -13,9 +13,9 @@ import numpy as np
 from msgspec import structs, to_builtins
 
 from lightpen.errors import FileError, NameTakenError, UsageError
-from lightpen.estimation.report import record_bytes
 from lightpen.formats.files import MEGABYTE, create_whole, printable, read_bytes
 from lightpen.formats.image_headers import read_image_header
+from lightpen.formats.json_records import record_bytes
 from lightpen.record.numbered_files import add_numbered, make_folder
 from lightpen.record.supervision import (
     Signature,

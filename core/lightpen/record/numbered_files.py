@@ -14,10 +14,10 @@ from lightpen.formats.files import (
     FOLDER,
     create_whole,
     printable,
-    strerror,
     sync_folder,
     unreadable,
 )
+from lightpen.formats.system_reasons import strerror
 from lightpen.sentences import sentence
 
 

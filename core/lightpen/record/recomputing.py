@@ -22,7 +22,7 @@ from lightpen.detection.observations import Observations, leave_out, observe_cen
 from lightpen.detection.reasons import Reason
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.report import METHODS
+from lightpen.estimation.methods import METHODS
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import printable
 from lightpen.formats.hashes import InputFile, Inputs

@@ -24,9 +24,9 @@ from msgspec import Meta, Struct, to_builtins
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.estimation.report import json_bytes
 from lightpen.estimation.verdict import Change
 from lightpen.formats.files import printable
+from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,
@@ -34,7 +34,7 @@ from lightpen.formats.own_json import (
     Vector,
     has_checksum,
     in_shape,
-    parse_json,
+    parse_own_json,
     require_path,
     require_usual,
     with_checksum,
@@ -383,7 +383,7 @@ def parse_withdrawal(data: bytes, file: Path) -> Withdrawal:
     """
     try:
         _heading(data)
-        return parse_json(data, Withdrawal)
+        return parse_own_json(data, Withdrawal)
     except DamagedError as error:
         raise _damaged(file) from error
 
@@ -408,7 +408,7 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
         number = _heading(head).format
         if number > FORMAT:
             raise _of_later_version(file, number)
-        entries = parse_json(head if number > 1 else data, _Entries)
+        entries = parse_own_json(head if number > 1 else data, _Entries)
         if number >= FIRST_WITH_CHECKSUM:
             _require_digest(data[len(head) - 1 :], entries.calibration_sha256)
         return Result(
@@ -445,7 +445,7 @@ def _head_of(data: bytes) -> bytes:
 
 def _heading(head: bytes) -> Heading:
     is_sound = has_checksum(head)
-    heading = parse_json(head, Heading)
+    heading = parse_own_json(head, Heading)
     if heading.format >= FIRST_WITH_CHECKSUM and not is_sound:
         raise DamagedError("There is no checksum.")
     return heading
@@ -453,12 +453,12 @@ def _heading(head: bytes) -> Heading:
 
 def _calibration(data: bytes, number: int) -> Mapping[str, Any]:
     if number == 1:
-        first = parse_json(data, _Calibration1)
+        first = parse_own_json(data, _Calibration1)
         return {
             "tip_pen_mm": list(first.tip_pen_mm),
             "expanded_uncertainty_mm": list(first.expanded_uncertainty_mm),
         }
-    calibration = parse_json(data, _Whole).calibration
+    calibration = parse_own_json(data, _Whole).calibration
     in_shape(calibration, _Calibration)
     return calibration
 

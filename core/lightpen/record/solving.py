@@ -24,7 +24,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.camera_path import steadied
 from lightpen.estimation.joint import ContactModel, reduce
-from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, kept
+from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, with_content
 from lightpen.formats.pairing import Pairing
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector
@@ -172,8 +172,8 @@ def record_inputs(source: RecordSource) -> Inputs:
     if source.rig_file is not None:
         rig = RigInputs(hashed(source.rig_file), all_hashed(source.camera_files))
     return Inputs(
-        camera=kept(source.camera_files[0]),
-        pen=kept(source.pen_file),
+        camera=with_content(source.camera_files[0]),
+        pen=with_content(source.pen_file),
         observations=all_hashed([file for file in images if file.is_file()]),
         nominal_tip=source.pen.nominal_tip,
         rig=rig,

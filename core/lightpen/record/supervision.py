@@ -18,8 +18,8 @@ from pathlib import Path
 from msgspec import Struct, to_builtins
 
 from lightpen.errors import AcceptanceError, FileError
-from lightpen.estimation.report import record_bytes
 from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.json_records import record_bytes
 from lightpen.formats.own_json import (
     DamagedError,
     Moment,
@@ -64,6 +64,10 @@ class Supervision:
     def is_guarded(self) -> bool:
         """Whether it takes a supervisor to change limits and to go beyond them."""
         return bool(self.password_hash)
+
+    def limits_at(self, station: str, chosen: StationLimits) -> StationLimits:
+        """Return what holds at a station: what is laid down for it, or was chosen."""
+        return self.limits.get(station, chosen)
 
 
 class _SwingLimits(Struct):

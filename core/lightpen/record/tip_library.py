@@ -26,7 +26,7 @@ from lightpen.formats.own_json import (
     Moment,
     Vector,
     parse_checked,
-    parse_json,
+    parse_own_json,
     require_usual,
 )
 from lightpen.model.due_rule import DueRule
@@ -304,7 +304,7 @@ def read_change(file: Path) -> LibraryChange:
                     file=printable(str(file)),
                 )
             )
-        return parse_json(text, LibraryChange)
+        return parse_own_json(text, LibraryChange)
     except DamagedError as error:
         raise FileError(
             sentence(

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lightpen.errors import FileError
-from lightpen.formats.files import printable, strerror
+from lightpen.formats.files import printable
+from lightpen.formats.system_reasons import strerror
 from lightpen.record.header import HEADER
 from lightpen.record.journal import JOURNAL, last_verdict
 from lightpen.record.lock import is_locked

@@ -307,7 +307,7 @@ class RecordWriter:
         self._length += length
 
 
-def make_folder(root: Path, names: Names, now: datetime) -> Path:
+def make_record_folder(root: Path, names: Names, now: datetime) -> Path:
     """Make a folder for a record, with a name that none had.
 
     Of two programs that do so in the same second each gets its own.

@@ -81,7 +81,7 @@ class Held:
     is_away: bool
 
 
-class _Moment(NamedTuple):
+class _HeldPose(NamedTuple):
     lean: FloatArray  # tilt times its direction, then turn, rad
     offset: FloatArray  # mm
 
@@ -141,7 +141,7 @@ class Operator:
         self._pursuit = GUIDED
         self._slips: tuple[_Slip, ...] = ()
         self._covers: tuple[_Cover, ...] = ()
-        first = _Moment(self._lean, self._offset)
+        first = _HeldPose(self._lean, self._offset)
         self._moments = deque([first], maxlen=N_REMEMBERED)
 
     @property
@@ -294,7 +294,7 @@ class Operator:
                 self._wishes.pop(0).act()
             self._move_tip()
             self._move_lean()
-            self._moments.append(_Moment(self._lean, self._offset))
+            self._moments.append(_HeldPose(self._lean, self._offset))
 
     @property
     def _time(self) -> float:

@@ -267,10 +267,10 @@ def scene_truth(plan: ScenePlan, folder: str = "images/") -> Json:
 def _make_folder(images: Path, names: list[str]) -> None:
     try:
         images.mkdir(parents=True, exist_ok=True)
-        strangers = {path.name for path in images.iterdir()} - set(names)
+        others = {path.name for path in images.iterdir()} - set(names)
     except OSError as error:
         raise _no_folder(images, error) from error
-    if strangers:
+    if others:
         raise FileError(
             sentence(
                 "scene.other-files",
@@ -278,8 +278,8 @@ def _make_folder(images: Path, names: list[str]) -> None:
                 "{example}, which would get mixed up with the new images. Choose an "
                 "empty folder.",
                 folder=str(images),
-                n_files=len(strangers),
-                example=min(strangers),
+                n_files=len(others),
+                example=min(others),
             )
         )
 

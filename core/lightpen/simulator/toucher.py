@@ -18,7 +18,7 @@ DOWNWARDS = np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True)
-class _Wanted:
+class _TouchGoal:
     """A touch that the operator was led to."""
 
     task: TaskKind | None
@@ -64,12 +64,12 @@ class Toucher:
     def __init__(self, operator: Operator, artefacts: Artefacts | None = None) -> None:
         self._operator = operator
         self._artefacts = artefacts or Artefacts()
-        self._wanted: _Wanted | None = None
+        self._wanted: _TouchGoal | None = None
 
     def follow(self, setup: SessionSetup, state: SessionState) -> None:
         """Do what a state of the verification asks for; a lifted tip is put back."""
         n_runs = len(state.runs) + len(state.visits)
-        wanted = _Wanted(state.task(setup), n_runs, len(state.touches))
+        wanted = _TouchGoal(state.task(setup), n_runs, len(state.touches))
         is_lifted = self._operator.doing in (Doing.LIFTED, Doing.ABSENT)
         if wanted == self._wanted and not (is_lifted and wanted.task is not None):
             return

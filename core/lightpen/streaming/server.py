@@ -21,12 +21,14 @@ from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import StreamError
-from lightpen.formats.files import printable, strerror
+from lightpen.formats.files import printable
+from lightpen.formats.system_reasons import strerror
 from lightpen.sentences import Sentence, sentence
 from lightpen.streaming.messages import StreamedTip, pose_messages
 
 LOOPBACK = "127.0.0.1"  # reached by programs of this computer only
 PORT = 18944  # that clients of OpenIGTLink look for
+NO_PORT = sentence("stream.no-port", "there is no such port")
 LAST_PORT = 65535
 MOST_CLIENTS = 16
 ON_THE_WAY = 16_384  # bytes to a slow client, lest what it reads at last is old
@@ -152,7 +154,7 @@ class PoseStream:
                 )
             )
         if not 0 <= place.port <= LAST_PORT:
-            raise StreamError(_not_open(place, "there is no such port"))
+            raise StreamError(_not_open(place, NO_PORT))
         try:
             listener = _listener(place)
         except OSError as error:
@@ -306,7 +308,7 @@ def _why_not(place: StreamPlace, error: OSError) -> Sentence:
     return _not_open(place, strerror(error))
 
 
-def _not_open(place: StreamPlace, reason: str) -> Sentence:
+def _not_open(place: StreamPlace, reason: Sentence | str) -> Sentence:
     return sentence(
         "stream.not-open",
         "Nobody can listen at {place}: {reason}. Choose a port from 1024 to 65535 "

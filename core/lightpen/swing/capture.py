@@ -8,7 +8,7 @@ from lightpen.cameras.protocol import Stats
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.record.writing import OtherView, RecordWriter
-from lightpen.swing.rules import Transition, advance
+from lightpen.swing.rules import Transition, advance_swing
 from lightpen.swing.state import Happening, SwingSetup, SwingState
 
 Rule: TypeAlias = Callable[[SwingSetup, SwingState, Sighting, float], Transition]
@@ -62,7 +62,7 @@ def capture_image(
             f"The swing is at image {state.next_number}, the record at "
             f"{writer.next_number}."
         )
-    transition = (rule or advance)(setup, state, sighting, time)
+    transition = (rule or advance_swing)(setup, state, sighting, time)
     # The image last: if the disk fails before, state and record both go without it.
     for event in transition.events:
         if event.what is Happening.SLIPPED and event.numbers:

@@ -25,7 +25,7 @@ from lightpen.record.results import Result
 from lightpen.record.solving import Solution, solve_again, solve_record
 from lightpen.record.supervision import Signature
 from lightpen.record.unfinished import discard_swing
-from lightpen.record.writing import RecordWriter, make_folder, note_taken_out
+from lightpen.record.writing import RecordWriter, make_record_folder, note_taken_out
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.attendance import Attendance
 from lightpen.swing.intake import Intake
@@ -35,7 +35,7 @@ from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
 from lightpen.swing.rules import (
     Transition,
-    advance,
+    advance_swing,
     conclude,
     finish,
     has_enough,
@@ -185,7 +185,7 @@ class SwingCourse:
     def begin(self, preparation: Preparation) -> None:
         """Begin a new swing, or say why it cannot."""
         try:
-            folder = make_folder(self._records, preparation.names, self._now())
+            folder = make_record_folder(self._records, preparation.names, self._now())
             RecordWriter.create(folder, preparation.header()).close()
             self._enter(read_resumable(folder))  # so with the files as recorded
         except LightpenError as error:
@@ -273,7 +273,7 @@ class SwingCourse:
         """See whether the pen is held upright and still, by which its holder agrees."""
         setup = self._status.setup
         assert setup is not None
-        state = advance(setup, before, sighting, frame.host_ts_ns * 1e-9).state
+        state = advance_swing(setup, before, sighting, frame.host_ts_ns * 1e-9).state
         says_yes = stillness(state) == 1.0 and stillness(before) < 1.0
         events = (SwingEvent(Happening.CONFIRMED),) if says_yes else ()
         self._publish(replace(self._status, state=state), *events)

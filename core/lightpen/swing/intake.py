@@ -9,7 +9,7 @@ from lightpen.formats.decoding import encode_png
 from lightpen.record.reading import DISCARDED, Record
 from lightpen.record.writing import OtherView, RecordWriter
 from lightpen.swing.capture import Rule, capture_image
-from lightpen.swing.recorded import pass_over, read_image
+from lightpen.swing.recorded import pass_over, take_recorded_image
 from lightpen.swing.rules import Transition
 from lightpen.swing.state import Phase, SwingSetup, SwingState
 from lightpen.swing.tally import Tally
@@ -59,7 +59,7 @@ class Intake:
                 return self._wait(before, n_images)
             self._n_others = 0
             is_known = self._is_known(frame)
-            rule = partial(read_image, n_images=n_images, is_known=is_known)
+            rule = partial(take_recorded_image, n_images=n_images, is_known=is_known)
         time = frame.host_ts_ns * 1e-9
         return capture_image(
             *(setup, before, self._writer, frame.image, sighting, time),

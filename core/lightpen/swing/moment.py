@@ -10,7 +10,7 @@ from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
-from lightpen.estimation.rig_poses import in_rig
+from lightpen.estimation.rig_poses import poses_in_rig
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
 
@@ -89,7 +89,7 @@ def fit_moments(
         start = R @ rotations[at], translations[at] @ R.T + t
         poses = fit_poses(camera, pen, pixels[at, c], *start)
         cofactors = poses.covariances / poses.sigma**2
-        by_rig = in_rig(rig, c, poses.rotations, poses.translations, cofactors)
+        by_rig = poses_in_rig(rig, c, poses.rotations, poses.translations, cofactors)
         found.rotations[at], found.translations[at], found.cofactors[at] = by_rig
         found.sigmas[at] = poses.sigma
     return found
@@ -98,7 +98,7 @@ def fit_moments(
 def _posed_by(rig: Rig, sighting: Sighting, c: int) -> Sighting:
     """Return the sighting with the pose by the c-th camera."""
     seen = sighting.others[c - 1]
-    R, t, cofactors = in_rig(
+    R, t, cofactors = poses_in_rig(
         rig, c, seen.rotation[None], seen.translation[None], seen.cofactors[None]
     )
     return replace(

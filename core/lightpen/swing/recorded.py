@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.messages import images_read
@@ -26,7 +25,7 @@ from lightpen.swing.state import (
 )
 
 
-def read_image(
+def take_recorded_image(
     setup: SwingSetup,
     state: SwingState,
     sighting: Sighting,
@@ -53,7 +52,7 @@ def read_image(
     """
     state = replace(_further(state, n_images), time=time)
     events: tuple[SwingEvent, ...] = ()
-    flaw = _flaw(setup, sighting)
+    flaw = _flaw(sighting)
     if flaw is not Reason.NONE:
         state = _with_dropped(state, flaw)
     elif not is_known:
@@ -96,10 +95,8 @@ def _ended_by_last(transition: Transition) -> Transition:
     return Transition(ended.state, (*transition.events, *ended.events))
 
 
-def _flaw(setup: SwingSetup, sighting: Sighting) -> Reason:
+def _flaw(sighting: Sighting) -> Reason:
     """Return why an image cannot take part."""
-    if not sighting.has_pose:
-        return sighting.reason
-    if sighting.n_leds < certain_leds(setup.pen) or not np.isfinite(sighting.sigma):
-        return Reason.TOO_FEW_LEDS
-    return Reason.NONE
+    if sighting.has_pose and not np.isfinite(sighting.sigma):
+        return Reason.MISFIT
+    return sighting.reason

@@ -1,7 +1,7 @@
 """The rules of a swing: from one image to the next.
 
-`advance` takes the state of a swing, what the next image shows and when it was taken,
-and returns the new state and what happened. It has no clock and no threads of its own.
+`advance_swing` takes the state of a swing, what the next image shows and when it was
+taken, and returns the new state and what happened. It has no clock and no threads.
 The tip must rest in one place for a second before anything is kept. Then an image is
 kept where its posture differs from that of all kept ones and its tip is in the cone. A
 tip that leaves the cone costs the images that it spoils, and no others. The swing ends
@@ -87,7 +87,7 @@ class Transition:
     events: tuple[SwingEvent, ...] = ()
 
 
-def advance(
+def advance_swing(
     setup: SwingSetup, state: SwingState, sighting: Sighting, time: float
 ) -> Transition:
     """Take one more image.

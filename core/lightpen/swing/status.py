@@ -83,6 +83,11 @@ class SwingStatus:
         return state is not None and state.phase not in (Phase.SOLVING, Phase.VERDICT)
 
     @property
+    def is_recording(self) -> bool:
+        """Whether no more images can be captured: all were recorded before."""
+        return self.setup is not None and self.setup.is_recording
+
+    @property
     def is_solving(self) -> bool:
         """Whether a solution is being computed."""
         return self.activity is Activity.SOLVING

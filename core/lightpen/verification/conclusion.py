@@ -9,17 +9,15 @@ records of its session by their hashes, so that it stands for the whole.
 
 from dataclasses import dataclass
 from datetime import datetime
-from importlib.metadata import version
 from typing import Any
 
-from lightpen.estimation.report import plain
 from lightpen.formats.hashes import InputFile
+from lightpen.formats.json_records import file_entry, plain, record_heading
 from lightpen.model.origin import Origin
 from lightpen.record.names import Names
 from lightpen.record.outcome import TrialOutcome
 from lightpen.record.verifications import CONCLUSION
 from lightpen.verification.assessment import Conformity
-from lightpen.verification.keeping import file_entry
 
 
 @dataclass(frozen=True)
@@ -64,8 +62,7 @@ def conclusion_record(
     """
     found = conclusion.found
     return {
-        "program": {"name": "lightpen", "version": version("lightpen")},
-        "created": conclusion.at.isoformat(timespec="seconds"),
+        **record_heading(conclusion.at),
         "verification": CONCLUSION,
         "outcome": conclusion.outcome,
         "session": conclusion.session.isoformat(timespec="seconds"),

@@ -31,7 +31,7 @@ from lightpen.verification.conclusion import Conclusion
 from lightpen.verification.going_on import GoneOn, go_on_with
 from lightpen.verification.happenings import ending, happenings
 from lightpen.verification.live_touches import LiveTouches
-from lightpen.verification.other_choices import with_choices
+from lightpen.verification.other_choices import with_other_choices
 from lightpen.verification.recorded_runs import ReadRuns, read_runs
 from lightpen.verification.session import (
     SessionTransition,
@@ -362,7 +362,7 @@ class VerificationCourse:
         if setup is None or state is None:
             return
         before = state
-        setup, state = with_choices(setup, state, choices)
+        setup, state = with_other_choices(setup, state, choices)
         refusal = self._why_not(status.tip)
         self._status = replace(status, setup=setup, state=state, refusal=refusal)
         if state.touching is before.touching:

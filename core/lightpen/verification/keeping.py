@@ -10,8 +10,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from lightpen.estimation.report import record_bytes
 from lightpen.formats.hashes import InputFile
+from lightpen.formats.json_records import file_entry, record_bytes
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.numbered_files import add_numbered
@@ -153,8 +153,3 @@ def _entries(found: Found, tip: TipInForce) -> dict[str, Any]:
     if isinstance(found, Drift):
         return drift_entries(found)
     return length_entries(found, tip.instrument)
-
-
-def file_entry(file: InputFile) -> dict[str, str]:
-    """Return a file with its hash, as an entry of a record."""
-    return {"file": file.path.name, "sha256": file.sha256}

@@ -23,9 +23,9 @@ from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.bundle import Bundle
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.camera_path import steadied
+from lightpen.estimation.information import inverse
 from lightpen.estimation.joint import JointFit, fit_joint
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
-from lightpen.estimation.unknowns import inverse
 from lightpen.formats.files import printable
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera

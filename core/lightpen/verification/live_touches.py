@@ -4,7 +4,7 @@ from lightpen.cameras.protocol import Frame
 from lightpen.detection.aim import Aim
 from lightpen.detection.rig_pose import see_together
 from lightpen.detection.sighting import Sighting
-from lightpen.verification.session import SessionTransition, advance, rules_of
+from lightpen.verification.session import SessionTransition, advance_session, rules_of
 from lightpen.verification.session_state import SessionSetup, SessionState, with_drift
 from lightpen.verification.touch_images import TouchImages, is_held_on
 from lightpen.verification.touching import TouchPhase
@@ -52,7 +52,7 @@ class LiveTouches:
             self._lamps = self._lamps.with_frame(frame, sighting, aim)
         together = see_together(setup.instrument.rig, setup.instrument.pen, sighting)
         name = self._name(frame, together, setup, state)
-        transition = advance(self._drifted(setup, state), state, name, together)
+        transition = advance_session(self._drifted(setup, state), state, name, together)
         self._images.follow(state, transition)
         return transition
 

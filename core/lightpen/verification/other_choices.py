@@ -11,7 +11,7 @@ from lightpen.verification.session_state import (
 )
 
 
-def with_choices(
+def with_other_choices(
     setup: SessionSetup, state: SessionState, choices: VerificationChoices
 ) -> tuple[SessionSetup, SessionState]:
     """Return a verification as it goes on by other choices.

@@ -14,7 +14,7 @@ from lightpen.formats.own_json import (
     Moment,
     Vector,
     has_checksum,
-    parse_json,
+    parse_own_json,
 )
 from lightpen.sentences import Sentence, sentence
 from lightpen.verification.fixed_point import MIN_TOUCHES
@@ -68,7 +68,7 @@ def fixed_point_in(record: str) -> TouchedPoint | None:
     """
     try:
         return _touched(
-            parse_json(record.encode("utf-8", "surrogateescape"), _FixedPoint)
+            parse_own_json(record.encode("utf-8", "surrogateescape"), _FixedPoint)
         )
     except DamagedError:
         return None
@@ -100,7 +100,7 @@ def _read(path: Path, shape: type[T], what: Sentence) -> T:
     data = read_bytes(path, what, LIMIT)
     try:
         has_checksum(data)
-        return parse_json(data, shape)
+        return parse_own_json(data, shape)
     except DamagedError as error:
         raise FileError(
             sentence(

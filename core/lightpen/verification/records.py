@@ -1,12 +1,11 @@
 """Verifications as JSON records."""
 
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 from typing import Any
 
 from lightpen.estimation.instrument import Instrument
-from lightpen.estimation.report import plain
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.formats.json_records import plain, record_heading
 from lightpen.local_time import local_now
 from lightpen.verification.articulation import Articulation
 from lightpen.verification.assessment import Conformity
@@ -42,8 +41,7 @@ def verification_record(
         What it was made from.
     """
     record = {
-        "program": {"name": "lightpen", "version": version("lightpen")},
-        "created": local_now().isoformat(timespec="seconds"),
+        **record_heading(local_now()),
         "verification": kind,
         "coverage_factor": COVERAGE_FACTOR,
         "verdict": None

@@ -1,9 +1,9 @@
 """A whole verification in one go, without a key: fixed point, ring, length, postures.
 
-`advance` takes the state and what the next image shows. Each task ends by itself when
-its touches suffice, and the next begins when the pen moves on; live images and recorded
-ones go through the same steps. Touches that can be none of the task are dropped with a
-word on it, as nobody is at the screen to take them out.
+`advance_session` takes the state and what the next image shows. Each task ends by
+itself when its touches suffice, and the next begins when the pen moves on; live images
+and recorded ones go through the same steps. Touches that can be none of the task are
+dropped with a word on it, as nobody is at the screen to take them out.
 """
 
 from collections.abc import Sequence
@@ -49,9 +49,9 @@ from lightpen.verification.touching import (
     TouchEvent,
     TouchHappening,
     TouchRules,
+    advance_touch,
     taken_again,
 )
-from lightpen.verification.touching import advance as advance_touch
 from lightpen.verification.witness import judged_with
 
 NEW_PLACE = 3.0  # mm, on a ring
@@ -94,7 +94,7 @@ def setup_of(tip: TipInForce, choices: VerificationChoices) -> SessionSetup:
     )
 
 
-def advance(
+def advance_session(
     setup: SessionSetup, state: SessionState, name: str, sighting: Sighting
 ) -> SessionTransition:
     """Take one more image, and end the task at hand when its touches suffice."""

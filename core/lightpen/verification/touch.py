@@ -20,7 +20,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.pose import Poses, disc_residuals, normal_equations
 from lightpen.detection.reasons import Reason
-from lightpen.detection.rig_pose import fit_rig_poses, in_rig
+from lightpen.detection.rig_pose import derivatives_in_rig, fit_rig_poses
 from lightpen.estimation.instrument import Instrument
 from lightpen.estimation.pivot import GATE, MEDIAN_CHI, in_deviations, tip_covariances
 from lightpen.model.posture import UPRIGHT_AXIS
@@ -245,7 +245,7 @@ def point_sensitivities(instrument: Instrument, poses: Poses) -> FloatArray:
     return np.asarray(sensitivities)
 
 
-class _View(NamedTuple):
+class _Derivatives(NamedTuple):
     """How the centres in the images of a camera follow poses and parameters.
 
     Attributes
@@ -260,7 +260,7 @@ class _View(NamedTuple):
     by_parameters: FloatArray
 
 
-def _view(instrument: Instrument, c: int, poses: Poses) -> _View:
+def _view(instrument: Instrument, c: int, poses: Poses) -> _Derivatives:
     """Return how the images of the c-th camera follow poses rig_from_pen."""
     rig, pen, at = instrument.rig, instrument.pen, instrument.parameters
     camera, turn = rig.cameras[c], rig.rotations[c]
@@ -288,7 +288,7 @@ def _view(instrument: Instrument, c: int, poses: Poses) -> _View:
     for j in range(n_leds):
         own = slice(at.leds.start + 3 * j, at.leds.start + 3 * j + 3)
         K[:, j, :, own] = by_led[:, j]
-    return _View(in_rig(J, turn), K)
+    return _Derivatives(derivatives_in_rig(J, turn), K)
 
 
 def _pooled_sigma(instrument: Instrument, poses: Poses) -> float:

@@ -22,7 +22,7 @@ from lightpen.record.journal import JOURNAL
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, Record, image_name, open_record
 from lightpen.record.verifications import TOUCHES
-from lightpen.record.writing import OtherView, RecordWriter, make_folder
+from lightpen.record.writing import OtherView, RecordWriter, make_record_folder
 from lightpen.verification.choices import TaskKind
 from lightpen.verification.session import SessionTransition
 from lightpen.verification.session_state import SessionState, n_done
@@ -219,4 +219,4 @@ def is_held_on(rules: TouchRules, state: SessionState) -> bool:
 
 def new_record(root: Path, names: Names, header: Header) -> NewRecord:
     """Make a folder for the images of a run below that of the verifications."""
-    return NewRecord(make_folder(root / TOUCHES, names, header.created), header)
+    return NewRecord(make_record_folder(root / TOUCHES, names, header.created), header)

@@ -1,11 +1,11 @@
 """Taking touches by themselves: a point is taken when the pen is held still on it.
 
-`advance` takes the state and what the next image shows, and returns the new state and
-what happened. It has no clock and no threads: live images and recorded ones go through
-the same steps. The pen is still while its tip stays within the noise of its images and
-its posture hardly turns. One image that disagrees is left out and named; a second one
-means that the pen has moved, and what was held so far counts no more. After a touch the
-pen must move on before the next one begins.
+`advance_touch` takes the state and what the next image shows, and returns the new state
+and what happened. It has no clock and no threads: live images and recorded ones go
+through the same steps. The pen is still while its tip stays within the noise of its
+images and its posture hardly turns. One image that disagrees is left out and named; a
+second one means that the pen has moved, and what was held so far counts no more. After
+a touch the pen must move on before the next one begins.
 """
 
 from collections.abc import Iterable
@@ -140,7 +140,7 @@ class TouchTransition:
     events: tuple[TouchEvent, ...] = ()
 
 
-def advance(
+def advance_touch(
     instrument: Instrument,
     rules: TouchRules,
     state: TouchState,
@@ -177,7 +177,7 @@ def take_all(
     """Take recorded images (name, sighting), one after the other."""
     state = TouchState()
     for name, sighting in images:
-        state = advance(instrument, rules, state, name, sighting).state
+        state = advance_touch(instrument, rules, state, name, sighting).state
     return state
 
 

@@ -31,7 +31,7 @@ from lightpen.formats.own_json import (
     Digest,
     Moment,
     parse_checked,
-    parse_json,
+    parse_own_json,
     require_usual,
     with_checksum,
 )
@@ -280,7 +280,7 @@ def written_since(folder: Path, under_way: UnderWay) -> WrittenSince:
         if file.name in under_way.files:
             break
         try:
-            record = parse_json(read_bytes(file, WHAT, 64 * MEGABYTE), _OfSession)
+            record = parse_own_json(read_bytes(file, WHAT, 64 * MEGABYTE), _OfSession)
         except (FileError, DamagedError):
             continue  # whoever reads the archive tells it
         if record.created < under_way.began.replace(microsecond=0):

@@ -14,7 +14,7 @@ from typing_extensions import override
 
 from lightpen.cameras.protocol import CameraSettings, Frame
 from lightpen.cameras.replay import ReplayCamera
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.formats.decoding import encode_png
 from lightpen.live.sources import Surroundings
 from lightpen.record.reading import open_record

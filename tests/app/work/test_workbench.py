@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import CameraFile, PenFile

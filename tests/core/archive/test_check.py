@@ -17,7 +17,7 @@ from lightpen.archive.database import look_into
 from lightpen.archive.entries import text_sha256
 from lightpen.archive.seal import close_sealed, read_seal, seal_of
 from lightpen.errors import ArchiveError
-from lightpen.estimation.report import json_bytes
+from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import with_checksum
 
 N_FLIPS = 60

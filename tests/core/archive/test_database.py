@@ -164,6 +164,15 @@ def test_an_archive_that_is_not_there_is_said_to_be_missing(tmp_path: Path) -> N
         look_into(tmp_path / "archive.sqlite")
 
 
+@pytest.mark.parametrize("opening", [look_into, open_file])
+def test_an_archive_that_may_not_be_looked_at_is_told(
+    tmp_path: Path, opening: Callable[[Path], Database]
+) -> None:
+    path = tmp_path / (300 * "x") / "archive.sqlite"  # no system has names so long
+    with pytest.raises(ArchiveError, match="xxx"):
+        opening(path)
+
+
 def test_an_archive_that_was_cut_off_while_it_was_made_is_empty_and_made_anew(
     tmp_path: Path,
 ) -> None:

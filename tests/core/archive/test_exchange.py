@@ -1,15 +1,17 @@
 """Entries travel by a file, and what is there already is passed over."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from sqlalchemy import text
 from tests.core.archive.conftest import Station
 
 from lightpen.archive.chains import entries_of, heads, records_of
 from lightpen.archive.check import check_archive
-from lightpen.archive.exchange import export_entries, import_entries
-from lightpen.errors import FileError, NameTakenError
+from lightpen.archive.exchange import deliver, export_entries, import_entries
+from lightpen.errors import ArchiveError, FileError, NameTakenError
 
 
 def test_what_is_exported_is_taken_up_once(
@@ -48,6 +50,20 @@ def test_all_chains_travel_on(
     }
 
 
+def test_an_export_is_on_the_disk_whole(
+    station: Station, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    station.enter(3)
+    lengths: list[int] = []
+    monkeypatch.setattr(
+        "os.fsync", lambda descriptor: lengths.append(os.fstat(descriptor).st_size)
+    )
+
+    export_entries(station.database, tmp_path / "all.jsonl")
+
+    assert lengths == [(tmp_path / "all.jsonl").stat().st_size]
+
+
 def test_an_export_replaces_no_file(station: Station, tmp_path: Path) -> None:
     file = tmp_path / "all.jsonl"
     file.write_text("mine")
@@ -83,3 +99,35 @@ def test_nothing_is_taken_up_of_a_file_that_is_not_whole(
     with pytest.raises(FileError, match=f"line {line}"):
         import_entries(there.database, file)
     assert [head.number for head in heads(there.database)] == [0]
+
+
+def test_nothing_is_taken_up_of_the_chains_before_a_damaged_one(
+    make_station: Callable[[str], Station], tmp_path: Path
+) -> None:
+    first, second, third = map(make_station, ("Hall 2", "Hall 3", "Hall 4"))
+    file = tmp_path / "first"
+    for station in (first, second):
+        station.enter(1)
+    export_entries(first.database, file)
+    import_entries(second.database, file)
+    export_entries(second.database, tmp_path / "both")
+    lines = (tmp_path / "both").read_text().splitlines(keepends=True)
+    (tmp_path / "both").write_text("".join([*lines[:-1], "Regards\n"]))
+
+    with pytest.raises(FileError, match="line 4"):
+        import_entries(third.database, tmp_path / "both")
+    assert [head.number for head in heads(third.database)] == [0]
+
+
+def test_a_server_with_another_last_entry_is_told_though_nothing_is_new(
+    make_station: Callable[[str], Station],
+) -> None:
+    here, server = make_station("Hall 2"), make_station("server")
+    here.enter(2)
+    assert deliver(here.database, here.chain, server.database).n_new == 2
+    other = text("UPDATE archive_entries SET sha256 = 'another' WHERE number = 2")
+    with server.database.writing() as connection:
+        connection.execute(other)
+
+    with pytest.raises(ArchiveError, match="entry 2"):
+        deliver(here.database, here.chain, server.database)

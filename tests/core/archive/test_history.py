@@ -160,6 +160,8 @@ def test_a_tip_is_due_by_its_age_or_by_the_swings_of_its_pen(station: Station) -
         swing = accepted(n, tip="T-11")[0]
         other = structs.replace(swing, kind=Kind.REFUSED, swing=f"swing-{n}")
         enter(station, other)
+    practice = accepted(4, tip="T-11")[0]
+    enter(station, structs.replace(practice, origin=Origin.SIMULATED))
     (tip,) = due_tips(station.database, station.chain, DueRule(30, 4))
     assert (tip.n_swings, tip.n_left) == (3, 1)
     assert tip.due == NOON + timedelta(days=30)

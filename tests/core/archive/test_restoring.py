@@ -85,6 +85,7 @@ def test_a_restored_tip_is_as_old_as_its_calibration(
     assert tip.entry == entries(logbook)[-1]
     assert tip.calibrated == first.entry.event.at
     assert tip.due == first.entry.event.at + timedelta(days=30)
+    assert tip.n_swings == 1  # that of the second calibration
 
 
 def test_a_tip_that_was_retired_is_not_restored(data: Path, logbook: Logbook) -> None:

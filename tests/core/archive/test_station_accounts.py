@@ -14,9 +14,9 @@ from lightpen.archive.check import check_archive
 from lightpen.archive.database import look_into
 from lightpen.archive.entries import Event, Kind
 from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.estimation.report import record_bytes
 from lightpen.estimation.verdict import Grade
 from lightpen.formats.hashes import InputFile
+from lightpen.formats.json_records import record_bytes
 from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.camera_calibrations import CameraTrial, keep_camera_trial

@@ -28,8 +28,8 @@ from lightpen.cameras.protocol import (
     FrameIncomplete,
     Region,
 )
-from lightpen.cameras.worker import (
-    CameraWorker,
+from lightpen.cameras.worker import CameraWorker
+from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
     Failed,

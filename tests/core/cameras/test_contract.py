@@ -25,12 +25,8 @@ from lightpen.cameras.protocol import (
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.source import SourcePlace
 from lightpen.cameras.sources import source_named
-from lightpen.cameras.worker import (
-    CameraWorker,
-    Connection,
-    ConnectionChanged,
-    WorkerEvent,
-)
+from lightpen.cameras.worker import CameraWorker
+from lightpen.cameras.worker_events import Connection, ConnectionChanged, WorkerEvent
 from lightpen.formats.decoding import encode_png
 from lightpen.model.camera import Camera
 from lightpen.simulator.camera import SimulatedCamera

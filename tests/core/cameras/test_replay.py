@@ -276,6 +276,35 @@ def test_an_image_of_another_depth_is_refused(tmp_path: Path) -> None:
         camera.read(1.0)
 
 
+@pytest.mark.parametrize(
+    "spoiled",
+    [
+        b"no image",
+        encode_png(np.zeros((10, 10), np.uint8)),
+        encode_png(np.zeros((20, 30), np.uint16)),
+    ],
+    ids=["unreadable", "of another size", "of another depth"],
+)
+def test_a_first_image_unlike_the_others_costs_none_but_itself(
+    tmp_path: Path, spoiled: bytes
+) -> None:
+    write_images(tmp_path)
+    (tmp_path / "frame_0.png").write_bytes(spoiled)
+    camera = opened(tmp_path)
+
+    assert (camera.caps.width, camera.caps.height) == (30, 20)
+    with pytest.raises(FrameIncomplete, match=r"frame_0\.png"):
+        camera.read(1.0)
+    assert [frame.seq for frame in read_all(camera)] == [1, 2, 3, 4]
+
+
+def test_a_folder_of_which_no_image_can_be_read_is_not_found(tmp_path: Path) -> None:
+    for name in ("1.png", "2.png"):
+        (tmp_path / name).write_bytes(b"no image")
+    with pytest.raises(DeviceNotFound, match=r"1\.png"):
+        ReplayCamera(str(tmp_path)).open()
+
+
 def test_exposure_and_gain_of_recorded_images_cannot_be_changed(tmp_path: Path) -> None:
     write_images(tmp_path)
     camera = opened(tmp_path)

@@ -26,8 +26,8 @@ from lightpen.cameras.protocol import (
     sealed,
 )
 from lightpen.cameras.replay import ReplayCamera
-from lightpen.cameras.worker import (
-    CameraWorker,
+from lightpen.cameras.worker import CameraWorker, is_too_slow
+from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
     Ended,
@@ -37,7 +37,6 @@ from lightpen.cameras.worker import (
     SettingsApplied,
     Troubled,
     WorkerEvent,
-    is_too_slow,
 )
 from lightpen.formats.decoding import encode_png
 from lightpen.model.camera import Camera

@@ -50,7 +50,7 @@ class Loop:
             )
             assert seen.spots is not None
             before = now
-            now = now.fed(frame, seen.spots, inspect(seen.spots, seen.labels), caps)
+            now = now.after(frame, seen.spots, inspect(seen.spots, seen.labels), caps)
             if now.outcome is not Standing.ADJUSTING:
                 return now
             if now.asked != before.asked:
@@ -100,6 +100,26 @@ def test_leds_that_stay_too_dark_or_too_bright_are_said_to_be() -> None:
         assert loop.run(caps).outcome is outcome
 
 
+def test_the_least_light_that_saturates_is_remembered() -> None:
+    loop = Loop(settings=CameraSettings(exposure_us=4000.0))
+    loop.camera.operator.seat()
+    for _ in range(40):  # until it is seated
+        frame = loop.camera.read(1.0)
+        seen = look(frame.image, SCENE.camera, SCENE.pen)
+        assert seen.spots is not None
+        leds = inspect(seen.spots, seen.labels)
+        if leds.exposure.n_saturated:
+            break
+    assert leds.exposure.n_saturated
+    assert seen.spots is not None
+    begun = AutoExposure.begun(loop.settings)
+
+    for known, least in ((np.inf, 4000.0), (5000.0, 4000.0), (3000.0, 3000.0)):
+        now = replace(begun, saturating=known)
+        now = now.after(frame, seen.spots, leds, loop.camera.caps)
+        assert now.saturating == pytest.approx(least)
+
+
 def test_without_leds_it_gives_up_and_changes_nothing() -> None:
     loop = Loop()
     found = loop.run()
@@ -117,5 +137,5 @@ def test_images_of_another_exposure_are_passed_over() -> None:
     spots = look(frame.image, SCENE.camera, SCENE.pen).spots
     assert spots is not None
 
-    assert now.fed(frame, spots, inspect(spots), loop.camera.caps) is now
+    assert now.after(frame, spots, inspect(spots), loop.camera.caps) is now
     assert np.isinf(now.saturating)

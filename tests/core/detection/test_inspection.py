@@ -43,7 +43,7 @@ def lamps(*centers: tuple[float, float], radius: float = 8.0) -> Spots:
 def searched(images: Sequence[Spots], n_with_pen: int = 0) -> StraySearch:
     search = StraySearch()
     for i, spots in enumerate(images):
-        search = search.fed(spots, shows_pen=i < n_with_pen)
+        search = search.after(spots, shows_pen=i < n_with_pen)
     return search
 
 
@@ -146,7 +146,7 @@ def test_a_search_is_over_after_enough_images() -> None:
     search = searched([NOTHING] * (SEARCHED_IMAGES - 1))
 
     assert not search.is_over
-    assert search.fed(NOTHING, shows_pen=False).is_over
+    assert search.after(NOTHING, shows_pen=False).is_over
 
 
 def test_a_search_beside_the_covered_pen_finds_the_lamp() -> None:

@@ -150,6 +150,22 @@ def test_an_image_noisier_than_the_others_promises_less(times: float) -> None:
     assert np.mean(squares[~noisy]) == pytest.approx(6, abs=1.5)
 
 
+def test_a_wrong_led_does_not_count_as_noise_of_its_image() -> None:
+    truth = swing(20)
+    clean = centers(truth, 0.03)
+    spoilt = clean.copy()
+    spoilt[3, 4, 0] += 30.0
+
+    one, other = (
+        fit_poses(CAMERA, PEN, pixels, truth.rotations, truth.translations)
+        for pixels in (clean, spoilt)
+    )
+
+    # An LED less, and what the loss leaves of it; 30 px as noise would make it 400.
+    ratios = np.diag(other.covariances[3]) / np.diag(one.covariances[3])
+    assert (np.sqrt(ratios) < 3).all()
+
+
 def test_the_noise_is_found() -> None:
     truth = swing(200)
     fit = fit_poses(

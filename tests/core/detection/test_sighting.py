@@ -9,6 +9,7 @@ from lightpen.arrays import Image
 from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import look, sight_centers
+from lightpen.detection.spots import Flaw
 from lightpen.simulator.image_plans import ImagePlan, live_plan, render_plan
 from lightpen.simulator.scenes import Scene
 
@@ -77,6 +78,45 @@ def test_masked_light_is_not_seen() -> None:
     np.testing.assert_array_equal(
         np.isnan(masked.pixels[:, 0]), np.arange(SCENE.pen.n_leds) == 4
     )
+
+
+def test_masked_light_is_not_seen_where_the_pen_is_followed() -> None:
+    image, _ = seen(1.0)
+    before = look(image, SCENE.camera, SCENE.pen)
+    circle = np.array([[*before.pixels[4], 40.0]])
+    followed = look(image, SCENE.camera, SCENE.pen, circle, before, is_followed=True)
+    np.testing.assert_array_equal(
+        np.isnan(followed.pixels[:, 0]), np.arange(SCENE.pen.n_leds) == 4
+    )
+
+
+def test_the_area_of_a_saturated_led_is_not_known() -> None:
+    sighting = look(seen(1.0)[0], SCENE.camera, SCENE.pen)
+    assert sighting.spots is not None
+    assert sighting.labels is not None
+    assert np.isfinite(sighting.areas).all()
+    flaws = sighting.spots.flaws.copy()
+    flaws[sighting.labels.spot[4]] |= Flaw.SATURATED
+    glaring = replace(sighting, spots=replace(sighting.spots, flaws=flaws))
+    np.testing.assert_array_equal(
+        np.isnan(glaring.areas), np.arange(SCENE.pen.n_leds) == 4
+    )
+
+
+def test_the_width_of_the_rims_is_that_of_the_leds_alone() -> None:
+    sighting = look(seen(1.0)[0], SCENE.camera, SCENE.pen)
+    assert sighting.spots is not None
+    assert sighting.labels is not None
+    labelled = sighting.labels.spot.copy()
+    lamp, labelled[4] = labelled[4], -1
+    widths = sighting.spots.edge_widths.copy()
+    widths[lamp] = 100.0
+    beside_lamp = replace(
+        sighting,
+        spots=replace(sighting.spots, edge_widths=widths),
+        labels=replace(sighting.labels, spot=labelled),
+    )
+    assert beside_lamp.edge_width == pytest.approx(np.delete(widths, lamp).mean())
 
 
 def test_a_dark_image_is_empty() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.pose import NOISE_FLOOR
+from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle import Bundle, fit_bundle
 from lightpen.estimation.joint import TURN_RIDGE
 from lightpen.estimation.linearised import (
@@ -19,7 +20,7 @@ from lightpen.estimation.linearised import (
     views_at,
 )
 from lightpen.estimation.priors import priors_of
-from lightpen.estimation.unknowns import forms_of
+from lightpen.estimation.seat_forms import forms_of
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -224,6 +225,42 @@ def test_exact_centres_and_files_give_the_exact_tip(rig: Rig) -> None:
     np.testing.assert_allclose(bundle.state.tip_pen, swing.tip_pen, atol=1e-6)
     np.testing.assert_allclose(bundle.state.cone_rig, swing.cone_cam, atol=1e-5)
     assert bundle.sigma == NOISE_FLOOR
+
+
+def test_led_errors_and_a_jitter_are_found_wherever_the_fit_begins() -> None:
+    rng = np.random.default_rng(1)
+    swing = swing_poses(30, np.random.default_rng(0))
+    measured = replace(perturbed_pen(PEN, 0.03, rng), led_sigma=None)
+    seat = 0.02 * rng.standard_normal((30, 3))
+    shaken = replace(swing, translations=swing.translations + seat)
+    pixels = simulate_rig_centers(rig_of(CAMERA), PEN, shaken, 0.03, rng)
+    far = replace(
+        swing,
+        tip_pen=swing.tip_pen + rng.standard_normal(3),
+        cone_cam=swing.cone_cam + rng.standard_normal(3),
+        rotations=rotation_from_vector(0.005 * rng.standard_normal((30, 3)))
+        @ swing.rotations,
+    )
+
+    one, other = (
+        adjusted(rig_of(CAMERA), measured, start, pixels) for start in (swing, far)
+    )
+
+    for each in (one, other):
+        assert each.components.leds.sigma == pytest.approx(0.03, rel=0.4)
+        jitter = each.components.jitter.covariance
+        assert jitter is not None
+        assert np.sqrt(np.diag(jitter)[:2]) == pytest.approx(0.02, rel=0.4)
+    np.testing.assert_allclose(one.state.tip_pen, other.state.tip_pen, atol=1e-4)
+
+
+def test_centres_that_are_of_no_pen_are_refused() -> None:
+    rng = np.random.default_rng(1)
+    swing = swing_poses(20, rng)
+    pixels = simulate_rig_centers(rig_of(CAMERA), PEN, swing, 50.0, rng)
+
+    with pytest.raises(CalibrationError, match="did not settle"):
+        adjusted(rig_of(CAMERA), PEN, swing, pixels)
 
 
 def test_the_tip_and_the_cone_scatter_as_their_covariance_says() -> None:

@@ -12,7 +12,7 @@ from lightpen.detection.observations import Observations, observe_centers
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.camera_path import follow_lamps
-from lightpen.estimation.report import warnings_of
+from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.verdict import Grade, NextStep, judge
 from lightpen.formats.observation_files import Centers
 from lightpen.messages import Code

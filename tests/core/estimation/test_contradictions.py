@@ -10,7 +10,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contradictions import DIAMETER, Contradiction
-from lightpen.estimation.report import warnings_of
+from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.verdict import Grade, NextStep, judge
 from lightpen.formats.observation_files import Centers
 from lightpen.messages import Code

@@ -15,7 +15,7 @@ from lightpen.estimation.disc_diameter import (
     read_diameter,
 )
 from lightpen.estimation.linearised import BundleState
-from lightpen.estimation.report import warnings_of
+from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.uncertainty import ShareName
 from lightpen.estimation.verdict import Grade, judge
 from lightpen.formats.observation_files import Centers
@@ -93,6 +93,17 @@ def test_an_led_that_looks_small_does_not_pull_the_diameter() -> None:
 
     assert reading is not None
     assert reading.value == pytest.approx(PEN.diameter, rel=1e-6)
+
+
+def test_areas_that_scatter_make_the_diameter_less_certain() -> None:
+    areas = true_areas()
+    areas[:, ::2] *= 1.1**2
+    areas[:, 1::2] *= 0.9**2
+    widths = np.full((len(SWING), 1), RIM)
+    reading = read_diameter(state_with(10.0), areas[:, None], widths)
+
+    assert reading is not None
+    assert reading.sigma > 0.1 * PEN.diameter
 
 
 def test_few_areas_tell_nothing() -> None:

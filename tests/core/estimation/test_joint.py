@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.joint import ContactModel, JointFit, fit_joint
+from lightpen.estimation.joint import ContactModel, JointFit, fit_joint, gate
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import (
     Swing,
@@ -204,3 +204,13 @@ def test_images_added_one_by_one_give_the_fit_of_all() -> None:
         )
 
     np.testing.assert_allclose(growing.tip_pen, fit(truth, pixels).tip_pen, atol=1e-6)
+
+
+def test_an_image_of_three_leds_counts_and_one_of_two_does_not() -> None:
+    residuals = 0.03 * np.random.default_rng(0).standard_normal((10, 8, 2))
+    residuals[3, 3:] = np.nan
+    residuals[4, 2:] = np.nan
+
+    np.testing.assert_array_equal(
+        gate(residuals).sum(axis=1), [8, 8, 8, 3, 0, 8, 8, 8, 8, 8]
+    )

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.noise_correlation import lag1
-from lightpen.estimation.report import warnings_of
+from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.uncertainty import ShareName
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
@@ -72,17 +73,16 @@ def test_independent_noise_is_taken_as_such() -> None:
     assert sum(budget.correlation_factor > 1 for budget in results) <= 2
 
 
-@pytest.mark.parametrize("n_images", [15, 30, 60])
-def test_u_covers_the_tip_whose_noise_lasts(n_images: int) -> None:
-    n_runs = 24
+def test_u_covers_the_tip_whose_noise_lasts() -> None:
     inside = []
-    for seed in range(n_runs):
+    for n_images, seed in product((15, 30, 60), range(24)):
         swing, result = of_noise(n_images, 0.9, seed)
         error = np.abs(result.joint.tip_pen - swing.tip_pen)
         inside.append(error <= result.budget.expanded_uncertainty[:3])
 
-    # 90 % of 24 along each axis, less three standard deviations of 6.1 %.
-    assert (np.mean(inside, axis=0) >= 0.71).all()
+    # 95 % of 72 along each axis, less three standard deviations of 2.6 %. Where the
+    # correlation is not measured, the scatter between blocks alone covers 78 %.
+    assert (np.mean(inside, axis=0) >= 0.87).all()
 
 
 def test_noise_that_lasts_is_not_counted_again_as_errors_of_leds_and_drift() -> None:

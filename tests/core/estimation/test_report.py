@@ -12,15 +12,13 @@ import pytest
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.pivot_calibration import calibrate_pivot
-from lightpen.estimation.report import (
-    calibration_record,
-    json_bytes,
-    pivot_record,
-    warnings_of,
-)
+from lightpen.estimation.pivot_report import pivot_record
+from lightpen.estimation.report import calibration_record
+from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.summary import calibration_text, pivot_text
 from lightpen.estimation.verdict import Verdict, judge
 from lightpen.formats.hashes import InputFile, Inputs
+from lightpen.formats.json_records import json_bytes
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits

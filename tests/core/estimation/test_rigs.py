@@ -12,7 +12,8 @@ from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_observations import observe_rig_centers
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
-from lightpen.estimation.report import calibration_record, warnings_of
+from lightpen.estimation.report import calibration_record
+from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.summary import calibration_text
 from lightpen.estimation.uncertainty import ShareName
 from lightpen.estimation.verdict import Grade, judge

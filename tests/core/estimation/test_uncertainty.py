@@ -18,6 +18,7 @@ from lightpen.estimation.uncertainty import (
     ShareName,
     combine,
     compare_halves,
+    shares_of,
 )
 from lightpen.formats.observation_files import Centers
 from lightpen.model.assumptions import USUAL
@@ -168,18 +169,24 @@ def test_halves_differ_as_predicted() -> None:
 
 def test_halves_agree_with_two_fits_of_half_the_images() -> None:
     errors = 0.05 * noise(1)
+    errors[1::2, :4] = np.nan  # so that one half knows more than the other
     odd, even = (
         fit_joint(
             CAMERA,
             PEN,
             seen(errors)[k::2],
             *(SWING.rotations[k::2], SWING.tip_pen, SWING.cone_cam),
-        ).tip_pen
+        )
         for k in (0, 1)
     )
 
+    halves = compare_halves(fit(errors))
+
+    np.testing.assert_allclose(halves.difference, odd.tip_pen - even.tip_pen, atol=2e-4)
+    variances = np.diag(odd.covariance + even.covariance)[:3]
+    # Each half has a noise of its own.
     np.testing.assert_allclose(
-        compare_halves(fit(errors)).difference, odd - even, atol=2e-4
+        halves.expanded_uncertainty, 2 * np.sqrt(variances), rtol=0.05
     )
 
 
@@ -203,6 +210,18 @@ def test_the_shares_add_up_to_the_covariance() -> None:
                 np.diag(bundle.covariance[:6, :6] - of_seat),
                 rtol=1e-3,
             )
+
+
+def test_what_holding_back_from_a_likely_error_changes_is_a_share() -> None:
+    adjustment = adjusted(calibrated(0.05 * noise(8, n_images=40)))
+    changed = np.array([0.01, -0.02, 0.03, 0.0, 0.0, 0.0])
+
+    *_, last = shares_of(
+        adjustment.allowed, adjustment.priors, 40, np.eye(6), held_back=changed
+    )
+
+    assert last.name is ShareName.HELD_BACK
+    np.testing.assert_allclose(last.standard_uncertainty, np.abs(changed[:3]))
 
 
 def test_the_camera_has_the_share_by_which_a_perfect_one_would_shrink_u() -> None:

@@ -9,7 +9,7 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.report import warnings_of
+from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.uncertainty import Halves, Share, ShareName
 from lightpen.estimation.variance_components import Component
 from lightpen.estimation.verdict import (

@@ -408,3 +408,10 @@ def in_other_process(preparation: str, call: str) -> str:
 def as_nobody(call: str) -> str:
     """Return the text of the FileError of a call without the rights of root."""
     return in_other_process("os.setuid(65534)" if os.geteuid() == 0 else "", call)
+
+
+@pytest.mark.parametrize("name", ["camera\0.yaml", "camera\ud800.yaml"])
+def test_a_name_that_no_file_can_have_is_refused(name: str) -> None:
+    """As a rig file may give it of a camera file."""
+    with pytest.raises(FileError, match=r"no file can have|does not exist"):
+        read_text(Path(name), CAMERA_FILE, LIMIT)

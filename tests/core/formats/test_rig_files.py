@@ -136,6 +136,7 @@ def test_a_rotation_in_few_digits_becomes_one_in_all(rig_file: Path) -> None:
         (setting("cam_from_rig_rotation", [1.0, 2.0]), "2 numbers where 9 are needed"),
         (setting("cam_from_rig_translation", [1.0, 2.0]), "2 numbers where 3"),
         (setting("cam_from_rig_translation", 3 * [1e9]), "millimetres are needed"),
+        (setting("cam_from_rig_translation", 3 * [-1e9]), "millimetres are needed"),
         (setting("cam_from_rig_translation", ["a", 0, 0]), "cannot be read"),
         (lambda camera: camera.pop("cam_from_rig_translation"), "has no cam_from_rig"),
         (setting("extrinsics_covariance", (-np.eye(6)).tolist()), "none of them neg"),

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import cv2
@@ -103,3 +104,26 @@ def children() -> set[int]:
     from multiprocessing import active_children
 
     return {process.pid for process in active_children() if process.pid is not None}
+
+
+def test_what_a_decoder_says_of_a_damaged_video_is_not_on_the_console(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(0)
+    path = tmp_path / "swing.mp4"
+    codec = cv2.VideoWriter.fourcc(*"mp4v")
+    writer = cv2.VideoWriter(str(path), codec, 20.0, (320, 240), isColor=False)
+    for _ in range(10):
+        writer.write(rng.integers(256, size=(240, 320), dtype=np.uint8))
+    writer.release()
+    data = bytearray(path.read_bytes())
+    data[len(data) // 3 : len(data) // 3 + 1000] = bytes(1000)
+    path.write_bytes(data)
+    for load in frame_loaders(path, count_frames(path)):
+        with suppress(FileError):
+            load()
+    path.write_bytes(b"no video")
+    with pytest.raises(FileError):
+        count_frames(path)
+
+    assert capfd.readouterr().err == ""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.adjustment import board_points
+from lightpen.intrinsics.board_fit import board_points
 from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera

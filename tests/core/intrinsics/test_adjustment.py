@@ -7,14 +7,9 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.adjustment import (
-    N_SHAPE,
-    BoardFit,
-    BoardState,
-    adjust,
-    fit_poses,
-)
-from lightpen.intrinsics.start import start_camera, start_poses
+from lightpen.intrinsics.adjustment import adjust_board, fit_board_poses
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
+from lightpen.intrinsics.start import start_board_poses, start_camera
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 
@@ -26,11 +21,11 @@ VAGUE = BoardTolerances(flatness=1.0, squareness=0.01)
 
 def fitted(views: Views, tolerances: BoardTolerances = VAGUE, n: int = 5) -> BoardFit:
     camera = start_camera(views, n)
-    poses = start_poses(camera, views)
+    poses = start_board_poses(camera, views)
     state = BoardState(
         (camera,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE)
     )
-    return adjust(views, state, tolerances)
+    return adjust_board(views, state, tolerances)
 
 
 @pytest.mark.parametrize(
@@ -61,7 +56,7 @@ def test_the_jacobian_agrees_with_differences(make_views: MakeViews) -> None:
         camera = found.state.cameras[0]
         camera = camera.with_intrinsics(camera.intrinsics + step)
         beside = replace(found.state, cameras=(camera,))
-        residuals = fit_poses(views, beside)
+        residuals = fit_board_poses(views, beside)
         grown = float(np.nansum(residuals**2))
         expected = step @ found.information.sum(axis=0)[at, at] @ step
         assert grown == pytest.approx(expected, rel=0.02)

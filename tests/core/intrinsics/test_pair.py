@@ -23,7 +23,12 @@ NOISE = 0.03  # px
 
 
 def both_see(
-    camera: Camera, n_views: int = 14, late: float = 0.0, stretch: float = 0.0
+    camera: Camera,
+    n_views: int = 14,
+    late: float = 0.0,
+    stretch: float = 0.0,
+    turn: FloatArray = TURN,
+    shift: FloatArray = SHIFT,
 ) -> Views:
     """Return views of a board that moves from view to view, the right one late."""
     board = parse_board("chessboard:9x6:20")
@@ -37,7 +42,7 @@ def both_see(
         printed = board.points * [1 + stretch, 1.0, 1.0]
         points = printed @ np.swapaxes(poses.rotations, 1, 2) + moved[:, None]
         if c == 1:
-            points = points @ TURN.T + SHIFT
+            points = points @ turn.T + shift
         pixels[:, c] = camera.project(points)
     pixels += rng.normal(0, NOISE, pixels.shape)
     names = tuple(f"{v}.png" for v in range(n_views))
@@ -70,6 +75,22 @@ def test_the_scale_of_the_board_is_part_of_the_baseline(camera: Camera) -> None:
     found = calibrate_pair(both_see(camera), vague, NAMES)
 
     assert found.baseline_sigma == pytest.approx(0.01 * found.baseline, rel=0.05)
+
+
+def test_views_of_the_second_camera_alone_are_used(camera: Camera) -> None:
+    turn = rotation_from_vector(np.array([0.0, -1.0, 0.0]))
+    middle = np.array([20.0, 0.0, 400.0])
+    views = both_see(camera, turn=turn, shift=middle - turn @ middle)
+    pixels = views.pixels.copy()
+    pixels[9:, 0] = np.nan
+    known = replace(camera, covariance=np.diag(np.full(9, 1e-12)))
+    found = calibrate_pair(
+        replace(views, pixels=pixels), BoardTolerances(), NAMES, (known, known)
+    )
+
+    assert (found.n_pairs, found.views.n_views) == (9, 14)
+    np.testing.assert_allclose(found.rig.rotations[1], turn, atol=1e-3)
+    assert np.sqrt(np.nanmean(found.adjustment.view_rms**2)) < 2 * NOISE
 
 
 def test_a_board_numbered_from_its_other_end_is_turned_round(camera: Camera) -> None:

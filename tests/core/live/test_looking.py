@@ -16,7 +16,7 @@ import pytest
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, ImageCamera
 from lightpen.cameras.replay import ReplayCamera
-from lightpen.cameras.worker import (
+from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
     Failed,
@@ -598,7 +598,7 @@ def test_a_bug_while_an_image_is_taken_does_not_end_the_camera(
     make_live()
     screen.wait_for_images(1)
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.capture.advance", fail)
+        broken.setattr("lightpen.swing.capture.advance_swing", fail)
         station.wait_until(lambda: len(station.witness.troubles) == 1)
         screen.wait_for_images(3)
     station.runner.resume()

@@ -19,7 +19,7 @@ from lightpen.cameras.clock import MachineClock
 from lightpen.cameras.device_camera import DeviceCamera
 from lightpen.cameras.protocol import CameraSettings, Frame, ImageCamera, Region
 from lightpen.cameras.replay import ReplayCamera
-from lightpen.cameras.worker import (
+from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
     Failed,
@@ -27,9 +27,12 @@ from lightpen.cameras.worker import (
     WorkerEvent,
 )
 from lightpen.detection.aim import Aim
+from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import Sighting, unseen
 from lightpen.formats.decoding import encode_png
 from lightpen.live.looking import LIVELY_NS, UNHURRIED, Live, LiveImage
 from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.sample_rigs import beside
 from lightpen.simulator.scenes import Scene
@@ -166,6 +169,40 @@ def test_a_second_camera_is_looked_at_before_it_is_known_what_for(
     live.stop()
 
     assert screen.failures == []
+
+
+def test_each_camera_is_followed_by_itself_and_anew_with_each_pen(
+    simulated: tuple[SimulatedCamera, SimulatedCamera],
+    station: "Station",
+    screen: Screen,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cameras = [replace(TINY, serial=str(n)) for n in range(4)]
+    told_before: dict[str, list[Sighting | None]] = {c.serial: [] for c in cameras}
+    found: dict[str, list[Sighting]] = {c.serial: [] for c in cameras}
+
+    def look(
+        image: Image, camera: Camera, pen: Pen, mask: object, before: Sighting | None,
+        full_scale: int, *, is_followed: bool,
+    ) -> Sighting:  # fmt: skip
+        told_before[camera.serial].append(before)
+        found[camera.serial].append(unseen(pen, Reason.EMPTY))
+        return found[camera.serial][-1]
+
+    monkeypatch.setattr("lightpen.live.looking.look", look)
+    live = Live(simulated, SETTINGS, screen, station.runner)
+    pen = station.preparation.pen
+    for one, other in (cameras[:2], cameras[2:]):
+        live.set_aim(Aim(one, pen, others=(Aim(other, pen),)))
+        if one is cameras[0]:
+            live.start()
+        screen.wait_until(lambda other=other: len(found[other.serial]) > 2)  # type: ignore[misc]
+    live.stop()
+
+    for serial, sightings in found.items():
+        first, *rest = told_before[serial]
+        assert first is None
+        assert all(a is b for a, b in zip(rest, sightings[:-1], strict=True))
 
 
 class HeldUpCamera(PunctualCamera):

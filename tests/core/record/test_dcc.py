@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from lightpen.estimation.report import record_bytes
+from lightpen.formats.json_records import record_bytes
 from lightpen.record.dcc import DCC, NO_CERTIFICATE, SI, VERSION, Laboratory, dcc_text
 from lightpen.record.statement import Statement, read_statement
 

@@ -2,7 +2,8 @@
 
 import csv
 import io
-from datetime import UTC, datetime
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -98,6 +99,9 @@ def test_ros_reads_metres(calibration: CalibrationFile) -> None:
     np.testing.assert_allclose([shift[a] for a in "xyz"], np.array(TIP) / 1000)
     assert message["transform"]["rotation"]["w"] == 1.0
     assert message["header"]["stamp"]["sec"] == calibration.when.timestamp()
+    later = replace(calibration, when=calibration.when + timedelta(seconds=0.25))
+    stamp = yaml.safe_load(ros_transform(later))["header"]["stamp"]
+    assert stamp == {**message["header"]["stamp"], "nanosec": 250_000_000}
 
 
 def test_statistics_get_each_axis_and_its_uncertainty(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from lightpen.estimation.report import json_bytes
+from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import with_checksum
 from lightpen.model.origin import Origin
 from lightpen.record.names import Names

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpen.estimation.report import record_bytes
+from lightpen.formats.json_records import record_bytes
 from lightpen.record.retraced import Retraced, retrace
 from lightpen.record.statement import StatedCalibration, read_statement
 

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from lightpen.errors import FileError, LightpenError, UsageError
-from lightpen.estimation.report import record_bytes
 from lightpen.estimation.verdict import Grade
+from lightpen.formats.json_records import record_bytes
 from lightpen.model.origin import Origin
 from lightpen.record.names import Names
 from lightpen.record.results import Result, Why, result_bytes

@@ -57,6 +57,14 @@ def test_the_newest_limits_of_each_station_count(guarded: Path) -> None:
     assert len(list((guarded / LIMITS).iterdir())) == 4
 
 
+def test_what_is_chosen_holds_where_nothing_is_laid_down() -> None:
+    supervision = Supervision(limits={"Hall 2": TIGHT})
+    chosen = StationLimits(SwingLimits(0.02, 40, 90))
+
+    assert supervision.limits_at("Hall 2", chosen) == TIGHT
+    assert supervision.limits_at("Hall 3", chosen) == chosen
+
+
 @pytest.mark.parametrize(
     ("signature", "code"),
     [

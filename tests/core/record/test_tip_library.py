@@ -169,7 +169,7 @@ def test_a_changed_file_is_told_and_nothing_older_counts(tmp_path: Path) -> None
 
 
 def test_a_file_of_a_later_version_is_refused(tmp_path: Path) -> None:
-    from lightpen.estimation.report import record_bytes
+    from lightpen.formats.json_records import record_bytes
 
     (tmp_path / LIBRARY).mkdir()
     file = tmp_path / LIBRARY / "000001.json"

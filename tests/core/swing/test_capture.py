@@ -18,9 +18,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting, look
 from lightpen.errors import FileError
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.report import (
-    calibration_record,
-)
+from lightpen.estimation.report import calibration_record
 from lightpen.formats.camera_files import CAMERA_FILE, write_camera
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.pen_files import PEN_FILE, write_pen
@@ -268,7 +266,7 @@ def test_a_slip_that_cannot_be_recorded_leaves_state_and_record_together(
         raise FileError(sentence("test.trouble", "The disk is full."))
 
     with monkeypatch.context() as patch:
-        patch.setattr("lightpen.swing.capture.advance", slipped_and_kept)
+        patch.setattr("lightpen.swing.capture.advance_swing", slipped_and_kept)
         patch.setattr(RecordWriter, "take_out", fail)
         with pytest.raises(FileError, match="disk is full"):
             wizard.run(4)

@@ -7,12 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import cv2
+import numpy as np
 import pytest
 
 from lightpen.cameras.protocol import Frame, FrameIncomplete
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import look
+from lightpen.formats.decoding import encode_png, read_image
 from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
@@ -115,6 +118,33 @@ def test_an_image_that_cannot_be_read_is_passed_over(
 
     assert station.n_recorded == N_IMAGES - 1
     assert station.state.n_dropped == {Reason.UNREADABLE: 1}
+
+
+def test_an_image_takes_part_that_would_on_files_with_few_leds_whole(
+    station: "Station", swung: Callable[..., Path], tmp_path: Path
+) -> None:
+    images = tmp_path / "images"
+    shutil.copytree(swung() / "images", images)
+    path = sorted(images.iterdir())[7]
+    preparation = station.preparation
+    assert preparation.camera is not None
+    assert preparation.pen is not None
+    image = read_image(path)
+    sighting = look(image, preparation.camera, preparation.pen)
+    image = image.copy()
+    for x, y in np.rint(sighting.pixels[:5]).astype(int).tolist():
+        cv2.circle(image, (x, y - 10), 3, 255, -1)  # at the rim of the disc
+    path.write_bytes(encode_png(image))
+    spoiled = look(image, preparation.camera, preparation.pen)
+    assert spoiled.has_pose
+    assert spoiled.n_leds == 5
+    recording = Recording(station, images)
+    station.begin()
+    recording.show(N_IMAGES)
+    station.wait_for_phase(Phase.VERDICT)
+
+    assert station.n_recorded == N_IMAGES
+    assert not station.state.n_dropped
 
 
 def test_the_postures_that_lack_are_named_at_the_end(

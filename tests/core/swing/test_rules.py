@@ -40,7 +40,7 @@ from lightpen.simulator.swings import (
 from lightpen.swing.kept_images import kept_before
 from lightpen.swing.rules import (
     Transition,
-    advance,
+    advance_swing,
     conclude,
     finish,
     pause,
@@ -144,7 +144,7 @@ class Station:
     def run(self, seconds: float, until: Phase | None = None) -> "Station":
         for _ in range(round(seconds / self.period)):
             self.clock.wait(self.period)
-            self.take(advance(self.setup, self.state, self.sight(), self.now))
+            self.take(advance_swing(self.setup, self.state, self.sight(), self.now))
             self.follow()
             if self.state.phase is until:
                 break
@@ -207,7 +207,7 @@ def shown(
             *(setup.camera, setup.pen, pixels[i]),
             *(moved.rotations[i], moved.translations[i]),
         )
-        transition = advance(setup, state, sighting, state.time + 0.1)
+        transition = advance_swing(setup, state, sighting, state.time + 0.1)
         state, events = transition.state, (*events, *transition.events)
     return Transition(state, events)
 
@@ -483,7 +483,7 @@ def test_an_image_that_the_program_failed_on_is_counted_and_the_swing_goes_on() 
     station = capturing()
     n_kept = station.state.n_kept
     failed = unseen(station.setup.pen, Reason.UNHANDLED)
-    station.take(advance(station.setup, station.state, failed, station.now))
+    station.take(advance_swing(station.setup, station.state, failed, station.now))
     assert station.state.n_dropped[Reason.UNHANDLED] == 1
     assert station.state.phase is Phase.CAPTURING
 
@@ -557,7 +557,10 @@ def test_the_verdict_is_told(whole: Station) -> None:
     assert conclude(whole.state, good, passed=False).events == (
         SwingEvent(Happening.FAILED),
     )
-    assert advance(whole.setup, transition.state, whole.sight(), whole.now).events == ()
+    assert (
+        advance_swing(whole.setup, transition.state, whole.sight(), whole.now).events
+        == ()
+    )
 
 
 def test_a_pause_does_not_stop_the_solving(whole: Station) -> None:
@@ -586,8 +589,8 @@ def test_three_seconds_upright_and_still_say_yes_and_no_more_than_that() -> None
     assert stillness(replace(still, time=9.0)) == 1.0
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_whatever_happens_the_events_tell_what_is_kept(seed: int) -> None:
+@pytest.mark.parametrize(("seed", "drops"), [(1, False), (2, False), (5, True)])
+def test_whatever_happens_the_events_tell_what_is_kept(seed: int, drops: bool) -> None:
     station = Station(seed=seed)
     operator, rng = station.operator, np.random.default_rng(seed)
     operator.seat()
@@ -618,6 +621,7 @@ def test_whatever_happens_the_events_tell_what_is_kept(seed: int) -> None:
             n_lost += len(event.numbers)
     assert recorded == set(station.state.kept.numbers.tolist())
     assert n_lost <= station.state.n_dropped[Reason.SLIPPED]
+    assert n_lost > 0 or not drops
     assert len(recorded) > 20
     assert station.tip_error < 2 * station.state.kept.uncertainty
 

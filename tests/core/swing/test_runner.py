@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.cameras.worker import WorkerEvent
+from lightpen.cameras.worker_events import WorkerEvent
 from lightpen.errors import FileError
 from lightpen.estimation.verdict import Grade
 from lightpen.formats.opened_files import PenFile

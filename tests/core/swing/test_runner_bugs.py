@@ -53,7 +53,7 @@ def test_a_bug_while_an_image_is_taken_pauses_the_swing_and_costs_nothing_else(
     station.go_on(interrupted)
     station.keep(1)
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.capture.advance", fail)
+        broken.setattr("lightpen.swing.capture.advance_swing", fail)
         station.see(5)
     station.wait_until(lambda: len(station.witness.troubles) == 1)
 

@@ -3,8 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from lightpen.detection.sighting import sight_centers
+from lightpen.estimation.reach import Reached
 from lightpen.messages import SIDES, Code
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import Posture, rotations_of
@@ -76,6 +78,19 @@ def test_the_estimate_of_images_to_come_holds() -> None:
     n_true = 400 * (late.kept.uncertainty / 0.006) ** 2
     # The images also tell more of the camera, the more they are.
     np.testing.assert_allclose(n_needed, n_true, rtol=0.3)
+
+
+def test_the_more_of_u_is_of_the_files_the_more_images_it_takes() -> None:
+    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=0.01))
+    state = state_of(setup, swing_poses(20, np.random.default_rng(0)))
+    reached = Reached(uncertainty=0.02, floor=0.007)
+    state = replace(state, kept=replace(state.kept, reached=reached))
+
+    n_needed = measure_shortfall(setup, state).n_for_uncertainty
+
+    # What is not of the files goes with one over the number of images.
+    of_images = (0.02**2 - 0.007**2) * 20 / (20 + n_needed)
+    assert np.hypot(np.sqrt(of_images), 0.007) == pytest.approx(0.01, rel=0.01)
 
 
 def test_no_more_images_are_announced_than_the_limit_allows() -> None:

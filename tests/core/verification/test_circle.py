@@ -1,6 +1,7 @@
 """Tests of `lightpen.verification.circle`."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,6 +71,29 @@ def test_less_than_three_quarters_of_a_ring_are_refused(
 ) -> None:
     with pytest.raises(CalibrationError, match=r"cover 200 degrees .* 270 are needed"):
         measured(ring(20, degrees=200))
+
+
+@pytest.mark.parametrize("middle", [0, 90, 180, 270])
+def test_a_gap_counts_wherever_in_the_ring_it_is(ring: Ring, middle: int) -> None:
+    degrees = np.degrees(fit_circle(ring(72)).angles) - middle
+    open_here = ring(72)[np.abs((degrees + 180) % 360 - 180) > 60]
+
+    assert fit_circle(open_here).covered == pytest.approx(240, abs=6)
+
+
+def test_runs_shrink_the_noise_and_not_what_is_certified(
+    instrument: Instrument, touching: Touching, ring: Ring
+) -> None:
+    exact = replace(instrument, covariance=np.zeros_like(instrument.covariance))
+    run = ("run", touching(ring(), tilt=0.1))
+
+    one, two, certified = (
+        measure_circle(runs, exact, RADIUS, LIMITS, certified_uncertainty=stated)
+        for runs, stated in (([run], 0.0), ([run, run], 0.0), ([run], 0.01))
+    )
+
+    assert two.uncertainty == pytest.approx(one.uncertainty / np.sqrt(2))
+    assert certified.uncertainty == pytest.approx(np.hypot(one.uncertainty, 0.01))
 
 
 def test_points_of_a_square_are_no_circle(measured: Callable[..., Circle]) -> None:

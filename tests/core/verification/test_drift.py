@@ -58,9 +58,13 @@ def test_a_single_visit_is_refused(instrument: Instrument, touching: Touching) -
 def test_a_move_that_would_not_show_is_not_denied(
     instrument: Instrument, touching: Touching
 ) -> None:
-    visits = [(name, touching(PAPER_CONE[None], seed=7)) for name in ("one", "two")]
+    touches = touching(PAPER_CONE[None], seed=7)
+    visits = [("one", touches), ("two", touches)]
     found = measure_drift(visits, instrument, VerificationLimits(drift=0.001))
 
     assert not found.moves.any()
+    # What both visits share is no part of it; the noise of each is.
+    deviations = np.sqrt(2 * np.diag(touches[0].noise))
+    np.testing.assert_allclose(found.uncertainties[1], 2 * deviations)
     assert found.assessment.reason.code == "drift.uncertain"
     assert found.assessment.grade is Grade.CHECK

@@ -35,6 +35,21 @@ def test_a_right_tip_is_accepted(instrument: Instrument, touching: Touching) -> 
     )
 
 
+def test_a_camera_that_moved_makes_a_fixed_point_less_certain(
+    instrument: Instrument, touching: Touching
+) -> None:
+    touches = touching(np.tile(PAPER_CONE, (4, 1)))
+
+    still, moved = (
+        measure_fixed_point(touches, instrument, LIMITS, drift=np.array(drift))
+        for drift in ([0.0, 0.0, 0.0], [0.01, 0.0, 0.02])
+    )
+
+    np.testing.assert_allclose(
+        moved.uncertainty, np.hypot(still.uncertainty, [0.02, 0.0, 0.04])
+    )
+
+
 def test_an_exchanged_tip_is_told_with_how_far_off_it_is(
     instrument: Instrument, touching: Touching
 ) -> None:

@@ -34,6 +34,21 @@ def test_a_length_is_measured_within_its_uncertainty(
     assert found.runs[0].along_view < 0.1
 
 
+def test_a_camera_that_moved_makes_a_length_less_certain_along_it(
+    instrument: Instrument, touching: Touching
+) -> None:
+    run = ("here", touching(np.array([START, END])))
+
+    still, across, along = (
+        measure_length([run], instrument, LENGTH, LIMITS, drift=np.array(drift))
+        for drift in ([0.0, 0.0, 0.0], [0.0, 0.01, 0.0], [0.01, 0.0, 0.0])
+    )
+
+    assert across.uncertainties[0] == pytest.approx(still.uncertainties[0])
+    moved = np.hypot(still.uncertainties[0], 2 * 0.01)
+    assert along.uncertainties[0] == pytest.approx(moved, rel=1e-3)
+
+
 @pytest.mark.parametrize("ball_offset", [2.0, -2.0])
 def test_at_faces_the_ball_is_compensated_along_the_length(
     instrument: Instrument, touching: Touching, ball_offset: float
@@ -75,6 +90,11 @@ def test_a_pen_that_grew_is_told_by_the_length(
 
     assert found.scale.factor - 1 == pytest.approx(grown, rel=0.3)
     assert found.scale.uncertainty < 0.2 * found.scale.uncertainty_before
+    vague = measure_length(runs, unsure, LENGTH, LIMITS, certified_uncertainty=0.1)
+    # All three are off by what is certified; before that, U is 0.2 %.
+    by_length = np.hypot(0.1 / LENGTH, found.scale.uncertainty)
+    together = (by_length**-2 + found.scale.uncertainty_before**-2) ** -0.5
+    assert vague.scale.uncertainty == pytest.approx(together, rel=0.05)
 
 
 def test_one_end_touched_twice_is_refused(

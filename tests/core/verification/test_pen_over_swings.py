@@ -11,9 +11,10 @@ import pytest
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.report import calibration_record, json_bytes
+from lightpen.estimation.report import calibration_record
 from lightpen.estimation.verdict import Grade
 from lightpen.formats.hashes import InputFile, Inputs
+from lightpen.formats.json_records import json_bytes
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.own_json import with_checksum
 from lightpen.formats.pen_files import read_pen, write_pen

@@ -21,7 +21,7 @@ from lightpen.simulator.toucher import Artefacts, Toucher
 from lightpen.verification.choices import WHOLE, TaskKind, VerificationChoices
 from lightpen.verification.counting import ALIKE, OTHER_POSTURE
 from lightpen.verification.guidance import fraction_done, instruction
-from lightpen.verification.session import advance, end_task, touched_anew
+from lightpen.verification.session import advance_session, end_task, touched_anew
 from lightpen.verification.session_state import SessionSetup, SessionState
 from lightpen.verification.touching import TouchEvent, TouchHappening
 
@@ -62,7 +62,7 @@ def test_a_simulated_operator_verifies_a_tip_without_a_key() -> None:
         frame = camera.read(1.0)
         sighting: Sighting = look(frame.image, scene.camera, pen, None, before)
         before = sighting
-        transition = advance(setup, state, str(frame.seq), sighting)
+        transition = advance_session(setup, state, str(frame.seq), sighting)
         state = transition.state
         asked.add(instruction(setup, state).code)
         if transition.events and first is None:
@@ -109,7 +109,7 @@ class Session:
 
     def see(self, sightings: Iterable[Sighting]) -> None:
         for sighting in sightings:
-            transition = advance(self.setup, self.state, "image", sighting)
+            transition = advance_session(self.setup, self.state, "image", sighting)
             self.state = transition.state
             self.events += transition.events
 

@@ -17,6 +17,7 @@ from lightpen.verification.touch import (
     Touch,
     TouchFrame,
     joint_covariance,
+    mean_point,
     measure_touches,
     on_surface,
     point_sensitivities,
@@ -65,6 +66,8 @@ def test_a_point_follows_the_parameters_as_its_derivative_says(
     poses = fit_poses(instrument.camera, instrument.pen, pixels, R[None], t[None])
     (derivative,) = point_sensitivities(instrument, poses)
     by_scale = derivative[:, at.leds] @ instrument.pen.leds.ravel()
+    # No image depends on the tip, which goes with the pen.
+    np.testing.assert_allclose(derivative[:, at.tip], R, atol=1e-6)
     for by_this, step in (
         (derivative[:, at.cameras[0].start], (0.1, 0.0, 0.0)),
         (by_scale, (0.0, 1e-4, 0.0)),
@@ -83,6 +86,26 @@ def test_more_images_make_a_point_less_noisy(touching: Touching) -> None:
 
     ratio = np.trace(one.noise) / np.trace(many.noise)
     assert ratio == pytest.approx(25, rel=0.3)  # the noise itself is estimated
+
+
+def test_images_that_scatter_by_more_than_their_noise_make_a_point_less_certain(
+    instrument: Instrument,
+) -> None:
+    R = np.diag([1.0, -1.0, -1.0])
+    rng = np.random.default_rng(0)
+    t = PAPER_CONE - R @ PAPER_TIP + 0.05 * rng.standard_normal((25, 3))
+    pixels = simulate_centers(
+        instrument.camera, instrument.pen, np.tile(R, (25, 1, 1)), t, 0.01, rng
+    )
+    frames = tuple(
+        TouchFrame(f"image {i}", each[None], R, t[i]) for i, each in enumerate(pixels)
+    )
+
+    (touch,) = measure_touches(instrument, [StillFrames(frames)])
+
+    # Along the view the noise is as large as the scatter.
+    across = np.sqrt(np.diag(touch.noise))[:2]
+    assert (across > 0.5 * 0.05 / np.sqrt(25)).all()
 
 
 def test_an_image_that_slipped_is_left_out_and_named(instrument: Instrument) -> None:
@@ -117,6 +140,10 @@ def test_what_touches_share_drops_out_of_their_difference(
     together = D @ covariance @ D.T
 
     assert np.trace(together) < 0.1 * np.trace(alone)
+    np.testing.assert_allclose(covariance[:3, :3], touches[0].covariance(instrument))
+    np.testing.assert_allclose(
+        mean_point(touches).noise, (touches[0].noise + touches[1].noise) / 4
+    )
 
 
 def test_a_ball_is_compensated_along_approach_or_axis(touching: Touching) -> None:

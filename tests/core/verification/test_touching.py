@@ -17,7 +17,7 @@ from lightpen.verification.touching import (
     TouchPhase,
     TouchRules,
     TouchState,
-    advance,
+    advance_touch,
 )
 
 RULES = TouchRules(n_frames=5, n_settling=2)
@@ -52,7 +52,7 @@ def run(
 ) -> tuple[TouchState, list[TouchEvent]]:
     state, events = TouchState(), list[TouchEvent]()
     for name, sighting in sightings(instrument, places):
-        transition = advance(instrument, rules, state, name, sighting)
+        transition = advance_touch(instrument, rules, state, name, sighting)
         state = transition.state
         events += transition.events
     return state, events

@@ -1,9 +1,8 @@
 """Calibrating the camera by a board, live or from a folder, in a window of its own."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -19,25 +18,17 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen.arrays import FloatArray, Image
+from lightpen.arrays import FloatArray
 from lightpen.errors import UsageError
-from lightpen.formats.camera_files import write_camera
-from lightpen.formats.hashes import InputFile, all_hashed, hashed
-from lightpen.formats.images import find_images
+from lightpen.formats.hashes import InputFile
 from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.calibration import (
     MIN_VIEWS,
     CameraCalibration,
-    calibrate_camera,
 )
-from lightpen.intrinsics.capture import Capture, Sight, wanted_outline
+from lightpen.intrinsics.capture import Capture, Sight
 from lightpen.intrinsics.coverage import cells_of
-from lightpen.intrinsics.observing import observe_board, why_unseen
-from lightpen.intrinsics.sightings import find_points
 from lightpen.intrinsics.uncertainty_map import UncertaintyMap, map_uncertainty
-from lightpen.intrinsics.views import BoardTolerances, Views
-from lightpen.local_time import local_now
-from lightpen.model.camera import Camera
 from lightpen.model.origin import Origin
 from lightpen.record.camera_calibrations import CameraTrial
 from lightpen.record.outcome import TrialOutcome
@@ -45,6 +36,16 @@ from lightpen.sentences import Sentence
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.camera.board_jobs import (
+    BoardLook,
+    ComputedCamera,
+    WantedOutline,
+    calibrate_by_folder,
+    calibrate_by_views,
+    find_outline,
+    look_for_board,
+    save_camera,
+)
 from lightpen_app.steps.camera.board_view import BoardOverlay, BoardView
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
@@ -212,7 +213,7 @@ class BoardWindow(Translated, QWidget):
         asks_why = time_s - self._seen_s >= LONGEST_UNSEEN
         if asks_why or self._capture.points is not None:
             self._seen_s = time_s
-        look = partial(_look, frame.image, self._sought, asks_why)
+        look = partial(look_for_board, frame.image, self._sought, asks_why)
         self._searching = job = Job(look, self)
 
         # Connections
@@ -223,7 +224,7 @@ class BoardWindow(Translated, QWidget):
     def _on_search_ended(self) -> None:
         self._searching = None
 
-    def _on_looked(self, seen: "_Looked", time_s: float) -> None:
+    def _on_looked(self, seen: BoardLook, time_s: float) -> None:
         if self._capture is None or self._sought is None:
             return
         n_kept = len(self._capture.kept)
@@ -239,14 +240,14 @@ class BoardWindow(Translated, QWidget):
         """Find where the board is wanted next."""
         if self._capture is None or self._leading is not None:
             return
-        self._leading = job = Job(partial(_wanted, self._capture), self)
+        self._leading = job = Job(partial(find_outline, self._capture), self)
 
         # Connections
         job.succeeded.connect(self._on_led)
         job.ended.connect(self._on_leading_ended)
         job.start()
 
-    def _on_led(self, wanted: "_Wanted") -> None:
+    def _on_led(self, wanted: WantedOutline) -> None:
         self._outline = wanted.outline
         self._refresh()
 
@@ -270,7 +271,7 @@ class BoardWindow(Translated, QWidget):
         self._conclude()
         self._capture = None
         self._image.set_image(None)
-        self._run(partial(_calibrate_folder, folder, board))
+        self._run(partial(calibrate_by_folder, folder, board))
 
     # Calibration
 
@@ -278,7 +279,7 @@ class BoardWindow(Translated, QWidget):
         if self._capture is not None:
             self._stop()
             self._conclude_found()
-            self._run(partial(_calibrate, self._capture.views, self._hashes))
+            self._run(partial(calibrate_by_views, self._capture.views, self._hashes))
 
     def _on_remove_clicked(self) -> None:
         found, item = self._found, self._worst.currentItem()
@@ -287,9 +288,9 @@ class BoardWindow(Translated, QWidget):
         name = item.data(Qt.ItemDataRole.UserRole)
         kept = np.array([each != name for each in found.views.names])
         self._conclude_found()
-        self._run(partial(_calibrate, found.views.chosen(kept), self._hashes))
+        self._run(partial(calibrate_by_views, found.views.chosen(kept), self._hashes))
 
-    def _run(self, calibrate: Callable[[Report], "_Computed"]) -> None:
+    def _run(self, calibrate: Callable[[Report], ComputedCamera]) -> None:
         if self._computing is not None:
             self._computing.cancel()
         self._forget()
@@ -311,7 +312,7 @@ class BoardWindow(Translated, QWidget):
         self._remark.set_value(_trouble(sentence))
         self._refresh()
 
-    def _on_found(self, computed: "_Computed") -> None:
+    def _on_found(self, computed: ComputedCamera) -> None:
         found = computed.found
         self._computing, self._found, self._is_saved = None, found, False
         self._hashes = computed.hashes
@@ -349,7 +350,7 @@ class BoardWindow(Translated, QWidget):
         if self._found is None:
             return
         camera = replace(self._found.camera, serial=self._serial())
-        job = Job(partial(_save, camera, Path(path)), self)
+        job = Job(partial(save_camera, camera, Path(path)), self)
 
         # Connections
         job.succeeded.connect(self._on_saved)
@@ -496,64 +497,6 @@ class BoardWindow(Translated, QWidget):
                 worded(found.choice.sentence),
             ]
         )
-
-
-@dataclass(frozen=True, eq=False)
-class _Looked:
-    """What one image shows, and the hash of its pixels where that is the board."""
-
-    points: FloatArray | None
-    sha256: str = ""
-    why_unseen: Sentence | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class _Computed:
-    """A calibration, and the hash of each image by its name."""
-
-    found: CameraCalibration
-    hashes: dict[str, str]
-
-
-@dataclass(frozen=True, eq=False)
-class _Wanted:
-    outline: FloatArray
-
-
-def _look(image: Image, board: Board, asks_why: bool, report: Report) -> _Looked:
-    points = find_points(image, board, quick=True)
-    if points is None:
-        return _Looked(
-            None, why_unseen=why_unseen(lambda: [image], board) if asks_why else None
-        )
-    return _Looked(points, sha256(image.tobytes()).hexdigest())
-
-
-def _wanted(capture: Capture, report: Report) -> _Wanted:
-    return _Wanted(wanted_outline(capture))
-
-
-def _calibrate(views: Views, hashes: dict[str, str], report: Report) -> _Computed:
-    found = calibrate_camera(views, BoardTolerances(), local_now().date(), report)
-    return _Computed(found, hashes)
-
-
-def _calibrate_folder(folder: str, board: Board, report: Report) -> _Computed:
-    images = find_images(folder)
-    observed = observe_board(images, board, lambda fraction: report(0.7 * fraction))
-    found = calibrate_camera(
-        observed.views,
-        BoardTolerances(),
-        local_now().date(),
-        lambda fraction: report(0.7 + 0.3 * fraction),
-    )
-    files = all_hashed(images.files)
-    return _Computed(found, {file.path.name: file.sha256 for file in files})
-
-
-def _save(camera: Camera, path: Path, report: Report) -> InputFile:
-    write_camera(camera, path)
-    return hashed(path)
 
 
 def _residuals(found: CameraCalibration) -> BoardOverlay:

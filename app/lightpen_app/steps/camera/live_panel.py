@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.cameras.protocol import Stats
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import Spots
 from lightpen.live.looking import LiveImage

@@ -1,9 +1,5 @@
 """The step Camera: images come, well exposed, sharp, and with their intrinsics."""
 
-from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING
-
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
@@ -18,19 +14,19 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.source import FoundDevice
 from lightpen.cameras.sources import absent_sources
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.detection.auto_exposure import AutoExposure
 from lightpen.detection.inspection import Exposure, Inspection, inspect
 from lightpen.detection.mask import clicked, with_circle
-from lightpen.formats.opened_files import CameraFile
 from lightpen.live.looking import LiveImage
-from lightpen.record.recordings import FilesBeside, files_beside
 from lightpen.swing.preparation import Lack, SourceChoice, SourceKind
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.sounds import Sound, Sounds
 from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.steps.camera.beside_control import BesideControl
 from lightpen_app.steps.camera.exposure_panel import ExposurePanel, FocusPanel
+from lightpen_app.steps.camera.intrinsics_control import IntrinsicsControl
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.live_panel import LivePanel
 from lightpen_app.steps.camera.second_camera import SecondCameraChoice
@@ -45,9 +41,6 @@ from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.work.job import Job
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.workbench import Workbench
-
-if TYPE_CHECKING:
-    from lightpen_app.steps.camera.board_window import BoardWindow
 
 SIDE_WIDTH, NARROW_SIDE_WIDTH = 50 * GRID, 46 * GRID
 
@@ -69,12 +62,7 @@ class CameraPage(Rearranged, Page):
         self._settings = CameraSettings()  # in force
         self._trouble = ""  # the last, of the camera or of a swing
         self._sentence = ""  # why no images come
-        self._reading: Job | None = None
         self._adjustment: AutoExposure | None = None
-        self._looking: Job | None = None
-        self._looked_beside = SourceChoice()
-        self._beside = FilesBeside()
-        self._board: BoardWindow | None = None  # made when it is asked for
 
         # Widgets
         self._swing_remark = SignLabel()
@@ -88,6 +76,8 @@ class CameraPage(Rearranged, Page):
         self._focus = FocusPanel()
 
         self._searching = self._source  # for whom cameras are looked for
+        self._beside = BesideControl(workbench, self._source)
+        self._files = IntrinsicsControl(workbench, self._intrinsics, self)
 
         # Layout
         self._arrange()
@@ -100,9 +90,6 @@ class CameraPage(Rearranged, Page):
         self._second.search_requested.connect(self._on_second_search_requested)
         self._images.camera_chosen.connect(self._on_camera_chosen)
         self._more.settings_changed.connect(self._live.configure)
-        self._source.files_requested.connect(self._workbench.use_files)
-        self._intrinsics.path_chosen.connect(self._on_path_chosen)
-        self._intrinsics.calibration_requested.connect(self._on_calibration_requested)
         self._source.samples_requested.connect(self._on_samples_requested)
         self._stray.found_changed.connect(self._mark)
         self._stray.mask_requested.connect(self._on_mask_requested)
@@ -175,11 +162,8 @@ class CameraPage(Rearranged, Page):
     @override
     def shut_down(self) -> None:
         self._second.shut_down()
-        if self._board is not None:
-            self._board.close()
-        for job in (self._reading, self._looking):
-            if job is not None:
-                job.cancel()
+        self._files.shut_down()
+        self._beside.shut_down()
 
     @override
     def _retranslate(self) -> None:
@@ -234,10 +218,8 @@ class CameraPage(Rearranged, Page):
     def _on_workbench_changed(self) -> None:
         now = self._workbench.preparation
         self._source.set_value(now.source)
-        if now.source != self._looked_beside:
-            self._look_beside(now.source)
+        if self._beside.follow(now.source):
             self._show_connection()  # what was lacking is another thing now
-        self._offer_beside()
         self._intrinsics.set_value(now.camera_file)
         self._intrinsics.set_image_size(now.image_size)
         self._intrinsics.setVisible(now.second is None)
@@ -249,34 +231,6 @@ class CameraPage(Rearranged, Page):
         self._stray.set_n_masked(len(self._mask))
         self._mark()
         self.changed.emit()
-
-    def _look_beside(self, source: SourceChoice) -> None:
-        """Look for the files that go with recorded images."""
-        self._looked_beside, self._beside = source, FilesBeside()
-        if self._looking is not None:
-            self._looking.cancel()
-        if source.kind != SourceKind.RECORDED or not source.place:
-            return
-        self._looking = job = Job(lambda _: files_beside(source.place), self)
-
-        # Connections
-        job.succeeded.connect(self._on_beside_found)
-        job.start()
-
-    def _on_beside_found(self, files: FilesBeside) -> None:
-        self._beside = files
-        self._offer_beside()
-
-    def _offer_beside(self) -> None:
-        """Offer the files beside the images, unless they are in use."""
-        now, beside = self._workbench.preparation, self._beside
-        camera = None if now.camera_file is None else now.camera_file.path
-        pen = None if now.pen_file is None else now.pen_file.path
-        others = FilesBeside(
-            None if beside.camera == camera else beside.camera,
-            None if beside.pen == pen else beside.pen,
-        )
-        self._source.set_beside(others)
 
     def _on_source_chosen(self, source: SourceChoice) -> None:
         self._forget_trouble()
@@ -361,45 +315,13 @@ class CameraPage(Rearranged, Page):
         if before is None or caps is None:
             return
         self._live.hurry()
-        self._adjustment = now = before.fed(seen.frame, seen.spots, inspection, caps)
+        self._adjustment = now = before.after(seen.frame, seen.spots, inspection, caps)
         exposure_us, gain_db = now.asked.exposure_us, now.asked.gain_db
         if exposure_us is not None and exposure_us != before.asked.exposure_us:
             self._live.set_exposure(exposure_us)
         if gain_db is not None and gain_db != before.asked.gain_db:
             self._live.set_gain(gain_db)
         self._exposure.set_adjustment(now)
-
-    def _on_path_chosen(self, path: str) -> None:
-        if self._reading is not None:
-            self._reading.cancel()
-        self._reading = job = Job(lambda _: CameraFile.read(Path(path)), self)
-
-        # Connections
-        job.succeeded.connect(self._on_file_read)
-        job.failed.connect(self._on_file_refused)
-        job.start()
-
-    def _on_calibration_requested(self) -> None:
-        if self._board is None:
-            # A camera is calibrated once a year; it is not waited for at each start.
-            from lightpen_app.steps.camera.board_window import BoardWindow
-
-            self._board = BoardWindow(self._live, self)
-
-            # Connections
-            self._board.saved.connect(self._on_path_chosen)
-            self._board.concluded.connect(self._workbench.keep_camera_trial)
-        self._board.show()
-        self._board.raise_()
-
-    def _on_file_read(self, camera_file: CameraFile) -> None:
-        self._reading = None
-        now = self._workbench.preparation
-        self._workbench.set_preparation(replace(now, camera_file=camera_file))
-
-    def _on_file_refused(self, sentence: str) -> None:
-        self._reading = None
-        self._intrinsics.set_problem(sentence)
 
     def _on_samples_requested(self) -> None:
         self._workbench.use_sample_files()

@@ -130,7 +130,7 @@ class StrayLightPanel(Translated, QGroupBox):
         sighting = seen.sighting
         self._knows_pen = sighting is not None
         shows_pen = sighting is not None and sighting.has_pose
-        self._search = search.fed(seen.spots, shows_pen=shows_pen)
+        self._search = search.after(seen.spots, shows_pen=shows_pen)
         if self._search.is_over:
             self._set_found(self._search.circles())
         self._refresh()

@@ -1,6 +1,7 @@
 """The file of the LEDs: opened, saved under another name, or why it cannot be."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
@@ -22,6 +23,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.job import Job
 
 
 class LedFilePanel(Translated, QWidget):
@@ -183,7 +185,14 @@ class LedFilePanel(Translated, QWidget):
 
     def _on_save_path_picked(self, text: str) -> None:
         path = Path(text)
-        if not path.exists():
+        job = Job(lambda _: path.exists(), self)
+
+        # Connections
+        job.succeeded.connect(partial(self._on_save_path_seen, path))
+        job.start()
+
+    def _on_save_path_seen(self, path: Path, exists: bool) -> None:
+        if not exists:
             self.save_chosen.emit(path)
             return
         self.ask(

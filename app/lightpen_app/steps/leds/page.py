@@ -12,7 +12,7 @@ from PySide6.QtGui import QUndoStack
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.formats.opened_files import PenFile
 from lightpen.model.pen import Pen
 from lightpen.pen_check.draft import DraftCheck, PenDraft, check_draft

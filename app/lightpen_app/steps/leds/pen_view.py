@@ -55,7 +55,7 @@ class PenPicture:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sight:
+class _Projection:
     """From the pen frame to the widget."""
 
     turn: FloatArray  # (3, 3), to right, up and towards the viewer
@@ -227,7 +227,7 @@ class PenView(Translated, QWidget):
             self._draw_number(painter, places[row], others, row, offset, colors)
 
     def _draw_plane(
-        self, painter: QPainter, sight: _Sight, pen: Pen, colors: Colors
+        self, painter: QPainter, sight: _Projection, pen: Pen, colors: Colors
     ) -> None:
         """Draw the front plane z = 0, and from each LED a line to it."""
         feet = pen.leds * np.array([1.0, 1.0, 0.0])
@@ -244,7 +244,7 @@ class PenView(Translated, QWidget):
         for top, bottom in zip(tops, bottoms, strict=True):
             painter.drawLine(top, bottom)
 
-    def _draw_axes(self, painter: QPainter, sight: _Sight, colors: Colors) -> None:
+    def _draw_axes(self, painter: QPainter, sight: _Projection, colors: Colors) -> None:
         """Draw the axes at the origin, or in the corner if that is far away."""
         painter.setFont(font(TextSize.SMALL, bold=True))
         start = np.zeros(3) if sight.shows_origin else sight.center
@@ -260,7 +260,7 @@ class PenView(Translated, QWidget):
             painter.drawText(_box(beyond), Qt.AlignmentFlag.AlignCenter, name)
 
     def _draw_tip(
-        self, painter: QPainter, sight: _Sight, tip: FloatArray, colors: Colors
+        self, painter: QPainter, sight: _Projection, tip: FloatArray, colors: Colors
     ) -> None:
         place = sight.places(tip)[0]
         painter.setPen(QPen(QColor(colors.text), 2))
@@ -273,7 +273,7 @@ class PenView(Translated, QWidget):
         painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, self.tr("tip"))
 
     def _draw_led(
-        self, painter: QPainter, sight: _Sight, pen: Pen, row: int, colors: Colors
+        self, painter: QPainter, sight: _Projection, pen: Pen, row: int, colors: Colors
     ) -> None:
         led, normal = pen.leds[row], pen.normals[row]
         near = float(sight.nearness(led))
@@ -316,10 +316,10 @@ class PenView(Translated, QWidget):
             return Tone.WARN
         return Tone.ACTIVE if row + 1 == self._chosen else Tone.PLAIN
 
-    def _least(self, sight: _Sight) -> float:
+    def _least(self, sight: _Projection) -> float:
         return LEAST_RADIUS / sight.scale
 
-    def _sight(self, pen: Pen) -> _Sight:
+    def _sight(self, pen: Pen) -> _Projection:
         every = pen.leds
         extent = float(np.ptp(pen.leds, axis=0).max())
         shows_origin = float(np.abs(pen.leds).min(axis=0).max()) < extent
@@ -335,7 +335,7 @@ class PenView(Translated, QWidget):
         scale = enlarged * min(width / 2 / aside, height / 2 / radius)
         middle = QPointF(self.width() / 2, self.height() / 2)
         turn = _turn_matrix(self._yaw, self._pitch)
-        return _Sight(turn, center, radius, max(scale, 0.01), middle, shows_origin)
+        return _Projection(turn, center, radius, max(scale, 0.01), middle, shows_origin)
 
     def _turn(self, yaw: float, pitch: float) -> None:
         self._yaw = math.remainder(self._yaw + yaw, 2 * math.pi)

@@ -1,8 +1,6 @@
 """The step Review: is the tip good, how sure is it, and what next."""
 
 from collections.abc import Callable
-from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSize, QTimer, Slot
@@ -11,48 +9,45 @@ from PySide6.QtWidgets import (
     QBoxLayout,
     QHBoxLayout,
     QProgressBar,
-    QTabWidget,
     QVBoxLayout,
     QWidget,
 )
 from typing_extensions import override
 
 from lightpen.estimation.verdict import Grade, NextStep
-from lightpen.model.origin import Origin
 from lightpen.record.acceptance import takes_supervisor
 from lightpen.record.assessment import Assessment
-from lightpen.record.next_tips import NextTip, next_tips
 from lightpen.record.results import Result
-from lightpen.swing.status import Activity
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.review.late_panels import (
-    make_images_panel,
-    make_methods_panel,
-    make_residuals_panel,
-    make_uncertainty_panel,
-)
+from lightpen_app.steps.review.detail_tabs import DetailTabs
+from lightpen_app.steps.review.next_tips_control import NextTipsControl
 from lightpen_app.steps.review.next_tips_row import NextTipsRow
 from lightpen_app.steps.review.remark_list import RemarkList
 from lightpen_app.steps.review.result_panel import Outcome, ResultPanel
 from lightpen_app.steps.review.result_tools import ResultTools
-from lightpen_app.steps.review.state_words import remarks, review_state, step_of_file
+from lightpen_app.steps.review.state_words import (
+    next_step_text,
+    remarks,
+    review_state,
+    step_of_file,
+    unsaved_text,
+    why_not_accepted,
+    why_not_changed,
+    why_not_now,
+)
 from lightpen_app.steps.review.taking_along import TakingAlong
-from lightpen_app.widgets.late import Late
-from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
+from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.state_banner import StateBanner
-from lightpen_app.work.job import Job
 from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
     from lightpen_app.steps.review.images_panel import ImagesPanel
-    from lightpen_app.steps.review.plots_panel import PlotsPanel
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
 RESULT_WIDTH, LARGE_RESULT_WIDTH = 46 * GRID, 80 * GRID
@@ -79,8 +74,6 @@ class ReviewPage(Rearranged, Page):
         self._result_shown: Result | None = None
         self._wants_more = self._repeats = self._to_next_tip = False
         self._place = SavePlace(workbench)
-        self._along = TakingAlong(self._run, self._place, self._save_plots, self)
-        self._search: Job | None = None
         self._on_yes: Callable[[], object] = self._repeat_swing
 
         # Widgets
@@ -106,19 +99,10 @@ class ReviewPage(Rearranged, Page):
         self._take_back = PushButton()
         self._tools = ResultTools()
         self._next_tips = NextTipsRow()
-        self._images = Late(make_images_panel)
-        self._panels: tuple[Late[ImagesPanel] | Late[PlotsPanel], ...] = (
-            self._images,
-            Late(make_residuals_panel),
-            Late(make_uncertainty_panel),
-            Late(make_methods_panel),
-        )
-        self._tabs = QTabWidget()
-        self._tab_of = {panel: PageScroll() for panel in self._panels}
-        for panel, tab in self._tab_of.items():
-            tab.setWidget(Squeezed(panel))
-            self._tabs.addTab(tab, "")
+        self._next = NextTipsControl(workbench, self._next_tips)
+        self._tabs = DetailTabs(self._run, self._place)
         self._result_side = QWidget()
+        self._along = TakingAlong(self._run, self._place, self._tabs.pictures, self)
 
         # Layout
         self._arrange()
@@ -139,17 +123,14 @@ class ReviewPage(Rearranged, Page):
         self._reason.declined.connect(self._tabs.setFocus)
         self._question.agreed.connect(self._on_question_agreed)
         self._question.declined.connect(self._tabs.setFocus)
-        self._images.made.connect(self._on_images_made)
-        self._tabs.currentChanged.connect(self._fill_tab)
+        self._tabs.images_made.connect(self._on_images_made)
+        self._tabs.saved.connect(self.status_changed)
+        self._tabs.failed.connect(self.notice_raised)
         self._along.follow(self._tools)
         self._along.told.connect(self.status_changed)
         self._along.failed.connect(self.notice_raised)
-        workbench.library.changed.connect(self._show_standings)
-        self._next_tips.chosen.connect(self._on_next_tip_chosen)
-        for panel in self._panels:
-            panel.made.connect(self._on_panel_made)
+        self._next.chosen.connect(self._on_next_tip_chosen)
 
-        self._show_standings()
         self._retranslate()
 
     @override
@@ -158,20 +139,7 @@ class ReviewPage(Rearranged, Page):
 
     @override
     def lead(self) -> str:
-        if self._run.status.result is not None:
-            return self.tr("Next: start the next calibration, or close the program.")
-        if self._run.status.verdict is None:
-            return self.tr("Nothing is in force until it is accepted.")
-        next_step = self._run.status.verdict.next_step
-        text = worded(next_step.sentence)
-        if next_step is NextStep.CAPTURE_MORE and self._is_recording:
-            text = self.tr("Next: record more images, and read them all again.")
-        assessment = self._run.status.assessment
-        has_last = assessment is not None and assessment.last is not None
-        is_practice = self._run.status.origin is Origin.SIMULATED
-        if next_step is NextStep.ACCEPT and has_last and not is_practice:
-            text = self.tr("{0} The old one stays in force until then.").format(text)
-        return text
+        return next_step_text(self._run.status)
 
     @override
     def is_complete(self) -> bool:
@@ -195,11 +163,11 @@ class ReviewPage(Rearranged, Page):
             is_new = self._acceptance.isActive()
             why_not = self.tr("The tip is accepted.") if is_new else ""
             return MainAction(self.tr("Start the next calibration"), why_not)
-        verdict, why_not = status.verdict, self._why_not_now()
+        verdict, why_not = status.verdict, why_not_now(status)
         match None if verdict is None else verdict.next_step:
             case None | NextStep.ACCEPT:
                 return MainAction(self.tr("Accept"), why_not, at_screen=True)
-            case NextStep.CAPTURE_MORE if not self._is_recording:
+            case NextStep.CAPTURE_MORE if not status.is_recording:
                 return MainAction(self.tr("Capture more"), why_not)
             case NextStep.SEE_TO_CAUSE:
                 return MainAction(self.tr("Check the settings"), why_not)
@@ -214,12 +182,12 @@ class ReviewPage(Rearranged, Page):
             self._run.runner.abandon()
             self.step_requested.emit("start")
             return
-        if status.verdict is None or self._why_not_now():
+        if status.verdict is None or why_not_now(status):
             return
         match status.verdict.next_step:
             case NextStep.ACCEPT:
                 self._run.runner.accept()
-            case NextStep.CAPTURE_MORE if not self._is_recording:
+            case NextStep.CAPTURE_MORE if not status.is_recording:
                 self._on_capture_more_clicked()
             case NextStep.SEE_TO_CAUSE:
                 self.step_requested.emit("start")
@@ -227,12 +195,6 @@ class ReviewPage(Rearranged, Page):
                 self.step_requested.emit(step_of_file(status.verdict.reason))
             case _:
                 self._ask_to_repeat()
-
-    @property
-    def _is_recording(self) -> bool:
-        """Whether no more images can be captured: all were recorded before."""
-        setup = self._run.status.setup
-        return setup is not None and setup.is_recording
 
     @override
     def first_control(self) -> QWidget:
@@ -244,41 +206,22 @@ class ReviewPage(Rearranged, Page):
 
     @override
     def unsaved(self) -> str:
-        status = self._run.status
-        if status.solution is None or status.result is not None:
-            return ""
-        taken = status.taken_back
-        if taken is not None and taken.record == status.record_folder:
-            # Its swing is over, however little is in force.
-            return self.tr(
-                "The tip was taken back and is not accepted. The swing is kept; the "
-                "file swing.lightpen in {0} opens it again."
-            ).format(status.record_folder)
-        return self.tr(
-            "The tip is not accepted. The swing is kept and offered again at the next "
-            "start."
-        )
+        return unsaved_text(self._run.status)
 
     @override
     def shut_down(self) -> None:
-        if self._search is not None:
-            self._search.cancel()
+        self._next.shut_down()
         self._along.shut_down()
-        for panel in self._panels:
-            content = panel.content_so_far()
-            if content is not None:
-                content.shut_down()
+        self._tabs.shut_down()
 
     @override
     def _retranslate(self) -> None:
-        names = (
+        self._tabs.set_names(
             self.tr("Images"),
             self.tr("Residuals"),
             self.tr("Uncertainty"),
             self.tr("Two-stage"),
         )
-        for tab, name in zip(self._tab_of.values(), names, strict=True):
-            self._tabs.setTabText(self._tabs.indexOf(tab), name)
         if self._room.is_narrow:
             self._tabs.setTabText(0, self.tr("Result"))
         self._scroll.setAccessibleName(self.tr("Result"))
@@ -373,37 +316,9 @@ class ReviewPage(Rearranged, Page):
             if side.parentWidget() is not None:  # else it would be a window
                 side.show()  # a tab that is not the current one is hidden
 
-    def _why_not_now(self) -> str:
-        """Return why nothing can be done with the tip at this moment."""
-        status = self._run.status
-        if status.solution is None or status.verdict is None:
-            return self.tr("Swing the pen first.")
-        if status.is_solving:
-            return self.tr("The tip is being computed.")
-        if status.is_reading:
-            return self.tr("The swing goes on.")
-        if status.activity is Activity.ACCEPTING:
-            return self.tr("The result is being stored.")
-        return ""
-
-    def _why_not_accepted(self) -> str:
-        """Return why the tip cannot be accepted with a reason."""
-        verdict, why_not = self._run.status.verdict, self._why_not_now()
-        if why_not or verdict is None or verdict.can_be_accepted:
-            return why_not
-        return self.tr("Not good enough: capture more images, or repeat the swing.")
-
-    def _why_locked(self) -> str:
-        """Return why the swing cannot be changed."""
-        if self._run.status.result is not None:
-            return self.tr("The tip is accepted; start the next calibration.")
-        if self._run.status.solution is None:
-            return self.tr("Swing the pen first.")
-        return ""
-
     def _lock(self, images: "ImagesPanel") -> None:
         goes_on = self.tr("The swing goes on.") if self._run.status.is_reading else ""
-        images.set_locked(self._why_locked() or goes_on)
+        images.set_locked(why_not_changed(self._run.status) or goes_on)
 
     @Slot()
     def _on_run_changed(self) -> None:
@@ -417,7 +332,7 @@ class ReviewPage(Rearranged, Page):
         self._told = told
         if status.result is not self._result_shown:
             self._result_shown = status.result
-            self._search_next_tips(status.result)
+            self._next.follow(status.result)
             self._acceptance.start(2 * QApplication.doubleClickInterval())
         if status.is_solving:
             self._progress.setValue(0)
@@ -443,7 +358,7 @@ class ReviewPage(Rearranged, Page):
     def _refresh(self) -> None:
         """Show what there is now."""
         self._take_solution()
-        self._fill_tab()
+        self._tabs.fill()
         self._refresh_words()
 
     def _take_solution(self) -> None:
@@ -460,38 +375,21 @@ class ReviewPage(Rearranged, Page):
             outcome = Outcome(status.solution, status.names, assessment)
             self._result.set_value(outcome)
 
-    def _fill_tab(self) -> None:
-        """Show the solution in the tab that is seen; the others wait until they are."""
-        for panel, tab in self._tab_of.items():
-            if tab is self._tabs.currentWidget():
-                self._show_solution(panel.content())
-
-    def _show_solution(self, panel: "ImagesPanel | PlotsPanel") -> None:
-        solution = self._run.status.solution
-        if panel.value() is not solution:
-            panel.set_value(solution)
-
     def _on_images_made(self, images: "ImagesPanel") -> None:
         self._lock(images)
         images.take_out_requested.connect(self._run.runner.take_out)
         images.put_back_requested.connect(self._run.runner.put_back)
 
-    def _on_panel_made(self, panel: "ImagesPanel | PlotsPanel") -> None:
-        for card in panel.cards():
-            card.set_place(self._place)
-        panel.saved.connect(self.status_changed)
-        panel.failed.connect(self.notice_raised)
-
     def _refresh_words(self) -> None:
         status = self._run.status
         self._banner.set_value(review_state(status))
         self._remarks.set_value(remarks(status, self._workbench.preparation.names))
-        why_locked = self._why_locked()
-        images = self._images.content_so_far()
+        why_locked = why_not_changed(status)
+        images = self._tabs.images()
         if images is not None:
             self._lock(images)
         all_read = ""
-        if self._is_recording:
+        if status.is_recording:
             all_read = self.tr("All recorded images are read.")
         self._capture_more.set_why_not(
             why_locked or all_read, self.tr("Add images to this swing")
@@ -502,7 +400,7 @@ class ReviewPage(Rearranged, Page):
         )
         self._accept.setVisible(is_doubted and status.result is None)
         self._accept.set_why_not(
-            self._why_not_accepted(), self.tr("Put it in force with a reason")
+            why_not_accepted(status), self.tr("Put it in force with a reason")
         )
         self._tools.set_why_not(
             self.tr("Swing the pen first.") if status.solution is None else ""
@@ -570,47 +468,13 @@ class ReviewPage(Rearranged, Page):
             operator = self._workbench.preparation.names.operator
             self._run.runner.take_back(result, operator)
 
-    # What comes next
-
-    def _search_next_tips(self, result: Result | None) -> None:
-        """Look for the other tips of the pen whose tip was accepted."""
-        if self._search is not None:
-            self._search.cancel()
-        self._next_tips.set_value(())
-        if result is None:
-            return
-        archive = self._run.archive
-        self._search = job = Job(lambda _: next_tips(archive, result), self)
-
-        # Connections
-        job.succeeded.connect(self._next_tips.set_value)
-        job.start()
-
-    def _show_standings(self) -> None:
-        self._next_tips.set_standings(self._workbench.library.standings)
-
-    def _on_next_tip_chosen(self, tip: NextTip) -> None:
-        workbench = self._workbench
-        self._run.runner.abandon()
-        chosen = workbench.preparation
-        if tip.last is not None:
-            chosen = chosen.with_last(tip.last)
-        if tip.listed is not None:
-            chosen = chosen.with_listed(tip.listed)
-        names = replace(chosen.names, pen=tip.pen)
-        workbench.set_preparation(replace(chosen, names=names))
+    def _on_next_tip_chosen(self) -> None:
         self._to_next_tip = True
-
-    def _save_plots(self, folder: Path, stem: str) -> None:
-        for panel in self._panels:
-            self._show_solution(panel.content())
-            for card in panel.content().cards():
-                card.save_beside(folder, stem)
 
     def _on_run_troubled(self) -> None:
         self._repeats = False
         if self._run.status.result is None:
             self._reason.refuse()
-        images = self._images.content_so_far()
+        images = self._tabs.images()
         if images is not None:
             images.forget_refused()

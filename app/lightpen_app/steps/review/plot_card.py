@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QMouseEvent
@@ -15,13 +16,19 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen.errors import FileError
-from lightpen.record.exports import save_new
-from lightpen_app.look.sentences import worded
+from lightpen.formats.files import write_whole
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.plots import Plot
 from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.job import Job
 from lightpen_app.work.save_place import SavePlace
+
+
+class NamedPicture(NamedTuple):
+    """A plot as a PNG file, and what its name ends with."""
+
+    name: str
+    data: bytes
 
 
 class PlotCard(Translated, QFrame):
@@ -92,16 +99,9 @@ class PlotCard(Translated, QFrame):
         """Offer this place for what is saved."""
         self._place = place
 
-    def save_beside(self, folder: Path, stem: str) -> None:
-        """Save a picture in a folder, under a name that none has yet.
-
-        Raises
-        ------
-        FileError
-            It cannot be written.
-        """
-        picture = self._plot.png(self._mark())
-        save_new(folder, f"{stem}_{self._file_stem}.png", picture)
+    def picture(self) -> NamedPicture:
+        """Return the plot as it is saved beside others."""
+        return NamedPicture(f"{self._file_stem}.png", self._plot.png(self._mark()))
 
     def actions_offered(self) -> Sequence[QAction]:
         """Return what the menu offers: enlarge, save as PNG, save as CSV."""
@@ -109,15 +109,15 @@ class PlotCard(Translated, QFrame):
 
     def save(self, path: Path) -> None:
         """Save as the suffix of the file says: numbers as CSV, else a picture."""
-        try:
-            if path.suffix.lower() == ".csv":
-                self._plot.save_csv(path)
-            else:
-                self._plot.save_png(path, self._mark())
-        except FileError as error:
-            self.failed.emit(worded(error.sentence))
-            return
-        self.saved.emit(self.tr("Saved as {0}").format(path))
+        is_table = path.suffix.lower() == ".csv"
+        data = self._plot.csv() if is_table else self._plot.png(self._mark())
+        job = Job(lambda _: write_whole(path, data), self)
+
+        # Connections
+        told = self.tr("Saved as {0}").format(path)
+        job.succeeded.connect(lambda _: self.saved.emit(told))
+        job.failed.connect(self.failed)
+        job.start()
 
     @override
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:

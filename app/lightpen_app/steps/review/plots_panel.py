@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.report import result_of
+from lightpen.estimation.methods import result_of
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.record.solving import Solution
 from lightpen_app.look.phrases import share_text

@@ -1,15 +1,13 @@
 """Takes a tip along: its folder, its numbers, files of it, and its record on paper."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
-from lightpen.errors import FileError
-from lightpen.record.exports import export_json, export_tables, tip_text
-from lightpen_app.look.sentences import worded
+from lightpen.record.exports import export_json, export_tables, save_new, tip_text
 from lightpen_app.paper.showing import PaperShowing
 from lightpen_app.steps.review.result_tools import Export, ResultTools
 from lightpen_app.widgets.opened_folder import open_folder
@@ -17,7 +15,10 @@ from lightpen_app.work.job import Job, Report
 from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.swing_run import SwingRun
 
-SavePlots: TypeAlias = Callable[[Path, str], None]
+if TYPE_CHECKING:
+    from lightpen_app.steps.review.plot_card import NamedPicture
+
+DrawPlots: TypeAlias = "Callable[[], Sequence[NamedPicture]]"
 
 
 class TakingAlong(QObject):
@@ -28,9 +29,8 @@ class TakingAlong(QObject):
     run : SwingRun
         With the tip.
     place : SavePlace
-    save_plots : callable
-        Saves all plots in a folder, under names that begin with a stem; only the page
-        can draw them.
+    draw_plots : callable
+        Returns all plots as pictures; only the page can draw them.
     page : QWidget
         Whose windows are opened.
 
@@ -46,12 +46,12 @@ class TakingAlong(QObject):
     failed = Signal(str)
 
     def __init__(
-        self, run: SwingRun, place: SavePlace, save_plots: SavePlots, page: QWidget
+        self, run: SwingRun, place: SavePlace, draw_plots: DrawPlots, page: QWidget
     ) -> None:
         super().__init__(page)
         self._run = run
         self._place = place
-        self._save_plots = save_plots
+        self._draw_plots = draw_plots
         self._page = page
         self._saving: Job | None = None
         self._paper = PaperShowing(place, page)
@@ -95,20 +95,18 @@ class TakingAlong(QObject):
         dialog.open()
 
     def _save(self, export: Export, folder: Path) -> None:
-        """Save what is wanted; plots at once, as only the GUI can draw them."""
+        """Save what is wanted."""
         status, stem = self._run.status, self._place.stem()
         solution, names = status.solution, status.names
         if solution is None:
             return
         self._place.remember(folder)
-        if export in (Export.PLOTS, Export.ALL):
-            try:
-                self._save_plots(folder, stem)
-            except FileError as error:
-                self.failed.emit(worded(error.sentence))
-                return
+        draws = export in (Export.PLOTS, Export.ALL)
+        pictures = self._draw_plots() if draws else ()
 
         def write(_: Report) -> None:
+            for picture in pictures:
+                save_new(folder, f"{stem}_{picture.name}", picture.data)
             if export in (Export.JSON, Export.ALL):
                 export_json(solution, folder, stem)
             if export in (Export.CSV, Export.ALL):

@@ -25,7 +25,7 @@ from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.translated import Translated
 
 
-class _Kind(NamedTuple):
+class _AssumedNumber(NamedTuple):
     """A field: its unit, of which so many are one of the core's, and its range."""
 
     name: str
@@ -37,14 +37,14 @@ class _Kind(NamedTuple):
 
 UNMEASURED = COLDEST  # degrees C, at which the field says that nothing was measured
 KINDS = (
-    _Kind("focal_length", "%", 1e2, (0.01, 10.0), 2),
-    _Kind("scale", "ppm", 1e6, (0.1, 10_000.0), 1),
-    _Kind("form_error", "\N{MICRO SIGN}m", 1e3, (0.01, 100.0), 2),
-    _Kind("center_bias", "px", 1.0, (0.0001, 1.0), 4),
-    _Kind("temperature_c", "\N{DEGREE SIGN}C", 1.0, (UNMEASURED, WARMEST), 1),
-    _Kind("temperature", "K", 1.0, (0.01, 20.0), 2),
-    _Kind("warmth", "K", 1.0, (0.01, 50.0), 2),
-    _Kind("expansion", "ppm/K", 1e6, (0.0, 100.0), 1),
+    _AssumedNumber("focal_length", "%", 1e2, (0.01, 10.0), 2),
+    _AssumedNumber("scale", "ppm", 1e6, (0.1, 10_000.0), 1),
+    _AssumedNumber("form_error", "\N{MICRO SIGN}m", 1e3, (0.01, 100.0), 2),
+    _AssumedNumber("center_bias", "px", 1.0, (0.0001, 1.0), 4),
+    _AssumedNumber("temperature_c", "\N{DEGREE SIGN}C", 1.0, (UNMEASURED, WARMEST), 1),
+    _AssumedNumber("temperature", "K", 1.0, (0.01, 20.0), 2),
+    _AssumedNumber("warmth", "K", 1.0, (0.01, 50.0), 2),
+    _AssumedNumber("expansion", "ppm/K", 1e6, (0.0, 100.0), 1),
 )
 
 

@@ -53,10 +53,6 @@ class LeaningDial(PostureDial):
         self._wish: Posture | None = None  # what the user wanted last
         self._turns_at: float | None = None  # where a drag that turns began, px
 
-    def is_interactive(self) -> bool:
-        """Return whether the pen can be leant by hand."""
-        return self._is_interactive
-
     def set_interactive(self, interactive: bool) -> None:
         """Let the user lean the pen, or only look."""
         if interactive == self._is_interactive:

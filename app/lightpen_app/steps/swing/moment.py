@@ -7,7 +7,7 @@ from math import ceil, isfinite
 from PySide6.QtCore import QObject
 
 from lightpen.arrays import FloatArray
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.estimation.verdict import Grade, NextStep, Verdict
 from lightpen.messages import SHOW_PEN, Code
 from lightpen.model.origin import Origin

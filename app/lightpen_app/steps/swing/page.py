@@ -9,7 +9,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from typing_extensions import override
 
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.model.limits import SwingLimits
 from lightpen.swing.kept_images import KeptImages
 from lightpen.swing.preparation import SourceKind
@@ -213,8 +213,7 @@ class SwingPage(Page):
             return self.tr("The swing goes on.")
         if self._run.status.solution is not None:
             return ""
-        setup = self._run.status.setup
-        if state.phase is Phase.VERDICT and setup is not None and setup.is_recording:
+        if state.phase is Phase.VERDICT and self._run.status.is_recording:
             return self.tr("There is no tip to review: choose other images.")
         if state.phase is Phase.VERDICT:
             return self.tr("There is no tip to review: capture more, or start over.")
@@ -343,10 +342,9 @@ class SwingPage(Page):
         return self.tr("Capture more"), self._runner.capture_more
 
     def _why_not_offered(self) -> str:
-        status = self._run.status
-        is_recording = status.setup is not None and status.setup.is_recording
-        state = status.state
-        if is_recording and state is not None and state.phase is Phase.VERDICT:
+        status, state = self._run.status, self._run.status.state
+        is_judged = state is not None and state.phase is Phase.VERDICT
+        if is_judged and status.is_recording:
             return self.tr("All recorded images are read.")
         return ""
 

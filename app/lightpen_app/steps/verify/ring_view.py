@@ -41,8 +41,8 @@ class RingValue:
         ordered = sorted(angle % (2 * math.pi) for angle in self.angles)
         if not ordered:
             return 0.0
-        following = [*ordered[1:], ordered[0] + 2 * math.pi]
-        gaps = [b - a for a, b in zip(ordered, following, strict=True)]
+        next_ones = [*ordered[1:], ordered[0] + 2 * math.pi]
+        gaps = [b - a for a, b in zip(ordered, next_ones, strict=True)]
         widest = gaps.index(max(gaps))
         return ordered[(widest + 1) % len(ordered)]
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QObject
 
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.estimation.verdict import Grade
 from lightpen.model.posture import posture_of
 from lightpen.sentences import Sentence

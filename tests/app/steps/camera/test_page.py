@@ -35,7 +35,7 @@ from typing_extensions import override
 
 from lightpen.cameras.pairing import not_synchronised
 from lightpen.cameras.protocol import CameraSettings, Frame, sealed
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.detection.inspection import SEARCHED_IMAGES
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import write_camera
@@ -623,6 +623,7 @@ def test_a_folder_is_picked_in_the_dialog(
 
     live.until(lambda: workbench.preparation.source.place == str(folder))
     live.wait("80 x 64 px")
+    live.wait("lost: 1")
 
 
 def test_a_missing_folder_is_told_and_tried_again(live: "Seen", tmp_path: Path) -> None:
@@ -636,7 +637,7 @@ def test_a_missing_folder_is_told_and_tried_again(live: "Seen", tmp_path: Path) 
     live.click("Try again")
 
     live.wait("80 x 64 px")
-    assert "RECORDED" in live.words
+    live.wait("lost: 1")
 
 
 def test_a_folder_without_images_is_told(live: "Seen", tmp_path: Path) -> None:
@@ -666,14 +667,28 @@ def test_a_damaged_image_is_counted_and_the_others_are_shown(
     assert "80 x 64 px" in live.words
 
 
-def test_a_recording_that_begins_damaged_is_told(live: "Seen", tmp_path: Path) -> None:
+def test_a_recording_of_damaged_images_is_told(live: "Seen", tmp_path: Path) -> None:
+    folder = recording(tmp_path / "swing")
+    for image in folder.iterdir():
+        image.write_bytes(b"no image")
+    live.choose("Recorded images")
+
+    live.enter("Folder, record or video", str(folder))
+
+    live.wait("frame_0.png is damaged or no image")
+
+
+def test_a_recording_that_begins_damaged_shows_the_others(
+    live: "Seen", tmp_path: Path
+) -> None:
     folder = recording(tmp_path / "swing")
     (folder / "frame_0.png").write_bytes(b"no image")
     live.choose("Recorded images")
 
     live.enter("Folder, record or video", str(folder))
 
-    live.wait("frame_0.png is damaged or no image")
+    live.wait("80 x 64 px")
+    live.wait("lost: 1")
 
 
 def test_the_pen_is_back_after_a_recording(live: "Seen", tmp_path: Path) -> None:

@@ -108,7 +108,8 @@ def save_as(seen: "Seen", path: Path) -> None:
     dialog.selectFile(str(path))
     dialog.accept()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-    seen.settle()
+    seen.settle()  # whether there is such a file
+    seen.settle()  # and what becomes of it
 
 
 @pytest.fixture

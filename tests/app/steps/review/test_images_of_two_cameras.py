@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QThreadPool
 from PySide6.QtWidgets import QAbstractButton, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -22,6 +23,19 @@ from lightpen_app.steps.review.residual_view import ResidualView
 @pytest.fixture(scope="module")
 def solution(swung: Callable[..., Path]) -> Solution:
     return solve_record(open_record(swung(14, by_two=True)))
+
+
+@pytest.fixture
+def panel(qtbot: QtBot) -> ImagesPanel:
+    """Return a panel that lasts as long as the thread that reads its images."""
+
+    def let_go(panel: ImagesPanel) -> None:
+        panel.shut_down()
+        QThreadPool.globalInstance().waitForDone()
+
+    panel = ImagesPanel()
+    qtbot.addWidget(panel, before_close_func=let_go)
+    return panel
 
 
 def press(panel: QWidget, text: str) -> None:
@@ -52,10 +66,8 @@ def test_the_residuals_are_of_both_cameras(solution: Solution) -> None:
 
 
 def test_the_images_of_the_second_camera_are_shown_with_what_it_saw(
-    solution: Solution, qtbot: QtBot
+    solution: Solution, panel: ImagesPanel, qtbot: QtBot
 ) -> None:
-    panel = ImagesPanel()
-    qtbot.addWidget(panel)
     panel.set_value(solution)
     panel.findChildren(ImageTable)[0].choose(5)
     view = panel.findChildren(ResidualView)[0]

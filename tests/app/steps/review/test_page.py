@@ -1244,10 +1244,11 @@ def test_a_plot_that_cannot_be_saved_is_told(
     page: ReviewPage, qtbot: QtBot, tmp_path: Path
 ) -> None:
     card = page.findChildren(PlotCard)[0]
-    with qtbot.waitSignal(page.notice_raised) as told:
-        card.save(tmp_path / "nowhere" / "plot.csv")
+    for name in ("plot.csv", "plot.png"):
+        with qtbot.waitSignal(page.notice_raised) as told:
+            card.save(tmp_path / "nowhere" / name)
 
-    assert "cannot be written" in told.args[0]
+        assert "cannot be written" in told.args[0]
 
 
 def test_a_file_is_chosen_in_a_dialog_that_stops_nothing(

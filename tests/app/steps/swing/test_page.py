@@ -15,7 +15,7 @@ from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import OpenedFiles
 from lightpen.live.sources import Surroundings

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
+from benchmarks.labelling import spots_at
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.constellation import constellation_of
 from lightpen.detection.labelling.matching import log_false_alarms, match, settle
 from lightpen.detection.labelling.spot_arrays import SpotArrays, spot_arrays
-from lightpen.detection.spots import Spots
 from lightpen.model.ellipse import disc_images
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import paper_camera, paper_pen
@@ -16,18 +16,6 @@ CONSTELLATION = constellation_of(PEN)
 FACING = np.diag([1.0, -1.0, -1.0])
 R = rotation_from_vector(np.array([0.3, -0.2, 0.1])) @ FACING
 T = np.array([20.0, 100.0, 1050.0])
-
-
-def spots_at(centers: FloatArray, shapes: FloatArray) -> Spots:
-    n = len(centers)
-    return Spots(
-        centers=centers,
-        shapes=shapes,
-        areas=4 * np.pi * np.sqrt(np.linalg.det(shapes)),
-        contrasts=np.full(n, 0.8),
-        edge_widths=np.full(n, 2.0),
-        flaws=np.zeros(n, dtype=np.int64),
-    )
 
 
 def true_sight(noise: float = 0.0, shift: FloatArray | None = None) -> SpotArrays:

@@ -18,9 +18,9 @@ from lightpen.messages import (
     too_little_tilt,
 )
 from lightpen.sentences import Sentence, sentence
-from lightpen_app.look.kept_words import worded_anew
 from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.sentences import worded
+from lightpen_app.paper.recorded_words import worded_anew
 
 DAMAGED = sentence(
     "results.damaged",

@@ -1,4 +1,4 @@
-"""What the core said once and a file kept in English, in the language that is chosen.
+"""What the core said once and a file holds in English, in the language that is chosen.
 
 A file keeps the words with the numbers in them, not how they were made. So the sentence
 is looked for whose words these are, and what stands in its places is put into the words

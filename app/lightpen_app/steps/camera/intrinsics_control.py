@@ -1,0 +1,79 @@
+"""What the step Camera does with the intrinsics: a file is read, or one is made."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QWidget
+
+from lightpen.formats.opened_files import CameraFile
+from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
+from lightpen_app.work.job import Job
+from lightpen_app.work.workbench import Workbench
+
+if TYPE_CHECKING:
+    from lightpen_app.steps.camera.board_window import BoardWindow
+
+
+class IntrinsicsControl(QObject):
+    """Does what is asked for by the panel of the intrinsics.
+
+    Parameters
+    ----------
+    page : QWidget
+        Whose window it is in which a camera is calibrated.
+    """
+
+    def __init__(
+        self, workbench: Workbench, panel: IntrinsicsPanel, page: QWidget
+    ) -> None:
+        super().__init__(page)
+        self._workbench = workbench
+        self._panel = panel
+        self._page = page
+        self._reading: Job | None = None
+        self._board: BoardWindow | None = None  # made when it is asked for
+
+        # Connections
+        panel.path_chosen.connect(self._on_path_chosen)
+        panel.calibration_requested.connect(self._on_calibration_requested)
+
+    def shut_down(self) -> None:
+        """Close the window, and read no more."""
+        if self._board is not None:
+            self._board.close()
+        if self._reading is not None:
+            self._reading.cancel()
+
+    def _on_path_chosen(self, path: str) -> None:
+        if self._reading is not None:
+            self._reading.cancel()
+        self._reading = job = Job(lambda _: CameraFile.read(Path(path)), self)
+
+        # Connections
+        job.succeeded.connect(self._on_file_read)
+        job.failed.connect(self._on_file_refused)
+        job.start()
+
+    def _on_calibration_requested(self) -> None:
+        if self._board is None:
+            # A camera is calibrated once a year; it is not waited for at each start.
+            from lightpen_app.steps.camera.board_window import BoardWindow
+
+            self._board = BoardWindow(self._workbench.live, self._page)
+
+            # Connections
+            self._board.saved.connect(self._on_path_chosen)
+            self._board.concluded.connect(self._workbench.keep_camera_trial)
+        self._board.show()
+        self._board.raise_()
+
+    def _on_file_read(self, camera_file: CameraFile) -> None:
+        self._reading = None
+        now = self._workbench.preparation
+        self._workbench.set_preparation(replace(now, camera_file=camera_file))
+
+    def _on_file_refused(self, sentence: str) -> None:
+        self._reading = None
+        self._panel.set_problem(sentence)

@@ -1,0 +1,111 @@
+"""The details of a solved swing: images and plots, each in a tab."""
+
+from itertools import chain
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QTabWidget, QWidget
+
+from lightpen_app.steps.review.late_panels import (
+    make_images_panel,
+    make_methods_panel,
+    make_residuals_panel,
+    make_uncertainty_panel,
+)
+from lightpen_app.widgets.late import Late
+from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
+from lightpen_app.work.save_place import SavePlace
+from lightpen_app.work.swing_run import SwingRun
+
+if TYPE_CHECKING:
+    from lightpen_app.steps.review.images_panel import ImagesPanel
+    from lightpen_app.steps.review.plot_card import NamedPicture
+    from lightpen_app.steps.review.plots_panel import PlotsPanel
+
+
+class DetailTabs(QTabWidget):
+    """Shows the solution of a swing in the tab that is seen; the others wait for it.
+
+    Parameters
+    ----------
+    run : SwingRun
+        With the solution.
+    place : SavePlace
+        Where plots are saved.
+
+    Signals
+    -------
+    images_made(ImagesPanel)
+        The tab of the images is seen for the first time.
+    saved(str), failed(str)
+        A sentence on a plot that was saved, or could not be.
+    """
+
+    images_made = Signal(object)
+    saved = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self, run: SwingRun, place: SavePlace, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._run = run
+        self._place = place
+        self._images = Late(make_images_panel)
+        self._panels: tuple[Late[ImagesPanel] | Late[PlotsPanel], ...] = (
+            self._images,
+            Late(make_residuals_panel),
+            Late(make_uncertainty_panel),
+            Late(make_methods_panel),
+        )
+        self._tab_of = {panel: PageScroll() for panel in self._panels}
+        for panel, tab in self._tab_of.items():
+            tab.setWidget(Squeezed(panel))
+            self.addTab(tab, "")
+
+        # Connections
+        self._images.made.connect(self.images_made)
+        for panel in self._panels:
+            panel.made.connect(self._on_panel_made)
+        self.currentChanged.connect(self.fill)
+
+    def set_names(self, images: str, residuals: str, u: str, methods: str) -> None:
+        """Set what the tabs are called."""
+        names = images, residuals, u, methods
+        for tab, name in zip(self._tab_of.values(), names, strict=True):
+            self.setTabText(self.indexOf(tab), name)
+
+    def images(self) -> "ImagesPanel | None":
+        """Return the images, once they were seen."""
+        return self._images.content_so_far()
+
+    def fill(self) -> None:
+        """Show the solution in the tab that is seen."""
+        for panel, tab in self._tab_of.items():
+            if tab is self.currentWidget():
+                self._show_solution(panel.content())
+
+    def pictures(self) -> "list[NamedPicture]":
+        """Return all plots as they are saved, those in tabs that were not seen too."""
+        for panel in self._panels:
+            self._show_solution(panel.content())
+        cards = chain.from_iterable(panel.content().cards() for panel in self._panels)
+        return [card.picture() for card in cards]
+
+    def shut_down(self) -> None:
+        """Cancel what the panels do."""
+        for panel in self._panels:
+            content = panel.content_so_far()
+            if content is not None:
+                content.shut_down()
+
+    def _show_solution(self, panel: "ImagesPanel | PlotsPanel") -> None:
+        solution = self._run.status.solution
+        if panel.value() is not solution:
+            panel.set_value(solution)
+
+    def _on_panel_made(self, panel: "ImagesPanel | PlotsPanel") -> None:
+        for card in panel.cards():
+            card.set_place(self._place)
+        panel.saved.connect(self.saved)
+        panel.failed.connect(self.failed)

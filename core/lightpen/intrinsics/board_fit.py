@@ -1,0 +1,155 @@
+"""All that the points of a board in views depend on, and how a fit knows it."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.intrinsics.boards import Board
+from lightpen.intrinsics.start import BoardPoses
+from lightpen.model.camera import Camera
+
+N_POSE, N_SHAPE = 6, 5
+
+
+@dataclass(frozen=True, eq=False)
+class BoardState:
+    """Everything that the points of the views depend on.
+
+    Attributes
+    ----------
+    cameras : tuple of Camera
+        C of them.
+    rotations, translations : (C, 3, 3) and (C, 3) array
+        Of cam_from_rig, mm.
+    poses : BoardPoses
+        Of rig_from_board.
+    shape : (5,) array
+        Stretch, shear, and three bends, mm.
+    """
+
+    cameras: tuple[Camera, ...]
+    rotations: FloatArray
+    translations: FloatArray
+    poses: BoardPoses
+    shape: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class BoardFit:
+    """A state that fits the views, and how well it is known.
+
+    Attributes
+    ----------
+    residuals : (V, C, N, 2) array
+        Observed minus modelled, px; NaN where not seen.
+    sigma : float
+        Noise of one coordinate, px.
+    information, scores : (V, p, p) and (V, p) array
+        Of each view about all but its pose, for points of 1 px noise; their gradient.
+    prior : (p, p) array
+        Information of the priors.
+    covariance : (p, p) array
+        Of the unknowns but the poses, noise being independent.
+    """
+
+    board: Board
+    state: BoardState
+    residuals: FloatArray
+    sigma: float
+    information: FloatArray
+    scores: FloatArray
+    prior: FloatArray
+    covariance: FloatArray
+
+    @property
+    def board_points(self) -> FloatArray:
+        """Points of the board as it was found to be, (N, 3), mm."""
+        return board_points(self.board, self.state.shape)
+
+    @property
+    def rms(self) -> float:
+        """Distance of the points from where they should be, px rms."""
+        squares = np.square(self.residuals).sum(axis=-1)
+        return float(np.sqrt(np.nanmean(squares)))
+
+    @property
+    def view_rms(self) -> FloatArray:
+        """The same of each view and camera, (V, C); NaN where nothing was seen."""
+        squares = np.square(self.residuals).sum(axis=-1)
+        counts = np.isfinite(squares).sum(axis=-1)
+        sums = np.nansum(squares, axis=-1)
+        return np.asarray(np.sqrt(sums / np.where(counts > 0, counts, np.nan)))
+
+    def of_intrinsics(self, camera: int) -> slice:
+        """Return where the intrinsics of a camera stand among the unknowns."""
+        return intrinsics_at(self.state.cameras)[camera]
+
+    def prior_of(self, camera: int) -> FloatArray:
+        """Return the information that was assumed of a camera's intrinsics."""
+        at = self.of_intrinsics(camera)
+        return self.prior[at, at]
+
+    @property
+    def correlation(self) -> float:
+        """How many times the variance of independent noise the views vary by.
+
+        The scores of views scatter as the information of independent noise says, if it
+        is that; where they scatter more, residuals hang together within a view [1]_.
+
+        References
+        ----------
+        .. [1] K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized
+           linear models", Biometrika 73 (1986) 13-22.
+        """
+        S, weight = self.covariance, self.sigma**-2
+        information, scores = weight * self.information, weight * self.scores
+        found = np.einsum("vi,ij,vj->", scores, S, scores)
+        leverages = S @ information
+        expected = np.einsum("vii->", leverages)
+        expected -= np.einsum("vij,vji->", leverages, leverages)
+        return float(found / expected)
+
+    @property
+    def of_places(self) -> slice:
+        """Where the places of all cameras but the first stand."""
+        return places_at(self.state.cameras)
+
+    @property
+    def of_shape(self) -> slice:
+        """Where the errors of the board stand."""
+        at = self.of_places
+        return slice(at.stop, at.stop + N_SHAPE)
+
+
+def board_points(board: Board, shape: FloatArray) -> FloatArray:
+    """Return the points of a board as it is, (N, 3), mm."""
+    return np.asarray(board.points + deformations_of(board) @ shape)
+
+
+@cache
+def deformations_of(board: Board) -> FloatArray:
+    """Return how each error of a board moves its points, (N, 3, 5)."""
+    points = board.points
+    x, y = points[:, 0], points[:, 1]
+    u, v = x / np.abs(x).max(), y / np.abs(y).max()
+    moves = np.zeros((len(points), 3, N_SHAPE))
+    moves[:, 0, 0], moves[:, 1, 0] = 0.5 * x, -0.5 * y
+    moves[:, 0, 1], moves[:, 1, 1] = 0.5 * y, 0.5 * x
+    for k, bend in enumerate((u * u, u * v, v * v), 2):
+        moves[:, 2, k] = bend - bend.mean()
+    moves.flags.writeable = False
+    return moves
+
+
+def intrinsics_at(cameras: tuple[Camera, ...]) -> list[slice]:
+    """Return where the intrinsics of each camera stand among the unknowns."""
+    ends = np.cumsum([len(camera.intrinsics) for camera in cameras]).tolist()
+    return [slice(b, e) for b, e in zip([0, *ends[:-1]], ends, strict=True)]
+
+
+def places_at(cameras: tuple[Camera, ...]) -> slice:
+    """Return where the places of all cameras but the first stand."""
+    begin = sum(len(camera.intrinsics) for camera in cameras)
+    return slice(begin, begin + N_POSE * (len(cameras) - 1))

@@ -1,0 +1,22 @@
+"""What the system says of a file is told in any language, where it is known."""
+
+import errno
+import os
+
+from lightpen.formats.system_reasons import strerror
+from lightpen.sentences import Sentence
+
+
+def test_a_known_reason_is_worded_as_the_system_does_and_can_be_translated() -> None:
+    said = strerror(PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
+
+    assert isinstance(said, Sentence)
+    assert str(said) == "Permission denied"
+    assert said.code == "system.denied"
+
+
+def test_any_other_reason_is_told_as_the_system_words_it() -> None:
+    assert strerror(OSError(errno.EXDEV, "Invalid cross-device link")) == (
+        "Invalid cross-device link"
+    )
+    assert strerror(OSError("no number, no words")) == "OSError"
