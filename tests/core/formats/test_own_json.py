@@ -1,7 +1,11 @@
-"""The program's own JSON is read by several threads at once."""
+"""The program's own JSON: read as it was written, or not at all; by many threads."""
 
 import subprocess
 import sys
+
+import pytest
+
+from lightpen.formats.own_json import DamagedError, parse_checked, with_checksum
 
 # A crash of the interpreter would end the tests with it.
 READERS = """
@@ -40,3 +44,16 @@ def test_a_shape_that_was_never_read_is_read_by_many_threads_at_once() -> None:
     )
 
     assert outcome.stdout == "done\n", outcome.stderr
+
+
+def test_what_stands_behind_a_checksum_is_damage() -> None:
+    text = with_checksum(b'{"a": 1}')
+    assert parse_checked(text, dict)["a"] == 1
+
+    with pytest.raises(DamagedError, match="checksum"):
+        parse_checked(text.removesuffix(b"}") + b', "a": 2}', dict)
+
+
+def test_an_entry_that_is_given_twice_is_damage() -> None:
+    with pytest.raises(DamagedError, match="twice"):
+        parse_checked(with_checksum(b'{"a": 1, "a": 2}'), dict)

@@ -49,11 +49,24 @@ def test_a_moving_board_is_not_kept(capture: Capture, make_views: MakeViews) -> 
 def test_a_view_like_one_that_was_kept_is_not_kept(
     capture: Capture, make_views: MakeViews
 ) -> None:
-    points = make_views(n_views=1).pixels[0, 0]
-    again = held(held(capture, points), points + 8.0, 1.0)
+    first, second = make_views(n_views=2).pixels[:, 0]
+    both = held(held(capture, first), second, 1.0)
+    for points, begin in ((first, 2.0), (second, 3.0)):
+        again = held(both, points + 8.0, begin)
 
-    assert again.sight is Sight.ALIKE
-    assert len(again.kept) == 1
+        assert again.sight is Sight.ALIKE
+        assert len(again.kept) == 2
+
+
+def test_a_board_that_has_just_come_to_rest_is_not_kept_yet(
+    capture: Capture, make_views: MakeViews
+) -> None:
+    first, second = make_views(n_views=2).pixels[:, 0]
+    moved = held(capture, first).after(second, 10.0)
+    still = moved.after(second, 10.0 + 0.5 * STILL_TIME)
+
+    assert (moved.sight, still.sight) == (Sight.MOVING, Sight.STILL)
+    assert len(still.kept) == 1
 
 
 def test_a_board_that_is_not_seen_is_said_to_be_so(capture: Capture) -> None:

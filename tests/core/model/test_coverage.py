@@ -1,6 +1,7 @@
 """Posture coverage: where the pen leant, and which direction hardly turned."""
 
 import numpy as np
+import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.model.coverage import DIRECTION_NAMES, measure_coverage, posture_spread
@@ -26,6 +27,15 @@ def test_each_direction_is_counted_under_its_name() -> None:
         assert far.counts[1, k] == 1
         assert name not in one.missing
         assert len(one.missing) == 7
+
+
+@pytest.mark.parametrize("degrees", [-20, 20])
+def test_a_lean_between_two_directions_counts_for_the_nearer(degrees: int) -> None:
+    for k in range(len(DIRECTION_NAMES)):
+        direction = k * np.pi / 4 + np.radians(degrees)
+        one = measure_coverage(leaning(direction, np.radians(15))[None])
+
+        assert one.counts[0, k] == 1
 
 
 def test_right_is_right_in_the_image_and_away_is_away_from_the_camera() -> None:

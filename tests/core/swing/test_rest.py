@@ -88,10 +88,21 @@ def test_images_out_of_the_seat_are_told_from_those_in_it() -> None:
     assert offset(moved) == pytest.approx(3.0, abs=0.3)
 
 
-def test_one_bad_image_does_not_tell_where_the_tip_is() -> None:
+def test_a_tip_that_has_just_come_back_does_not_rest_yet() -> None:
     state = state_after(STILL, seat=True)
     moves = STILL.copy()
-    moves[12] = [0.0, 3.0, 0.0]
+    moves[:18] = [0.0, 3.0, 0.0]
+    back = replace(state_after(moves), seat=state.seat)
+
+    assert in_place(back, back.recent[-1:]).all()
+    assert not rests_in_place(back, 0.5)
+
+
+@pytest.mark.parametrize("which", [12, 20])
+def test_one_bad_image_does_not_tell_where_the_tip_is(which: int) -> None:
+    state = state_after(STILL, seat=True)
+    moves = STILL.copy()
+    moves[which] = [0.0, 3.0, 0.0]
     jumping = replace(state_after(moves), seat=state.seat)
 
     assert offset(jumping, 1.0) < 0.3
