@@ -1,8 +1,8 @@
 """From Start to Accept through the whole wizard, as an operator walks it."""
 
 import re
-import shutil
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,9 @@ from tests.app.walks import (
     watch_the_swing,
 )
 
+from lightpen.live.sources import Surroundings
 from lightpen.model.origin import Origin
+from lightpen.simulator.scenes import Scene
 from lightpen_app.look.languages import Language
 from lightpen_app.work.settings import Preferences, Settings, Station
 
@@ -95,15 +97,13 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
 
 def test_a_recorded_swing_gives_its_tip(
     open_wizard: "OpenWizard",
-    scene: Callable[..., Path],
-    tmp_path: Path,
+    around: Surroundings,
+    shared_data: Path,
     truth: Callable[[Path], dict[str, Any]],
     lightpen: Run,
 ) -> None:
-    rendered = scene("--binning", "2", "--images", "60", "--seed", "8")
-    folder = tmp_path / "recorded"  # as of a real pen, without the simulator's mark
-    shutil.copytree(rendered, folder, ignore=shutil.ignore_patterns("SIMULATED.txt"))
-    walker = open_wizard()
+    folder = shared_data / "swing-clean"
+    walker = open_wizard(replace(around, scene=Scene()))
     for name, text in NAMES.items():
         walker.click_into(name, text)
     walker.click("Continue to the camera")
@@ -117,7 +117,7 @@ def test_a_recorded_swing_gives_its_tip(
     walker.until_says("Open the intrinsics file.")
     walker.until_says("Beside the images: camera.yaml and leds.csv")
     walker.click("Use both")
-    walker.until_tells("Fits the live images: 1224 x 1024")
+    walker.until_tells("Fits the live images: 2448 x 2048")
     walker.until(walker.main_button().isEnabled)
     assert not walker.offers("Use both")
     walker.click("Continue to the LEDs")
@@ -136,6 +136,7 @@ def test_a_recorded_swing_gives_its_tip(
 
     tip = read_out(walker).tip
     true_tip = np.array(truth(folder)["pen"][BEST_FIT])
+    # A solver that knows the images' model comes as near as 3.1 um.
     assert np.linalg.norm(tip - true_tip) <= 0.004
     walker.click("Accept")
     walker.until_says("IN FORCE")
