@@ -26,6 +26,7 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 from typing_extensions import override
 
+from lightpen.formats.decoding import keep_freed_memory
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
 from lightpen.swing.state import (
@@ -143,6 +144,7 @@ def _memory_mb() -> float:
 
 def main() -> int:
     """Run, print the figures, and return the exit status."""
+    keep_freed_memory()  # as the program does
     application = make_application(sys.argv[:1])
     with tempfile.TemporaryDirectory() as folder:
         settings = Settings(Path(folder) / "lightpen.json")

@@ -124,6 +124,13 @@ def test_what_a_record_brings_itself_is_refused_beside_it(
     assert (outcome.returncode, both.returncode) == (2, 2)
 
 
+def test_an_empty_name_stands_for_no_images(lightpen: Run) -> None:
+    outcome = lightpen("calibrate", "")
+
+    assert "Give either IMAGES" in outcome.stderr
+    assert outcome.returncode == 2
+
+
 def test_a_record_is_not_written_over_itself(
     lightpen: Run, calibrated: tuple[Path, str]
 ) -> None:

@@ -89,7 +89,7 @@ class _Calibrated:
 
 @printing
 def _calibrate(options: argparse.Namespace) -> None:
-    given = (bool(options.images), options.centers, options.from_record)
+    given = (any(options.images), options.centers, options.from_record)
     if sum(map(bool, given)) != 1:
         raise UsageError(
             sentence(

@@ -41,7 +41,7 @@ MAX_SCANS = 64  # of a JPEG, each of which takes as long as the image; 10 are us
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
 MAX_KEPT_BLOCK = 32 * 2**20  # bytes; the most that malloc takes
 MAX_KEPT_MEMORY = 256 * 2**20
-MAX_ARENAS = 4  # of threads; each reserves 64 MB, of what `ulimit -v` leaves
+MAX_ARENAS = 1  # of threads; what stays free in one is of no use to another
 
 
 def keep_freed_memory() -> None:
@@ -49,7 +49,7 @@ def keep_freed_memory() -> None:
 
     Blocks as large as an image otherwise go back to the kernel when freed, and come
     anew page by page, zeroed: two fifths of the time that decoding takes. Threads that
-    begin later share a few arenas.
+    begin later share one arena; several would each keep the memory of an image or two.
     """
     if sys.platform != "linux":
         return

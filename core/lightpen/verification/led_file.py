@@ -134,8 +134,8 @@ def improve_pen(
         raise CalibrationError(
             sentence(
                 "led-file.too-few",
-                "{n_swings} swings are given; {needed} are needed to pool, and one "
-                "more to confirm what comes of them.",
+                "Swings given: {n_swings}. {needed} are needed to pool, and one more "
+                "to confirm what comes of them.",
                 n_swings=len(calibrations),
                 needed=MIN_POOLED,
             )

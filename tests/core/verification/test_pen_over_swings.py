@@ -181,5 +181,5 @@ def test_swings_of_before_and_after_a_knock_are_not_pooled(swing: Swing) -> None
 def test_too_few_swings_are_refused(swing: Swing) -> None:
     swings = [swing(true_pen(), number) for number in (1, 2, 3)]
 
-    with pytest.raises(CalibrationError, match="3 swings are given"):
+    with pytest.raises(CalibrationError, match="Swings given: 3"):
         improve_pen(swings, paper_camera(), PEN_FILE)
