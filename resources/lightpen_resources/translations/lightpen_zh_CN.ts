@@ -5764,6 +5764,10 @@
         <translation>实时数据流需要 pyigtl 软件包，但尚未安装。安装命令：pip install &quot;lightpen[stream]&quot;。</translation>
     </message>
     <message>
+        <source>Swings given: {n_swings}. {needed} are needed to pool, and one more to confirm what comes of them.</source>
+        <translation>给出的摆动次数：{n_swings}。合并需要 {needed} 次，另需一次来确认所得结果。</translation>
+    </message>
+    <message>
         <source>The GenTL producer {file} does not load: {why}. Choose the producer of this camera, for this system and 64 bit.</source>
         <translation>无法加载 GenTL 生产者 {file}：{why}。请选择适用于此相机、此系统和 64 位的生产者。</translation>
     </message>
@@ -7538,10 +7542,6 @@
     <message>
         <source>{n_poses} poses are usable; the two-stage method starts from {needed}. Capture more images.</source>
         <translation>可用位姿 {n_poses} 个；两步法至少需要 {needed} 个。请采集更多图像。</translation>
-    </message>
-    <message>
-        <source>{n_swings} swings are given; {needed} are needed to pool, and one more to confirm what comes of them.</source>
-        <translation>给出了 {n_swings} 次摆动；合并需要 {needed} 次，另需一次来确认所得结果。</translation>
     </message>
     <message>
         <source>{n_tips} calibration tells nothing of how well it repeats; give two at least, ten are usual.</source>
