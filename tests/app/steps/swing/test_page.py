@@ -710,6 +710,7 @@ def test_space_pauses_even_after_a_click_on_the_simulated_hand(
 ) -> None:
     capturing.window.go_to(0)
     capturing.window.go_to(1)
+    keep_on(qtbot, capturing, 1)  # as it was paused by leaving the step
     capturing.click("Slip")
 
     capturing.type(Key.Key_Space)
