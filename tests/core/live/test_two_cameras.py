@@ -5,6 +5,7 @@ import shutil
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -189,6 +190,9 @@ def test_each_camera_is_followed_by_itself_and_anew_with_each_pen(
         found[camera.serial].append(unseen(pen, Reason.EMPTY))
         return found[camera.serial][-1]
 
+    def has_several(sightings: list[Sighting]) -> bool:
+        return len(sightings) > 2
+
     monkeypatch.setattr("lightpen.live.looking.look", look)
     live = Live(simulated, SETTINGS, screen, station.runner)
     pen = station.preparation.pen
@@ -196,7 +200,7 @@ def test_each_camera_is_followed_by_itself_and_anew_with_each_pen(
         live.set_aim(Aim(one, pen, others=(Aim(other, pen),)))
         if one is cameras[0]:
             live.start()
-        screen.wait_until(lambda other=other: len(found[other.serial]) > 2)  # type: ignore[misc]
+        screen.wait_until(partial(has_several, found[other.serial]))
     live.stop()
 
     for serial, sightings in found.items():
