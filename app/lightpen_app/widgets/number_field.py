@@ -73,6 +73,20 @@ class NumberField(QDoubleSpinBox):
         return None if nearest == number else nearest
 
     @override
+    def setValue(self, value: float) -> None:
+        """Show another number; where it is the same, what is being typed stays."""
+        bounded = min(max(value, self.minimum()), self.maximum())
+        is_same = self.textFromValue(bounded) == self.textFromValue(self.value())
+        if not (is_same and self.hasFocus()):
+            super().setValue(value)
+
+    @override
+    def setSuffix(self, suffix: str) -> None:
+        """Show another unit; where it is the same, what is being typed stays."""
+        if suffix != self.suffix():
+            super().setSuffix(suffix)
+
+    @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Leave the page keys, which a presenter's remote sends, to the window."""
         if event.key() in PAGE_KEYS:

@@ -158,6 +158,29 @@ def test_a_number_beyond_its_limits_becomes_the_nearest_and_no_digit_is_lost(
     assert field.value() == pytest.approx(value)
 
 
+def test_a_number_that_is_being_typed_stays_until_another_one_is_shown(
+    qtbot: QtBot,
+) -> None:
+    field = NumberField("mm", (1, 50), 3)
+    qtbot.addWidget(field)
+    field.setKeyboardTracking(False)
+    field.setValue(2)
+    field.show()
+    field.activateWindow()
+    field.setFocus()
+    qtbot.waitUntil(field.hasFocus)
+    field.selectAll()
+    QTest.keyClicks(field, "1")
+
+    field.setValue(2)
+    field.setSuffix(" mm")
+    QTest.keyClicks(field, "7")
+    assert field.text() == "17 mm"
+    field.setValue(3)
+
+    assert field.text() == "3.000 mm"
+
+
 def test_the_wheel_over_a_choice_changes_nothing(qtbot: QtBot) -> None:
     field = ChoiceField()
     qtbot.addWidget(field)

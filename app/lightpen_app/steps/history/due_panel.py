@@ -89,12 +89,12 @@ class DuePanel(Translated, QWidget):
                 field.setValue(number)
             field.setEnabled(not is_guarded)
         self._is_guarded = is_guarded
-        self._retranslate()
+        self._refresh()
 
     def set_tips(self, tips: Sequence[DueTip]) -> None:
         """Show other tips."""
         self._tips = tuple(tips)
-        self._retranslate()
+        self._refresh()
 
     def figures(self) -> Figures:
         """Return the tips as they are shown."""
@@ -112,6 +112,9 @@ class DuePanel(Translated, QWidget):
             label.setText(text)
             field.setAccessibleName(text)
         self._swings.setSpecialValueText(self.tr("any number"))
+        self._refresh()
+
+    def _refresh(self) -> None:
         laid_down = self.tr("A supervisor lays it down, at Start: All limits...")
         swings = self.tr("Each swing, with whatever tip, wears the seat of all tips.")
         self._days.setToolTip(laid_down if self._is_guarded else "")

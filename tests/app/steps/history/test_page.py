@@ -566,6 +566,22 @@ def test_when_tips_are_due_follows_a_rule_that_is_remembered(
     assert settings.due_rule().max_days == 7
 
 
+def test_a_rule_that_is_being_typed_stays_while_something_else_changes(
+    desk: Desk,
+) -> None:
+    desk.open()
+    desk.show_tab(DUE)
+    days, swings = desk.child(DuePanel).findChildren(NumberField)
+    for field in (days, swings):
+        field.setFocus()
+        field.selectAll()
+        QTest.keyClicks(field, "7")
+
+        workbench = desk.workbench
+        workbench.set_choices(replace(workbench.choices, n_touches=12))
+        assert field.text() == "7"
+
+
 def test_what_a_supervisor_laid_down_is_not_changed_by_anybody(desk: Desk) -> None:
     desk.enter(3)
     folder, eve = desk.workbench.folder, Signature("Eve", "correct horse")
