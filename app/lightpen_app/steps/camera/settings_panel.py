@@ -155,10 +155,12 @@ class SettingsPanel(Translated, QGroupBox):
     def _offer_choices(
         self, field: ChoiceField, offered: tuple[str, ...], chosen: str
     ) -> None:
+        before = tuple(field.itemData(index) for index in range(field.count()))
         with QSignalBlocker(field):
-            field.clear()
-            for each in offered:
-                field.addItem(each, each)
+            if offered != before:  # else somebody may be choosing
+                field.clear()
+                for each in offered:
+                    field.addItem(each, each)
             field.setCurrentIndex(field.findData(chosen))
 
     def _offer_region(self, caps: Caps, region: Region | None) -> None:

@@ -1,6 +1,8 @@
 """The settings of a camera: what it offers is shown, what is changed is asked for."""
 
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
 from lightpen.cameras.protocol import (
@@ -115,3 +117,20 @@ def test_recorded_images_have_nothing_to_set(panel: SettingsPanel) -> None:
     panel.set_camera(Caps(80, 60, ("Mono8",), n_images=4), CameraSettings())
 
     assert panel.isHidden()
+
+
+@pytest.mark.qt_log_ignore("^This plugin does not support ")
+def test_a_list_that_is_open_stays_as_it_is_while_the_camera_offers_the_same(
+    qtbot: QtBot, panel: SettingsPanel
+) -> None:
+    panel.show()
+    formats = panel.findChildren(ChoiceField)[0]
+    formats.showPopup()
+    qtbot.waitUntil(formats.view().isVisible)
+    QTest.keyClick(formats.view(), Qt.Key.Key_Down)
+
+    panel.set_camera(CAPS, SETTINGS)
+    with qtbot.waitSignal(panel.settings_changed) as signal:
+        QTest.keyClick(formats.view(), Qt.Key.Key_Return)
+
+    assert signal.args == [CameraSettings(pixel_format="Mono12")]
