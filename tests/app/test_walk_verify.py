@@ -171,7 +171,7 @@ def test_a_verification_that_was_interrupted_is_gone_on_with(
     walker.click("Let the simulated operator touch")
     walker.until(lambda: walker.main_button().text() == "Back to Start")
 
-    assert walker.tells("The witness stays within")
+    walker.until_tells("The witness stays within")
     kinds = [each["verification"] for each in records(walker)]
     assert kinds == [TaskKind.FIXED_POINT, TaskKind.DRIFT, CONCLUSION]
     walker.click_step("Start")
