@@ -1,5 +1,6 @@
 """What the pages share: what was chosen, the live images, and the swing."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import monotonic
@@ -115,6 +116,7 @@ class Workbench(QObject):
         self._is_started = False
         self._wants_samples = False
         self._reading = FileReading(self)
+        self._read_for = SourceChoice()  # which was chosen when that began
         self._unread = Station()
         self._subject_told: Subject | None = None
         self._verified_told: tuple[Path, ...] = ()
@@ -320,9 +322,7 @@ class Workbench(QObject):
     def use_files(self, files: FilesBeside) -> None:
         """Choose the files that stand beside recorded images, once they are read."""
         self._reading.relieve()
-        self._reading.start(
-            lambda _: open_files(files.camera, files.pen), self._on_chosen_read
-        )
+        self._read(lambda _: open_files(files.camera, files.pen), self._on_chosen_read)
 
     def open_camera(self) -> None:
         """Open the source, or open it again after it failed; then follow its choice.
@@ -346,9 +346,26 @@ class Workbench(QObject):
 
     def _write_samples(self) -> None:
         around, folder = self._around, self._folder / SIMULATED
-        self._reading.start(
-            lambda _: sample_files(around, folder), self._on_chosen_read
-        )
+        self._read(lambda _: sample_files(around, folder), self._on_chosen_read)
+
+    def _read(
+        self,
+        function: Callable[[Report], OpenedFiles],
+        on_read: Callable[[OpenedFiles], None],
+    ) -> None:
+        self._read_for = self._preparation.source
+        self._reading.start(function, on_read)
+
+    def _still_wanted(self, opened: OpenedFiles) -> OpenedFiles:
+        """Return what was read, without what another source chosen since rules out."""
+        now = self._preparation
+        held = replace(
+            now,
+            source=self._read_for,
+            camera_file=opened.camera_file,
+            pen_file=opened.pen_file,
+        ).with_source(now.source)
+        return replace(opened, camera_file=held.camera_file, pen_file=held.pen_file)
 
     def shut_down(self, timeout_s: float = CLOSING_TIME) -> bool:
         """Close the camera, cancel what is under way, and wait until all has ended.
@@ -390,7 +407,7 @@ class Workbench(QObject):
         if any(path is not None for path in (camera_path, pen_path, rig_path)):
             self._unread = station
             samples = self._folder / SIMULATED
-            self._reading.start(
+            self._read(
                 lambda _: files_of_before(
                     *(samples, camera_path, pen_path, units, rig_path)
                 ),
@@ -399,6 +416,7 @@ class Workbench(QObject):
 
     def _on_files_read(self, opened: OpenedFiles) -> None:
         self._unread = Station()
+        opened = self._still_wanted(opened)
         before = self._preparation  # files chosen meanwhile count
         self._preparation = replace(
             before,
@@ -418,6 +436,7 @@ class Workbench(QObject):
             self._write_samples()
 
     def _on_chosen_read(self, opened: OpenedFiles) -> None:
+        opened = self._still_wanted(opened)
         before = self._preparation
         self._preparation = replace(
             before,

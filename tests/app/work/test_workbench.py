@@ -228,6 +228,26 @@ def test_the_files_of_the_simulated_pen_are_those_of_its_scene(stage: Stage) -> 
     np.testing.assert_allclose(read_pen(now.pen_file.path).leds, scene.pen.leds)
 
 
+@pytest.mark.parametrize(
+    "read",
+    [
+        lambda workbench: workbench.use_sample_files(),
+        lambda workbench: workbench.choose_station("Hall 2"),
+    ],
+    ids=["sample files", "files of the station"],
+)
+def test_files_of_the_simulated_pen_that_come_late_are_not_those_of_another_source(
+    stage: Stage, recording: Path, read: Callable[[Workbench], None]
+) -> None:
+    read(stage.workbench)
+    source = SourceChoice(SourceKind.RECORDED, str(recording))
+    stage.workbench.set_preparation(stage.workbench.preparation.with_source(source))
+    stage.wait_for_files()
+
+    now = stage.workbench.preparation
+    assert (now.camera_file, now.pen_file) == (None, None)
+
+
 def test_sample_files_that_cannot_be_written_are_told(
     tmp_path: Path, workbench: Workbench, qtbot: QtBot
 ) -> None:
