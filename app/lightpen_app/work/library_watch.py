@@ -69,6 +69,7 @@ class LibraryWatch(QObject):
         self._trouble = ""
         self._reading: Job | None = None
         self._changing: Job | None = None
+        self._is_over = False
         self._timer = QTimer(self)
         self._timer.setInterval(AGAIN_MS)
 
@@ -93,6 +94,8 @@ class LibraryWatch(QObject):
 
     def refresh(self) -> None:
         """Read it anew; the last to ask is told."""
+        if self._is_over:
+            return
         if self._reading is not None:
             self._reading.cancel()
         self._timer.start()
@@ -144,6 +147,7 @@ class LibraryWatch(QObject):
 
     def shut_down(self) -> None:
         """Read nothing more."""
+        self._is_over = True
         self._timer.stop()
         if self._reading is not None:
             self._reading.cancel()

@@ -377,6 +377,8 @@ class Workbench(QObject):
             behind: all that was acknowledged is on the disk.
         """
         deadline = monotonic() + timeout_s
+        for told in (self.run, self.verification):
+            told.blockSignals(True)  # nothing more is begun because of what they tell
         self.folder_watch.stop()
         self.library.shut_down()
         self.run.runner.shut_down()

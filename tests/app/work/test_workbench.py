@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QCoreApplication, QThreadPool
 from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import FloatArray
@@ -20,7 +21,9 @@ from lightpen.model.assumptions import USUAL, with_focal_length
 from lightpen.model.limits import SwingLimits
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.names import Names
+from lightpen.streaming.server import StreamPlace
 from lightpen.swing.preparation import Lack, Preparation, SourceChoice, SourceKind
+from lightpen.swing.status import SwingStatus
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.workbench import Workbench
 
@@ -465,3 +468,20 @@ def test_shutting_down_twice_does_no_harm(stage: Stage) -> None:
     stage.workbench.shut_down()
 
     assert not stage.workbench.live.is_open
+
+
+def test_what_is_told_after_shutting_down_begins_nothing(stage: Stage) -> None:
+    workbench = stage.workbench
+    workbench.streaming.want(StreamPlace(port=0))  # a job that tells of its end later
+    workbench.library.refresh()
+    workbench.shut_down()
+    told: list[str] = []
+    workbench.run.changed.connect(lambda: told.append("swing"))
+    workbench.library.changed.connect(lambda: told.append("library"))
+    workbench.run.tell(SwingStatus(), ())
+    workbench.library.refresh()
+    for _ in range(3):
+        QCoreApplication.processEvents()
+        assert QThreadPool.globalInstance().waitForDone(0)
+
+    assert told == []
