@@ -1,5 +1,6 @@
 """The tip library and how all tips stand, read and changed beside the window."""
 
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from datetime import datetime
@@ -38,17 +39,17 @@ class LibraryWatch(QObject):
     -------
     changed()
         `standings` are different.
-    change_kept()
-        A change that was asked for.
-    change_failed(str)
-        The sentence why it was not.
+    change_kept(object)
+        What was asked for.
+    change_failed(object, str)
+        What was asked for, and the sentence why it was not kept.
     troubled(str), relieved(str)
         A sentence to be read, and that its cause is gone.
     """
 
     changed = Signal()
-    change_kept = Signal()
-    change_failed = Signal(str)
+    change_kept = Signal(object)
+    change_failed = Signal(object, str)
     troubled = Signal(str)
     relieved = Signal(str)
 
@@ -68,6 +69,7 @@ class LibraryWatch(QObject):
         self._standings = Standings()
         self._trouble = ""
         self._reading: Job | None = None
+        self._asked: deque[tuple[object, Change]] = deque()
         self._changing: Job | None = None
         self._is_over = False
         self._timer = QTimer(self)
@@ -126,10 +128,20 @@ class LibraryWatch(QObject):
         job.failed.connect(self._on_read_failed)
         job.start()
 
-    def change(self, change: Change) -> None:
-        """Make a change of the library, and enter it in the archive."""
-        if self._changing is not None:
-            return
+    def change(self, asked: object, change: Change) -> None:
+        """Make a change of the library in its turn, and enter it in the archive.
+
+        Parameters
+        ----------
+        asked : object
+            What is told of when it is kept, or is not.
+        """
+        self._asked.append((asked, change))
+        if self._changing is None:
+            self._change_next()
+
+    def _change_next(self) -> None:
+        asked, change = self._asked.popleft()
         logbook = self._logbook
 
         def make(_: Report) -> None:
@@ -140,8 +152,9 @@ class LibraryWatch(QObject):
         self._changing = job = Job(make, self)
 
         # Connections
-        job.succeeded.connect(lambda _: self._on_changed())
-        job.failed.connect(self.change_failed)
+        job.succeeded.connect(lambda _: self._on_changed(asked))
+        job.failed.connect(lambda why: self.change_failed.emit(asked, why))
+        job.crashed.connect(lambda: self.change_failed.emit(asked, ""))
         job.ended.connect(self._on_change_ended)
         job.start()
 
@@ -152,12 +165,14 @@ class LibraryWatch(QObject):
         if self._reading is not None:
             self._reading.cancel()
 
-    def _on_changed(self) -> None:
-        self.change_kept.emit()
+    def _on_changed(self, asked: object) -> None:
+        self.change_kept.emit(asked)
         self.refresh()
 
     def _on_change_ended(self) -> None:
         self._changing = None
+        if self._asked:
+            self._change_next()
 
     def _on_read(self, found: Standings) -> None:
         self._reading = None

@@ -104,7 +104,7 @@ class LibraryControl(QObject):
 
         # Connections
         self._watch.change_kept.connect(dialog.tell_kept)
-        self._watch.change_failed.connect(dialog.tell)
+        self._watch.change_failed.connect(self._on_change_failed)
         dialog.chosen.connect(self.chosen)
         dialog.change_asked.connect(self._on_change_asked)
         dialog.form.spin_toggled.connect(self._on_spin_toggled)
@@ -168,7 +168,12 @@ class LibraryControl(QObject):
         names = self._workbench.preparation.names
         by = Author(names.station, names.operator, asked.reason, asked.signature)
         folder, now = self._workbench.folder, self._workbench.around.now
-        self._watch.change(lambda: _changed(folder, asked, by, now()))
+        self._watch.change(asked, lambda: _changed(folder, asked, by, now()))
+
+    def _on_change_failed(self, asked: Asked, why: str) -> None:
+        """Say it in the dialog, or on the page if that was left meanwhile."""
+        if self._dialog is None or not self._dialog.tell_refused(asked, why):
+            self.told.emit(why)
 
 
 def _changed(folder: Path, asked: Asked, by: Author, now: datetime) -> Library:

@@ -91,6 +91,7 @@ class LibraryDialog(Translated, QDialog):
         self._is_guarded = False
         self._item: AnyItem | None = None  # that is being added or changed
         self._is_new = False
+        self._asked: Asked | None = None  # of which it is not known if it is kept
 
         # Widgets
         self._lead = text_label(TextSize.BODY)
@@ -210,13 +211,19 @@ class LibraryDialog(Translated, QDialog):
         made = structs.replace(MADE[self.kind()](id="?"), id=name)
         self._start_editing(made, self.tr("A new one"), is_new=True)
 
-    def tell_kept(self) -> None:
-        """Show that what was asked for is done."""
-        self._stop_editing()
+    def tell_kept(self, asked: Asked) -> None:
+        """Show that what was asked for is done, if that is still waited for."""
+        if asked is self._asked:
+            self._stop_editing()
 
-    def tell(self, trouble: str) -> None:
-        """Say why it was not."""
+    def tell_refused(self, asked: Asked, trouble: str) -> bool:
+        """Say why it was not; return whether that is still waited for."""
+        if asked is not self._asked:
+            return False
+        self._asked = None
         self._trouble.set_value(Remark(trouble, Sign.CROSS, Tone.BAD))
+        self._refresh()
+        return True
 
     def rows(self) -> tuple[tuple[str, ...], ...]:
         """Return what is written in the table."""
@@ -281,6 +288,7 @@ class LibraryDialog(Translated, QDialog):
         self._open_panel()
 
     def _open_panel(self) -> None:
+        self._asked = None
         self._reason.clear()
         self._supervisor.clear()
         self._supervisor.setVisible(self._is_guarded)
@@ -291,7 +299,7 @@ class LibraryDialog(Translated, QDialog):
         self.adjustSize()
 
     def _stop_editing(self) -> None:
-        self._item = None
+        self._item = self._asked = None
         self._form.stop_spin()
         self._panel.hide()
         self._list.show()
@@ -340,8 +348,9 @@ class LibraryDialog(Translated, QDialog):
         self._trouble.set_value(Remark())
         picture = self._form.picture() if is_typed else ""
         reason = self._reason.text().strip()
-        asked = Asked(item, picture, self._is_new, reason, signature)
-        self.change_asked.emit(asked)
+        self._asked = Asked(item, picture, self._is_new, reason, signature)
+        self._refresh()
+        self.change_asked.emit(self._asked)
 
     def _show_picture(self, item: AnyItem | None) -> None:
         """Show the picture of the tip that is chosen, if it has one."""
@@ -371,7 +380,11 @@ class LibraryDialog(Translated, QDialog):
             lacks = self.tr("Enter a day such as 2026-08-14, or none.")
         if not lacks and self._is_guarded and not self._supervisor.is_filled():
             lacks = self.tr("A supervisor signs each change.")
-        self._save.set_why_not(lacks, self.tr("With your name and the time"))
+        is_asked = self.tr("It is being kept.") if self._asked is not None else ""
+        self._save.set_why_not(
+            is_asked or lacks, self.tr("With your name and the time")
+        )
+        self._leave.set_why_not(is_asked)
 
     @override
     def _retranslate(self) -> None:

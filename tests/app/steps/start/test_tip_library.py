@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
+from threading import Event
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,6 +34,7 @@ from lightpen.record.tip_library import (
 from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.sounds import Silence
 from lightpen_app.shell.sidebar import Sidebar
+from lightpen_app.steps.start import library_control
 from lightpen_app.steps.start.barcode import PACE_MS
 from lightpen_app.steps.start.form import NamesForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog
@@ -274,6 +277,84 @@ def test_a_tip_is_added_and_changed_in_the_dialog_and_entered_with_who(
     assert [change.operator for change in changes] == ["Ann", "Ann"]
     assert changes[0].reason == "new"
     desk.click("Close")
+
+
+@pytest.fixture
+def slow_disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Event]:
+    """Changes are kept once this is set."""
+    disk, keep = Event(), library_control._changed
+
+    def kept(*arguments: Any) -> Library:
+        disk.wait()
+        return keep(*arguments)
+
+    monkeypatch.setattr(library_control, "_changed", kept)
+    yield disk
+    disk.set()
+
+
+def test_what_is_being_kept_is_neither_asked_for_again_nor_left(
+    desk: Desk, slow_disk: Event
+) -> None:
+    desk.names.library_requested.emit(ItemKind.TIP)
+    desk.click("Add...")
+    desk.enter("Id, as on its label", "T-11")
+    desk.click("Keep")
+    for name in ("Keep", "Leave it"):
+        assert not desk.control(name).isEnabled()
+        assert desk.control(name).toolTip() == "It is being kept."
+
+    slow_disk.set()
+    desk.settle()
+    assert desk.dialog.rows()[0][0] == "T-11"
+    desk.click("Close")
+
+
+def keep_and_leave(desk: Desk, name: str) -> None:
+    """Add a tip, and leave the dialog before it is kept."""
+    desk.names.library_requested.emit(ItemKind.TIP)
+    desk.click("Add...")
+    desk.enter("Id, as on its label", name)
+    desk.click("Keep")
+    QTest.keyClick(desk.dialog, Qt.Key.Key_Escape)
+
+
+def test_what_is_typed_stays_when_the_change_before_is_kept(
+    desk: Desk, slow_disk: Event
+) -> None:
+    keep_and_leave(desk, "T-11")
+    desk.names.library_requested.emit(ItemKind.TIP)
+    desk.click("Add...")
+    desk.enter("Id, as on its label", "T-12")
+    slow_disk.set()
+    desk.settle()
+
+    assert list(desk.library.tips) == ["T-11"]
+    assert desk.text_of("Id, as on its label") == "T-12"
+    desk.click("Leave it")
+    desk.click("Close")
+
+
+def test_a_change_that_is_asked_for_while_another_is_kept_is_kept_after_it(
+    desk: Desk, slow_disk: Event
+) -> None:
+    for name in ("T-11", "T-12"):
+        keep_and_leave(desk, name)
+    slow_disk.set()
+    desk.settle()
+
+    assert list(desk.library.tips) == ["T-11", "T-12"]
+
+
+def test_why_a_change_was_not_kept_is_told_though_the_dialog_was_left(
+    desk: Desk, slow_disk: Event
+) -> None:
+    keep_and_leave(desk, "T-11")
+    add_item(desk.data, ListedTip(id="T-11"), ANN, local_now())
+    slow_disk.set()
+    desk.settle()
+
+    assert "The tip T-11 is in the library already." in desk.told[-1]
 
 
 def test_the_picture_of_a_tip_is_seen_where_it_is_chosen_and_where_it_is_kept(
