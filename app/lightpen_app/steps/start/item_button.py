@@ -39,6 +39,10 @@ class ItemButton(Translated, PushButton):
         self._choices: tuple[ItemChoice, ...] = ()
         self._menu = QMenu(self)
         self.setMenu(self._menu)
+
+        # Connections
+        self._menu.aboutToShow.connect(self._fill)
+
         self._retranslate()
 
     def choices(self) -> tuple[ItemChoice, ...]:
@@ -46,9 +50,10 @@ class ItemButton(Translated, PushButton):
         return self._choices
 
     def set_choices(self, choices: Sequence[ItemChoice]) -> None:
-        """Let other items be chosen."""
+        """Let other items be chosen; a list that is open stays as it is."""
         self._choices = tuple(choices)
-        self._fill()
+        if not self._menu.isVisible():
+            self._fill()
 
     def _fill(self) -> None:
         menu = self._menu

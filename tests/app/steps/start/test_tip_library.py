@@ -160,6 +160,25 @@ def test_a_tip_is_exchanged_by_two_clicks_with_its_ball_and_centre(desk: Desk) -
     assert desk.text_of("Probe tip") == "T-7"
 
 
+@pytest.mark.qt_log_ignore("^This plugin does not support ")
+def test_a_list_that_is_open_stays_as_it_is_while_the_library_is_read(
+    desk: Desk,
+) -> None:
+    desk.add(TIP)
+    button = desk.names.list_of(ItemKind.TIP)
+    menu = button.menu()
+    menu.popup(button.mapToGlobal(button.rect().bottomLeft()))
+    QTest.keyClick(menu, Qt.Key.Key_Down)
+
+    desk.add(ListedTip(id="T-1"))
+    QTest.keyClick(menu, Qt.Key.Key_Return)
+    assert desk.workbench.preparation.names.tip == "T-7"
+    menu.popup(button.mapToGlobal(button.rect().bottomLeft()))
+    names = [each.text().partition("\t")[0] for each in menu.actions()]
+    assert names[:2] == ["T-7", "T-1"]
+    menu.close()
+
+
 def test_pens_and_cones_are_chosen_from_their_lists(desk: Desk) -> None:
     desk.add(ListedPen(id="LP-9"), ListedCone(id="C-9"))
 
