@@ -51,6 +51,7 @@ class PenPanel(Translated, QWidget):
         self._trouble = ""
         self._reading: Job | None = None
         self._improving: Job | None = None
+        self._opening: Job | None = None  # the new file
         self._read_of: tuple[object, ...] = ()
 
         # Widgets
@@ -97,7 +98,7 @@ class PenPanel(Translated, QWidget):
 
     def shut_down(self) -> None:
         """Let go of what is computed."""
-        for job in (self._reading, self._improving):
+        for job in (self._reading, self._improving, self._opening):
             if job is not None:
                 job.cancel()
 
@@ -138,13 +139,15 @@ class PenPanel(Translated, QWidget):
     def _read(self) -> None:
         """Read the swings of the pen anew."""
         now, archive = self._workbench.preparation, self._workbench.run.archive
-        if self._reading is not None:
-            self._reading.cancel()
         is_other, self._read_of = self._chosen() != self._read_of, self._chosen()
         if is_other:
+            self.shut_down()  # what comes of it would be of the pen before
+            self._improving = None
             self._shown, self._new, self._trouble = None, None, ""
-        if now.pen_file is None:
             self._refresh()
+        elif self._reading is not None:
+            self._reading.cancel()
+        if now.pen_file is None:
             return
         work = partial(read_pen_over_time, archive, now)
         self._reading = job = Job(work, self)
@@ -159,7 +162,6 @@ class PenPanel(Translated, QWidget):
         self._refresh()
 
     def _on_failed(self, why: str) -> None:
-        self._reading = self._improving = None
         self._trouble = why
         self._refresh()
 
@@ -178,7 +180,7 @@ class PenPanel(Translated, QWidget):
         # Connections
         job.progressed.connect(self._on_progressed)
         job.succeeded.connect(self._on_improved)
-        job.failed.connect(self._on_failed)
+        job.failed.connect(self._on_improving_failed)
         job.crashed.connect(self._on_cancel_clicked)
         job.start()
         self._refresh()
@@ -198,6 +200,10 @@ class PenPanel(Translated, QWidget):
         self._refresh()
         self._use.setFocus()
 
+    def _on_improving_failed(self, why: str) -> None:
+        self._improving = None
+        self._on_failed(why)
+
     def _on_cancel_clicked(self) -> None:
         job, self._improving = self._improving, None
         if job is not None:
@@ -209,7 +215,7 @@ class PenPanel(Translated, QWidget):
         if self._new is None:
             return
         path: Path = self._new.path
-        job = Job(lambda _: PenFile.read(path), self)
+        self._opening = job = Job(lambda _: PenFile.read(path), self)
 
         # Connections
         job.succeeded.connect(self._on_new_read)

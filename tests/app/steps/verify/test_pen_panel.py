@@ -1,0 +1,69 @@
+"""What is told of the pen is of the pen that is chosen now."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from threading import Event
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QCoreApplication, Qt, QThreadPool
+from PySide6.QtTest import QTest
+from pytestqt.qtbot import QtBot
+from tests.accepted_tip import accept_tip
+
+from lightpen.verification.pen_over_time import improve_led_file
+from lightpen_app.steps.verify import pen_panel
+from lightpen_app.steps.verify.pen_panel import PenPanel
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.work.workbench import Workbench
+
+
+@pytest.fixture
+def slow_machine(monkeypatch: pytest.MonkeyPatch) -> Iterator[Event]:
+    """LED files are improved once this is set."""
+    machine = Event()
+
+    def improved(*arguments: Any) -> object:
+        machine.wait()
+        return improve_led_file(*arguments)
+
+    monkeypatch.setattr(pen_panel, "improve_led_file", improved)
+    yield machine
+    machine.set()
+
+
+def words(panel: PenPanel) -> str:
+    labels = panel.findChildren(SignLabel)
+    told = (each.value().text for each in labels if each.isVisible())
+    return " ".join(filter(None, told))
+
+
+def button(panel: PenPanel, text: str) -> PushButton:
+    return next(b for b in panel.findChildren(PushButton) if b.text() == text)
+
+
+def test_what_comes_of_the_pen_before_is_not_told_of_the_next_one(
+    qtbot: QtBot, workbench: Workbench, slow_machine: Event
+) -> None:
+    for seed in (3, 4, 5, 6):
+        accept_tip(workbench.folder, workbench.preparation, seed=seed)
+    panel = PenPanel(workbench)
+    qtbot.addWidget(panel)
+    panel.show()
+    improve = button(panel, "Improve the LED file")
+    qtbot.waitUntil(improve.isEnabled)
+    QTest.mouseClick(improve, Qt.MouseButton.LeftButton)
+    assert button(panel, "Cancel").isVisible()
+
+    now = workbench.preparation
+    workbench.set_preparation(replace(now, names=replace(now.names, pen="LP-05")))
+    assert not button(panel, "Cancel").isVisible()
+    slow_machine.set()
+    QThreadPool.globalInstance().waitForDone()
+    QCoreApplication.processEvents()
+
+    assert words(panel) == (
+        "Two accepted swings with this LED file are needed to tell how pen LP-05 "
+        "changes; there are 0."
+    )
