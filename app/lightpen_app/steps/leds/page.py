@@ -66,6 +66,7 @@ class LedsPage(Rearranged, Page):
         self._is_foreign = False  # opened from a file that cannot be used
         self._check = DraftCheck()
         self._job: Job | None = None
+        self._draft_then = PenDraft()  # when that began
         self._edits = QUndoStack(self)
 
         # Widgets
@@ -329,6 +330,18 @@ class LedsPage(Rearranged, Page):
         self._start(lambda _: open_pen(path, units), self._on_opened)
 
     def _on_opened(self, opened: OpenedPen) -> None:
+        show = partial(self._show_opened, opened)
+        if self._was_typed_in:
+            self._unless_lost(show)
+        else:
+            show()
+
+    @property
+    def _was_typed_in(self) -> bool:
+        """Whether the table was changed while a file was read or written."""
+        return self._draft != self._draft_then
+
+    def _show_opened(self, opened: OpenedPen) -> None:
         problem = "" if opened.problem is None else worded(opened.problem)
         if opened.file is not None:
             self._use(opened.file)
@@ -351,11 +364,15 @@ class LedsPage(Rearranged, Page):
         self._file.set_problem(sentence)
 
     def _use(self, file: PenFile) -> None:
-        preparation = self._workbench.preparation
-        self._workbench.set_preparation(replace(preparation, pen_file=file))
+        """Put a file in use, and show it without changes."""
+        self._put_in_use(file)
         self._open_in_use()
         self._file.set_problem("")
         self.changed.emit()
+
+    def _put_in_use(self, file: PenFile) -> None:
+        preparation = self._workbench.preparation
+        self._workbench.set_preparation(replace(preparation, pen_file=file))
 
     def _use_samples(self) -> None:
         if self._is_edited:
@@ -368,7 +385,10 @@ class LedsPage(Rearranged, Page):
             self._start(lambda _: save_pen(pen, path), self._on_saved)
 
     def _on_saved(self, file: PenFile) -> None:
-        self._use(file)
+        if self._was_typed_in:
+            self._put_in_use(file)
+        else:
+            self._use(file)
         words = self.tr("The LEDs are saved as {0} and in use.")
         self.status_changed.emit(words.format(file.path.name))
 
@@ -378,6 +398,7 @@ class LedsPage(Rearranged, Page):
         """Read or write a file; an earlier one that is under way is not waited for."""
         if self._job is not None:
             self._job.cancel()
+        self._draft_then = self._draft
         self._job = job = Job(function, self)
 
         # Connections

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +29,7 @@ from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.pen_check.match import Finding, PenMatch, What
+from lightpen.pen_check.opening import OpenedPen, open_pen, save_pen
 from lightpen.record.names import Names
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Doing
@@ -538,6 +540,59 @@ def test_opening_another_file_asks_before_changes_are_lost(
     seen.settle()
     assert in_use(workbench).path == path
     assert cell(seen, 7, Y) == "160"
+
+
+@pytest.fixture
+def slow_disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Event]:
+    """LED files are read and written once this is set."""
+    disk = Event()
+
+    def opened(path: Path, units: str | None) -> OpenedPen:
+        disk.wait()
+        return open_pen(path, units)
+
+    def saved(pen: Pen, path: Path) -> PenFile:
+        disk.wait()
+        return save_pen(pen, path)
+
+    monkeypatch.setattr("lightpen_app.steps.leds.page.open_pen", opened)
+    monkeypatch.setattr("lightpen_app.steps.leds.page.save_pen", saved)
+    yield disk
+    disk.set()
+
+
+def test_what_is_typed_while_a_file_is_read_is_lost_after_a_question_only(
+    seen: "Seen", workbench: Workbench, tmp_path: Path, slow_disk: Event
+) -> None:
+    path = write_table(tmp_path / "leds.csv", LEDS)
+    seen.child(LedFilePanel).path_chosen.emit(str(path))
+    type_cell(seen, 7, Y, "161")
+    slow_disk.set()
+    seen.settle()
+    assert cell(seen, 7, Y) == "161"
+
+    seen.click("Discard them")
+    assert in_use(workbench).path == path
+    assert cell(seen, 7, Y) == "160"
+
+
+def test_what_is_typed_while_the_table_is_saved_is_still_to_be_saved(
+    seen: "Seen", workbench: Workbench, tmp_path: Path, slow_disk: Event
+) -> None:
+    path = tmp_path / "leds.json"
+    type_cell(seen, 7, Y, "161")
+    seen.child(LedFilePanel).save_chosen.emit(path)
+    type_cell(seen, 7, Y, "162")
+    slow_disk.set()
+    seen.settle()
+
+    assert in_use(workbench).path == path
+    assert read_pen(path).leds[6, 1] == 161
+    assert cell(seen, 7, Y) == "162"
+    assert why_not(seen) == "Save the LED table first: the record needs its file."
+    seen.click("Discard")
+    seen.click("Discard them")
+    assert cell(seen, 7, Y) == "161"
 
 
 def test_choosing_units_asks_before_changes_are_lost(
