@@ -176,6 +176,7 @@ class BoardWindow(Translated, QWidget):
             self._stop()
         else:
             self._conclude()
+            self._compute_no_more()
             self._sought = self._named_board()
             self._capture = self._outline = None
             self._hashes = {}
@@ -290,9 +291,13 @@ class BoardWindow(Translated, QWidget):
         self._conclude_found()
         self._run(partial(calibrate_by_views, found.views.chosen(kept), self._hashes))
 
+    def _compute_no_more(self) -> None:
+        job, self._computing = self._computing, None
+        if job is not None:
+            job.cancel()
+
     def _run(self, calibrate: Callable[[Report], ComputedCamera]) -> None:
-        if self._computing is not None:
-            self._computing.cancel()
+        self._compute_no_more()
         self._forget()
         self._computing = job = Job(calibrate, self)
 
@@ -350,19 +355,27 @@ class BoardWindow(Translated, QWidget):
         if self._found is None:
             return
         camera = replace(self._found.camera, serial=self._serial())
+        trial = self._trial(TrialOutcome.ACCEPTED, self._found)
+        self._is_saved = True  # unless that is denied
         job = Job(partial(save_camera, camera, Path(path)), self)
 
         # Connections
-        job.succeeded.connect(self._on_saved)
-        job.failed.connect(self._on_refused)
+        job.succeeded.connect(partial(self._on_saved, trial))
+        job.failed.connect(partial(self._on_save_refused, trial))
         job.start()
 
-    def _on_saved(self, file: InputFile) -> None:
+    def _on_saved(self, trial: CameraTrial, file: InputFile) -> None:
         words = self.tr("Saved and in use: {0}").format(file.path)
         self._remark.set_value(Remark(words, Sign.CHECK, Tone.GOOD))
-        self._is_saved = True
-        self.concluded.emit(self._trial(TrialOutcome.ACCEPTED, self._found, file))
+        self.concluded.emit(replace(trial, camera_file=file))
         self.saved.emit(str(file.path))
+
+    def _on_save_refused(self, trial: CameraTrial, sentence: str) -> None:
+        self._remark.set_value(_trouble(sentence))
+        if trial.found is self._found:
+            self._is_saved = False
+        else:  # it was left meanwhile
+            self.concluded.emit(replace(trial, outcome=TrialOutcome.REFUSED))
 
     # What became of it
 
@@ -383,10 +396,7 @@ class BoardWindow(Translated, QWidget):
         self._found = None
 
     def _trial(
-        self,
-        outcome: TrialOutcome,
-        found: CameraCalibration | None = None,
-        file: InputFile | None = None,
+        self, outcome: TrialOutcome, found: CameraCalibration | None = None
     ) -> CameraTrial:
         is_live, board = self._capture is not None, self._board.text()
         names = set(self._hashes) if found is None else set(found.views.names)
@@ -397,7 +407,6 @@ class BoardWindow(Translated, QWidget):
             origin=self._origin() if is_live else Origin.RECORDED,
             images={name: h for name, h in self._hashes.items() if name in names},
             found=found,
-            camera_file=file,
         )
 
     def _origin(self) -> Origin:

@@ -4,11 +4,12 @@ import json
 from collections.abc import Iterator
 from hashlib import sha256
 from pathlib import Path
+from threading import Event
 
 import cv2
 import numpy as np
 import pytest
-from PySide6.QtCore import QSize
+from PySide6.QtCore import QCoreApplication, QSize, QThreadPool
 from PySide6.QtWidgets import QListWidget, QPushButton
 from pytestqt.qtbot import QtBot
 
@@ -16,6 +17,7 @@ from lightpen.arrays import Image
 from lightpen.cameras.protocol import Frame, sealed
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import read_camera
+from lightpen.formats.hashes import InputFile
 from lightpen.intrinsics.boards import parse_board
 from lightpen.live.looking import LiveImage
 from lightpen.model.camera import Camera
@@ -25,10 +27,12 @@ from lightpen.simulator.board_views import simulate_board_poses
 from lightpen.simulator.boards import expose_board, render_board
 from lightpen.simulator.sensor import Sensor
 from lightpen_app.look.pooling import pooled
+from lightpen_app.steps.camera.board_jobs import save_camera
 from lightpen_app.steps.camera.board_view import BoardView
 from lightpen_app.steps.camera.board_window import BoardWindow
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.work.job import Report
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.workbench import Workbench
 
@@ -212,6 +216,63 @@ def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
     assert record["camera_file"]["file"] == "camera.yaml"
     assert record["calibration"]["board"] == BOARD
     assert len(record["inputs"]["images"]) == 7
+
+
+@pytest.fixture
+def slow_disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Event]:
+    """Camera files are saved once this is set."""
+    disk = Event()
+
+    def saved_late(camera: Camera, path: Path, report: Report) -> InputFile:
+        disk.wait()
+        return save_camera(camera, path, report)
+
+    place = "lightpen_app.steps.camera.board_window.save_camera"
+    monkeypatch.setattr(place, saved_late)
+    yield disk
+    disk.set()
+
+
+def test_a_camera_file_that_is_still_being_saved_is_that_of_its_attempt(
+    window: BoardWindow,
+    images: list[Image],
+    tmp_path: Path,
+    qtbot: QtBot,
+    slow_disk: Event,
+) -> None:
+    told: list[CameraTrial] = []
+    window.concluded.connect(told.append)
+    folder = written(tmp_path, images)
+    for path, outcome in (
+        (tmp_path / "camera.yaml", TrialOutcome.ACCEPTED),
+        (tmp_path / "not there" / "camera.yaml", TrialOutcome.REFUSED),
+    ):
+        slow_disk.clear()
+        window.show()
+        window.read_folder(folder)
+        qtbot.waitUntil(lambda: views_listed(window) == 7)
+        window.save(str(path))
+        window.close()
+        assert told == []
+        slow_disk.set()
+        qtbot.waitUntil(lambda: told != [])
+
+        trial = told.pop()
+        assert trial.outcome is outcome
+        assert trial.found is not None
+        assert len(trial.images) == 7
+
+
+def test_a_board_that_is_sought_again_is_not_disturbed_by_what_was_being_computed(
+    window: BoardWindow, images: list[Image], tmp_path: Path
+) -> None:
+    window.read_folder(written(tmp_path, images))
+    press(window, "Start")
+    QThreadPool.globalInstance().waitForDone()
+    QCoreApplication.processEvents()
+
+    assert views_listed(window) == 0
+    press(window, "Stop")
 
 
 def test_views_that_were_kept_and_never_computed_are_abandoned(
