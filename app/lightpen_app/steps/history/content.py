@@ -213,16 +213,27 @@ class HistoryContent(Translated, QWidget):
 
     def _enter_note(self, about: Written, text: str) -> None:
         logbook, operator = self._logbook, self._workbench.preparation.names.operator
-        self._do(
+        self._enter(
             lambda _: logbook.opened().enter_note(about, text, operator),
             lambda _: self.read_anew(),
         )
 
     def _restore(self, entry: Written, reason: str) -> None:
         logbook, names = self._logbook, self._workbench.preparation.names
-        self._do(
+        self._enter(
             lambda _: logbook.opened().restore(entry, names, reason), self._on_restored
         )
+
+    def _enter(
+        self, function: Callable[[Report], T], on_succeeded: Callable[[T], object]
+    ) -> None:
+        """Enter something, whatever is done to the archive as a whole meanwhile."""
+        job = Job(function, self)
+
+        # Connections
+        job.succeeded.connect(on_succeeded)
+        job.failed.connect(self.notice_raised)
+        job.start()
 
     def _on_restored(self, result: Result) -> None:
         self.read_anew()
@@ -313,7 +324,7 @@ class HistoryContent(Translated, QWidget):
     def _do(
         self, function: Callable[[Report], T], on_succeeded: Callable[[T], object]
     ) -> None:
-        """Do one thing at a time beside the window."""
+        """Do one thing at a time to the archive as a whole, beside the window."""
         if self._work is not None:
             return
         self._work = job = Job(function, self)

@@ -2,6 +2,7 @@
 
 import json
 import sqlite3
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -26,7 +27,8 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from lightpen.archive.chains import append, own_chain
-from lightpen.archive.database import open_file
+from lightpen.archive.check import Checked, check_archive
+from lightpen.archive.database import Database, open_file
 from lightpen.archive.entries import Event, Kind
 from lightpen.archive.exchange import export_entries, import_entries
 from lightpen.archive.late_logbook import LateLogbook
@@ -64,6 +66,7 @@ from lightpen_app.steps.history.selection_panel import SelectionPanel
 from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.trend_panel import TrendPanel
+from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 
@@ -440,6 +443,32 @@ def test_a_note_is_entered_and_shown_with_its_entry(desk: Desk) -> None:
     panel = desk.child(EntryPanel)
     desk.until(lambda: any("Note" in words for words in panel.words()))
     assert any("Ann: Dropped on the floor." in words for words in panel.words())
+
+
+def test_a_note_is_entered_while_the_archive_is_checked(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    is_entered = threading.Event()
+
+    def check_slowly(database: Database, folder: Path, report: Report) -> Checked:
+        is_entered.wait()
+        return check_archive(database, folder, report)
+
+    place = "lightpen_app.steps.history.content.check_archive"
+    monkeypatch.setattr(place, check_slowly)
+    desk.enter(1)
+    desk.open()
+    desk.show_tab(WHOLE)
+    desk.click("Check the archive")
+    try:
+        desk.show_tab(ENTRY)
+        desk.select(0)
+        desk.click("Add a note...")
+        desk.type_reason("Dropped on the floor.")
+        desk.until(lambda: desk.column(WHAT)[0] == "Note")
+    finally:
+        is_entered.set()
+    desk.wait_idle()
 
 
 def test_a_change_of_the_tip_library_is_shown_with_what_it_says(desk: Desk) -> None:
