@@ -459,11 +459,11 @@ def test_the_swing_goes_on_when_a_lost_camera_is_back(
     station.wait_until(lambda: station.state.n_kept > N_IMAGES)
     camera.faults.unplug()
     screen.wait_until(lambda: Connection.LOST in screen.connections)
-    n_kept = station.state.n_kept
     camera.faults.plug_in()
-    station.wait_until(lambda: station.state.n_kept > n_kept)
+    screen.wait_until(lambda: screen.connections[-1] is Connection.STREAMING)
 
-    assert screen.connections[-1] is Connection.STREAMING
+    n_kept = station.state.n_kept
+    station.wait_until(lambda: station.state.n_kept > n_kept)
 
 
 def test_a_swing_goes_on_with_another_camera(

@@ -225,6 +225,7 @@ def test_other_choices_are_not_settled_by_capturing_more(
 ) -> None:
     solved.runner.choose(solved.preparation)
     solved.runner.abandon()
+    solved.wait_until(lambda: solved.status.state is None)
     solved.go_on(interrupted)
     solved.runner.choose(other_operator(solved.preparation))
     solved.solve()
