@@ -50,10 +50,15 @@ class Presence:
                 self._file.unlink()
 
     def _announce(self) -> None:
+        """Hold the file; another window that found it unlocked may have removed it."""
+        before = self._descriptor
+        if before is not None and not self._file.exists():
+            self._descriptor = None
+            os.close(before)
         if self._descriptor is None:
             self._folder.mkdir(parents=True, exist_ok=True)
             self._descriptor = os.open(self._file, os.O_RDWR | os.O_CREAT)
-            locked(self._descriptor)
+        locked(self._descriptor)
 
 
 def _is_held(file: Path) -> bool:

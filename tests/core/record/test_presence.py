@@ -44,6 +44,20 @@ def test_one_that_was_killed_is_not_counted_and_its_file_removed(
     one.leave()
 
 
+def test_one_whose_file_was_removed_before_it_was_locked_is_counted_again(
+    tmp_path: Path,
+) -> None:
+    one, other = Presence(tmp_path), Presence(tmp_path)
+    assert one.count_others() == 0
+    (file,) = (tmp_path / WINDOWS).iterdir()
+    file.unlink()
+    assert other.count_others() == 0
+
+    assert one.count_others() == other.count_others() == 1
+    one.leave()
+    other.leave()
+
+
 def test_where_nothing_can_be_written_nobody_is_known(tmp_path: Path) -> None:
     (tmp_path / WINDOWS).touch()
 
