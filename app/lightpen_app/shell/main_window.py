@@ -1,6 +1,7 @@
 """The window of the wizard: steps at the left, one page, one main button."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from PySide6.QtCore import QEvent, QPoint, QSize, Qt, Signal
 from PySide6.QtGui import (
@@ -312,7 +313,7 @@ class MainWindow(Rearranged, QMainWindow):
         page.advance_requested.connect(self.advance)
         page.step_requested.connect(self._on_step_requested)
         page.status_changed.connect(self._action_bar.set_status)
-        page.notice_raised.connect(self._on_notice_raised)
+        page.notice_raised.connect(partial(self._on_notice_raised, page))
         page.operator_value_changed.connect(self._operator_view.set_value)
         page.data_folder_requested.connect(self._on_data_folder_asked)
 
@@ -453,11 +454,11 @@ class MainWindow(Rearranged, QMainWindow):
         keys = [page.key for page in self._pages]
         self.go_to(keys.index(key))
 
-    def _on_notice_raised(self, text: str) -> None:
+    def _on_notice_raised(self, page: Page, text: str) -> None:
         if text:
-            self._notice.show_text(text, of_page=True)
+            self._notice.show_text(text, page=page)
         else:
-            self._notice.clear_page()
+            self._notice.clear_page(page)
 
     def _on_space_pressed(self) -> None:
         """Press the button that has the focus; pause where none has."""

@@ -26,7 +26,7 @@ class NoticeBar(Translated, QFrame):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("area", "notice")
-        self._is_of_page = False
+        self._page: QWidget | None = None  # that raised it
         self._unwritable = self._trouble = ""  # the data folder, and why
 
         # Widgets
@@ -52,13 +52,13 @@ class NoticeBar(Translated, QFrame):
         return self._text.text()
 
     def show_text(
-        self, text: str, tone: Tone = Tone.BAD, *, of_page: bool = False
+        self, text: str, tone: Tone = Tone.BAD, *, page: QWidget | None = None
     ) -> None:
         """Say a sentence, instead of an earlier one; of a page until another shows."""
         told, is_of_folder = self.text(), self._with_way(text) != text
         if is_of_folder and told == self._with_way(self._trouble):
             return
-        self._is_of_page = of_page
+        self._page = page
         text = self._with_way(text)
         self._text.setText(text)
         self._text.setAccessibleName(text)
@@ -72,9 +72,9 @@ class NoticeBar(Translated, QFrame):
         if self.text() in (text, self._with_way(text)):
             self.clear()
 
-    def clear_page(self) -> None:
-        """Say nothing of the page that was shown."""
-        if self._is_of_page:
+    def clear_page(self, page: QWidget | None = None) -> None:
+        """Say nothing that a page raised, or any where none is given."""
+        if self._page is not None and page in (None, self._page):
             self.clear()
 
     def set_unwritable(self, folder: str, trouble: str) -> None:

@@ -58,7 +58,7 @@ class Page(Translated, QWidget):
         A sentence for the status line.
     notice_raised(str)
         A sentence that must be read, such as the text of an error; an empty one takes
-        it away, and so does another page.
+        that of this page away, and so does another page.
     operator_value_changed(OperatorValue)
         What the operator view shows.
     data_folder_requested()

@@ -739,6 +739,16 @@ def test_that_someone_must_be_at_the_screen_is_said_until_they_need_not(
     assert "Press this button at the screen." not in shell.window.words()
 
 
+def test_a_page_takes_no_notice_away_that_another_page_raised(shell: Shell) -> None:
+    shell.pages[1].notice_raised.emit("There is no camera.")
+    shell.pages[0].notice_raised.emit("The file holds no LED.")
+    shell.pages[1].notice_raised.emit("")
+    assert "The file holds no LED." in shell.window.words()
+
+    shell.pages[0].notice_raised.emit("")
+    assert "The file holds no LED." not in shell.window.words()
+
+
 def test_a_page_takes_no_notice_away_that_is_not_of_a_page(shell: Shell) -> None:
     shell.pages[0].notice_raised.emit("The file holds no LED.")
     shell.window.show_notice("The disk is full.")
