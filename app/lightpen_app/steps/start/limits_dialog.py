@@ -148,6 +148,7 @@ class LimitsDialog(Translated, QDialog):
             self._on_save_clicked()
 
     def _on_save_clicked(self) -> None:
+        self._save.setEnabled(False)  # until something else is signed
         new = self._new_password.text()
         self.signed.emit(self.value(), self._supervisor.value(), new)
 

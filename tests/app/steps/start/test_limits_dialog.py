@@ -13,6 +13,7 @@ from lightpen.record.supervision import Signature, Supervision
 from lightpen_app.steps.start.limits_dialog import LimitsDialog
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.reason_bar import ReasonBar
+from lightpen_app.widgets.supervisor_fields import SupervisorFields
 from lightpen_app.work.workbench import Workbench
 
 TIGHT = StationLimits(
@@ -72,6 +73,25 @@ def test_limits_are_laid_down_only_with_a_signature(
     wanted = replace(TIGHT.verification, length=0.01)
     expected = replace(TIGHT, verification=wanted), Signature("Eve", "secret"), ""
     assert told == [expected]
+
+
+def test_limits_are_laid_down_once_however_often_enter_is_pressed(
+    dialog: LimitsDialog,
+) -> None:
+    dialog.set_value(TIGHT, is_guarded=True)
+    sign(dialog)
+    told: list[Any] = []
+    dialog.signed.connect(lambda *what: told.append(what))
+    supervisor = dialog.findChild(SupervisorFields)
+    assert isinstance(supervisor, SupervisorFields)
+    for _ in range(2):
+        supervisor.entered.emit()
+    assert len(told) == 1
+
+    dialog.tell("The password is not that of the supervisors.")
+    sign(dialog)
+    supervisor.entered.emit()
+    assert len(told) == 2
 
 
 def test_what_is_laid_down_counts_for_its_station_alone(workbench: Workbench) -> None:
