@@ -1,10 +1,11 @@
 """A question in the page that waits for an answer, and stops nothing else."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.widgets.asking_bar import AskingBar
+from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.push_button import PushButton
 
 
@@ -51,7 +52,7 @@ class QuestionBar(AskingBar):
     def ask(self) -> None:
         """Show the question; the answer that changes nothing has the focus."""
         self.show()
-        self._decline.setFocus(Qt.FocusReason.OtherFocusReason)
+        give_focus(self._decline)
 
     def words(self) -> str:
         """Return the question; empty while nothing is asked."""

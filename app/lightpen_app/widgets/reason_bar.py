@@ -1,12 +1,13 @@
 """A question in the page that takes a reason, and a signature, for an answer."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QAbstractButton, QGridLayout, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.widgets.asking_bar import AskingBar
+from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
@@ -85,7 +86,7 @@ class ReasonBar(AskingBar):
         self._supervisor.clear()
         self._supervisor.setVisible(of_supervisor)
         self.show()
-        self._edit.setFocus(Qt.FocusReason.OtherFocusReason)
+        give_focus(self._edit)
 
     def refuse(self) -> None:
         """Ask once more where the answer did not do; all but the password stays."""
@@ -96,7 +97,7 @@ class ReasonBar(AskingBar):
         if self._supervisor.isVisibleTo(self):
             self._supervisor.clear_password()
         else:
-            self._edit.setFocus(Qt.FocusReason.OtherFocusReason)
+            give_focus(self._edit)
 
     def _reason(self) -> str:
         return self._edit.text().strip()

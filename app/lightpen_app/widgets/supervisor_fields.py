@@ -1,11 +1,12 @@
 """The fields in which a supervisor signs."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
 from typing_extensions import override
 
 from lightpen.record.supervision import Signature
 from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.translated import Translated
 
@@ -65,7 +66,7 @@ class SupervisorFields(Translated, QWidget):
     def clear_password(self) -> None:
         """Have the password typed again."""
         self._password.clear()
-        self._password.setFocus(Qt.FocusReason.OtherFocusReason)
+        give_focus(self._password)
 
     @override
     def _retranslate(self) -> None:

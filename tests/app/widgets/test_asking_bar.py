@@ -1,15 +1,25 @@
 """A bar that asks borrows the focus, and gives it back."""
 
+from collections.abc import Callable
+
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLineEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QLineEdit,
+    QPushButton,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
+from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.reason_bar import ReasonBar
+from lightpen_app.widgets.supervisor_fields import SupervisorFields
 
 
 @pytest.mark.parametrize("kind", [QuestionBar, ReasonBar])
@@ -36,6 +46,37 @@ def test_what_had_the_focus_before_a_question_has_it_again(
     leaving.setFocus()
     bar.hide()
     assert page.focusWidget() is leaving
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda page: asked(QuestionBar(page)),
+        lambda page: asked(ReasonBar(page)),
+        lambda page: SupervisorFields(page).clear_password(),
+        lambda page: LedFilePanel(page).ask_units("leds.csv"),
+    ],
+    ids=["question", "reason", "password", "units"],
+)
+def test_what_is_asked_on_a_page_that_is_not_shown_leaves_the_focus_where_it_is(
+    qtbot: QtBot, ask: Callable[[QWidget], None]
+) -> None:
+    pages, field, other = QStackedWidget(), QLineEdit(), QWidget()
+    pages.addWidget(field)
+    pages.addWidget(other)
+    qtbot.addWidget(pages)
+    pages.show()
+    pages.activateWindow()
+    field.setFocus()
+    qtbot.waitUntil(field.hasFocus)
+
+    ask(other)
+
+    assert field.hasFocus()
+
+
+def asked(bar: QuestionBar | ReasonBar) -> None:
+    bar.ask()
 
 
 class Behind(QWidget):

@@ -18,6 +18,7 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.file_drops import FileDrops
+from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
@@ -260,7 +261,7 @@ class _UnitsRow(Translated, QWidget):
         self._retranslate()
         self.setVisible(bool(file_name))
         if file_name:
-            self._choice.setFocus(Qt.FocusReason.OtherFocusReason)
+            give_focus(self._choice)
 
     def _on_activated(self, units: str) -> None:
         if units:

@@ -12,6 +12,7 @@ from lightpen.record.solving import Solution
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.push_button import PushButton
@@ -119,7 +120,7 @@ class MonteCarloRow(Translated, QWidget):
     def _on_cancel_clicked(self) -> None:
         self.stop()
         self._refresh()
-        self._start.setFocus()
+        give_focus(self._start)
 
     @override
     def _retranslate(self) -> None:

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWi
 
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.look.words import unbroken
+from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
@@ -124,7 +125,7 @@ class WaitingRow(Translated, QFrame):
         for button in buttons:
             button.set_why_not(why)
         if not why and self._had_focus is not None:
-            self._had_focus.setFocus(Qt.FocusReason.OtherFocusReason)
+            give_focus(self._had_focus)
             self._had_focus = None
 
     def _words(self) -> RowWords:

@@ -26,6 +26,7 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import moment_text, shortened
 from lightpen_app.steps.verify.pen_plot import LedMovesPlot
+from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.plots import Axes
 from lightpen_app.widgets.push_button import PushButton
@@ -197,8 +198,10 @@ class PenPanel(Translated, QWidget):
 
     def _on_improved(self, new: NewLedFile) -> None:
         self._improving, self._new = None, new
+        was_waited_for = self._cancel.hasFocus()
         self._refresh()
-        self._use.setFocus()
+        if was_waited_for:
+            give_focus(self._use)
 
     def _on_improving_failed(self, why: str) -> None:
         self._improving = None
@@ -209,7 +212,7 @@ class PenPanel(Translated, QWidget):
         if job is not None:
             job.cancel()
         self._refresh()
-        self._improve.setFocus()
+        give_focus(self._improve)
 
     def _on_use_clicked(self) -> None:
         if self._new is None:
