@@ -21,6 +21,7 @@ from lightpen.detection.sighting import (
 )
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import CalibrationError, FileError
+from lightpen.formats.decoding import bits_of
 from lightpen.formats.images import ImageSource, look_at_all
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
@@ -195,7 +196,11 @@ def _search(
         )
         return _Searched(reason=Reason.WRONG_SIZE, detail=size)
     try:
-        return _Searched(detect_spots(image, mask), masked_lights(image, mask))
+        full_scale = 2 ** bits_of(image) - 1
+        return _Searched(
+            detect_spots(image, mask, full_scale=full_scale),
+            masked_lights(image, mask, full_scale),
+        )
     except MISHAPS as error:
         return _Searched.failed(error)
 
