@@ -61,7 +61,8 @@ class Observations:
     details : tuple of Sentence or None
         More on that, where the reason does not say all.
     advice : Sentence or None
-        What may be wrong with the set as a whole; None when most images are labelled.
+        What may be wrong with the set as a whole; None when most images that have
+        spots are labelled.
     """
 
     names: tuple[str, ...]
@@ -138,7 +139,8 @@ def observe_images(
     masked = np.stack([nothing if i.masked is None else i.masked for i in images])
     seen = _observations(source.names, sightings, fixed_lamps(masked, sightings))
     spots = [sighting.spots for sighting in sightings if sighting.spots is not None]
-    mostly_labelled = 2 * seen.reasons.count(Reason.NONE) > n_images
+    n_lit = sum(len(found) > 0 for found in spots)
+    mostly_labelled = 2 * seen.reasons.count(Reason.NONE) > n_lit
     if mostly_labelled and not np.isfinite(seen.seen_pixels[..., 0]).any(axis=0).all():
         _require_right_hand(spots, camera, pen)
     return replace(

@@ -13,6 +13,7 @@ from lightpen.cameras.replay import ReplayCamera
 from lightpen.detection.observations import Observations, observe_images
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting, look, sight_centers
+from lightpen.errors import CalibrationError
 from lightpen.formats.images import ImageSource
 from lightpen.model.ellipse import disc_images, ellipse_centers
 from lightpen.model.pen import Pen
@@ -270,6 +271,14 @@ def test_only_the_image_before_tells_how_a_symmetric_pen_is_held() -> None:
     assert tracked.has_pose
     np.testing.assert_allclose(tracked.rotation, SHOT.rotation, atol=1e-3)
     assert look(of_pen(pen, defocus=8.0), CAMERA, pen).reason is Reason.BLURRED
+
+
+@pytest.mark.parametrize("n_dark", [0, 3])
+def test_a_mirrored_pen_is_refused_also_among_images_without_it(n_dark: int) -> None:
+    """A swing that was captured does not keep such images."""
+    image = of_pen(replace(PEN, leds=PEN.leds * [-1, 1, 1]))
+    with pytest.raises(CalibrationError, match="mirror image of the pen"):
+        on_files([image, *[np.zeros_like(image)] * n_dark])
 
 
 def test_a_recorded_image_is_as_deep_as_on_files() -> None:
