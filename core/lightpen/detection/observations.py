@@ -55,7 +55,8 @@ class Observations:
         Mean width of the rims of the labelled LEDs from dark to bright, px; NaN where
         none is labelled, or only centres are given.
     lamps : (N, K, 2) array
-        Centres of K fixed lamps in view, px; NaN where an image does not show one.
+        Centres of K fixed lamps in view, px; NaN where an image does not show one, or
+        not the pen.
     reasons : tuple of Reason
         Why an image cannot be used; `Reason.NONE` where it can.
     details : tuple of Sentence or None
@@ -137,7 +138,7 @@ def observe_images(
     _require_size(images, camera)
     nothing = np.full((0 if mask is None else len(mask), 2), np.nan)
     masked = np.stack([nothing if i.masked is None else i.masked for i in images])
-    seen = _observations(source.names, sightings, fixed_lamps(masked, sightings))
+    seen = _observations(source.names, sightings, _lamps_beside_pen(masked, sightings))
     spots = [sighting.spots for sighting in sightings if sighting.spots is not None]
     n_lit = sum(len(found) > 0 for found in spots)
     mostly_labelled = 2 * seen.reasons.count(Reason.NONE) > n_lit
@@ -242,6 +243,17 @@ def _observations(
         reasons=tuple(sighting.reason for sighting in sightings),
         details=(None,) * len(sightings),
     )
+
+
+def _lamps_beside_pen(masked: FloatArray, sightings: list[Sighting]) -> FloatArray:
+    """Return the fixed lamps of images that show the pen, (N, K, 2), px; else NaN."""
+    shown = np.flatnonzero([sighting.has_pose for sighting in sightings])
+    if not len(shown):
+        return np.zeros((len(sightings), 0, 2))
+    found = fixed_lamps(masked[shown], [sightings[i] for i in shown])
+    lamps = np.full((len(sightings), *found.shape[1:]), np.nan)
+    lamps[shown] = found
+    return lamps
 
 
 def _require_size(searched: list[_Searched], camera: Camera) -> None:

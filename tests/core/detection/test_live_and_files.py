@@ -281,6 +281,17 @@ def test_a_mirrored_pen_is_refused_also_among_images_without_it(n_dark: int) -> 
         on_files([image, *[np.zeros_like(image)] * n_dark])
 
 
+def test_images_without_the_pen_neither_show_a_lamp_nor_hide_that_others_do() -> None:
+    lamp = np.array([300.0, 300.0])
+    beside_pen, alone = shown(lamplit(lamp)), shown(lamplit(lamp, shot=lit()))
+    images = [beside_pen, alone, beside_pen, np.zeros_like(alone)]
+    lamps = on_files(images).lamps
+
+    assert lamps.shape == (4, 1, 2)
+    np.testing.assert_allclose(lamps[[0, 2], 0], [lamp, lamp], atol=0.1)
+    assert np.isnan(lamps[[1, 3]]).all()
+
+
 def test_a_recorded_image_is_as_deep_as_on_files() -> None:
     """One hot pixel tells that 4095 is not full scale, so the discs are not clipped."""
     scene = replace(SCENE, sensor=Sensor(bits=12))
