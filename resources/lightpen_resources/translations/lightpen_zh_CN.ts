@@ -3562,6 +3562,10 @@
         <translation>{0} 与 {1} 相距 {2} mm</translation>
     </message>
     <message>
+        <source>{0} stays in use: {1}</source>
+        <translation>{0} 仍在使用：{1}</translation>
+    </message>
+    <message>
         <source>Both take their images at the same moment.</source>
         <translation>两台相机同步曝光。</translation>
     </message>

@@ -44,6 +44,7 @@ class RigPanel(Translated, QGroupBox):
         self._path = PathField()
         self._open = PushButton()
         self._path.add_button(self._open)
+        self._problem = SignLabel()
         self._told = SignLabel()
         self._step = SignLabel()
 
@@ -51,7 +52,13 @@ class RigPanel(Translated, QGroupBox):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID)
-        for widget in (self._second, self._path, self._told, self._step):
+        for widget in (
+            self._second,
+            self._path,
+            self._problem,
+            self._told,
+            self._step,
+        ):
             layout.addWidget(widget)
 
         # Connections
@@ -63,28 +70,37 @@ class RigPanel(Translated, QGroupBox):
         self._retranslate()
 
     def remark(self) -> Remark:
-        """Return what is told of the file."""
+        """Return what is told of the file in use."""
         return self._told.value()
+
+    def problem(self) -> Remark:
+        """Return why the file that was chosen last is not the one in use."""
+        return self._problem.value()
 
     def step(self) -> Remark:
         """Return whether the cameras keep step."""
         return self._step.value()
 
     def set_value(self, is_wanted: bool, file: RigFile | None) -> None:
-        """Show whether there are two cameras, and their file."""
+        """Show whether there are two cameras, and their file.
+
+        A complaint about a file that is not used goes away with another file in use,
+        and with the second camera.
+        """
         self._second.blockSignals(True)
         self._second.setChecked(is_wanted)
         self._second.blockSignals(False)
-        if file is not self._file:
+        if file is not self._file or not is_wanted:
+            self._file = file
             self._path.set_value("" if file is None else str(file.path))
-            self._path.set_faulty(False)
-        self._file = file
+            self.set_problem("")
         self._refresh()
 
     def set_problem(self, why: str) -> None:
-        """Say why the file that was chosen is not used."""
-        self._path.set_faulty(True)
-        self._told.set_value(Remark(why, Sign.CROSS, Tone.BAD))
+        """Say why the file that was chosen is not used, or nothing."""
+        self._path.set_faulty(bool(why))
+        self._problem.set_value(Remark(why, Sign.CROSS, Tone.BAD))
+        self._refresh()
 
     def set_step(self, late: Sentence | None, n_unpaired: int | None) -> None:
         """Show by how much the cameras are apart, and how many images found no partner.
@@ -135,6 +151,8 @@ class RigPanel(Translated, QGroupBox):
         words = self.tr("{0} and {1} stand {2} mm apart").format(
             rig.names[0], rig.names[1], _baseline(rig)
         )
+        if self._problem.value().text:
+            words = self.tr("{0} stays in use: {1}").format(self._file.path.name, words)
         return Remark(words, Sign.CHECK, Tone.GOOD)
 
     def _refresh_step(self) -> None:

@@ -213,9 +213,16 @@ def test_a_rig_file_that_cannot_be_read_is_told_where_it_was_chosen(
     panel = live.child(RigPanel)
     panel.path_chosen.emit(str(tmp_path / "rig.json"))
 
-    live.until(lambda: "cameras" in panel.remark().text)
-    assert panel.remark().tone is Tone.BAD
+    live.until(lambda: "cameras" in panel.problem().text)
+    assert panel.problem().tone is Tone.BAD
     assert workbench.preparation.rig_file is not None
+    assert "stays in use: left and right stand" in panel.remark().text
+
+    workbench.changed.emit()
+    assert "cameras" in panel.problem().text
+
+    ask_for_second(live)
+    assert not panel.problem().text
 
 
 def test_cameras_out_of_step_are_told_with_what_that_costs(live: "Seen") -> None:
