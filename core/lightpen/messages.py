@@ -335,7 +335,7 @@ def halves_differ(difference: float, usual: float) -> Sentence:
 
 
 def many_dropped(n_dropped: int, n_images: int) -> Sentence:
-    """Tell how many of the images do not take part."""
+    """Tell how many of the images that show the pen do not take part."""
     return sentence(
         Code.MANY_DROPPED,
         "{n_dropped} of {n_images} images do not take part. Repeat the swing if the "

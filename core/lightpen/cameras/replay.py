@@ -1,12 +1,10 @@
 """Recorded images as a live camera, at the rate they were taken or as fast as asked."""
 
 import os
-from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from math import inf
-from typing import Self
 
 from lightpen.arrays import Image
 from lightpen.cameras.clock import Clock, MachineClock
@@ -28,33 +26,20 @@ from lightpen.cameras.protocol import (
 )
 from lightpen.cameras.source import Needs, Source, SourcePlace
 from lightpen.errors import FileError
+from lightpen.formats.decoding import bits_of
 from lightpen.formats.files import printable
 from lightpen.formats.images import ImageSource, find_images
 from lightpen.sentences import Sentence, sentence
 
 FRAME_RATE = Range(0.1, inf)  # inf: as fast as asked
 USUAL_FRAME_RATE = 20.0
-ALIKE = 2  # images that tell of what size and depth all are
-
-
-@dataclass(frozen=True)
-class _Kind:
-    """What the images of one camera have in common; width and height in px."""
-
-    width: int
-    height: int
-    pixel_format: str
-
-    @classmethod
-    def of(cls, image: Image) -> Self:
-        height, width = image.shape
-        return cls(width, height, f"Mono{8 * image.itemsize}")
 
 
 class ReplayCamera:
     """Images of a source, one after the other, then the end.
 
     Each start begins with the first image. No image is lost, however late it is read.
+    All have one size; images of 8 and 16 bits may be mixed.
 
     Parameters
     ----------
@@ -108,14 +93,14 @@ class ReplayCamera:
             return
         try:
             source = self._find()
-            kind = _usual_kind(source, self._where)
+            (height, width), pixel_format = _usual_kind(source, self._where)
         except FileError as error:
             raise DeviceNotFound(error.sentence) from error
         self._source = source
         self._caps = Caps(
-            width=kind.width,
-            height=kind.height,
-            pixel_formats=(kind.pixel_format,),
+            width=width,
+            height=height,
+            pixel_formats=(pixel_format,),
             frame_rate=FRAME_RATE,
             waits=True,
             n_images=len(source.names) if self._loops else None,
@@ -232,7 +217,7 @@ class ReplayCamera:
         self._next_seq += 1
         try:
             image = loader()
-            _check_like_others(image, self._name(seq), self.caps)
+            _check_size(image, self._name(seq), self.caps)
         except FileError as error:
             self._stats = replace(self._stats, incomplete=self._stats.incomplete + 1)
             self._n_unread += 1
@@ -251,8 +236,8 @@ class ReplayCamera:
             image=sealed(image),
             seq=seq,
             host_ts_ns=self._clock.now_ns(),
-            pixel_format=self.caps.pixel_formats[0],
-            bits=_bits(image),
+            pixel_format=_pixel_format(image),
+            bits=bits_of(image),
         )
 
     def _name(self, seq: int) -> str:
@@ -269,34 +254,33 @@ class ReplayCamera:
         return not is_there or self._n_unread >= len(self._source.names)
 
 
-def _bits(image: Image) -> int:
-    """Return the depth of an image; a file of 16 bits does not say how many it uses."""
-    if image.itemsize == 1:
-        return 8
-    return 12 if int(image.max(initial=0)) < 2**12 else 16
+def _pixel_format(image: Image) -> str:
+    return f"Mono{8 * image.itemsize}"
 
 
-def _usual_kind(source: ImageSource, where: str) -> _Kind:
-    """Return the first kind that two images are of, so that a bad one spoils nothing.
+def _usual_kind(source: ImageSource, where: str) -> tuple[tuple[int, ...], str]:
+    """Return the first size that two images have, and the format of the first of them.
+
+    So a bad image spoils nothing. Where no two are alike, it is the first image.
 
     Raises
     ------
     FileError
         There is no image, or none can be read.
     """
-    counts: Counter[_Kind] = Counter()
+    formats: dict[tuple[int, ...], str] = {}  # by size: height and width, px
     unread: FileError | None = None
     for loader in source.open():
         try:
-            kind = _Kind.of(loader())
+            image = loader()
         except FileError as error:
             unread = unread or error
             continue
-        counts[kind] += 1
-        if counts[kind] == ALIKE:
-            return kind
-    if counts:
-        return next(iter(counts))
+        if image.shape in formats:
+            return image.shape, formats[image.shape]
+        formats[image.shape] = _pixel_format(image)
+    if formats:
+        return next(iter(formats.items()))
     raise unread or FileError(
         sentence(
             "replay.no-images",
@@ -306,31 +290,19 @@ def _usual_kind(source: ImageSource, where: str) -> _Kind:
     )
 
 
-def _check_like_others(image: Image, name: str, caps: Caps) -> None:
-    kind = _Kind.of(image)
-    if (kind.width, kind.height) != (caps.width, caps.height):
+def _check_size(image: Image, name: str, caps: Caps) -> None:
+    height, width = image.shape
+    if (width, height) != (caps.width, caps.height):
         raise FileError(
             sentence(
                 "replay.other-size",
                 "{name} is {width} x {height} px, the other images are {usual_width} "
                 "x {usual_height} px. Replay only images of one camera together.",
                 name=name,
-                width=kind.width,
-                height=kind.height,
+                width=width,
+                height=height,
                 usual_width=caps.width,
                 usual_height=caps.height,
-            )
-        )
-    (usual,) = caps.pixel_formats
-    if kind.pixel_format != usual:
-        raise FileError(
-            sentence(
-                "replay.other-depth",
-                "{name} has {bits} bits, the other images are {usual}. Replay only "
-                "images of one camera together.",
-                name=name,
-                bits=8 * image.itemsize,
-                usual=usual,
             )
         )
 

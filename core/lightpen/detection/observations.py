@@ -21,6 +21,7 @@ from lightpen.detection.sighting import (
 )
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import CalibrationError, FileError
+from lightpen.formats.decoding import bits_of
 from lightpen.formats.images import ImageSource, look_at_all
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
@@ -54,13 +55,15 @@ class Observations:
         Mean width of the rims of the labelled LEDs from dark to bright, px; NaN where
         none is labelled, or only centres are given.
     lamps : (N, K, 2) array
-        Centres of K fixed lamps in view, px; NaN where an image does not show one.
+        Centres of K fixed lamps in view, px; NaN where an image does not show one, or
+        not the pen.
     reasons : tuple of Reason
         Why an image cannot be used; `Reason.NONE` where it can.
     details : tuple of Sentence or None
         More on that, where the reason does not say all.
     advice : Sentence or None
-        What may be wrong with the set as a whole; None when most images are labelled.
+        What may be wrong with the set as a whole; None when most images that have
+        spots are labelled.
     """
 
     names: tuple[str, ...]
@@ -135,9 +138,10 @@ def observe_images(
     _require_size(images, camera)
     nothing = np.full((0 if mask is None else len(mask), 2), np.nan)
     masked = np.stack([nothing if i.masked is None else i.masked for i in images])
-    seen = _observations(source.names, sightings, fixed_lamps(masked, sightings))
+    seen = _observations(source.names, sightings, _lamps_beside_pen(masked, sightings))
     spots = [sighting.spots for sighting in sightings if sighting.spots is not None]
-    mostly_labelled = 2 * seen.reasons.count(Reason.NONE) > n_images
+    n_lit = sum(len(found) > 0 for found in spots)
+    mostly_labelled = 2 * seen.reasons.count(Reason.NONE) > n_lit
     if mostly_labelled and not np.isfinite(seen.seen_pixels[..., 0]).any(axis=0).all():
         _require_right_hand(spots, camera, pen)
     return replace(
@@ -195,7 +199,11 @@ def _search(
         )
         return _Searched(reason=Reason.WRONG_SIZE, detail=size)
     try:
-        return _Searched(detect_spots(image, mask), masked_lights(image, mask))
+        full_scale = 2 ** bits_of(image) - 1
+        return _Searched(
+            detect_spots(image, mask, full_scale=full_scale),
+            masked_lights(image, mask, full_scale),
+        )
     except MISHAPS as error:
         return _Searched.failed(error)
 
@@ -235,6 +243,17 @@ def _observations(
         reasons=tuple(sighting.reason for sighting in sightings),
         details=(None,) * len(sightings),
     )
+
+
+def _lamps_beside_pen(masked: FloatArray, sightings: list[Sighting]) -> FloatArray:
+    """Return the fixed lamps of images that show the pen, (N, K, 2), px; else NaN."""
+    shown = np.flatnonzero([sighting.has_pose for sighting in sightings])
+    if not len(shown):
+        return np.zeros((len(sightings), 0, 2))
+    found = fixed_lamps(masked[shown], [sightings[i] for i in shown])
+    lamps = np.full((len(sightings), *found.shape[1:]), np.nan)
+    lamps[shown] = found
+    return lamps
 
 
 def _require_size(searched: list[_Searched], camera: Camera) -> None:

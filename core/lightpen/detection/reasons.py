@@ -30,10 +30,23 @@ class Reason(StrEnum):
     ABSENT = "no image"  # of one camera at a moment that another saw
 
     @property
+    def shows_pen(self) -> bool:
+        """Whether such an image shows the pen, also if it takes no part."""
+        return self in _OF_THE_PEN
+
+    @property
     def words(self) -> Sentence:
         """It in a few words; `NONE` has none."""
         return _WORDS[self]
 
+
+_OF_THE_PEN = {
+    Reason.NONE,
+    Reason.MISFIT,
+    Reason.SLIPPED,
+    Reason.TAKEN_OUT,
+    Reason.OTHER_MOMENT,
+}
 
 _WORDS = {
     Reason.UNREADABLE: sentence("reason.unreadable", "unreadable"),

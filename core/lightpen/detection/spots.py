@@ -27,6 +27,7 @@ from lightpen.detection.disc_moments import (
     measure_disc,
 )
 from lightpen.detection.pose import MIN_POSE_LEDS
+from lightpen.formats.decoding import bits_of
 
 MAX_SPOTS = 64
 MAX_BOXES = 128  # the smallest of more are clutter
@@ -167,8 +168,8 @@ def detect_spots(
     mask : (M, 3) array, optional
         Circles of stray light to leave out: centre x, y and radius, px.
     full_scale : int, optional
-        Brightest value a pixel can have. Taken as 255, 4095 or 65535 if not given, by
-        the type of the image and its brightest pixel.
+        Brightest value a pixel can have. Taken as 255, 4095 or 65535 if not given; see
+        `lightpen.formats.decoding.bits_of`.
     window : Box, optional
         All of the image that is read; what reaches out of it is cut.
 
@@ -189,6 +190,8 @@ def detect_spots(
         )
     if min(image.shape) < MIN_SIZE:
         return _as_spots([], 1.0, MIN_NOISE)
+    if full_scale is None:
+        full_scale = 2 ** bits_of(image) - 1
     stride = 4 if min(image.shape) >= 1024 else 2 if min(image.shape) >= 512 else 1
     if window is not None:
         corner = np.array([window.left, window.top])
@@ -201,7 +204,7 @@ def detect_spots(
 
 
 def _spots_of(
-    image: Image, mask: FloatArray | None, stride: int, full_scale: int | None
+    image: Image, mask: FloatArray | None, stride: int, full_scale: int
 ) -> Spots:
     budget = iter(range(MAX_REGIONS))
     scene = _survey(image, mask, stride)
@@ -210,9 +213,6 @@ def _spots_of(
     if len(discs) < MIN_POSE_LEDS and stride > 1:
         scene = _survey(image, mask, stride // 2)
         discs = _find_discs(scene, budget)
-    if full_scale is None:
-        full_scale = 255 if image.dtype == np.uint8 else 4095
-        full_scale = full_scale if scene.peak <= full_scale else 65535
     has_smears = False
     if len(discs) < MIN_POSE_LEDS or next(budget, None) is None:
         flat = _survey(_flattened(image, full_scale), mask, stride)

@@ -91,7 +91,7 @@ def pose_steadily(camera: Camera, pen: Pen, observations: Observations) -> Stead
     CalibrationError
         The images do not determine the tip; the text says what is missing.
     """
-    path = follow_lamps(observations.lamps)
+    path = _way_of(observations)
     if path is None or path.moved == 0:
         return SteadyImages(observations, pose_images(camera, pen, observations), path)
     with suppress(CalibrationError):  # that of a camera which moves too far
@@ -101,6 +101,20 @@ def pose_steadily(camera: Camera, pen: Pen, observations: Observations) -> Stead
     path = replace(path, is_followed=True)
     still = steadied(camera, observations, path)
     return SteadyImages(still, pose_images(camera, pen, still), path)
+
+
+def _way_of(observations: Observations) -> CameraPath | None:
+    """Return the way of the camera by the images that show the pen.
+
+    A swing that is captured keeps no others.
+    """
+    shown = np.flatnonzero([reason.shows_pen for reason in observations.reasons])
+    path = follow_lamps(observations.lamps[shown])
+    if path is None:
+        return None
+    index = np.arange(len(observations.reasons))
+    shifts = [np.interp(index, shown, each) for each in path.shifts.T]
+    return replace(path, shifts=np.stack(shifts, axis=1))
 
 
 def steadied(

@@ -40,7 +40,7 @@ from lightpen.sentences import Sentence, sentence
 
 FAR_OFF = 3.0  # times the limit of U: no result to work with
 FAR_MOVED = 3.0  # times the limit of U: cone against camera, though it is taken out
-MANY_DROPPED = 0.2  # of the images
+MANY_DROPPED = 0.2  # of the images that show the pen
 HALVES_GATE = 1.5  # times U (k = 2) of their difference: 3 standard deviations
 FAR_FROM_NOMINAL = 3.0  # mm; pens of one design differ by some 2
 CHANGE_GATE = 1.2  # times U (k = 2) of a change: 95 % of three axes by chance alone
@@ -322,13 +322,18 @@ def halves_agree(halves: Halves) -> bool:
 
 
 def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
-    """Judge a calibration by what its tip is worth, not by its residuals alone."""
+    """Judge a calibration by what its tip is worth, not by its residuals alone.
+
+    Only images that show the pen count. What else there is depends on how long a
+    camera ran before and after, and a swing that is captured does not keep it.
+    """
     uncertainty = calibration.budget.weakest_uncertainty
     limit = limits.max_uncertainty
     budget = calibration.budget
     largest = budget.largest_share
     by_largest = budget.weakest_share(largest)
-    n_images, n_used = len(calibration.used), int(calibration.used.sum())
+    n_images = sum(reason.shows_pen for reason in calibration.reasons)
+    n_used = int(calibration.used.sum())
     is_same_in_more = largest.name is ShareName.CENTERS and n_used >= POSTURES
     if largest.name in IMAGES_SHRINK and not is_same_in_more:
         reason = uncertain(uncertainty, limit)

@@ -92,6 +92,13 @@ def decode_image(data: bytes, name: str) -> Image:
         return _decoded(data, name)
 
 
+def bits_of(image: Image) -> int:
+    """Return the depth of an image; a file of 16 bits does not say how many it uses."""
+    if image.itemsize == 1:
+        return 8
+    return 12 if int(image.max(initial=0)) < 2**12 else 16
+
+
 def encode_png(image: Image) -> bytes:
     """Return a grey image as PNG, made for dark images: runs of equal values.
 

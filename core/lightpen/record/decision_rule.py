@@ -48,9 +48,9 @@ def decision_rule(limits: StatedLimits) -> tuple[Sentence, ...]:
             "{contradicted:g} standard deviations, if cone and camera moved by more "
             "than {moved:.4f} mm, if the residuals exceed {sigma:g} px, if an LED "
             "stands out by more than {displaced:g} mm, if one of several cameras is "
-            "out of step, if more than {dropped:.0f} % of the images take no part, if "
-            "there are fewer than {n_images} images, or none on one of the eight "
-            "sides.",
+            "out of step, if more than {dropped:.0f} % of the images that show the pen "
+            "take no part, if fewer than {n_images} images show it, or none on one of "
+            "the eight sides.",
             halves=HALVES_GATE,
             contradicted=CONTRADICTED,
             moved=FAR_MOVED * limit,

@@ -66,7 +66,7 @@ def write_scene(
     Parameters
     ----------
     folder : Path
-        Created if it is missing. Images of the same names are replaced.
+        Created if it is missing.
     report : callable, optional
         Called with the fraction done; what it raises stops the writing.
 
@@ -79,11 +79,11 @@ def write_scene(
     Raises
     ------
     FileError
-        The folder holds images of another set, or something cannot be written.
+        The folder is not empty, or something cannot be written.
     """
     images = folder / "images"
     names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
-    _make_folder(images, names)
+    _make_folders(folder, images)
     mark_simulated(folder)
     plan = plan_scene(scene)
     write_camera(scene.camera, folder / "camera.yaml", "opencv")
@@ -124,8 +124,7 @@ def write_rig_scene(
         As `write_scene`.
     """
     names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
-    for name in rig.names:
-        _make_folder(folder / name, names)
+    _make_folders(folder, *(folder / name for name in rig.names))
     mark_simulated(folder)
     plans = plan_rig(scene, rig)
     there = from_first(rig)
@@ -264,21 +263,23 @@ def scene_truth(plan: ScenePlan, folder: str = "images/") -> Json:
     }
 
 
-def _make_folder(images: Path, names: list[str]) -> None:
+def _make_folders(folder: Path, *below: Path) -> None:
+    """Make a folder and those in it, or refuse one that holds something."""
     try:
-        images.mkdir(parents=True, exist_ok=True)
-        others = {path.name for path in images.iterdir()} - set(names)
+        folder.mkdir(parents=True, exist_ok=True)
+        others = [path.name for path in folder.iterdir()]
+        if not others:
+            for each in below:
+                each.mkdir()
     except OSError as error:
-        raise _no_folder(images, error) from error
+        raise _no_folder(folder, error) from error
     if others:
         raise FileError(
             sentence(
-                "scene.other-files",
-                "The folder {folder} holds {n_files} other files, such as "
-                "{example}, which would get mixed up with the new images. Choose an "
-                "empty folder.",
-                folder=str(images),
-                n_files=len(others),
+                "scene.not-empty",
+                "The folder {folder} is not empty: it holds {example}. Choose another, "
+                "or empty it; nothing is overwritten.",
+                folder=str(folder),
                 example=min(others),
             )
         )

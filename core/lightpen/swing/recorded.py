@@ -65,7 +65,7 @@ def take_recorded_image(
 
 
 def pass_over(state: SwingState, n_images: int) -> Transition:
-    """Leave out the next recorded image, which cannot be read."""
+    """Leave out the next recorded image, which cannot be read or is of another size."""
     passed = _with_dropped(_further(state, n_images), Reason.UNREADABLE)
     return _ended_by_last(Transition(passed))
 

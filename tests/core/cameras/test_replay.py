@@ -267,13 +267,18 @@ def test_an_image_of_another_size_is_refused(tmp_path: Path) -> None:
         camera.read(1.0)
 
 
-def test_an_image_of_another_depth_is_refused(tmp_path: Path) -> None:
-    write_images(tmp_path)
-    (tmp_path / "frame_1.png").write_bytes(encode_png(np.zeros((20, 30), np.uint16)))
-    camera = opened(tmp_path)
-    camera.read(1.0)
-    with pytest.raises(FrameIncomplete, match=r"frame_1\.png has 16 bits"):
-        camera.read(1.0)
+@pytest.mark.parametrize("number", [0, 3])
+def test_an_image_of_another_depth_comes_as_it_is(tmp_path: Path, number: int) -> None:
+    images = write_images(tmp_path)
+    images[number] = images[number].astype(np.uint16) * 257
+    (tmp_path / f"frame_{number}.png").write_bytes(encode_png(images[number]))
+    frames = read_all(opened(tmp_path))
+
+    assert len(frames) == N_IMAGES
+    for i, (frame, image) in enumerate(zip(frames, images, strict=True)):
+        np.testing.assert_array_equal(frame.image, image)
+        expected = ("Mono16", 65535) if i == number else ("Mono8", 255)
+        assert (frame.pixel_format, frame.full_scale) == expected
 
 
 @pytest.mark.parametrize(
@@ -281,9 +286,8 @@ def test_an_image_of_another_depth_is_refused(tmp_path: Path) -> None:
     [
         b"no image",
         encode_png(np.zeros((10, 10), np.uint8)),
-        encode_png(np.zeros((20, 30), np.uint16)),
     ],
-    ids=["unreadable", "of another size", "of another depth"],
+    ids=["unreadable", "of another size"],
 )
 def test_a_first_image_unlike_the_others_costs_none_but_itself(
     tmp_path: Path, spoiled: bytes

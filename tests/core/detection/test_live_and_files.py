@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray, Image
+from lightpen.cameras.replay import ReplayCamera
 from lightpen.detection.observations import Observations, observe_images
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting, look, sight_centers
+from lightpen.errors import CalibrationError
 from lightpen.formats.images import ImageSource
 from lightpen.model.ellipse import disc_images, ellipse_centers
 from lightpen.model.pen import Pen
@@ -204,6 +206,7 @@ def assert_alike(live: Sighting, files: Observations, index: int) -> None:
     assert_same = partial(np.testing.assert_allclose, rtol=0, atol=1e-9)  # px; rounding
     assert_same(live.pixels, files.pixels[index])
     assert_same(live.seen_pixels, files.seen_pixels[index])
+    assert_same(live.areas, files.areas[index])
     assert_same(live.edge_width, files.edge_widths[index])
     assert live.has_pose == np.isfinite(files.rotations[index]).all()
 
@@ -268,6 +271,43 @@ def test_only_the_image_before_tells_how_a_symmetric_pen_is_held() -> None:
     assert tracked.has_pose
     np.testing.assert_allclose(tracked.rotation, SHOT.rotation, atol=1e-3)
     assert look(of_pen(pen, defocus=8.0), CAMERA, pen).reason is Reason.BLURRED
+
+
+@pytest.mark.parametrize("n_dark", [0, 3])
+def test_a_mirrored_pen_is_refused_also_among_images_without_it(n_dark: int) -> None:
+    """A swing that was captured does not keep such images."""
+    image = of_pen(replace(PEN, leds=PEN.leds * [-1, 1, 1]))
+    with pytest.raises(CalibrationError, match="mirror image of the pen"):
+        on_files([image, *[np.zeros_like(image)] * n_dark])
+
+
+def test_images_without_the_pen_neither_show_a_lamp_nor_hide_that_others_do() -> None:
+    lamp = np.array([300.0, 300.0])
+    beside_pen, alone = shown(lamplit(lamp)), shown(lamplit(lamp, shot=lit()))
+    images = [beside_pen, alone, beside_pen, np.zeros_like(alone)]
+    lamps = on_files(images).lamps
+
+    assert lamps.shape == (4, 1, 2)
+    np.testing.assert_allclose(lamps[[0, 2], 0], [lamp, lamp], atol=0.1)
+    assert np.isnan(lamps[[1, 3]]).all()
+
+
+def test_a_recorded_image_is_as_deep_as_on_files() -> None:
+    """One hot pixel tells that 4095 is not full scale, so the discs are not clipped."""
+    scene = replace(SCENE, sensor=Sensor(bits=12))
+    image = shown(replace(SHOT, optics=replace(SHOT.optics, exposure=2.0)), scene)
+    assert image.max() == 4095
+    image[3, 5] = 2**16 - 1
+    camera = ReplayCamera(
+        "", lambda: ImageSource(("",), (), lambda: iter([loader(image)]))
+    )
+    camera.open()
+    camera.start()
+    frame = camera.read(1.0)
+    live = look(frame.image, CAMERA, PEN, full_scale=frame.full_scale)
+
+    assert np.isfinite(live.areas).all()
+    assert_alike(live, on_files([image]), 0)
 
 
 def test_light_that_is_masked_is_no_smear() -> None:

@@ -8,10 +8,15 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.fixed_lamps import lamps_among
-from lightpen.detection.observations import Observations, observe_centers
+from lightpen.detection.observations import (
+    Observations,
+    leave_out,
+    observe_centers,
+)
+from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.camera_path import follow_lamps
+from lightpen.estimation.camera_path import follow_lamps, pose_steadily
 from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.verdict import Grade, NextStep, judge
 from lightpen.formats.observation_files import Centers
@@ -91,6 +96,23 @@ def test_images_that_do_not_show_a_lamp_are_bridged() -> None:
     path = follow_lamps(lamps)
     assert path is not None
     np.testing.assert_allclose(path.shifts, EVEN - EVEN.mean(axis=0), atol=0.05)
+
+
+def test_images_without_the_pen_do_not_tell_the_way() -> None:
+    """A swing that is captured does not keep them, and gives the same tip."""
+    dark = np.arange(0, N_IMAGES, 4)
+    lamps = lamps_along(CURVE)
+    lamps[dark] += 30.0
+    seen = leave_out(
+        replace(seen_along(CURVE), lamps=lamps), dict.fromkeys(dark, Reason.EMPTY)
+    )
+    path = pose_steadily(CAMERA, PEN, seen).path
+    kept = follow_lamps(np.delete(lamps, dark, axis=0))
+    assert path is not None
+    assert kept is not None
+    assert path.is_followed
+    np.testing.assert_array_equal(np.delete(path.shifts, dark, axis=0), kept.shifts)
+    assert path.moved == kept.moved
 
 
 def test_without_lamps_there_is_no_way() -> None:

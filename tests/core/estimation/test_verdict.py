@@ -8,6 +8,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
+from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.uncertainty import Halves, Share, ShareName
@@ -264,6 +265,33 @@ def test_many_dropped_images_are_checked(good: Calibration) -> None:
     used[::4] = False
     verdict = judge(replace(good, used=used), SwingLimits(max_uncertainty=0.01))
     assert verdict.reason == many_dropped(38, 150)
+
+
+def test_images_without_the_pen_do_not_count_however_many(good: Calibration) -> None:
+    """A camera that runs before and after the swing says nothing about the tip."""
+    no_pen = (Reason.EMPTY, Reason.TOO_FEW_LEDS, Reason.BLURRED, Reason.UNREADABLE)
+    used = np.arange(len(good.used)) % 3 == 0
+    reasons = tuple(
+        Reason.NONE if is_used else no_pen[i % len(no_pen)]
+        for i, is_used in enumerate(used)
+    )
+    few = replace(good, used=used, reasons=reasons)
+    limits = SwingLimits(max_uncertainty=0.01, min_images=50)
+    assert judge(few, limits).grade is Grade.PASS
+    verdict = judge(few, replace(limits, min_images=51))
+    assert verdict.reason == too_few_images(50, 51)
+
+
+@pytest.mark.parametrize("reason", [Reason.SLIPPED, Reason.MISFIT, Reason.TAKEN_OUT])
+def test_images_of_the_pen_that_are_left_out_count(
+    good: Calibration, reason: Reason
+) -> None:
+    used = good.used.copy()
+    used[:31] = False
+    reasons = (reason,) * 31 + good.reasons[31:]
+    limits = SwingLimits(max_uncertainty=0.01, min_images=150)
+    verdict = judge(replace(good, used=used, reasons=reasons), limits)
+    assert verdict.reason == many_dropped(31, 150)
 
 
 def test_fewer_images_than_asked_for_are_checked_also_if_they_suffice(

@@ -1,5 +1,6 @@
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,8 @@ from lightpen.model.rigid import fit_rigid
 from lightpen.simulator.image_plans import plan_scene
 from lightpen.simulator.render import render_view
 from lightpen.simulator.sample_pens import six_led_pen
-from lightpen.simulator.scene_files import scene_truth, write_scene
+from lightpen.simulator.sample_rigs import row_of_cameras
+from lightpen.simulator.scene_files import scene_truth, write_rig_scene, write_scene
 from lightpen.simulator.scenes import HARD, Disturbances, Scene
 from lightpen.simulator.sensor import Sensor, quantize
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP, paper_camera
@@ -174,11 +176,30 @@ def test_truth_of_hidden_missing_and_saturated_leds() -> None:
     assert n_hidden >= 6
 
 
-def test_smaller_set_does_not_mix_with_a_larger_one(tmp_path: Path) -> None:
-    write_scene(SMALL, tmp_path)
-    write_scene(SMALL, tmp_path)
-    with pytest.raises(FileError, match=r"frame_0003\.png"):
-        write_scene(replace(SMALL, n_images=2), tmp_path)
+@pytest.mark.parametrize("name", ["camera.yaml", "leds.csv", "notes.txt"])
+def test_nothing_is_written_into_a_folder_that_holds_something(
+    tmp_path: Path, name: str
+) -> None:
+    """A real file in it would be taken for a simulated one by the mark beside it."""
+    (tmp_path / name).write_text("real")
+    with pytest.raises(FileError, match=f"not empty: it holds {name}"):
+        write_scene(SMALL, tmp_path)
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["real"]
+
+
+@pytest.mark.parametrize("n_images", [1, 2])
+def test_a_set_is_not_written_over_nor_mixed_with_another(
+    tmp_path: Path, n_images: int
+) -> None:
+    folder = tmp_path / "set"
+    write_scene(replace(SMALL, n_images=1), folder)
+    before = {path: path.read_bytes() for path in folder.rglob("*.*")}
+    other = replace(SMALL, n_images=n_images, seed=6)
+    rig = row_of_cameras(2, 1000.0, 4)
+    for write in (partial(write_scene, other), partial(write_rig_scene, other, rig)):
+        with pytest.raises(FileError, match="nothing is overwritten"):
+            write(folder)
+    assert {path: path.read_bytes() for path in folder.rglob("*.*")} == before
 
 
 def test_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:

@@ -13,9 +13,13 @@ import pytest
 
 from lightpen.cameras.protocol import Frame, FrameIncomplete
 from lightpen.cameras.replay import ReplayCamera
+from lightpen.detection.observations import observe_images
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import look
+from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.verdict import Grade, judge
 from lightpen.formats.decoding import encode_png, read_image
+from lightpen.formats.images import find_images
 from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
@@ -118,6 +122,34 @@ def test_an_image_that_cannot_be_read_is_passed_over(
 
     assert station.n_recorded == N_IMAGES - 1
     assert station.state.n_dropped == {Reason.UNREADABLE: 1}
+
+
+def test_the_verdict_is_that_on_the_same_files(
+    station: "Station", swung: Callable[..., Path], tmp_path: Path
+) -> None:
+    images = tmp_path / "images"
+    shutil.copytree(swung() / "images", images)
+    paths = sorted(images.iterdir())
+    deep = read_image(paths[0]).astype(np.uint16) * 257
+    paths[0].write_bytes(encode_png(deep))
+    paths[3].write_bytes(b"no image")
+    for path in paths[5:15:2]:
+        path.write_bytes(encode_png(np.zeros_like(deep)))
+    limits = replace(station.preparation.limits, min_images=14)
+    recording = Recording(station, images)
+    station.begin(limits)
+    recording.show(3 * N_IMAGES)
+    station.wait_for_phase(Phase.VERDICT)
+    setup = station.status.setup
+    assert setup is not None
+    seen = observe_images(find_images(str(images)), setup.camera, setup.pen)
+    on_files = calibrate(setup.camera, setup.pen, seen, setup.assumptions)
+
+    assert station.n_recorded == on_files.used.sum() == 14
+    assert station.tip == on_files.joint.tip_pen.tolist()
+    told = judge(station.solution.calibration, limits)
+    assert told == judge(on_files, limits)
+    assert told.grade is Grade.PASS
 
 
 def test_an_image_takes_part_that_would_on_files_with_few_leds_whole(
