@@ -91,6 +91,7 @@ class LibraryDialog(Translated, QDialog):
         self._is_guarded = False
         self._item: AnyItem | None = None  # that is being added or changed
         self._is_new = False
+        self._kept: AnyItem | None = None  # that is being kept
 
         # Widgets
         self._lead = text_label(TextSize.BODY)
@@ -212,11 +213,21 @@ class LibraryDialog(Translated, QDialog):
 
     def tell_kept(self) -> None:
         """Show that what was asked for is done."""
-        self._stop_editing()
+        if self._ended_keeping():
+            self._stop_editing()
 
-    def tell(self, trouble: str) -> None:
-        """Say why it was not."""
-        self._trouble.set_value(Remark(trouble, Sign.CROSS, Tone.BAD))
+    def tell(self, trouble: str) -> bool:
+        """Say why it was not; return whether that can be seen here."""
+        is_seen = self._ended_keeping() and self.isVisible()
+        if is_seen:
+            self._trouble.set_value(Remark(trouble, Sign.CROSS, Tone.BAD))
+        return is_seen
+
+    def _ended_keeping(self) -> bool:
+        """Let a change be kept again; return whether what was kept is still shown."""
+        kept, self._kept = self._kept, None
+        self._refresh()
+        return kept is not None and kept is self._item
 
     def rows(self) -> tuple[tuple[str, ...], ...]:
         """Return what is written in the table."""
@@ -341,6 +352,8 @@ class LibraryDialog(Translated, QDialog):
         picture = self._form.picture() if is_typed else ""
         reason = self._reason.text().strip()
         asked = Asked(item, picture, self._is_new, reason, signature)
+        self._kept = self._item
+        self._refresh()
         self.change_asked.emit(asked)
 
     def _show_picture(self, item: AnyItem | None) -> None:
@@ -365,7 +378,9 @@ class LibraryDialog(Translated, QDialog):
         )
         is_typed = not self._form.isHidden()
         lacks = ""
-        if is_typed and not self._form.has_id():
+        if self._kept is not None:
+            lacks = self.tr("A change is being kept.")
+        elif is_typed and not self._form.has_id():
             lacks = self.tr("Enter an id.")
         elif is_typed and not self._form.has_day():
             lacks = self.tr("Enter a day such as 2026-08-14, or none.")

@@ -508,3 +508,32 @@ def test_the_barcode_of_a_retired_tip_chooses_nothing(desk: Desk) -> None:
 
     assert desk.workbench.preparation.names.tip != "T-7"
     assert desk.told[-1].startswith("Tip T-7 is retired")
+
+
+def test_a_change_kept_late_leaves_what_is_typed_by_then(desk: Desk) -> None:
+    desk.add(TIP)
+    desk.names.library_requested.emit(ItemKind.TIP)
+    desk.click("Change...")
+    desk.click("Keep")
+    keep = desk.control("Keep")
+    assert (keep.isEnabled(), keep.toolTip()) == (False, "A change is being kept.")
+    desk.click("Leave it")
+    desk.click("Add...")
+    desk.enter("Id, as on its label", "T-8")
+    desk.settle()
+
+    assert desk.text_of("Id, as on its label") == "T-8"
+    assert desk.control("Keep").isEnabled()
+
+
+def test_an_unknown_barcode_is_asked_about_no_more_once_its_tip_is_there(
+    desk: Desk,
+) -> None:
+    desk.scan("T-7")
+    question = desk.page.findChild(QuestionBar)
+    assert isinstance(question, QuestionBar)
+    assert question.words() == "There is no tip T-7 in the library. Add it?"
+
+    desk.add(TIP)
+
+    assert question.words() == ""
