@@ -156,6 +156,8 @@ class HistoryContent(Translated, QWidget):
         self._archive.set_delivery(opening.delivery)
         self._table.set_stations(opening.names.stations)
         self._table.set_lines(opening.n_lines, opening.first)
+        if self._followed is None:
+            self._on_trend_read(Trend())
         self.status_changed.emit(self.tr("{0} entries").format(opening.n_lines))
         # Later than what is seen at once.
         self._reader.read_due(self._due.rule(), self._workbench.library.library)
@@ -213,16 +215,29 @@ class HistoryContent(Translated, QWidget):
 
     def _enter_note(self, about: Written, text: str) -> None:
         logbook, operator = self._logbook, self._workbench.preparation.names.operator
-        self._do(
+        self._enter(
             lambda _: logbook.opened().enter_note(about, text, operator),
             lambda _: self.read_anew(),
         )
 
     def _restore(self, entry: Written, reason: str) -> None:
         logbook, names = self._logbook, self._workbench.preparation.names
-        self._do(
+        self._enter(
             lambda _: logbook.opened().restore(entry, names, reason), self._on_restored
         )
+
+    def _enter(
+        self, function: Callable[[Report], T], on_succeeded: Callable[[T], object]
+    ) -> None:
+        """Enter what was typed; it is asked for once more where that cannot be."""
+        job = self._do(function, on_succeeded)
+        if job is None:
+            self.notice_raised.emit(
+                self.tr("Something else is under way: wait for it.")
+            )
+            self._entry.ask_again()
+        else:
+            job.failed.connect(self._entry.ask_again)
 
     def _on_restored(self, result: Result) -> None:
         self.read_anew()
@@ -312,10 +327,10 @@ class HistoryContent(Translated, QWidget):
 
     def _do(
         self, function: Callable[[Report], T], on_succeeded: Callable[[T], object]
-    ) -> None:
-        """Do one thing at a time beside the window."""
+    ) -> Job | None:
+        """Do one thing at a time beside the window; None if another is under way."""
         if self._work is not None:
-            return
+            return None
         self._work = job = Job(function, self)
         self._archive.set_working(True)
 
@@ -325,6 +340,7 @@ class HistoryContent(Translated, QWidget):
         job.failed.connect(self.notice_raised)
         job.ended.connect(self._on_done)
         job.start()
+        return job
 
     def _on_done(self) -> None:
         self._work = None

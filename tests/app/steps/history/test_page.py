@@ -637,3 +637,34 @@ def test_a_file_that_is_no_archive_is_refused_in_words(
 
     desk.until(lambda: desk.notices)
     assert "is no exported archive" in desk.notices[0]
+
+
+def test_a_note_that_cannot_be_entered_now_is_asked_for_again(desk: Desk) -> None:
+    desk.enter(2)
+    desk.open()
+    desk.show_tab(ENTRY)
+    desk.select(1)
+    desk.click("Add a note...")
+    desk.child(ArchivePanel).check_requested.emit()  # which may take long
+    desk.type_reason("Dropped on the floor.")
+
+    assert desk.notices == ["Something else is under way: wait for it."]
+    (typed,) = (
+        each.text()
+        for each in desk.child(EntryPanel).findChildren(QLineEdit)
+        if each.isVisible()
+    )
+    assert typed == "Dropped on the floor."
+    desk.wait_idle()
+
+
+def test_no_trend_is_left_of_what_is_no_longer_looked_for(desk: Desk) -> None:
+    desk.enter(3)
+    desk.open()
+    panel = desk.child(TrendPanel)
+    desk.until(lambda: len(panel.value().entries) == 3)
+    QTest.keyClicks(desk.child(DateField), "2030-01-01")
+    desk.until(lambda: desk.statuses[-1] == "0 entries")
+
+    assert panel.value().entries == ()
+    assert panel.words().startswith("Choose an entry")
