@@ -10,7 +10,6 @@ import os
 import shutil
 import subprocess
 import sys
-import tomllib
 from collections.abc import Sequence
 from enum import Enum, auto
 from hashlib import sha256
@@ -47,6 +46,8 @@ from installer.payload import (
 from installer.places import INSTALLER, IS_WINDOWS, ROOT
 from installer.runtime import RuntimeFileError
 from installer.sbom import BundledPart, bill_of_materials
+
+from lightpen import __version__
 
 KILOBYTE = 1024
 EXTRAS = {
@@ -87,7 +88,7 @@ def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> P
     Parameters
     ----------
     version : str
-        That of pyproject.toml unless given, as the tests of upgrades do.
+        That of the program unless given, as the tests of upgrades do.
     sign : str
         Command that signs the file whose path is put after it; none leaves them
         unsigned.
@@ -99,7 +100,7 @@ def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> P
     BuildError, RuntimeFileError, ToolMissingError
         It cannot be built.
     """
-    version = version or project_version()
+    version = version or __version__
     moment = commit_time()
     out.mkdir(parents=True, exist_ok=True)
     folder, work = out / "payload", out / "work"
@@ -151,12 +152,6 @@ def shipped_pins() -> tuple[Pin, ...]:
     )
     extra = (pin for pin in development if pin.name in EXTRAS)
     return (*program, *extra)
-
-
-def project_version() -> str:
-    """Return the version in pyproject.toml."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    return str(project["version"])
 
 
 def commit_time() -> int:
@@ -306,7 +301,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--version",
         default="",
-        help="other than that of pyproject.toml, for tests of upgrades",
+        help="other than that of the program, for tests of upgrades",
     )
     parser.add_argument(
         "--sign",

@@ -22,11 +22,13 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from installer import bad_conditions, life
-from installer.build import Packing, pack, project_version
+from installer.build import Packing, pack
 from installer.launchers import ToolMissingError
 from installer.machine import fresh_machine
 from installer.places import IS_WINDOWS
 from installer.trial import Trial, await_so
+
+from lightpen import __version__
 
 DISPLAY = 93
 CHINESE_LOCALE = Path("/usr/share/i18n/locales/zh_CN")  # of the package locales
@@ -57,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def try_quickly(trial: Trial) -> None:
     """Install, self-test and uninstall."""
     files, registry = trial.machine.files(), trial.machine.registry()
-    life.try_installation(trial, project_version())
+    life.try_installation(trial, __version__)
     compare_tips(trial, life.try_self_test(trial, "offscreen"))
     life.try_removal(trial, files, registry)
 
@@ -70,7 +72,7 @@ def try_all(trial: Trial, payload: Path) -> None:
     payload : Path
         The folder that the installer was packed from, for one of a newer version.
     """
-    version = project_version()
+    version = __version__
     files, registry = trial.machine.files(), trial.machine.registry()
     bad_conditions.try_no_right(trial)
     bad_conditions.try_full_disk(trial)

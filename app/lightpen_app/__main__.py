@@ -1,8 +1,9 @@
 """Start of the program: its window, its demo, its test of itself, or a command."""
 
-import os
 import sys
 from pathlib import Path
+
+from lightpen.interpreter import run_program
 
 SELF_TEST = "--self-test"
 
@@ -64,9 +65,10 @@ class Starts:
 
 def main() -> int:
     """Run the program and return the exit status."""
-    # Before numpy is imported: the matrices are many and small; threads would only
-    # wait for each other.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    return run_program(_run)
+
+
+def _run() -> int:
     if len(sys.argv) == 3 and sys.argv[1] == SELF_TEST:
         # A damaged file is to be named, also one that all commands need.
         return Starts().test_itself(Path(sys.argv[2]))

@@ -12,3 +12,5 @@ Conventions used everywhere in this package:
 * Arrays over frames have the frame as first axis, arrays over LEDs the LED as
   the axis before the coordinates.
 """
+
+__version__ = "0.1.0"

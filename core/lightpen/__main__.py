@@ -1,16 +1,19 @@
-"""Start of the command line, with what must be set before numpy is imported."""
+"""Start of the command line."""
 
-import os
 import sys
+
+from lightpen.interpreter import run_program
 
 
 def main() -> int:
     """Run the command line and return the exit status."""
-    # The matrices are many and small; threads would only wait for each other.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from lightpen.cli import main as run
 
-    return run()
+    def command_line() -> int:
+        from lightpen.cli import main as run
+
+        return run()
+
+    return run_program(command_line)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ import argparse
 import re
 import sys
 from collections.abc import Collection, Sequence
-from importlib.metadata import version
 from io import TextIOWrapper
 from pathlib import Path
 from pkgutil import resolve_name
@@ -16,6 +15,7 @@ from typing import NoReturn
 
 import cv2
 
+from lightpen import __version__
 from lightpen.commands.archive import add_archive, usual_data_folder
 from lightpen.commands.console import BAD_INPUT, NO_TIP, Command, shown
 from lightpen.commands.desktop import Desktop, add_desktop, add_open, add_report
@@ -133,7 +133,7 @@ def _parser(
         epilog="Exit status: 0 done, 1 the data cannot give a tip or the archive was "
         "changed, 2 wrong usage or unreadable input.",
     )
-    parser.add_argument("--version", action="version", version=version("lightpen"))
+    parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=not has_window, metavar="COMMAND")
     if desktop is not None:
         add_desktop(parser, desktop)

@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, QTimer
 from lightpen_app.look.layout_items import forget_layout_items
 
 PERIOD_MS = 500
+LIMITS = (700, 10, 10)  # of the generations: objects, and collections of the younger
 
 
 class GarbageCollector(QObject):
@@ -31,6 +32,6 @@ class GarbageCollector(QObject):
 def collect_if_due() -> None:
     """Collect the oldest generation that has grown beyond its threshold."""
     for generation in (2, 1, 0):
-        if gc.get_count()[generation] > gc.get_threshold()[generation]:
+        if gc.get_count()[generation] > LIMITS[generation]:
             gc.collect(generation)
             return

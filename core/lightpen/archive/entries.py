@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from hashlib import sha256
-from importlib.metadata import version
 from typing import Annotated, TypeAlias
 
 from msgspec import Meta, Struct, to_builtins
 
+from lightpen import __version__
 from lightpen.formats.files import printable
 from lightpen.formats.own_json import (
     Digest,
@@ -272,4 +272,4 @@ def text_sha256(text: str) -> str:
 
 def this_program() -> str:
     """Return what an entry says of the program that makes it."""
-    return f"lightpen {version('lightpen')}"
+    return f"lightpen {__version__}"

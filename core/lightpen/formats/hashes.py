@@ -1,9 +1,11 @@
 """The files that a calibration was made from, with their hashes."""
 
+import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from hashlib import sha256 as sha256_of
+from itertools import chain
 from pathlib import Path
 
 from lightpen.arrays import FloatArray
@@ -84,6 +86,13 @@ def with_content(path: Path) -> InputFile:
 
 
 def all_hashed(paths: Sequence[Path]) -> tuple[InputFile, ...]:
-    """Return files with their hashes, read in threads."""
-    with ThreadPoolExecutor() as executor:
-        return tuple(executor.map(hashed, paths))
+    """Return files with their hashes, read in as many threads as processors."""
+    n_threads = os.cpu_count() or 1
+    n_each = -(-len(paths) // n_threads) or 1  # taking one by one, threads wait in turn
+    shares = [paths[i : i + n_each] for i in range(0, len(paths), n_each)]
+    with ThreadPoolExecutor(n_threads) as executor:
+        return tuple(chain.from_iterable(executor.map(_hashed_in_turn, shares)))
+
+
+def _hashed_in_turn(paths: Sequence[Path]) -> list[InputFile]:
+    return [hashed(path) for path in paths]

@@ -7,12 +7,12 @@ import json
 from base64 import b64encode
 from collections.abc import Mapping
 from datetime import datetime
-from importlib.metadata import version
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
+from lightpen import __version__
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.own_json import with_checksum
 from lightpen.sentences import Sentence
@@ -21,7 +21,7 @@ from lightpen.sentences import Sentence
 def record_heading(created: datetime) -> dict[str, Any]:
     """Return what every record begins with: the program, and when it was made."""
     return {
-        "program": {"name": "lightpen", "version": version("lightpen")},
+        "program": {"name": "lightpen", "version": __version__},
         "created": created.isoformat(timespec="seconds"),
     }
 
@@ -36,20 +36,22 @@ def file_entry(file: InputFile) -> dict[str, str]:
 
 def plain(value: Any) -> Any:
     """Return arrays as lists, what is not a number as null, sentences with codes."""
-    if isinstance(value, Sentence):
-        value = {"code": value.code, "text": str(value), "values": value.values}
+    if value is None or isinstance(value, (str, int)):
+        return value
+    if isinstance(value, float):
+        return float(value) if isfinite(value) else None
+    if isinstance(value, dict):
+        return {name: plain(entry) for name, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
     if isinstance(value, np.ndarray):
         if value.dtype.kind == "f" and np.isfinite(value).all():
             return value.tolist()
-        value = value.tolist()
+        return plain(value.tolist())
     if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    if isinstance(value, dict):
-        return {name: plain(entry) for name, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(entry) for entry in value]
+        return plain(value.item())
+    if isinstance(value, Sentence):
+        return plain({"code": value.code, "text": str(value), "values": value.values})
     return value
 
 

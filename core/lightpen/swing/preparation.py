@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from importlib.metadata import version
 from typing import Self
 
 import numpy as np
 
+from lightpen import __version__
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.replay import RECORDED
@@ -417,7 +417,7 @@ class Preparation:
             camera=FileCopy.of(camera_path, CAMERA_FILE),
             pen=FileCopy.of(self.pen_file.path, PEN_FILE),
             created=local_now(),
-            program=f"lightpen {version('lightpen')}",
+            program=f"lightpen {__version__}",
             station=self.names.station,
             operator=self.names.operator,
             tip=self.names.tip,
