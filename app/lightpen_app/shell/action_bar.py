@@ -3,7 +3,9 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QVBoxLayout, QWidget
+from typing_extensions import override
 
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.page import MainAction
@@ -36,7 +38,7 @@ class ActionBar(Translated, QFrame):
         self._why_not = text_label(TextSize.BODY, Tone.WARN)
         self._status = text_label(TextSize.SMALL, Tone.QUIET)
         self._back = PushButton()
-        self._main = PushButton(MAIN_WIDTH)
+        self._main = _MainButton(MAIN_WIDTH)
         self._main.setObjectName("main_button")
 
         # Layout
@@ -115,3 +117,11 @@ class ActionBar(Translated, QFrame):
 
     def _retranslate(self) -> None:
         self._back.setText(self.tr("Back"))
+
+
+class _MainButton(PushButton):
+    """A double click is one: the second is of what another page has by then."""
+
+    @override
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        event.accept()

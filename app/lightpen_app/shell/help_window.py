@@ -62,6 +62,11 @@ class HelpWindow(Translated, QWidget):
         self._browser.setMarkdown(help_text(key, language))
         _space_out(self._browser.document())
 
+    def set_language(self, language: Language) -> None:
+        """Show the same help in another language."""
+        if self._key:
+            self.set_topic(self._key, language)
+
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Escape, Qt.Key.Key_F1):

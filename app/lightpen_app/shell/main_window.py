@@ -40,7 +40,7 @@ from lightpen_app.shell.sidebar import Sidebar
 from lightpen_app.shell.step_states import Status, Step, list_steps
 from lightpen_app.shell.stream_dialog import StreamDialog, StreamState
 from lightpen_app.steps.page import Page
-from lightpen_app.widgets.keys import ENTER_KEYS
+from lightpen_app.widgets.keys import ENTER_KEYS, PAGE_KEYS
 from lightpen_app.widgets.operator_view import OperatorView
 from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.work.settings import Preferences, Settings, data_folder
@@ -48,6 +48,7 @@ from lightpen_app.work.workbench import Subject
 
 LEAST_SIZE = QSize(116 * GRID, 62 * GRID)  # for the wizard; fits 1920 x 1080 at 200 %
 FIRST_SIZE = QSize(160 * GRID, 100 * GRID)
+KEYS_THAT_LEAD_ON = (*ENTER_KEYS, *PAGE_KEYS)
 
 
 class MainWindow(Rearranged, QMainWindow):
@@ -263,6 +264,8 @@ class MainWindow(Rearranged, QMainWindow):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Take the keys that no control has taken."""
         key = event.key()
+        if event.isAutoRepeat() and key in KEYS_THAT_LEAD_ON:
+            return  # of a key held too long, which would go through all steps
         if key in ENTER_KEYS:
             focused = QApplication.focusWidget()
             if (
@@ -306,7 +309,7 @@ class MainWindow(Rearranged, QMainWindow):
         if event.type() == QEvent.Type.LanguageChange:
             self._retranslate()
             self._refresh()
-            self._help_window.set_topic(self.page().key, self._options.value().language)
+            self._help_window.set_language(self._options.value().language)
 
     def _connect_page(self, page: Page) -> None:
         page.changed.connect(self._refresh)
@@ -346,6 +349,7 @@ class MainWindow(Rearranged, QMainWindow):
     def _action(self, key: Qt.Key, slot: Callable[[], object]) -> QAction:
         action = QAction(self)
         action.setShortcut(key)
+        action.setAutoRepeat(False)
         action.triggered.connect(lambda _=False: slot())
         self.addAction(action)
         return action

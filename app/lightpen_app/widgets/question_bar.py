@@ -1,5 +1,8 @@
 """A question in the page that waits for an answer, and stops nothing else."""
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
@@ -7,9 +10,18 @@ from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.widgets.asking_bar import AskingBar
 from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.translated import Translated
 
 
-class QuestionBar(AskingBar):
+class Question(NamedTuple):
+    """What is asked, and what its answers say."""
+
+    text: str = ""
+    yes: str = ""
+    no: str = ""
+
+
+class QuestionBar(Translated, AskingBar):
     """Hidden until it asks; either answer hides it again.
 
     Signals
@@ -23,6 +35,8 @@ class QuestionBar(AskingBar):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self._words: Callable[[], Question] = Question
+
         # Widgets
         self._text = text_label(TextSize.BODY)
         self._decline = PushButton()
@@ -42,12 +56,18 @@ class QuestionBar(AskingBar):
 
         self.hide()
 
-    def set_words(self, question: str, yes: str, no: str) -> None:
-        """Change the question and its answers."""
-        self._text.setText(question)
-        self.setAccessibleName(question)
-        self._agree.setText(yes)
-        self._decline.setText(no)
+    def set_words(self, words: Callable[[], Question]) -> None:
+        """Change the question; its words are asked for in each language anew."""
+        self._words = words
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Ask by the words as they are now."""
+        asked = self._words()
+        self._text.setText(asked.text)
+        self.setAccessibleName(asked.text)
+        self._agree.setText(asked.yes)
+        self._decline.setText(asked.no)
 
     def ask(self) -> None:
         """Show the question; the answer that changes nothing has the focus."""
@@ -57,6 +77,9 @@ class QuestionBar(AskingBar):
     def words(self) -> str:
         """Return the question; empty while nothing is asked."""
         return "" if self.isHidden() else self._text.text()
+
+    def _retranslate(self) -> None:
+        self.refresh()
 
     def _on_agree_clicked(self) -> None:
         self.hide()

@@ -41,6 +41,7 @@ class Job(QObject):
     failed = Signal(str)
     crashed = Signal()
     ended = Signal()
+    _moved = Signal(float)
     _returned = Signal(object)
     _refused = Signal(object)
     _broke = Signal()
@@ -55,6 +56,7 @@ class Job(QObject):
         self._over = Event()
 
         # Connections
+        self._moved.connect(self._on_moved)
         self._returned.connect(self._on_returned)
         self._refused.connect(self._on_refused)
         self._broke.connect(self._on_broke)
@@ -86,10 +88,14 @@ class Job(QObject):
     def _report(self, fraction: float) -> None:
         if self._cancelled.is_set():
             raise Cancelled
-        self.progressed.emit(fraction)
+        self._moved.emit(fraction)
 
-    # An outcome may be under way between the threads while the user cancels: it is
+    # What is told may be under way between the threads while the user cancels: it is
     # judged here, on the thread of the user.
+
+    def _on_moved(self, fraction: float) -> None:
+        if not self._cancelled.is_set():
+            self.progressed.emit(fraction)
 
     def _on_returned(self, result: object) -> None:
         if not self._cancelled.is_set():

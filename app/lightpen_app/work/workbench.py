@@ -89,6 +89,8 @@ class Workbench(QObject):
         `subject` is different.
     troubled(str)
         A sentence to be read.
+    station_left()
+        Another station is chosen: files that are still being read are not for it.
     swing_wanted(Path)
         What leads to a recorded swing was opened from outside the program.
     relieved(str)
@@ -97,6 +99,7 @@ class Workbench(QObject):
 
     changed = Signal()
     subject_changed = Signal(object)
+    station_left = Signal()
     swing_wanted = Signal(object)
     troubled = Signal(str)
     relieved = Signal(str)
@@ -118,6 +121,7 @@ class Workbench(QObject):
         self._reading = FileReading(self)
         self._read_for = SourceChoice()  # which was chosen when that began
         self._unread = Station()
+        self._unsaved_told = ""
         self._subject_told: Subject | None = None
         self._verified_told: tuple[Path, ...] = ()
         self._choices = VerificationChoices()
@@ -248,6 +252,7 @@ class Workbench(QObject):
         station = self._settings.station(name) if name else Station()
         before = self._preparation
         self._reading.relieve()
+        self.station_left.emit()
         chosen = preparation_of(name, station, before)
         self._preparation = replace(chosen, limits=self._limits_for(chosen).swing)
         self._choices = self._limited(choices_of(station))
@@ -275,8 +280,9 @@ class Workbench(QObject):
     def set_preparation(self, preparation: Preparation) -> None:
         """Take over other choices, and remember them for the station."""
         before, self._preparation = self._preparation, preparation
-        files = before.camera_file, before.pen_file
-        if (preparation.camera_file, preparation.pen_file) != files:
+        files = before.camera_file, before.pen_file, before.rig_file
+        now = preparation.camera_file, preparation.pen_file, preparation.rig_file
+        if now != files:
             self._reading.relieve()
         self._remember_station()
         self._remember()
@@ -402,12 +408,12 @@ class Workbench(QObject):
     def _open_files(self, station: Station) -> None:
         """Read the files of a station; what cannot be read must be chosen again."""
         self._reading.cancel()
+        self._unread = station
         camera_path = Path(station.camera_file) if station.camera_file else None
         pen_path = Path(station.pen_file) if station.pen_file else None
         units = station.pen_units or None
         rig_path = Path(station.rig_file) if station.rig_file else None
         if any(path is not None for path in (camera_path, pen_path, rig_path)):
-            self._unread = station
             samples = self._folder / SIMULATED
             self._read(
                 lambda _: files_of_before(
@@ -511,10 +517,11 @@ class Workbench(QObject):
             self._settings.set_station(name, with_choices(station, self._choices))
 
     def _on_settings_troubled(self, why: Sentence) -> None:
-        self.troubled.emit(worded(why))
+        self._unsaved_told = worded(why)
+        self.troubled.emit(self._unsaved_told)
 
-    def _on_settings_relieved(self, why: Sentence) -> None:
-        self.relieved.emit(worded(why))
+    def _on_settings_relieved(self) -> None:
+        self.relieved.emit(self._unsaved_told)  # as it was told, in whatever language
 
     def _on_image_shown(self, shown: Shown) -> None:
         size = shown.size.width(), shown.size.height()

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 
 import pytest
-from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt
+from PySide6.QtGui import QKeyEvent, QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -861,3 +862,40 @@ def test_a_place_is_changed_only_as_far_as_the_screen_asks_for(
     available = QRect(0, 30, 960, 510)  # below a panel
 
     assert fitted_place(QRect(*place), available) == QRect(*fitted)
+
+
+def test_a_double_click_on_the_main_button_leads_one_step_on(shell: Shell) -> None:
+    button = shell.main_button
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+    at = QPointF(button.rect().center())
+    left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    for kind in (QEvent.Type.MouseButtonDblClick, QEvent.Type.MouseButtonRelease):
+        event = QMouseEvent(kind, at, button.mapToGlobal(at), left, left, none)
+        QApplication.sendEvent(button, event)
+
+    assert shell.shown == "Camera"
+
+
+@pytest.mark.parametrize("key", [Key.Key_Return, Key.Key_PageDown])
+def test_a_key_held_too_long_leads_one_step_on(shell: Shell, key: Key) -> None:
+    shell.pages[0].field.setFocus()
+    QTest.keyClick(shell.pages[0].field, key)
+    held = QKeyEvent(
+        QEvent.Type.KeyPress, key, Qt.KeyboardModifier.NoModifier, "", True
+    )
+    QApplication.sendEvent(shell.pages[1].field, held)
+
+    assert shell.shown == "Camera"
+
+
+def test_the_help_that_is_read_stays_when_the_language_changes(
+    shell: Shell, qapp: QApplication
+) -> None:
+    window = shell.window.help_window()
+    window.set_topic("start", Language.ENGLISH)
+    english = window.text()
+    shell.window.go_to(1)
+    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    QApplication.processEvents()
+
+    assert window.text() == english

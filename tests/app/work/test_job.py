@@ -113,3 +113,12 @@ def test_a_bug_reaches_the_crash_hook_and_ends_the_job(
     assert seen == [True]
     assert QThreadPool.globalInstance().waitForDone(60_000)
     assert isinstance(caught[0], ZeroDivisionError)
+
+
+def test_the_progress_of_a_cancelled_job_is_not_told(qtbot: QtBot) -> None:
+    job = Job(lambda report: report(0.5))
+    with qtbot.assertNotEmitted(job.progressed):
+        job.start()
+        assert QThreadPool.globalInstance().waitForDone(60_000)
+        job.cancel()  # it waits in the event queue of this thread
+        QApplication.processEvents()

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import QCoreApplication, QThreadPool
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import FloatArray
@@ -17,6 +18,7 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
+from lightpen.live.sources import sample_files
 from lightpen.model.assumptions import USUAL, with_focal_length
 from lightpen.model.limits import SwingLimits
 from lightpen.record.folder_archive import SIMULATED
@@ -24,6 +26,7 @@ from lightpen.record.names import Names
 from lightpen.streaming.server import StreamPlace
 from lightpen.swing.preparation import Lack, Preparation, SourceChoice, SourceKind
 from lightpen.swing.status import SwingStatus
+from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.workbench import Workbench
 
@@ -485,3 +488,53 @@ def test_what_is_told_after_shutting_down_begins_nothing(stage: Stage) -> None:
         assert QThreadPool.globalInstance().waitForDone(0)
 
     assert told == []
+
+
+def test_a_new_station_keeps_no_file_that_was_being_read_for_another(
+    stage: Stage,
+) -> None:
+    stage.choose(names=OTHER)
+    stage.workbench.choose_station(OTHER.station)  # its files are being read
+    stage.workbench.choose_station("")
+    stage.choose(names=replace(OTHER, station="Hall 9"))
+    stage.wait_for_files()
+
+    kept = stage.settings.station("Hall 9")
+    assert (kept.camera_file, kept.pen_file) == ("", "")
+
+
+def test_why_a_rig_file_cannot_be_read_is_taken_back_with_the_second_camera(
+    stage: Stage, qtbot: QtBot
+) -> None:
+    stage.choose(names=OTHER)
+    lost = str(stage.folder / "lost.json")
+    there = stage.settings.station(OTHER.station)
+    stage.settings.set_station(
+        OTHER.station, replace(there, second_source="simulated", rig_file=lost)
+    )
+    stage.choose_station(OTHER.station)
+    (told,) = (each for each in stage.sentences if "lost.json" in each)
+    found = sample_files(stage.workbench.around, stage.folder / "rig").rig_file
+    assert found is not None
+    with qtbot.waitSignal(stage.workbench.relieved) as relieved:
+        stage.workbench.set_preparation(stage.workbench.preparation.with_rig(found))
+
+    assert relieved.args == [told]
+
+
+def test_what_could_not_be_saved_is_taken_back_in_the_language_it_was_told_in(
+    stage: Stage, qapp: QApplication, qtbot: QtBot
+) -> None:
+    assert stage.settings.await_saved(120.0)
+    config = stage.settings.file.parent
+    shutil.rmtree(config)
+    config.write_text("not a folder")
+    stage.choose(names=OTHER)
+    stage.qtbot.waitUntil(lambda: bool(stage.sentences))
+    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    config.unlink()
+
+    with qtbot.waitSignal(stage.workbench.relieved) as relieved:
+        stage.choose(names=replace(OTHER, operator="Eve"))
+
+    assert relieved.args == stage.sentences

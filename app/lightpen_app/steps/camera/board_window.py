@@ -87,6 +87,7 @@ class BoardWindow(Translated, QWidget):
         self._why_unseen: Sentence | None = None
         self._hashes: dict[str, str] = {}  # of the views that are kept or computed
         self._is_saved = False
+        self._outcome: Callable[[], Remark] = Remark  # of what was done last
         self._searching: Job | None = None
         self._leading: Job | None = None
         self._computing: Job | None = None
@@ -163,10 +164,9 @@ class BoardWindow(Translated, QWidget):
         self._stop()
         self._conclude()
         self._capture, self._hashes = None, {}
-        for job in (self._searching, self._leading, self._computing):
-            if job is not None:
-                job.cancel()
-        self._searching = self._leading = self._computing = None
+        self._drop_jobs()
+        self._forget()
+        self._tell(Remark)
         super().closeEvent(event)
 
     # Views
@@ -176,11 +176,23 @@ class BoardWindow(Translated, QWidget):
             self._stop()
         else:
             self._conclude()
-            self._compute_no_more()
             self._sought = self._named_board()
             self._capture = self._outline = None
             self._hashes = {}
+            self._drop_jobs()
             self._forget()
+        self._refresh()
+
+    def _drop_jobs(self) -> None:
+        """Tell nothing more of what was begun before."""
+        for job in (self._searching, self._leading, self._computing):
+            if job is not None:
+                job.cancel()
+        self._searching = self._leading = self._computing = None
+
+    def _tell(self, outcome: Callable[[], Remark]) -> None:
+        """Say what came of something, in each language anew."""
+        self._outcome = outcome
         self._refresh()
 
     def _stop(self) -> None:
@@ -191,9 +203,9 @@ class BoardWindow(Translated, QWidget):
         try:
             board = parse_board(self._board.text())
         except UsageError as error:
-            self._remark.set_value(_trouble(worded(error.sentence)))
+            self._tell(partial(_trouble, error.sentence))
             return None
-        self._remark.set_value(Remark())
+        self._tell(Remark)
         return board
 
     def _on_image_shown(self, shown: Shown) -> None:
@@ -219,11 +231,12 @@ class BoardWindow(Translated, QWidget):
 
         # Connections
         job.succeeded.connect(lambda seen: self._on_looked(seen, time_s))
-        job.ended.connect(self._on_search_ended)
+        job.ended.connect(partial(self._on_search_ended, job))
         job.start()
 
-    def _on_search_ended(self) -> None:
-        self._searching = None
+    def _on_search_ended(self, job: Job) -> None:
+        if job is self._searching:
+            self._searching = None
 
     def _on_looked(self, seen: BoardLook, time_s: float) -> None:
         if self._capture is None or self._sought is None:
@@ -241,19 +254,27 @@ class BoardWindow(Translated, QWidget):
         """Find where the board is wanted next."""
         if self._capture is None or self._leading is not None:
             return
-        self._leading = job = Job(partial(find_outline, self._capture), self)
+        capture = self._capture
+        self._leading = job = Job(partial(find_outline, capture), self)
 
         # Connections
         job.succeeded.connect(self._on_led)
-        job.ended.connect(self._on_leading_ended)
+        job.ended.connect(partial(self._on_leading_ended, job, len(capture.kept)))
         job.start()
 
     def _on_led(self, wanted: WantedOutline) -> None:
-        self._outline = wanted.outline
-        self._refresh()
+        if self._sought is not None:
+            self._outline = wanted.outline
+            self._refresh()
 
-    def _on_leading_ended(self) -> None:
+    def _on_leading_ended(self, job: Job, n_kept: int) -> None:
+        """Find it again where more views were kept meanwhile."""
+        if job is not self._leading:
+            return
         self._leading = None
+        now = self._capture
+        if self._sought is not None and now is not None and len(now.kept) > n_kept:
+            self._lead()
 
     def _on_folder_clicked(self) -> None:
         board = self._named_board()
@@ -309,23 +330,38 @@ class BoardWindow(Translated, QWidget):
         self._refresh()
 
     def _on_progressed(self, fraction: float) -> None:
+        self._tell(partial(self._progress_remark, fraction))
+
+    def _progress_remark(self, fraction: float) -> Remark:
         words = self.tr("Calibrating: {0:.0%}").format(fraction)
-        self._remark.set_value(Remark(words, Sign.WAIT, Tone.QUIET))
+        return Remark(words, Sign.WAIT, Tone.QUIET)
 
     def _on_refused(self, sentence: str) -> None:
         self._computing = None
-        self._remark.set_value(_trouble(sentence))
-        self._refresh()
+        self._tell(partial(Remark, sentence, Sign.CROSS, Tone.BAD))
 
     def _on_found(self, computed: ComputedCamera) -> None:
         found = computed.found
         self._computing, self._found, self._is_saved = None, found, False
         self._hashes = computed.hashes
-        self._worst.clear()
         if self._image.image_size().isEmpty():  # the views are from a folder
             width, height = found.views.image_sizes[0]
             blank = np.zeros((height // 2, width // 2), np.uint8)
             self._image.set_half(blank, QSize(width, height))
+        self._list_views()
+        self._tell(partial(self._found_remark, found))
+
+    def _found_remark(self, found: CameraCalibration) -> Remark:
+        words = " ".join(map(worded, found.remarks))
+        sign, tone = (Sign.WARNING, Tone.WARN) if words else (Sign.CHECK, Tone.GOOD)
+        return Remark(words or self.tr("Calibrated."), sign, tone)
+
+    def _list_views(self) -> None:
+        """List the views of what was found; the one that is chosen stays so."""
+        found, chosen = self._found, self._worst.currentRow()
+        self._worst.clear()
+        if found is None:
+            return
         rms = found.adjustment.view_rms[:, 0]
         for v in found.worst_first:
             words = self.tr("{0}: {1:.4f} px, by the others {2:.4f} px")
@@ -333,10 +369,7 @@ class BoardWindow(Translated, QWidget):
             item = QListWidgetItem(words.format(name, rms[v], found.held_out[v]))
             item.setData(Qt.ItemDataRole.UserRole, name)
             self._worst.addItem(item)
-        words = " ".join(map(worded, found.remarks))
-        sign, tone = (Sign.WARNING, Tone.WARN) if words else (Sign.CHECK, Tone.GOOD)
-        self._remark.set_value(Remark(words or self.tr("Calibrated."), sign, tone))
-        self._refresh()
+        self._worst.setCurrentRow(chosen)
 
     def _forget(self) -> None:
         """Take away what was computed before."""
@@ -365,13 +398,16 @@ class BoardWindow(Translated, QWidget):
         job.start()
 
     def _on_saved(self, trial: CameraTrial, file: InputFile) -> None:
-        words = self.tr("Saved and in use: {0}").format(file.path)
-        self._remark.set_value(Remark(words, Sign.CHECK, Tone.GOOD))
+        self._tell(partial(self._saved_remark, file))
         self.concluded.emit(replace(trial, camera_file=file))
         self.saved.emit(str(file.path))
 
+    def _saved_remark(self, file: InputFile) -> Remark:
+        words = self.tr("Saved and in use: {0}").format(file.path)
+        return Remark(words, Sign.CHECK, Tone.GOOD)
+
     def _on_save_refused(self, trial: CameraTrial, sentence: str) -> None:
-        self._remark.set_value(_trouble(sentence))
+        self._tell(partial(Remark, sentence, Sign.CROSS, Tone.BAD))
         if trial.found is self._found:
             self._is_saved = False
         else:  # it was left meanwhile
@@ -442,6 +478,7 @@ class BoardWindow(Translated, QWidget):
         self._image.set_message(
             self.tr("Start, and hold the board as the outline shows.")
         )
+        self._list_views()
         self._refresh()
 
     def _refresh(self) -> None:
@@ -460,10 +497,12 @@ class BoardWindow(Translated, QWidget):
             button.setVisible(self._found is not None)
         self._image.set_overlay(self._overlay())
         if is_live and self._why_unseen is not None:
-            self._remark.set_value(_trouble(worded(self._why_unseen)))
+            self._remark.set_value(_trouble(self._why_unseen))
         elif is_live and self._capture is not None:
             words = self._words_of(self._capture.sight)
             self._remark.set_value(Remark(words, Sign.WAIT, Tone.QUIET))
+        else:
+            self._remark.set_value(self._outcome())
 
     def _overlay(self) -> BoardOverlay:
         found = self._found
@@ -521,5 +560,5 @@ def _uncertainty(found: CameraCalibration) -> UncertaintyMap:
     return map_uncertainty(camera, camera.covariance)
 
 
-def _trouble(sentence: str) -> Remark:
-    return Remark(sentence, Sign.CROSS, Tone.BAD)
+def _trouble(sentence: Sentence) -> Remark:
+    return Remark(worded(sentence), Sign.CROSS, Tone.BAD)

@@ -164,8 +164,9 @@ class ExposurePanel(Translated, QFrame):
         self._why_fixed.setText(
             self.tr("Recorded: exposure and gain are as they were taken.")
         )
-        if self._adjustment is not None:
-            self._advice.setText(self._outcome_words(self._adjustment))
+        adjustment = self._adjustment
+        if adjustment is not None and _holds(adjustment, self._bar.value()):
+            self._advice.setText(self._outcome_words(adjustment))
             return
         advice = advise(self._bar.value(), self._settings, self._caps)
         self._advice.setText(self._words(advice, self._caps))
@@ -226,6 +227,16 @@ class ExposurePanel(Translated, QFrame):
                 return self.tr("Close the aperture of the lens a little.")
             case Advice.OPEN_APERTURE:
                 return self.tr("Open the aperture of the lens a little.")
+
+
+def _holds(adjustment: AutoExposure, exposure: Exposure) -> bool:
+    """Return whether the outcome of an adjustment is still true of the last image."""
+    match adjustment.outcome:
+        case Standing.DONE:
+            return not exposure.n_saturated
+        case Standing.NO_LEDS:
+            return not exposure.peaks
+    return True
 
 
 class FocusPanel(Translated, QFrame):

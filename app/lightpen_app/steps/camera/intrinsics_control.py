@@ -36,6 +36,7 @@ class IntrinsicsControl(QObject):
         self._board: BoardWindow | None = None  # made when it is asked for
 
         # Connections
+        workbench.station_left.connect(self._forget_file)
         panel.path_chosen.connect(self._on_path_chosen)
         panel.calibration_requested.connect(self._on_calibration_requested)
 
@@ -43,12 +44,19 @@ class IntrinsicsControl(QObject):
         """Close the window, and read no more."""
         if self._board is not None:
             self._board.close()
+        self._drop_reading()
+
+    def _drop_reading(self) -> None:
         if self._reading is not None:
             self._reading.cancel()
 
+    def _forget_file(self) -> None:
+        """Say nothing any more of a file that was chosen at another station."""
+        self._drop_reading()
+        self._panel.forget_refused()
+
     def _on_path_chosen(self, path: str) -> None:
-        if self._reading is not None:
-            self._reading.cancel()
+        self._drop_reading()
         self._reading = job = Job(lambda _: CameraFile.read(Path(path)), self)
 
         # Connections

@@ -100,8 +100,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         if value is self._file:
             return
         self._file = value
-        self._path.set_value("" if value is None else str(value.path))
-        self.set_problem("")
+        self.forget_refused()
 
     def set_image_size(self, image_size: tuple[int, int] | None) -> None:
         """Compare with other live images, width and height in px, or with none."""
@@ -120,6 +119,11 @@ class IntrinsicsPanel(Translated, QGroupBox):
         if swing is not self._swing:
             self._swing = swing
             self._refresh()
+
+    def forget_refused(self) -> None:
+        """Show the file in use again, whatever was chosen and is not used."""
+        self._path.set_value("" if self._file is None else str(self._file.path))
+        self.set_problem("")
 
     def set_problem(self, sentence: str) -> None:
         """Say why the file that was chosen is not used, or nothing."""

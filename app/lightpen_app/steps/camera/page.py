@@ -111,6 +111,7 @@ class CameraPage(Rearranged, Page):
         self._live.settings_applied.connect(self._on_settings_applied)
         self._live.troubled.connect(self._on_troubled)
         self._live.failed.connect(self._on_failed)
+        self._live.relieved.connect(self._on_relieved)
 
         self._retranslate()
         self._on_workbench_changed()
@@ -262,12 +263,14 @@ class CameraPage(Rearranged, Page):
         panel.set_searching(True)
 
     def _on_cameras_found(self, found: tuple[FoundDevice, ...]) -> None:
-        self._searching.set_searching(False)
-        self._searching.set_found(found)
+        if self._searching.is_searching:  # else another source is chosen by now
+            self._searching.set_searching(False)
+            self._searching.set_found(found)
 
     def _on_search_failed(self, why: str) -> None:
-        self._searching.set_searching(False)
-        self._searching.set_search_problem(why)
+        if self._searching.is_searching:
+            self._searching.set_searching(False)
+            self._searching.set_search_problem(why)
 
     # Two cameras
 
@@ -368,7 +371,8 @@ class CameraPage(Rearranged, Page):
             self._side.reveal(self._stray)
 
     def _on_connection_changed(self, connection: Connection) -> None:
-        if connection in (Connection.OPENING, Connection.STREAMING):
+        is_lost = self._live.worst_connection is Connection.LOST  # the other may be
+        if connection in (Connection.OPENING, Connection.STREAMING) and not is_lost:
             self._forget_trouble()
         if connection is Connection.LOST:
             self._on_lost()
@@ -377,6 +381,7 @@ class CameraPage(Rearranged, Page):
         if connection is not Connection.STREAMING:
             self._end_adjustment()
             self._exposure.set_value(Exposure())
+            self._second.forget_step()
             self._focus.clear()
         if connection is Connection.STREAMING:
             self._show_pen()
@@ -399,6 +404,10 @@ class CameraPage(Rearranged, Page):
         self._sounds.play(Sound.FAILED)
         self._raise_trouble(sentence)
         self._show_connection()
+
+    def _on_relieved(self, sentence: str) -> None:
+        if sentence == self._sentence:
+            self._forget_trouble()
 
     def _on_cover_requested(self, covers: bool) -> None:
         operator = self._live.operator

@@ -53,6 +53,7 @@ class SecondCameraChoice(QWidget):
         self._source.retry_requested.connect(workbench.open_camera)
         self._source.search_requested.connect(self.search_requested)
         workbench.changed.connect(self._on_workbench_changed)
+        workbench.station_left.connect(self.shut_down)
 
         self._on_workbench_changed()
 
@@ -77,6 +78,10 @@ class SecondCameraChoice(QWidget):
             px_per_mm = camera.fx / float(seen.sighting.translation[2])
         n_unpaired = None if lag_ms is None else live.stats.unpaired
         self._rig.set_step(not_synchronised(lag_ms, px_per_mm), n_unpaired)
+
+    def forget_step(self) -> None:
+        """Know nothing of their moments: no images come."""
+        self._rig.set_step(None, None)
 
     def shut_down(self) -> None:
         """Read no more."""

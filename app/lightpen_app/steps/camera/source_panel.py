@@ -1,7 +1,8 @@
 """Where the images come from."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
@@ -66,7 +67,7 @@ class SourcePanel(Translated, QGroupBox):
         self._value = SourceChoice()
         self._absent: Mapping[str, Sentence] = {}
         self._is_searching = False
-        self._outcome = Remark()
+        self._outcome: Callable[[], Remark] = Remark
 
         # Widgets
         self._kind = ChoiceField()
@@ -145,7 +146,8 @@ class SourcePanel(Translated, QGroupBox):
             return
         if value.kind != self._value.kind:
             self._device.set_found(())
-            self._outcome = Remark()
+            self._outcome = Remark
+            self._is_searching = False
         self._value = value
         if self._needs is Needs.FILES:
             self._place.set_value(value.place)
@@ -159,6 +161,11 @@ class SourcePanel(Translated, QGroupBox):
         self._absent = absent
         self._retranslate()
 
+    @property
+    def is_searching(self) -> bool:
+        """Whether cameras of the source that is chosen are being looked for."""
+        return self._is_searching
+
     def set_searching(self, is_searching: bool) -> None:
         """Say whether cameras are being looked for."""
         self._is_searching = is_searching
@@ -167,22 +174,14 @@ class SourcePanel(Translated, QGroupBox):
     def set_found(self, found: tuple[FoundDevice, ...]) -> None:
         """Offer the cameras that were found; the first if none is chosen yet."""
         self._device.set_found(found)
-        if found:
-            words = self.tr("Cameras found: {0}").format(len(found))
-            self._outcome = Remark(words, Sign.CHECK, Tone.GOOD)
-        else:
-            words = self.tr(
-                "No camera was found. Check its power and its cable, or enter its "
-                "serial number or its address."
-            )
-            self._outcome = Remark(words, Sign.WARNING, Tone.WARN)
+        self._outcome = partial(self._found_remark, len(found))
         self._refresh()
         if found and not self._value.place:
             self._choose(replace(self._value, place=found[0].place))
 
     def set_search_problem(self, why: str) -> None:
         """Say why no cameras can be looked for."""
-        self._outcome = Remark(why, Sign.CROSS, Tone.BAD)
+        self._outcome = partial(Remark, why, Sign.CROSS, Tone.BAD)
         self._refresh()
 
     def set_beside(self, files: FilesBeside) -> None:
@@ -281,7 +280,17 @@ class SourcePanel(Translated, QGroupBox):
         if self._is_searching:
             words = self.tr("Cameras are being looked for.")
             return Remark(words, Sign.WAIT, Tone.ACTIVE)
-        return self._outcome
+        return self._outcome()
+
+    def _found_remark(self, n_found: int) -> Remark:
+        if n_found:
+            words = self.tr("Cameras found: {0}").format(n_found)
+            return Remark(words, Sign.CHECK, Tone.GOOD)
+        words = self.tr(
+            "No camera was found. Check its power and its cable, or enter its serial "
+            "number or its address."
+        )
+        return Remark(words, Sign.WARNING, Tone.WARN)
 
     def _refresh_beside(self) -> None:
         files = [f for f in (self._beside.camera, self._beside.pen) if f is not None]

@@ -156,6 +156,8 @@ class HistoryContent(Translated, QWidget):
         self._archive.set_delivery(opening.delivery)
         self._table.set_stations(opening.names.stations)
         self._table.set_lines(opening.n_lines, opening.first)
+        if self._followed is None:
+            self._on_trend_read(Trend())
         self.status_changed.emit(self.tr("{0} entries").format(opening.n_lines))
         # Later than what is seen at once.
         self._reader.read_due(self._due.rule(), self._workbench.library.library)

@@ -120,7 +120,11 @@ class EntryPanel(Translated, QWidget):
         if line is None or line.entry is None:
             return
         self._asked, self._restores = line.entry, restores
-        if restores:
+        self._word_question()
+        self._reason.ask()
+
+    def _word_question(self) -> None:
+        if self._restores:
             self._reason.set_words(
                 self.tr(
                     "Put this tip in force again? It becomes a new entry; the tip in "
@@ -137,7 +141,6 @@ class EntryPanel(Translated, QWidget):
                 self.tr("Enter"),
                 self.tr("Leave it"),
             )
-        self._reason.ask()
 
     def _ask_paper(self) -> None:
         if self._line is not None and self._line.entry is not None:
@@ -150,6 +153,7 @@ class EntryPanel(Translated, QWidget):
     def _retranslate(self) -> None:
         line, entry = self._line, None if self._line is None else self._line.entry
         is_changed = line is not None and entry is None
+        self._word_question()
         self._changed.set_value(Remark())
         if is_changed:
             assert line is not None

@@ -83,7 +83,8 @@ class HistoryReader(QObject):
         """Read how many entries there are, and the newest."""
         self._wanted = wanted
         self._waiting.clear()
-        self._drop("block")
+        for what in ("block", "trend", "remarks"):
+            self._drop(what)
         logbook = self._logbook
 
         def read(_: Report) -> Opening:

@@ -21,7 +21,7 @@ from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job
@@ -133,11 +133,25 @@ class LedFilePanel(Translated, QWidget):
         """Ask for the units of a file that does not say them; empty asks no more."""
         self._units.ask(name)
 
-    def ask(self, question: str, yes: str, agreed: Callable[[], None]) -> None:
-        """Ask before something is lost; ``agreed`` is called if it may be."""
+    def ask(
+        self, words: Callable[[], tuple[str, str]], agreed: Callable[[], None]
+    ) -> None:
+        """Ask before something is lost; ``agreed`` is called if it may be.
+
+        Parameters
+        ----------
+        words : callable
+            Returns the question, and what agrees to it.
+        """
         self._agreed = agreed
-        self._question.set_words(question, yes, self.tr("Cancel"))
+        self._question.set_words(lambda: Question(*words(), self.tr("Cancel")))
         self._question.ask()
+
+    def withdraw(self) -> None:
+        """Ask nothing any more: the LEDs are others."""
+        if self._question.words():
+            self._question.hide()
+            self._on_declined()
 
     def question(self) -> str:
         """Return what is asked now, or nothing."""
@@ -197,10 +211,12 @@ class LedFilePanel(Translated, QWidget):
             self.save_chosen.emit(path)
             return
         self.ask(
-            self.tr("{0} exists already. Replace it by these LEDs?").format(path.name),
-            self.tr("Replace"),
-            lambda: self.save_chosen.emit(path),
+            partial(self._replacing, path.name), lambda: self.save_chosen.emit(path)
         )
+
+    def _replacing(self, name: str) -> tuple[str, str]:
+        text = self.tr("{0} exists already. Replace it by these LEDs?")
+        return text.format(name), self.tr("Replace")
 
     def _on_agreed(self) -> None:
         agreed, self._agreed = self._agreed, None

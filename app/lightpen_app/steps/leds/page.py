@@ -19,6 +19,7 @@ from lightpen.pen_check.draft import DraftCheck, PenDraft, check_draft
 from lightpen.pen_check.match import Finding, PenMatch
 from lightpen.pen_check.mending import exchanged, leds_to_exchange, mended
 from lightpen.pen_check.opening import OpenedPen, open_pen, save_pen
+from lightpen.sentences import Sentence
 from lightpen.swing.preparation import SourceKind
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.sentences import worded
@@ -66,7 +67,7 @@ class LedsPage(Rearranged, Page):
         self._is_foreign = False  # opened from a file that cannot be used
         self._check = DraftCheck()
         self._job: Job | None = None
-        self._draft_then = PenDraft()  # when that began
+        self._problem: Callable[[], str] = self._frame_error
         self._edits = QUndoStack(self)
 
         # Widgets
@@ -110,6 +111,7 @@ class LedsPage(Rearranged, Page):
         self._match.mend_requested.connect(self._on_mend_requested)
         self._watch.value_changed.connect(self._on_match_changed)
         self._workbench.changed.connect(self._on_workbench_changed)
+        self._workbench.station_left.connect(self._drop_job)
         self._workbench.live.image_shown.connect(self._on_image_shown)
         self._workbench.live.connection_changed.connect(self._on_connection_changed)
         self._workbench.live.other_changed.connect(self._on_connection_changed)
@@ -175,7 +177,11 @@ class LedsPage(Rearranged, Page):
 
     @override
     def _retranslate(self) -> None:
+        self._tell(self._problem)
+        self._table.set_flaw(worded(self._check.flaw))
+        self._table.set_marked(self._match.reasons())
         self._refresh()
+        self._refresh_live()
 
     @override
     def _use_room(self) -> None:
@@ -250,13 +256,15 @@ class LedsPage(Rearranged, Page):
         self._edits.push(DraftEdit(self._set_draft, self._draft, draft))
 
     def _set_draft(self, draft: PenDraft) -> None:
+        if draft != self._draft:
+            self._file.withdraw()
         self._draft = draft
         self._table.set_value(draft, self._changes)
         in_use = None if self._is_pending else self._in_use
         self._check = check_draft(draft, None if in_use is None else in_use.pen)
         frame = self._check.frame
         self._table.set_flaw(worded(self._check.flaw))
-        self._file.set_problem("" if frame is None else worded(frame.error))
+        self._tell(self._frame_error)
         self._file.set_exchange(leds_to_exchange(frame))
         self._match.set_has_frame(frame is None or not frame.error)
         is_as_typed = self._check.sought is self._check.pen
@@ -269,6 +277,15 @@ class LedsPage(Rearranged, Page):
         self._refresh()
         self._aim()
         self.changed.emit()
+
+    def _tell(self, problem: Callable[[], str]) -> None:
+        """Say what is wrong with the file, in each language anew."""
+        self._problem = problem
+        self._file.set_problem(problem())
+
+    def _frame_error(self) -> str:
+        frame = self._check.frame
+        return "" if frame is None else worded(frame.error)
 
     def _refresh(self) -> None:
         """Show what follows from the draft."""
@@ -321,53 +338,54 @@ class LedsPage(Rearranged, Page):
         if not self._is_edited:
             act()
             return
-        question = self.tr("The LED table has changes that are not saved.")
-        self._file.ask(question, self.tr("Discard them"), act)
+        self._file.ask(self._discarding, act)
+
+    def _discarding(self) -> tuple[str, str]:
+        text = self.tr("The LED table has changes that are not saved.")
+        return text, self.tr("Discard them")
+
+    def _unless_changed(self, before: PenDraft, act: Callable[[], None]) -> None:
+        """Do what gives up the table, but ask if it was changed since a draft."""
+        if self._draft == before:
+            act()
+        else:
+            self._unless_lost(act)
 
     def _open(self, path: Path, units: str | None = None) -> None:
         self.status_changed.emit("")
         self._file.ask_units("")
-        self._start(lambda _: open_pen(path, units), self._on_opened)
+        before = self._draft
+
+        def take(opened: OpenedPen) -> None:
+            self._unless_changed(before, partial(self._on_opened, opened))
+
+        self._start(lambda _: open_pen(path, units), take)
 
     def _on_opened(self, opened: OpenedPen) -> None:
-        show = partial(self._show_opened, opened)
-        if self._was_typed_in:
-            self._unless_lost(show)
-        else:
-            show()
-
-    @property
-    def _was_typed_in(self) -> bool:
-        """Whether the table was changed while a file was read or written."""
-        return self._draft != self._draft_then
-
-    def _show_opened(self, opened: OpenedPen) -> None:
-        problem = "" if opened.problem is None else worded(opened.problem)
         if opened.file is not None:
             self._use(opened.file)
         elif opened.draft is not None:  # those in use stay in use
             self._open_draft(opened.draft, foreign=True)
             self._file.set_value(str(opened.path))
-            self._file.set_problem(problem)
+            self._tell(partial(worded, opened.problem))
         elif opened.needs_units:
-            self._file.set_problem("")
+            self._tell(str)
             self._file.ask_units(opened.path.name)
         else:
-            self._refuse(problem)
+            self._tell(partial(self._refusal, opened.problem, self._file.value()))
 
-    def _refuse(self, sentence: str) -> None:
-        """Say why a file cannot be opened, and which one is open."""
-        still_open = self._file.value()
-        if still_open:
-            kept = self.tr("{0} stays open.").format(Path(still_open).name)
-            sentence = f"{sentence} {kept}"
-        self._file.set_problem(sentence)
+    def _refusal(self, why: Sentence | None, still_open: str) -> str:
+        """Return why a file cannot be opened, and which one is open."""
+        if not still_open:
+            return worded(why)
+        kept = self.tr("{0} stays open.").format(Path(still_open).name)
+        return f"{worded(why)} {kept}"
 
     def _use(self, file: PenFile) -> None:
         """Put a file in use, and show it without changes."""
         self._put_in_use(file)
         self._open_in_use()
-        self._file.set_problem("")
+        self._tell(str)
         self.changed.emit()
 
     def _put_in_use(self, file: PenFile) -> None:
@@ -382,13 +400,14 @@ class LedsPage(Rearranged, Page):
     def _on_save_chosen(self, path: Path) -> None:
         pen = self._check.usable
         if pen is not None:
-            self._start(lambda _: save_pen(pen, path), self._on_saved)
+            on_saved = partial(self._on_saved, self._draft)
+            self._start(lambda _: save_pen(pen, path), on_saved)
 
-    def _on_saved(self, file: PenFile) -> None:
-        if self._was_typed_in:
-            self._put_in_use(file)
-        else:
+    def _on_saved(self, saved: PenDraft, file: PenFile) -> None:
+        if self._draft == saved:
             self._use(file)
+        else:  # what was typed since stays
+            self._put_in_use(file)
         words = self.tr("The LEDs are saved as {0} and in use.")
         self.status_changed.emit(words.format(file.path.name))
 
@@ -396,15 +415,20 @@ class LedsPage(Rearranged, Page):
         self, function: Callable[[Report], T], on_succeeded: Callable[[T], None]
     ) -> None:
         """Read or write a file; an earlier one that is under way is not waited for."""
-        if self._job is not None:
-            self._job.cancel()
-        self._draft_then = self._draft
+        self._drop_job()
         self._job = job = Job(function, self)
 
         # Connections
         job.succeeded.connect(on_succeeded)
-        job.failed.connect(self._file.set_problem)
+        job.failed.connect(self._on_failed)
         job.start()
+
+    def _on_failed(self, sentence: str) -> None:
+        self._tell(lambda: sentence)
+
+    def _drop_job(self) -> None:
+        if self._job is not None:
+            self._job.cancel()
 
     # The table
 

@@ -39,7 +39,7 @@ from lightpen_app.steps.review.state_words import (
 from lightpen_app.steps.review.taking_along import TakingAlong
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.state_banner import StateBanner
@@ -240,7 +240,6 @@ class ReviewPage(Rearranged, Page):
         self._take_back.setToolTip(
             self.tr("Put the result before in force again; both are kept.")
         )
-        self._question.hide()
         self._reason.set_words(
             self.tr(
                 "The tip is to be checked. Why is it accepted nevertheless? The reason "
@@ -333,6 +332,8 @@ class ReviewPage(Rearranged, Page):
         if status.result is not self._result_shown:
             self._result_shown = status.result
             self._next.follow(status.result)
+            self._question.hide()
+            self._reason.hide()
             self._acceptance.start(2 * QApplication.doubleClickInterval())
         if status.is_solving:
             self._progress.setValue(0)
@@ -422,11 +423,13 @@ class ReviewPage(Rearranged, Page):
         self._run.runner.capture_more()
 
     def _ask_to_repeat(self) -> None:
-        self._ask(
+        self._ask(self._repeating, self._repeat_swing)
+
+    def _repeating(self) -> Question:
+        return Question(
             self.tr("Repeat the swing from the start? These images stay on the disk."),
             self.tr("Repeat"),
             self.tr("Go on with these"),
-            self._repeat_swing,
         )
 
     def _on_verify_clicked(self) -> None:
@@ -440,19 +443,21 @@ class ReviewPage(Rearranged, Page):
             self._reason.ask(of_supervisor=of_supervisor)
 
     def _ask_to_take_back(self) -> None:
-        self._ask(
+        self._ask(self._taking_back, self._withdraw)
+
+    def _taking_back(self) -> Question:
+        return Question(
             self.tr(
                 "Take this acceptance back? The result before is in force again; both "
                 "are kept."
             ),
             self.tr("Take back"),
             self.tr("Leave it in force"),
-            self._withdraw,
         )
 
-    def _ask(self, text: str, yes: str, no: str, on_yes: Callable[[], object]) -> None:
+    def _ask(self, words: Callable[[], Question], on_yes: Callable[[], object]) -> None:
         self._on_yes = on_yes
-        self._question.set_words(text, yes, no)
+        self._question.set_words(words)
         self._question.ask()
 
     def _on_question_agreed(self) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -124,6 +125,8 @@ class InterruptedControl(QObject):
             tuple(r for r in swings.under_way if r.folder != present),
             swings.damaged,
         )
+        if self._work is None and self._continued is None:
+            self._panel.set_waiting("")
         self._panel.set_value(others, found.verifications)
 
     def _work_on(
@@ -140,6 +143,7 @@ class InterruptedControl(QObject):
         self._work.succeeded.connect(on_succeeded)
         self._work.failed.connect(self._on_work_failed)
         self._work.crashed.connect(self._on_work_crashed)
+        self._work.ended.connect(partial(self._on_work_ended, self._work))
         self._work.start()
 
     def _on_work_failed(self, sentence: str) -> None:
@@ -149,6 +153,10 @@ class InterruptedControl(QObject):
     def _on_work_crashed(self) -> None:
         self._panel.set_waiting("")
         self._search_now()
+
+    def _on_work_ended(self, work: Job) -> None:
+        if work is self._work:
+            self._work = None
 
     # Swings
 

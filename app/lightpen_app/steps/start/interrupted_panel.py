@@ -138,6 +138,7 @@ class InterruptedPanel(Translated, QGroupBox):
         self._value = Unfinished()
         self._verifications: tuple[InterruptedVerification, ...] = ()
         self._rows: list[WaitingRow] = []
+        self._why_waiting = ""
 
         # Widgets
         self._hint = text_label(TextSize.SMALL, Tone.QUIET)
@@ -176,6 +177,8 @@ class InterruptedPanel(Translated, QGroupBox):
             *(self._row(record, is_under_way=True) for record in swings.under_way),
             *(self._row(swing) for swing in swings.damaged),
         ]
+        for row in self._rows:
+            row.set_waiting(self._why_waiting)
         content = QWidget()
         layout = QVBoxLayout(content)
         layout.setContentsMargins(0, 0, GRID, 0)
@@ -202,6 +205,7 @@ class InterruptedPanel(Translated, QGroupBox):
 
     def set_waiting(self, why: str) -> None:
         """Disable the buttons for a reason, or enable them for none."""
+        self._why_waiting = why
         for row in self._rows:
             row.set_waiting(why)
 

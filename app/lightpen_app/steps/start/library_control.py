@@ -24,7 +24,7 @@ from lightpen_app.steps.start.form import NamesForm
 from lightpen_app.steps.start.item_button import ItemChoice
 from lightpen_app.steps.start.library_dialog import Asked, LibraryDialog
 from lightpen_app.steps.start.spin_recorder import SpinRecorder
-from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.standing_mark import standing_remark
 from lightpen_app.work.workbench import Workbench
 
@@ -77,11 +77,15 @@ class LibraryControl(QObject):
         names.library_requested.connect(self.open)
         question.agreed.connect(self._on_agreed)
 
+        question.set_words(self._asking)
+
     def refresh(self) -> None:
         """Show the library as it is now, for the pen that is chosen."""
         standings, pen = self._watch.standings, self._workbench.preparation.names.pen
         for kind in ItemKind:
             self._names.set_choices(kind, self._choices(kind, pen))
+        if self._watch.library.tip_of_code(self._unknown) is not None:
+            self._question.hide()
         is_guarded = self._workbench.supervision.is_guarded
         if self._dialog is not None:
             self._dialog.set_value(standings, pen, is_guarded=is_guarded)
@@ -144,10 +148,7 @@ class LibraryControl(QObject):
         tip = self._watch.library.tip_of_code(code)
         if tip is None:
             self._unknown = code
-            words = self.tr("There is no tip {0} in the library. Add it?")
-            self._question.set_words(
-                words.format(shortened(code)), self.tr("Add it"), self.tr("Not now")
-            )
+            self._question.refresh()
             self._question.ask()
             return
         self._question.hide()
@@ -160,6 +161,11 @@ class LibraryControl(QObject):
             return
         self.chosen.emit(ItemKind.TIP, tip.id)
         self.told.emit(self.tr("Tip {0}, by its barcode.").format(tip.id))
+
+    def _asking(self) -> Question:
+        words = self.tr("There is no tip {0} in the library. Add it?")
+        asked = words.format(shortened(self._unknown))
+        return Question(asked, self.tr("Add it"), self.tr("Not now"))
 
     def _on_agreed(self) -> None:
         self.open().add(self._unknown, ItemKind.TIP)

@@ -45,6 +45,7 @@ class LimitsDialog(Translated, QDialog):
         super().__init__(parent)
         self._value = StationLimits()
         self._is_guarded = False
+        self._is_signed = False  # and waits for what comes of it
 
         # Widgets
         self._lead = text_label(TextSize.BODY)
@@ -131,24 +132,27 @@ class LimitsDialog(Translated, QDialog):
         self._supervisor.clear()
         self._new_password.clear()
         self._new_password.setVisible(is_guarded)
+        self._is_signed = False
         self._trouble.set_value(Remark())
         self._retranslate()
         self._refresh()
 
     def tell(self, trouble: str) -> None:
         """Say why nothing was laid down."""
+        self._is_signed = False
         self._trouble.set_value(Remark(trouble, Sign.CROSS, Tone.BAD))
         self._supervisor.clear_password()
 
     def _refresh(self) -> None:
-        self._save.setEnabled(self._supervisor.is_filled())
+        self._save.setEnabled(self._supervisor.is_filled() and not self._is_signed)
 
     def _on_entered(self) -> None:
         if self._save.isEnabled():
             self._on_save_clicked()
 
     def _on_save_clicked(self) -> None:
-        self._save.setEnabled(False)  # until something else is signed
+        self._is_signed = True
+        self._refresh()
         new = self._new_password.text()
         self.signed.emit(self.value(), self._supervisor.value(), new)
 

@@ -9,6 +9,7 @@ from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
+from lightpen.model.due_rule import DueRule
 from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.results import Result
@@ -239,6 +240,8 @@ class StartPage(Rearranged, Page):
     @override
     def _retranslate(self) -> None:
         self._tell_why_unverified()
+        self._tell_why_untried()
+        self._library.refresh()
         self.changed.emit()
 
     def _why_not_on(self) -> str:
@@ -382,6 +385,7 @@ class StartPage(Rearranged, Page):
         standing = standings.of_tip(now.names.pen, now.names.tip)
         is_simulated = now.origin is Origin.SIMULATED
         self._last.set_standing(None if is_simulated else standing)
+        self._last.set_rule(self._rule_looked_up())
         self.changed.emit()
 
     def _show_changes(self, before: Preparation | None, now: Preparation) -> None:
@@ -428,11 +432,16 @@ class StartPage(Rearranged, Page):
             pen, tip, is_simulated = _key(self._workbench.preparation)
             self._vast.set_value(pen, tip, is_simulated=is_simulated)
 
-    def _on_looked_up(self, result: Result | None) -> None:
-        is_simulated = self._looked_up[2]
+    def _rule_looked_up(self) -> DueRule:
+        """Return how long the tip that is looked for may be in force."""
         library = self._workbench.library.library
-        rule = library.rule_of(self._looked_up[1], self._workbench.due_rule())
-        self._last.set_value(LastResult(result, is_simulated=is_simulated, rule=rule))
+        return library.rule_of(self._looked_up[1], self._workbench.due_rule())
+
+    def _on_looked_up(self, result: Result | None) -> None:
+        found = LastResult(
+            result, is_simulated=self._looked_up[2], rule=self._rule_looked_up()
+        )
+        self._last.set_value(found)
         now = self._workbench.preparation
         wants_last, self._wants_last = self._wants_last, False
         is_bare = now.names.ball_diameter is None and now.nominal_tip is None
@@ -470,12 +479,14 @@ class StartPage(Rearranged, Page):
 
     def _on_run_changed(self) -> None:
         status = self._workbench.run.status
-        self._newcomer.set_why_not(
-            self.tr("A swing is under way.") if status.state is not None else ""
-        )
+        self._tell_why_untried()
         if status.taken_back is not self._taken_back:
             self._taken_back = status.taken_back
             self._look_up_last()
+
+    def _tell_why_untried(self) -> None:
+        is_on = self._workbench.run.status.state is not None
+        self._newcomer.set_why_not(self.tr("A swing is under way.") if is_on else "")
 
     def _started(
         self, function: Callable[[Report], T], on_succeeded: Callable[[T], None]

@@ -1,7 +1,7 @@
 """The tip in force for a pen and probe tip, and its age."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from PySide6.QtCore import Qt, Signal
@@ -27,7 +27,7 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.widgets.origin_mark import origin_remark
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.rearranged import Room
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.standing_mark import standing_remark
@@ -110,6 +110,7 @@ class LastResultPanel(Translated, QGroupBox):
         self._verify = PushButton()
         self._take_back = PushButton()
         self._question = QuestionBar()
+        self._question.set_words(self._taking_back)
 
         # Layout
         table = QGridLayout(self._table)
@@ -174,6 +175,12 @@ class LastResultPanel(Translated, QGroupBox):
         self._question.hide()
         self._retranslate()
 
+    def set_rule(self, rule: DueRule) -> None:
+        """Go by another rule of how long a tip may be in force."""
+        if rule != self._value.rule:
+            self._value = replace(self._value, rule=rule)
+            self._retranslate()
+
     def set_standing(self, standing: TipStanding | None) -> None:
         """Mark a tip that must not be measured with; None where that is not known."""
         self._marked = None if standing is TipStanding.VALID else standing
@@ -212,11 +219,6 @@ class LastResultPanel(Translated, QGroupBox):
         self._take_back.setToolTip(
             self.tr("Put the result before in force again; both are kept.")
         )
-        self._question.set_words(
-            self.tr("Take this acceptance back? The result before is in force again."),
-            self.tr("Take back"),
-            self.tr("Leave it in force"),
-        )
         for button in (self._verify, self._take_back):
             button.setVisible(value.result is not None)
         if value.result is not None:
@@ -232,6 +234,13 @@ class LastResultPanel(Translated, QGroupBox):
             )
         else:
             self._say(hint=self.tr("It is shown when the pen and its tip are named."))
+
+    def _taking_back(self) -> Question:
+        return Question(
+            self.tr("Take this acceptance back? The result before is in force again."),
+            self.tr("Take back"),
+            self.tr("Leave it in force"),
+        )
 
     def _say(self, short: str = "", hint: str = "", trouble: str = "") -> None:
         """Say why there is no result."""

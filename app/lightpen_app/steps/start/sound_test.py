@@ -29,6 +29,7 @@ class SoundTest(Translated, QWidget):
         super().__init__(parent)
         self._sounds = sounds
         self._waiting: list[Sound] = []
+        self._is_silent = False  # as was told last
 
         # Widgets
         self._button = PushButton()
@@ -60,18 +61,30 @@ class SoundTest(Translated, QWidget):
         """Play no more sounds."""
         self._timer.stop()
         self._waiting.clear()
+        self._is_silent = False
         self._words.set_value(Remark())
 
     def _on_clicked(self) -> None:
         self.stop()
-        silence = self._silence()
-        if silence:
-            self._words.set_value(Remark(silence, Sign.WARNING))
+        self._is_silent = bool(self._silence())
+        if self._is_silent:
+            self._tell_silence()
             return
         self._waiting = list(Sound)
         self._play_next()
 
+    def _tell_silence(self) -> None:
+        """Say why nothing can be heard, as long as that is so."""
+        silence = self._silence()
+        self._words.set_value(Remark(silence, Sign.WARNING) if silence else Remark())
+        self._is_silent = bool(silence)
+        if silence:
+            self._timer.start()
+
     def _play_next(self) -> None:
+        if self._is_silent:
+            self._tell_silence()
+            return
         if not self._waiting:
             self._words.set_value(Remark())
             return

@@ -27,7 +27,7 @@ from lightpen_app.steps.swing.moment import Moment, SwingWords
 from lightpen_app.steps.swing.to_go import ToGo
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.sign_label import Remark
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.workbench import Workbench
@@ -139,12 +139,8 @@ class SwingPage(Page):
         if not self._run.status.is_capturing:
             self.advance_requested.emit()
             return
-        lacks = self._missing()
-        if lacks:
-            self._ask(
-                *(lacks, self.tr("Finish now"), self.tr("Go on swinging")),
-                self._runner.finish,
-            )
+        if self._missing():
+            self._ask(self._finishing, self._runner.finish)
         else:
             self._runner.finish()
 
@@ -199,7 +195,6 @@ class SwingPage(Page):
 
     @override
     def _retranslate(self) -> None:
-        self._question.hide()
         self._start_over.setText(self.tr("Start over"))
         self._start_over.setToolTip(
             self.tr("Set this swing aside and begin anew. Its images are kept.")
@@ -267,25 +262,43 @@ class SwingPage(Page):
             self._to_go = self._to_go.after(n_more, state.n_kept)
         self._to_go_of = swing
 
-    def _ask(self, text: str, yes: str, no: str, on_yes: Callable[[], object]) -> None:
+    def _ask(self, words: Callable[[], Question], on_yes: Callable[[], object]) -> None:
         self._on_yes = on_yes
-        self._question.set_words(text, yes, no)
+        self._question.set_words(words)
         self._question.ask()
 
-    def _ask_about_choices(self) -> None:
-        """Ask whether a swing goes on though something else was chosen meanwhile."""
-        if not (self._is_entered and self._run.status.has_other_choices):
-            return
-        self._runner.keep_choices()
-        self._ask(
+    def _finishing(self) -> Question:
+        lacks = self._missing()
+        return Question(lacks, self.tr("Finish now"), self.tr("Go on swinging"))
+
+    def _with_other_choices(self) -> Question:
+        return Question(
             self.tr(
                 "Something else was chosen meanwhile. This swing goes on with the "
                 "files, names and limits that it began with."
             ),
             self.tr("Start over with the new ones"),
             self.tr("Go on with this swing"),
-            self._start_anew,
         )
+
+    def _starting_over(self) -> Question:
+        state = self._run.status.state
+        text = self.tr(
+            "Begin anew? The images of this swing ({0}) are set aside; they stay on "
+            "the disk."
+        )
+        return Question(
+            text.format(0 if state is None else state.n_kept),
+            self.tr("Begin anew"),
+            self.tr("Go on with this swing"),
+        )
+
+    def _ask_about_choices(self) -> None:
+        """Ask whether a swing goes on though something else was chosen meanwhile."""
+        if not (self._is_entered and self._run.status.has_other_choices):
+            return
+        self._runner.keep_choices()
+        self._ask(self._with_other_choices, self._start_anew)
 
     def _show_soon(self) -> None:
         if not self._showing.isActive():
@@ -319,6 +332,9 @@ class SwingPage(Page):
         if self._run.status.is_capturing is not self._was_capturing:
             self._was_capturing = self._run.status.is_capturing
             self._question.hide()
+        if self._question.words():
+            self._question.refresh()  # of what is missing there is less by now
+            self._question.setVisible(bool(self._question.words()))
         said = self.main_action(), self.is_complete()
         if said != self._said:
             self._said = said
@@ -400,16 +416,7 @@ class SwingPage(Page):
         if status.state is None or status.result is not None:
             self._start_anew()
             return
-        text = self.tr(
-            "Begin anew? The images of this swing ({0}) are set aside; they stay on "
-            "the disk."
-        )
-        self._ask(
-            text.format(status.state.n_kept),
-            self.tr("Begin anew"),
-            self.tr("Go on with this swing"),
-            self._start_anew,
-        )
+        self._ask(self._starting_over, self._start_anew)
 
     def _start_anew(self) -> None:
         lacks = self._workbench.preparation.lacks()

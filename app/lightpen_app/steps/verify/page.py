@@ -47,7 +47,7 @@ from lightpen_app.widgets.late import Late
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.rearranged import NO_ROOM, Rearranged
 from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.sign_label import Remark, SignLabel
@@ -102,6 +102,7 @@ class VerifyPage(Rearranged, Page):
         self._start_over = PushButton()
         self._accept = PushButton()
         self._question = QuestionBar()
+        self._question.set_words(self._starting_over)
         self._reason = ReasonBar()
         self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
         self._banner = StateBanner(TextSize.TITLE)
@@ -277,11 +278,6 @@ class VerifyPage(Rearranged, Page):
 
     @override
     def _retranslate(self) -> None:
-        self._question.set_words(
-            self.tr("Begin the verification anew? What was found is kept."),
-            self.tr("Begin anew"),
-            self.tr("Go on"),
-        )
         self._reason.set_words(
             self.tr(
                 "Something was found against the tip. Why is it used nevertheless? The "
@@ -305,6 +301,13 @@ class VerifyPage(Rearranged, Page):
             index = self._tabs.indexOf(self._image)
             self._tabs.setTabText(index, self.tr("Live image"))
         self._show()
+
+    def _starting_over(self) -> Question:
+        return Question(
+            self.tr("Begin the verification anew? What was found is kept."),
+            self.tr("Begin anew"),
+            self.tr("Go on"),
+        )
 
     def _arrange(self) -> None:
         head = QHBoxLayout()

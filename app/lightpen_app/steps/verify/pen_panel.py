@@ -49,7 +49,8 @@ class PenPanel(Translated, QWidget):
         self._workbench = workbench
         self._shown: PenOverTime | None = None
         self._new: NewLedFile | None = None
-        self._trouble = ""
+        self._trouble = ""  # why there is no better file
+        self._unread = ""  # why nothing is told of the swings
         self._reading: Job | None = None
         self._improving: Job | None = None
         self._opening: Job | None = None  # the new file
@@ -141,25 +142,32 @@ class PenPanel(Translated, QWidget):
         """Read the swings of the pen anew."""
         now, archive = self._workbench.preparation, self._workbench.run.archive
         is_other, self._read_of = self._chosen() != self._read_of, self._chosen()
+        self._unread = ""
         if is_other:
             self.shut_down()  # what comes of it would be of the pen before
             self._improving = None
             self._shown, self._new, self._trouble = None, None, ""
-            self._refresh()
         elif self._reading is not None:
             self._reading.cancel()
         if now.pen_file is None:
+            self._reading = None
+            self._refresh()
             return
         work = partial(read_pen_over_time, archive, now)
         self._reading = job = Job(work, self)
 
         # Connections
         job.succeeded.connect(self._on_read)
-        job.failed.connect(self._on_failed)
+        job.failed.connect(self._on_unread)
         job.start()
+        self._refresh()
 
     def _on_read(self, found: PenOverTime) -> None:
         self._reading, self._shown = None, found
+        self._refresh()
+
+    def _on_unread(self, why: str) -> None:
+        self._reading, self._unread = None, why
         self._refresh()
 
     def _on_failed(self, why: str) -> None:
@@ -221,12 +229,14 @@ class PenPanel(Translated, QWidget):
         self._opening = job = Job(lambda _: PenFile.read(path), self)
 
         # Connections
-        job.succeeded.connect(self._on_new_read)
+        job.succeeded.connect(partial(self._on_new_read, self._read_of))
         job.failed.connect(self._on_failed)
         job.start()
 
-    def _on_new_read(self, pen_file: PenFile) -> None:
+    def _on_new_read(self, made_for: tuple[object, ...], pen_file: PenFile) -> None:
         now = self._workbench.preparation
+        if self._chosen() != made_for:
+            return
         self._workbench.set_preparation(replace(now, pen_file=pen_file))
 
     # What is shown
@@ -253,9 +263,13 @@ class PenPanel(Translated, QWidget):
         self._use.setVisible(self._new is not None and not is_busy)
 
     def _health_remark(self, health: PenHealth | None) -> Remark:
+        if self._unread:
+            return Remark(self._unread, Sign.CROSS, Tone.BAD)
         if health is not None:
             told = health.assessment
             return Remark(worded(told.reason), *GRADE_MARKS[told.grade])
+        if self._shown is None and self._reading is None:
+            return Remark()
         if self._shown is None:
             return Remark(self.tr("The swings of the pen are being read."), Sign.WAIT)
         text = self.tr(

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import QCoreApplication, QSize, QThreadPool
-from PySide6.QtWidgets import QListWidget, QPushButton
+from PySide6.QtWidgets import QApplication, QListWidget, QPushButton
 from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import Image
@@ -26,6 +26,7 @@ from lightpen.record.outcome import TrialOutcome
 from lightpen.simulator.board_views import simulate_board_poses
 from lightpen.simulator.boards import expose_board, render_board
 from lightpen.simulator.sensor import Sensor
+from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.pooling import pooled
 from lightpen_app.steps.camera.board_jobs import save_camera
 from lightpen_app.steps.camera.board_view import BoardView
@@ -296,3 +297,61 @@ def _shown(image: Image, seconds: int) -> Shown:
     height, width = image.shape
     seen = LiveImage(frame, detect_spots(image), None)
     return Shown(pooled(image, 8), QSize(width, height), seen)
+
+
+def test_what_the_live_image_shows_is_said_no_more_once_it_is_stopped(
+    window: BoardWindow, images: list[Image], workbench: Workbench, qtbot: QtBot
+) -> None:
+    press(window, "Start")
+    workbench.live.image_shown.emit(_shown(images[0], 1))
+    qtbot.waitUntil(lambda: window._searching is None)
+    assert remark(window) != ""
+    press(window, "Stop")
+
+    assert remark(window) == ""
+
+
+def test_a_window_opened_again_tells_nothing_of_the_calibration_before(
+    window: BoardWindow, images: list[Image], tmp_path: Path, qtbot: QtBot
+) -> None:
+    window.read_folder(written(tmp_path, images))
+    qtbot.waitUntil(lambda: views_listed(window) == 7)
+    window.close()
+    window.show()
+
+    assert (remark(window), views_listed(window)) == ("", 0)
+    (save,) = (
+        each
+        for each in window.findChildren(QPushButton)
+        if each.text() == "Save and use..."
+    )
+    assert not save.isEnabled()
+
+
+def test_a_calibration_under_way_ends_where_other_views_are_begun(
+    window: BoardWindow, images: list[Image], tmp_path: Path
+) -> None:
+    window.read_folder(written(tmp_path, images))
+    press(window, "Start")
+    QThreadPool.globalInstance().waitForDone()
+    QApplication.processEvents()
+
+    assert (remark(window), views_listed(window)) == ("", 0)
+
+
+def test_what_was_calibrated_is_told_in_the_language_that_is_chosen(
+    window: BoardWindow,
+    images: list[Image],
+    tmp_path: Path,
+    qtbot: QtBot,
+    qapp: QApplication,
+) -> None:
+    window.read_folder(written(tmp_path, images))
+    qtbot.waitUntil(lambda: views_listed(window) == 7)
+    english = window.findChildren(QListWidget)[0].item(0).text()
+    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    QApplication.processEvents()
+
+    assert "by the others" in english
+    assert "by the others" not in window.findChildren(QListWidget)[0].item(0).text()
+    assert not remark(window).isascii()

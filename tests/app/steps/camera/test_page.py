@@ -35,6 +35,7 @@ from typing_extensions import override
 
 from lightpen.cameras.pairing import not_synchronised
 from lightpen.cameras.protocol import CameraSettings, Frame, sealed
+from lightpen.cameras.source import FoundDevice
 from lightpen.cameras.worker_events import Connection
 from lightpen.detection.inspection import SEARCHED_IMAGES
 from lightpen.detection.spots import detect_spots
@@ -719,6 +720,21 @@ def test_another_source_takes_the_notice_of_the_last_away(
         live.choose("Simulated pen")
 
     assert notice.args == [""]
+
+
+def test_cameras_that_are_found_late_are_not_taken_for_another_source(
+    seen: "Seen", workbench: Workbench
+) -> None:
+    panel = seen.child(SourcePanel)
+    workbench.set_preparation(workbench.preparation.with_source(SourceChoice("aravis")))
+    panel.set_searching(True)
+    recorded = SourceChoice(SourceKind.RECORDED)
+    workbench.set_preparation(workbench.preparation.with_source(recorded))
+
+    workbench.search.succeeded.emit((FoundDevice("LP02", "Aravis Fake (LP02)"),))
+
+    assert panel.value() == recorded
+    assert workbench.preparation.source == recorded
 
 
 # A camera that fails

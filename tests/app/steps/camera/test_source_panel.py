@@ -3,13 +3,14 @@
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox
+from PySide6.QtWidgets import QApplication, QComboBox
 from pytestqt.qtbot import QtBot
 
 from lightpen.cameras.source import FoundDevice
 from lightpen.cameras.sources import SOURCES
 from lightpen.sentences import sentence
 from lightpen.swing.preparation import SourceChoice
+from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.theme import Tone
 from lightpen_app.steps.camera.device_field import DeviceField
 from lightpen_app.steps.camera.source_panel import SourcePanel
@@ -103,3 +104,17 @@ def test_why_a_producer_does_not_load_is_shown(panel: SourcePanel) -> None:
 
     assert "wrong ELF class" in told(panel).value().text
     assert told(panel).value().tone is Tone.BAD
+
+
+def test_what_a_search_came_to_is_told_in_the_language_that_is_chosen(
+    panel: SourcePanel, qapp: QApplication
+) -> None:
+    choose(panel, "aravis")
+    panel.set_found(())
+    english = told(panel).value().text
+
+    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    QApplication.processEvents()
+
+    assert english.startswith("No camera was found")
+    assert "No camera" not in told(panel).value().text

@@ -682,3 +682,15 @@ def test_a_file_that_is_no_archive_is_refused_in_words(
 
     desk.until(lambda: desk.notices)
     assert "is no exported archive" in desk.notices[0]
+
+
+def test_no_trend_is_left_of_what_is_no_longer_looked_for(desk: Desk) -> None:
+    desk.enter(3)
+    desk.open()
+    panel = desk.child(TrendPanel)
+    desk.until(lambda: len(panel.value().entries) == 3)
+    QTest.keyClicks(desk.child(DateField), "2030-01-01")
+    desk.until(lambda: desk.statuses[-1] == "0 entries")
+
+    assert panel.value().entries == ()
+    assert panel.words().startswith("Choose an entry")

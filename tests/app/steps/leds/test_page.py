@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, Qt, QThreadPool
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -37,6 +37,7 @@ from lightpen.simulator.sample_pens import fanned_pen, six_led_pen
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_pen
 from lightpen.swing.preparation import Lack, SourceChoice, SourceKind
+from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.leds.file_panel import LedFilePanel
@@ -45,6 +46,7 @@ from lightpen_app.steps.leds.led_table import MISFIT, LedTable
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.page import LedsPage
 from lightpen_app.steps.leds.pen_view import PenView
+from lightpen_app.steps.leds.table_panel import LedTablePanel
 from lightpen_app.widgets.image_view import ImageView
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.state_banner import StateBanner
@@ -1091,3 +1093,71 @@ def test_a_pen_keeps_every_digit_while_nothing_is_changed(
     save_as(seen, tmp_path / "copy.json")
 
     np.testing.assert_array_equal(in_use(workbench).pen.leds, pen.leds)
+
+
+# What comes late, or in another language
+
+
+def test_what_is_typed_while_the_table_is_saved_is_not_lost(
+    seen: "Seen", tmp_path: Path
+) -> None:
+    type_cell(seen, 7, Y, "161")
+    seen.click("Save as...")
+    dialog = seen.child(QFileDialog)
+    dialog.selectFile(str(tmp_path / "mine.json"))
+    dialog.accept()
+    seen.settle()  # whether there is such a file
+    QThreadPool.globalInstance().waitForDone()
+    assert read_pen(tmp_path / "mine.json").leds[6, 1] == 161  # not told of yet
+    model = led_table(seen).model()
+    model.setData(model.index(6, Y), "162")
+    seen.until(lambda: shown_path(seen).endswith("mine.json"))
+
+    assert cell(seen, 7, Y) == "162"
+    assert seen.page.unsaved()
+
+
+def test_what_is_typed_while_a_file_is_opened_is_asked_about(
+    seen: "Seen", tmp_path: Path
+) -> None:
+    write_pen(fanned_pen(), path := tmp_path / "fanned.json")
+    field = seen.named("LED file")
+    assert isinstance(field, QLineEdit)
+    field.setText(str(path))
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    QThreadPool.globalInstance().waitForDone()
+    led_table(seen).model().setData(led_table(seen).model().index(7, X), "26")
+    QCoreApplication.processEvents()
+
+    assert cell(seen, 8, X) == "26"
+    assert seen.child(QuestionBar).words().startswith("The LED table has changes")
+
+
+def test_a_question_about_changes_goes_with_the_changes(seen: "Seen") -> None:
+    type_cell(seen, 8, X, "26")
+    seen.click("Discard")
+    assert seen.child(QuestionBar).words() != ""
+    seen.click("Undo")
+
+    assert seen.child(QuestionBar).words() == ""
+
+
+def test_what_is_wrong_and_what_is_asked_is_told_in_the_language_that_is_chosen(
+    seen: "Seen", tmp_path: Path, qapp: QApplication
+) -> None:
+    path = write_table(tmp_path / "exchanged.csv", exchanged())
+    open_file(seen, path)
+    type_cell(seen, 8, X, "wide")
+    seen.click("Discard")
+    panel, table = seen.child(LedFilePanel), seen.child(LedTablePanel)
+    english = panel.problem(), table.flaw(), panel.question()
+    assert english[1] != ""
+    assert english[2] != ""
+
+    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    QApplication.processEvents()
+
+    now = panel.problem(), table.flaw(), panel.question()
+    assert all(
+        one != other or not other for one, other in zip(english, now, strict=True)
+    )

@@ -63,6 +63,7 @@ from lightpen.swing.resuming import (
 )
 from lightpen.swing.shortfall import N_MORE
 from lightpen.swing.state import SwingState
+from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.theme import Tone, colors_of
 from lightpen_app.paper.preview import PaperWindow
 from lightpen_app.steps.page import MainAction
@@ -1476,3 +1477,30 @@ def test_a_swing_that_cannot_be_set_aside_is_told(
 
     assert "does not exist" in told.args[0]
     assert workbench.run.status.solution is not None
+
+
+# What is asked
+
+
+def test_a_question_stays_in_another_language(
+    page: ReviewPage, qapp: QApplication
+) -> None:
+    click(page, "Repeat")
+    english = the(page, QuestionBar).words()
+    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    QApplication.processEvents()
+
+    assert english.startswith("Repeat the swing")
+    assert the(page, QuestionBar).words() not in ("", english)
+
+
+def test_whether_to_repeat_is_asked_no_more_once_the_tip_is_accepted(
+    bed: Bed,
+) -> None:
+    bed.solve()
+    page = bed.show()
+    click(page, "Repeat")
+    page.run_main_action()
+    bed.qtbot.waitUntil(page.is_complete)
+
+    assert the(page, QuestionBar).words() == ""

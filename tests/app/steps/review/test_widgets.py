@@ -18,7 +18,7 @@ from lightpen_app.steps.review.remark_list import MOST, RemarkList
 from lightpen_app.steps.review.residual_view import Arrows, ResidualView
 from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
 from lightpen_app.widgets.number_table import Figures, NumberTable
-from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.sign_label import Remark
 
 
@@ -126,7 +126,7 @@ def test_a_question_is_answered_once(qtbot: QtBot, answer: str, signal: str) -> 
     around = QWidget()
     qtbot.addWidget(around)
     bar = QuestionBar(around)
-    bar.set_words("Really?", "Yes", "No")
+    bar.set_words(lambda: Question("Really?", "Yes", "No"))
     around.show()
     assert bar.words() == ""
 

@@ -4,6 +4,8 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialogButtonBox, QLineEdit
 from pytestqt.qtbot import QtBot
 
@@ -119,3 +121,25 @@ def test_a_supervisor_is_asked_for_name_and_password(qtbot: QtBot) -> None:
     password.returnPressed.emit()
 
     assert told == [("It will do.", Signature("Eve", "secret"))]
+
+
+def test_limits_are_signed_once_however_often_the_key_is_pressed(
+    dialog: LimitsDialog,
+) -> None:
+    dialog.set_value(TIGHT, is_guarded=True)
+    sign(dialog)
+    told: list[Any] = []
+    dialog.signed.connect(lambda *what: told.append(what))
+    (new,) = (
+        each
+        for each in dialog.findChildren(QLineEdit)
+        if each.accessibleName().startswith("New password")
+    )
+    new.setFocus()
+    QTest.keyClick(new, Qt.Key.Key_Return)
+    assert len(told) == 1
+
+    dialog.tell("The password is wrong.")
+    sign(dialog)
+    QTest.keyClick(new, Qt.Key.Key_Return)
+    assert len(told) == 2

@@ -1609,3 +1609,38 @@ def test_every_word_changes_with_the_language(
         dressed.sendPostedEvents(None, QEvent.Type.LanguageChange)
 
     assert [text for text in quiet if "Ann" not in text and ":" not in text] == []
+
+
+# What is told as long as it holds
+
+
+def test_that_sounds_are_off_is_said_until_they_are_on(
+    qtbot: QtBot, look: None
+) -> None:
+    sounds = Mute(Recorder(), muted=True)
+    widget = SoundTest(sounds, step_ms=0)
+    qtbot.addWidget(widget)
+    widget.findChildren(QPushButton)[0].click()
+    assert widget.words() == "Sounds are off. Press B to switch them on."
+
+    sounds.muted = False
+
+    qtbot.waitUntil(lambda: widget.words() == "")
+
+
+def test_a_row_that_is_worked_on_waits_though_the_list_is_read_anew(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    interrupted(workbench, "a")
+    start = show(workbench)
+    (panel,) = start.page.findChildren(InterruptedPanel)
+    panel.set_waiting("The swing is being discarded.")
+    panel.set_value(panel.value())
+
+    (resume,) = (
+        each
+        for each in panel.findChildren(QPushButton)
+        if each.text() == "Resume" and each.isVisible()
+    )
+    assert resume.toolTip() == "The swing is being discarded."
+    assert not resume.isEnabled()

@@ -608,3 +608,16 @@ def test_the_barcode_of_a_retired_tip_chooses_nothing(desk: Desk) -> None:
 
     assert desk.workbench.preparation.names.tip != "T-7"
     assert desk.told[-1].startswith("Tip T-7 is retired")
+
+
+def test_an_unknown_barcode_is_asked_about_no_more_once_its_tip_is_there(
+    desk: Desk,
+) -> None:
+    desk.scan("T-7")
+    question = desk.page.findChild(QuestionBar)
+    assert isinstance(question, QuestionBar)
+    assert question.words() == "There is no tip T-7 in the library. Add it?"
+
+    desk.add(TIP)
+
+    assert question.words() == ""

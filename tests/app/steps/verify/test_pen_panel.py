@@ -67,3 +67,20 @@ def test_what_comes_of_the_pen_before_is_not_told_of_the_next_one(
         "Two accepted swings with this LED file are needed to tell how pen LP-05 "
         "changes; there are 0."
     )
+
+
+def test_swings_are_said_to_be_read_only_as_long_as_they_are(
+    qtbot: QtBot, workbench: Workbench
+) -> None:
+    panel = PenPanel(workbench)
+    qtbot.addWidget(panel)
+    panel.show()
+    assert words(panel) == "The swings of the pen are being read."
+    QThreadPool.globalInstance().waitForDone()
+    QCoreApplication.processEvents()
+    assert words(panel).startswith("Two accepted swings")
+
+    workbench.set_preparation(replace(workbench.preparation, pen_file=None))
+
+    assert not words(panel)
+    panel.shut_down()
