@@ -2246,6 +2246,10 @@
         <translation>每次更改须由主管签署。</translation>
     </message>
     <message>
+        <source>It is being kept.</source>
+        <translation>正在保存。</translation>
+    </message>
+    <message>
         <source>With your name and the time</source>
         <translation>连同您的姓名和时间一起保存</translation>
     </message>
@@ -6040,10 +6044,6 @@
         <translation>文件夹 {folder} 中没有图像 ({suffixes})。请指定图像所在的文件夹。</translation>
     </message>
     <message>
-        <source>The folder {folder} holds {n_files} other files, such as {example}, which would get mixed up with the new images. Choose an empty folder.</source>
-        <translation>文件夹 {folder} 中有 {n_files} 个其他文件，例如 {example}，会与新图像混在一起。请选择空文件夹。</translation>
-    </message>
-    <message>
         <source>The folder {folder} is not empty. Choose another for this swing; nothing is overwritten.</source>
         <translation>文件夹 {folder} 不是空的。请为本次摆动选择其他文件夹；不会覆盖任何内容。</translation>
     </message>
@@ -6540,10 +6540,6 @@
         <translation>网络摄像头（试用）</translation>
     </message>
     <message>
-        <source>What would pass is CHECK nevertheless if odd and even images put the tip apart by more than the limit and by more than {halves:g} times U (k = 2) of their difference, if the images contradict a file by more than {contradicted:g} standard deviations, if cone and camera moved by more than {moved:.4f} mm, if the residuals exceed {sigma:g} px, if an LED stands out by more than {displaced:g} mm, if one of several cameras is out of step, if more than {dropped:.0f} % of the images take no part, if there are fewer than {n_images} images, or none on one of the eight sides.</source>
-        <translation>即使 U 合格，出现下列任一情形仍判为“需检查”：由奇数图像与偶数图像求得的测头之差既超过限值，又超过该差值 U (k = 2) 的 {halves:g} 倍；图像与文件的矛盾超过 {contradicted:g} 倍标准差；锥孔与相机的相对移动超过 {moved:.4f} mm；残差超过 {sigma:g} px；某个 LED 明显偏离且超过 {displaced:g} mm；多台相机中有一台不同步；未参与计算的图像超过 {dropped:.0f} %；图像少于 {n_images} 幅；八个方向中有一个方向没有图像。</translation>
-    </message>
-    <message>
         <source>ball and cone, which are not quite round. Use better ones, and state their form error</source>
         <translation>测球与锥孔不够圆。请换用更好的，并给出其形状误差</translation>
     </message>
@@ -6684,10 +6680,6 @@
         <translation>{name} 中 calibration_temperature 为 {celsius:g}；应为 {coldest:g} 至 {warmest:g} 摄氏度。请更正或删除。</translation>
     </message>
     <message>
-        <source>{name} has {bits} bits, the other images are {usual}. Replay only images of one camera together.</source>
-        <translation>{name} 为 {bits} 位，其他图像为 {usual}。请只回放同一台相机的图像。</translation>
-    </message>
-    <message>
         <source>{name} has {width} x {height} px, {first} has {first_width} x {first_height} px. Give images of one camera, with one region and binning.</source>
         <translation>{name} 为 {width} x {height} px，{first} 为 {first_width} x {first_height} px。请提供同一相机、相同区域和像素合并设置的图像。</translation>
     </message>
@@ -6806,6 +6798,10 @@
     <message>
         <source>The folder {folder} cannot be made or read: {reason}</source>
         <translation>文件夹 {folder} 无法创建或读取：{reason}</translation>
+    </message>
+    <message>
+        <source>The folder {folder} is not empty: it holds {example}. Choose another, or empty it; nothing is overwritten.</source>
+        <translation>文件夹 {folder} 不是空的：其中有 {example}。请选择其他文件夹，或将其清空；不会覆盖任何内容。</translation>
     </message>
     <message>
         <source>The pen leans otherwise than at the first visit, so this touch does not count. Hold it as then: what is not known of the pen then moves all visits alike.</source>
@@ -7038,6 +7034,10 @@
     <message>
         <source>What is kept here does not go on with {entry}. A data folder was copied and both copies were gone on with, or entries were changed. Check both archives.</source>
         <translation>此处保存的内容与{entry}不相接。可能是数据文件夹被复制后两份都在继续使用，或条目被改动过。请检查两边的档案库。</translation>
+    </message>
+    <message>
+        <source>What would pass is CHECK nevertheless if odd and even images put the tip apart by more than the limit and by more than {halves:g} times U (k = 2) of their difference, if the images contradict a file by more than {contradicted:g} standard deviations, if cone and camera moved by more than {moved:.4f} mm, if the residuals exceed {sigma:g} px, if an LED stands out by more than {displaced:g} mm, if one of several cameras is out of step, if more than {dropped:.0f} % of the images that show the pen take no part, if fewer than {n_images} images show it, or none on one of the eight sides.</source>
+        <translation>即使 U 合格，出现下列任一情形仍判为“需检查”：由奇数图像与偶数图像求得的测头之差既超过限值，又超过该差值 U (k = 2) 的 {halves:g} 倍；图像与文件的矛盾超过 {contradicted:g} 倍标准差；锥孔与相机的相对移动超过 {moved:.4f} mm；残差超过 {sigma:g} px；某个 LED 明显偏离且超过 {displaced:g} mm；多台相机中有一台不同步；拍到光笔的图像中未参与计算的超过 {dropped:.0f} %；拍到光笔的图像少于 {n_images} 幅；八个方向中有一个方向没有图像。</translation>
     </message>
     <message>
         <source>Where the tip has a limit of its own for its change, the distance from the tip that was in force before (as found) to the tip that is accepted (as left) is compared with it by simple acceptance; beyond it is CHECK.</source>
