@@ -132,8 +132,8 @@ def test_the_record_holds_the_verdict_and_the_limits_that_it_was_judged_by() -> 
     assert record()["verdict"] == {
         "grade": "check",
         "code": "verdict.too-few-images",
-        "text": "Images kept: 40 of at least 41.",
-        "values": {"n_kept": 40, "needed": 41},
+        "text": "Images kept: 39 of at least 41.",
+        "values": {"n_kept": 39, "needed": 41},
         "next_step": "capture more",
         "limits": {"max_uncertainty_mm": 0.0987, "min_images": 41, "min_per_field": 2},
     }
@@ -240,7 +240,7 @@ def test_the_text_ends_with_the_verdict_its_reason_and_the_next_step() -> None:
     text = calibration_text(calibration(), "joint", None, verdict())
 
     assert text.splitlines()[-2:] == [
-        "Verdict      CHECK: Images kept: 40 of at least 41.",
+        "Verdict      CHECK: Images kept: 39 of at least 41.",
         "             Next: capture more images; those of this swing are kept.",
     ]
 
