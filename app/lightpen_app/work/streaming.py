@@ -99,9 +99,8 @@ class Streaming(QObject):
 
     def shut_down(self) -> None:
         """Let nobody listen any more, once all jobs have ended."""
-        self._wanted = self._opened = (
-            None  # what a job has still to tell begins no more
-        )
+        # What a job has still to tell begins nothing more.
+        self._wanted = self._opened = None
         self.stream.close()
 
     def _follow(self) -> None:
