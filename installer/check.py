@@ -72,19 +72,18 @@ def try_all(trial: Trial, payload: Path) -> None:
     payload : Path
         The folder that the installer was packed from, for one of a newer version.
     """
-    version = __version__
     files, registry = trial.machine.files(), trial.machine.registry()
     bad_conditions.try_no_right(trial)
     bad_conditions.try_full_disk(trial)
     bad_conditions.try_other_folder(trial)
     try_chinese(trial)
-    life.try_installation(trial, version)
+    life.try_installation(trial, __version__)
     compare_tips(trial, life.try_self_test(trial, "offscreen"))
     with _screen(trial) as seen:
         if seen is not None:
             life.try_self_test(seen, "windows")
     try_start(trial)
-    life.try_entry_points(trial, version)
+    life.try_entry_points(trial, __version__)
     life.try_demo(trial)
     life.try_double_click(trial)
     life.try_refusals(trial)
@@ -93,7 +92,7 @@ def try_all(trial: Trial, payload: Path) -> None:
     with TemporaryDirectory() as work:
         newer = Path(work) / "newer-setup.exe"
         pack(payload, Path(work), newer, NEWER, Packing.STORED)
-        life.try_upgrade(trial, newer, version, NEWER)
+        life.try_upgrade(trial, newer, __version__, NEWER)
     life.try_removal(trial, files, registry)
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from pkgutil import resolve_name
 from threading import Event
 from typing import Any, NoReturn, TypeAlias
 
@@ -583,3 +584,31 @@ def open_wizard(
 def walker(open_wizard: OpenWizard) -> Walker:
     """The program at its first start."""
     return open_wizard()
+
+
+HoldBack = Callable[..., Event]
+
+
+@pytest.fixture
+def hold_back(monkeypatch: pytest.MonkeyPatch) -> Iterator[HoldBack]:
+    """Return a function that has others, by their places, begin once that is set."""
+    held: list[Event] = []
+
+    def hold(*places: str) -> Event:
+        may_begin = Event()
+        held.append(may_begin)
+        for place in places:
+            monkeypatch.setattr(place, _once_set(may_begin, resolve_name(place)))
+        return may_begin
+
+    yield hold
+    for may_begin in held:
+        may_begin.set()
+
+
+def _once_set(may_begin: Event, function: Callable[..., Any]) -> Callable[..., Any]:
+    def held(*arguments: Any) -> Any:
+        may_begin.wait()
+        return function(*arguments)
+
+    return held

@@ -312,13 +312,9 @@ class BoardWindow(Translated, QWidget):
         self._conclude_found()
         self._run(partial(calibrate_by_views, found.views.chosen(kept), self._hashes))
 
-    def _compute_no_more(self) -> None:
-        job, self._computing = self._computing, None
-        if job is not None:
-            job.cancel()
-
     def _run(self, calibrate: Callable[[Report], ComputedCamera]) -> None:
-        self._compute_no_more()
+        if self._computing is not None:
+            self._computing.cancel()
         self._forget()
         self._computing = job = Job(calibrate, self)
 

@@ -5,11 +5,12 @@ from collections.abc import Iterator
 from hashlib import sha256
 from pathlib import Path
 from threading import Event
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 import pytest
-from PySide6.QtCore import QCoreApplication, QSize, QThreadPool
+from PySide6.QtCore import QSize, QThreadPool
 from PySide6.QtWidgets import QApplication, QListWidget, QPushButton
 from pytestqt.qtbot import QtBot
 
@@ -17,7 +18,6 @@ from lightpen.arrays import Image
 from lightpen.cameras.protocol import Frame, sealed
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.hashes import InputFile
 from lightpen.intrinsics.boards import parse_board
 from lightpen.live.looking import LiveImage
 from lightpen.model.camera import Camera
@@ -28,14 +28,15 @@ from lightpen.simulator.boards import expose_board, render_board
 from lightpen.simulator.sensor import Sensor
 from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.pooling import pooled
-from lightpen_app.steps.camera.board_jobs import save_camera
 from lightpen_app.steps.camera.board_view import BoardView
 from lightpen_app.steps.camera.board_window import BoardWindow
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.sign_label import SignLabel
-from lightpen_app.work.job import Report
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.workbench import Workbench
+
+if TYPE_CHECKING:
+    from tests.app.conftest import HoldBack
 
 BOARD = "chessboard:7x5:20"
 CAMERA = Camera(200, 160, 300.0, 299.6, 101.0, 78.0)
@@ -220,18 +221,9 @@ def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
 
 
 @pytest.fixture
-def slow_disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Event]:
+def slow_disk(hold_back: "HoldBack") -> Event:
     """Camera files are saved once this is set."""
-    disk = Event()
-
-    def saved_late(camera: Camera, path: Path, report: Report) -> InputFile:
-        disk.wait()
-        return save_camera(camera, path, report)
-
-    place = "lightpen_app.steps.camera.board_window.save_camera"
-    monkeypatch.setattr(place, saved_late)
-    yield disk
-    disk.set()
+    return hold_back("lightpen_app.steps.camera.board_window.save_camera")
 
 
 def test_a_camera_file_that_is_still_being_saved_is_that_of_its_attempt(
@@ -262,18 +254,6 @@ def test_a_camera_file_that_is_still_being_saved_is_that_of_its_attempt(
         assert trial.outcome is outcome
         assert trial.found is not None
         assert len(trial.images) == 7
-
-
-def test_a_board_that_is_sought_again_is_not_disturbed_by_what_was_being_computed(
-    window: BoardWindow, images: list[Image], tmp_path: Path
-) -> None:
-    window.read_folder(written(tmp_path, images))
-    press(window, "Start")
-    QThreadPool.globalInstance().waitForDone()
-    QCoreApplication.processEvents()
-
-    assert views_listed(window) == 0
-    press(window, "Stop")
 
 
 def test_views_that_were_kept_and_never_computed_are_abandoned(
@@ -337,6 +317,7 @@ def test_a_calibration_under_way_ends_where_other_views_are_begun(
     QApplication.processEvents()
 
     assert (remark(window), views_listed(window)) == ("", 0)
+    press(window, "Stop")
 
 
 def test_what_was_calibrated_is_told_in_the_language_that_is_chosen(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, Qt, QThreadPool
+from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -29,7 +29,6 @@ from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.pen_check.match import Finding, PenMatch, What
-from lightpen.pen_check.opening import OpenedPen, open_pen, save_pen
 from lightpen.record.names import Names
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Doing
@@ -55,6 +54,7 @@ from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
+    from tests.app.conftest import HoldBack
     from tests.app.steps.conftest import See, Seen
 
 LEDS = paper_pen().leds
@@ -545,22 +545,11 @@ def test_opening_another_file_asks_before_changes_are_lost(
 
 
 @pytest.fixture
-def slow_disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Event]:
+def slow_disk(hold_back: "HoldBack") -> Event:
     """LED files are read and written once this is set."""
-    disk = Event()
-
-    def opened(path: Path, units: str | None) -> OpenedPen:
-        disk.wait()
-        return open_pen(path, units)
-
-    def saved(pen: Pen, path: Path) -> PenFile:
-        disk.wait()
-        return save_pen(pen, path)
-
-    monkeypatch.setattr("lightpen_app.steps.leds.page.open_pen", opened)
-    monkeypatch.setattr("lightpen_app.steps.leds.page.save_pen", saved)
-    yield disk
-    disk.set()
+    return hold_back(
+        "lightpen_app.steps.leds.page.open_pen", "lightpen_app.steps.leds.page.save_pen"
+    )
 
 
 def test_what_is_typed_while_a_file_is_read_is_lost_after_a_question_only(
@@ -572,6 +561,7 @@ def test_what_is_typed_while_a_file_is_read_is_lost_after_a_question_only(
     slow_disk.set()
     seen.settle()
     assert cell(seen, 7, Y) == "161"
+    assert seen.child(QuestionBar).words().startswith("The LED table has changes")
 
     seen.click("Discard them")
     assert in_use(workbench).path == path
@@ -591,6 +581,8 @@ def test_what_is_typed_while_the_table_is_saved_is_still_to_be_saved(
     assert in_use(workbench).path == path
     assert read_pen(path).leds[6, 1] == 161
     assert cell(seen, 7, Y) == "162"
+    assert shown_path(seen).endswith("leds.json")
+    assert seen.page.unsaved()
     assert why_not(seen) == "Save the LED table first: the record needs its file."
     seen.click("Discard")
     seen.click("Discard them")
@@ -1096,41 +1088,6 @@ def test_a_pen_keeps_every_digit_while_nothing_is_changed(
 
 
 # What comes late, or in another language
-
-
-def test_what_is_typed_while_the_table_is_saved_is_not_lost(
-    seen: "Seen", tmp_path: Path
-) -> None:
-    type_cell(seen, 7, Y, "161")
-    seen.click("Save as...")
-    dialog = seen.child(QFileDialog)
-    dialog.selectFile(str(tmp_path / "mine.json"))
-    dialog.accept()
-    seen.settle()  # whether there is such a file
-    QThreadPool.globalInstance().waitForDone()
-    assert read_pen(tmp_path / "mine.json").leds[6, 1] == 161  # not told of yet
-    model = led_table(seen).model()
-    model.setData(model.index(6, Y), "162")
-    seen.until(lambda: shown_path(seen).endswith("mine.json"))
-
-    assert cell(seen, 7, Y) == "162"
-    assert seen.page.unsaved()
-
-
-def test_what_is_typed_while_a_file_is_opened_is_asked_about(
-    seen: "Seen", tmp_path: Path
-) -> None:
-    write_pen(fanned_pen(), path := tmp_path / "fanned.json")
-    field = seen.named("LED file")
-    assert isinstance(field, QLineEdit)
-    field.setText(str(path))
-    QTest.keyClick(field, Qt.Key.Key_Return)
-    QThreadPool.globalInstance().waitForDone()
-    led_table(seen).model().setData(led_table(seen).model().index(7, X), "26")
-    QCoreApplication.processEvents()
-
-    assert cell(seen, 8, X) == "26"
-    assert seen.child(QuestionBar).words().startswith("The LED table has changes")
 
 
 def test_a_question_about_changes_goes_with_the_changes(seen: "Seen") -> None:

@@ -1,5 +1,6 @@
 """Tests of the limits of a station, and of who may change them."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -77,22 +78,37 @@ def test_limits_are_laid_down_only_with_a_signature(
     assert told == [expected]
 
 
+def enter_the_signature(dialog: LimitsDialog) -> None:
+    supervisor = dialog.findChild(SupervisorFields)
+    assert isinstance(supervisor, SupervisorFields)
+    supervisor.entered.emit()
+
+
+def enter_the_new_password(dialog: LimitsDialog) -> None:
+    (new,) = (
+        each
+        for each in dialog.findChildren(QLineEdit)
+        if each.accessibleName().startswith("New password")
+    )
+    new.setFocus()
+    QTest.keyClick(new, Qt.Key.Key_Return)
+
+
+@pytest.mark.parametrize("enter", [enter_the_signature, enter_the_new_password])
 def test_limits_are_laid_down_once_however_often_enter_is_pressed(
-    dialog: LimitsDialog,
+    dialog: LimitsDialog, enter: Callable[[LimitsDialog], None]
 ) -> None:
     dialog.set_value(TIGHT, is_guarded=True)
     sign(dialog)
     told: list[Any] = []
     dialog.signed.connect(lambda *what: told.append(what))
-    supervisor = dialog.findChild(SupervisorFields)
-    assert isinstance(supervisor, SupervisorFields)
     for _ in range(2):
-        supervisor.entered.emit()
+        enter(dialog)
     assert len(told) == 1
 
     dialog.tell("The password is not that of the supervisors.")
     sign(dialog)
-    supervisor.entered.emit()
+    enter(dialog)
     assert len(told) == 2
 
 
@@ -121,25 +137,3 @@ def test_a_supervisor_is_asked_for_name_and_password(qtbot: QtBot) -> None:
     password.returnPressed.emit()
 
     assert told == [("It will do.", Signature("Eve", "secret"))]
-
-
-def test_limits_are_signed_once_however_often_the_key_is_pressed(
-    dialog: LimitsDialog,
-) -> None:
-    dialog.set_value(TIGHT, is_guarded=True)
-    sign(dialog)
-    told: list[Any] = []
-    dialog.signed.connect(lambda *what: told.append(what))
-    (new,) = (
-        each
-        for each in dialog.findChildren(QLineEdit)
-        if each.accessibleName().startswith("New password")
-    )
-    new.setFocus()
-    QTest.keyClick(new, Qt.Key.Key_Return)
-    assert len(told) == 1
-
-    dialog.tell("The password is wrong.")
-    sign(dialog)
-    QTest.keyClick(new, Qt.Key.Key_Return)
-    assert len(told) == 2

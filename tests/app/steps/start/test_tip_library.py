@@ -5,7 +5,7 @@ from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from threading import Event
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -34,7 +34,6 @@ from lightpen.record.tip_library import (
 from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.sounds import Silence
 from lightpen_app.shell.sidebar import Sidebar
-from lightpen_app.steps.start import library_control
 from lightpen_app.steps.start.barcode import PACE_MS
 from lightpen_app.steps.start.form import NamesForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog
@@ -43,6 +42,9 @@ from lightpen_app.steps.start.spin_recorder import SpinRecorder
 from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.work.workbench import Workbench
+
+if TYPE_CHECKING:
+    from tests.app.conftest import HoldBack
 
 LEFT = Qt.MouseButton.LeftButton
 ANN = Author("Hall 2", "Ann")
@@ -299,17 +301,9 @@ def test_a_tip_is_added_and_changed_in_the_dialog_and_entered_with_who(
 
 
 @pytest.fixture
-def slow_disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Event]:
+def slow_disk(hold_back: "HoldBack") -> Event:
     """Changes are kept once this is set."""
-    disk, keep = Event(), library_control._changed
-
-    def kept(*arguments: Any) -> Library:
-        disk.wait()
-        return keep(*arguments)
-
-    monkeypatch.setattr(library_control, "_changed", kept)
-    yield disk
-    disk.set()
+    return hold_back("lightpen_app.steps.start.library_control._changed")
 
 
 def test_what_is_being_kept_is_neither_asked_for_again_nor_left(

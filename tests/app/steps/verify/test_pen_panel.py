@@ -1,9 +1,8 @@
 """What is told of the pen is of the pen that is chosen now."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from threading import Event
-from typing import Any
+from typing import TYPE_CHECKING
 
 import pytest
 from PySide6.QtCore import QCoreApplication, Qt, QThreadPool
@@ -11,26 +10,19 @@ from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
 
-from lightpen.verification.pen_over_time import improve_led_file
-from lightpen_app.steps.verify import pen_panel
 from lightpen_app.steps.verify.pen_panel import PenPanel
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.workbench import Workbench
 
+if TYPE_CHECKING:
+    from tests.app.conftest import HoldBack
+
 
 @pytest.fixture
-def slow_machine(monkeypatch: pytest.MonkeyPatch) -> Iterator[Event]:
+def slow_machine(hold_back: "HoldBack") -> Event:
     """LED files are improved once this is set."""
-    machine = Event()
-
-    def improved(*arguments: Any) -> object:
-        machine.wait()
-        return improve_led_file(*arguments)
-
-    monkeypatch.setattr(pen_panel, "improve_led_file", improved)
-    yield machine
-    machine.set()
+    return hold_back("lightpen_app.steps.verify.pen_panel.improve_led_file")
 
 
 def words(panel: PenPanel) -> str:
