@@ -22,18 +22,19 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.hostile_records import NAMES, make_data
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
+from benchmarks.small_records import with_images
 
 from lightpen.archive.chains import append, copy_entries, own_chain
 from lightpen.archive.check import check_archive
 from lightpen.archive.database import Database, look_into, open_file
-from lightpen.archive.entries import Event, Head, Kind, chained, text_sha256
+from lightpen.archive.entries import ChainHead, Event, Kind, chained, text_sha256
 from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.queries import Wanted, last_accepted, newest
+from lightpen.archive.queries import EntryFilter, last_accepted, newest
 from lightpen.archive.seal import seal_of
 from lightpen.errors import ArchiveError
-from lightpen.record.folder_archive import FolderArchive
-from lightpen.record.names import Names
-from lightpen.record.reading import open_record, record_files
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import open_record, record_files
 
 N_ENTRIES, N_TIPS = 100_000, 40
 RECORD = "{" + " " * 280_000 + "}"  # as long as that of 300 images
@@ -79,7 +80,7 @@ def _speed_rows() -> list[Row]:
             partial(last_accepted, database, f"LP-{n % 10:02}", f"T-{n}")
             for n in range(N_TIPS)
         )
-        shown = _milliseconds([partial(newest, database, Wanted(), 100)] * N_TIPS)
+        shown = _milliseconds([partial(newest, database, EntryFilter(), 100)] * N_TIPS)
         history = _history_row(folder)
         start = time.perf_counter()
         checked = check_archive(database, folder)
@@ -115,13 +116,13 @@ def _history_row(folder: Path) -> Row:
 
 
 def _fill(database: Database, chain: str) -> None:
-    head = Head(chain)
+    head = ChainHead(chain)
     records = {text_sha256(SHORT_RECORD): SHORT_RECORD}
     for first in range(0, N_ENTRIES, BATCH):
         entries = []
         for n in range(first, first + BATCH):
             entry = chained(head, _event(n, SHORT_RECORD))
-            head = Head(chain, n + 1, entry.sha256, entry.entry.since)
+            head = ChainHead(chain, n + 1, entry.sha256, entry.entry.since)
             entries.append(entry)
         copy_entries(database, chain, entries, records)
 
@@ -175,8 +176,7 @@ def _data_files(folder: Path) -> list[Path]:
     results = FolderArchive(folder)
     result = results.in_force(NAMES.pen, NAMES.tip)
     assert result is not None
-    inputs = {"inputs": {"observations": images}}
-    results.store(replace(result, calibration={**result.calibration, **inputs}))
+    results.store(replace(result, calibration=with_images(images)))
     with closing(Logbook(folder)) as logbook:
         logbook.enter_owed()
     archive = folder / ARCHIVE

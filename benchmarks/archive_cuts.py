@@ -43,11 +43,11 @@ from benchmarks.rows import Row, table
 from lightpen.archive.chains import entries_of, heads
 from lightpen.archive.check import check_archive
 from lightpen.archive.database import Database, look_into
-from lightpen.archive.entries import Written
+from lightpen.archive.entries import StoredEntry
 from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.errors import LightpenError, NoArchiveError
-from lightpen.record.folder_archive import FolderArchive
-from lightpen.record.tip_library import library_files
+from lightpen.record.library.tip_library import library_files
+from lightpen.record.results.result_folder import FolderArchive
 
 SEED = 3
 N_CUTS = 50  # of each kind
@@ -63,7 +63,7 @@ EXT4_IOC_SHUTDOWN, NO_LOG_FLUSH = 0x8004587D, 2
 
 
 @dataclass
-class Tally:
+class FrameCounters:
     """What became of what was written.
 
     Attributes
@@ -75,7 +75,7 @@ class Tally:
     n_whole : int
         Cuts after which the archive opened and passed its check, and after which the
         next start entered each file once.
-    n_troubles : int
+    n_faults : int
         Writes that failed, and were told.
     faults : list of str
         What was wrong.
@@ -85,7 +85,7 @@ class Tally:
     n_told: int = 0
     n_lost: int = 0
     n_whole: int = 0
-    n_troubles: int = 0
+    n_faults: int = 0
     faults: list[str] = field(default_factory=list)
 
 
@@ -173,24 +173,25 @@ def cut_rows() -> list[Row]:
     return [_row(kind, _apart(kind, N_CUTS)) for kind in KINDS]
 
 
-def _row(kind: str, tally: Tally | None) -> Row:
+def _row(kind: str, counters: FrameCounters | None) -> Row:
     what = f"archive, {WORDS[kind]} at {N_CUTS} random moments: "
-    if tally is None:
+    if counters is None:
         return Row(f"{what}lost, whole", "needs the superuser")
-    for fault in tally.faults[:10]:
+    for fault in counters.faults[:10]:
         print(f"{kind}: {fault}", file=sys.stderr)
     return Row(
-        f"{what}lost of {tally.n_told} acknowledged entries and files; times that it "
-        "was whole",
-        f"{tally.n_lost}; {tally.n_whole}",
+        f"{what}lost of {counters.n_told} acknowledged entries and files; times "
+        "that it was whole",
+        f"{counters.n_lost}; {counters.n_whole}",
         f"0; {N_CUTS}",
-        met=(tally.n_lost, tally.n_whole) == (0, N_CUTS) and tally.n_told > N_CUTS,
+        met=(counters.n_lost, counters.n_whole) == (0, N_CUTS)
+        and counters.n_told > N_CUTS,
     )
 
 
-def _apart(kind: str, n_cuts: int) -> Tally | None:
+def _apart(kind: str, n_cuts: int) -> FrameCounters | None:
     """Try a kind of cut in a mount namespace, if it needs one and may have it."""
-    words = [sys.executable, __file__, "--tally", "--cuts", str(n_cuts), kind]
+    words = [sys.executable, __file__, "--counters", "--cuts", str(n_cuts), kind]
     if kind in ("full", "read-only", "power"):
         namespace = ["unshare", "--mount"]
         if os.geteuid() != 0:
@@ -201,12 +202,12 @@ def _apart(kind: str, n_cuts: int) -> Tally | None:
             return None
         words = [*namespace, *words]
     told = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True)
-    return Tally(**json.loads(told.stdout))
+    return FrameCounters(**json.loads(told.stdout))
 
 
-def cut_off(kind: str, n_cuts: int) -> Tally:
+def cut_off(kind: str, n_cuts: int) -> FrameCounters:
     """Cut the archive off again and again, and return what became of it."""
-    rng, tally = random.Random(SEED), Tally()
+    rng, counters = random.Random(SEED), FrameCounters()
     with (
         tempfile.TemporaryDirectory(prefix="lightpen-cuts-") as folder,
         closing(KINDS[kind](Path(folder), rng)) as trial,
@@ -216,11 +217,11 @@ def cut_off(kind: str, n_cuts: int) -> Tally:
         for _ in range(n_cuts):
             victim.begin()
             time.sleep(rng.uniform(0, LONGEST_LIFE_S))
-            _note(tally, trial.cut(victim), trial.place)
+            _note(counters, trial.cut(victim), trial.place)
             if trial.place.archive.stat().st_size > GROWN:
                 shutil.rmtree(trial.place.data)
                 make_data(trial.place.data)
-    return tally
+    return counters
 
 
 class _Trial:
@@ -370,15 +371,15 @@ WORDS = {
 }
 
 
-def _note(tally: Tally, told: list[str], place: Place) -> None:
+def _note(counters: FrameCounters, told: list[str], place: Place) -> None:
     """Note what is there of what was told."""
     of = Counter(line.partition(" ")[0] for line in told)
-    tally.n_cuts += 1
-    tally.n_troubles += of["trouble"]
+    counters.n_cuts += 1
+    counters.n_faults += of["trouble"]
     entries = {line.removeprefix("entry ") for line in told if line.startswith("entry")}
     files = {line.removeprefix("file ") for line in told if line.startswith("file")}
     faults = [line.removeprefix("fault ") for line in told if line.startswith("fault")]
-    tally.n_told += len(entries) + len(files)
+    counters.n_told += len(entries) + len(files)
     lost = {file for file in files if not (place.data / file).is_file()}
     there = set[str]()
     try:
@@ -389,9 +390,9 @@ def _note(tally: Tally, told: list[str], place: Place) -> None:
     except LightpenError as error:
         faults.append(str(error))
     lost |= entries - there
-    tally.n_lost += len(lost)
-    tally.n_whole += not faults
-    tally.faults += [*faults, *(f"{each} is lost." for each in sorted(lost))]
+    counters.n_lost += len(lost)
+    counters.n_whole += not faults
+    counters.faults += [*faults, *(f"{each} is lost." for each in sorted(lost))]
 
 
 def _faults_of_next_start(data: Path) -> list[str]:
@@ -409,7 +410,7 @@ def _faults_of_next_start(data: Path) -> list[str]:
     return faults
 
 
-def _all_entries(database: Database) -> Iterator[Written]:
+def _all_entries(database: Database) -> Iterator[StoredEntry]:
     for head in heads(database):
         yield from entries_of(database, head.chain)
 
@@ -423,10 +424,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Cut the archive off.")
     parser.add_argument("kinds", nargs="*", metavar="KIND", help=", ".join(KINDS))
     parser.add_argument("--cuts", type=int, default=N_CUTS)
-    parser.add_argument("--tally", action="store_true", help="print one kind's tally")
+    parser.add_argument(
+        "--counters", action="store_true", help="print one kind's counters"
+    )
     options = parser.parse_args()
     kinds = options.kinds or list(KINDS)
-    if options.tally:
+    if options.counters:
         print(json.dumps(asdict(cut_off(kinds[0], options.cuts))))
         return 0
     rows = [_row(kind, _apart(kind, N_CUTS)) for kind in kinds]

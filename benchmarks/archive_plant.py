@@ -28,7 +28,7 @@ from benchmarks.rows import Row, table
 from lightpen.archive.chains import chain_at_home, entries_of, heads
 from lightpen.archive.check import check_archive
 from lightpen.archive.database import look_into, open_server
-from lightpen.archive.late_logbook import SERVER
+from lightpen.archive.lazy_logbook import SERVER
 from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.errors import ArchiveError
 

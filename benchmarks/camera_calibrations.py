@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 from benchmarks.rows import Row, numbers, without_data
 from benchmarks.workers import Workers
+from tests.simulated_boards import expose_board, render_board, simulate_board_poses
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.uncertainty import ShareName
+from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import Centers
@@ -23,8 +24,6 @@ from lightpen.intrinsics.sightings import find_points
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
-from lightpen.simulator.board_views import simulate_board_poses
-from lightpen.simulator.boards import expose_board, render_board
 from lightpen.simulator.sensor import Sensor
 from lightpen.simulator.swings import (
     paper_camera,
@@ -46,7 +45,7 @@ NORMAL_95 = 1.959964
 COVERED = (93.0, 97.0)  # per cent
 CHANCE = 0.99  # of a coverage of 95 % in so many trials; a row has three
 # What is drawn here; what seat and drift may do is in U, too, and does not happen.
-DRAWN = (ShareName.NOISE, ShareName.CAMERA)
+DRAWN = (ContributionName.NOISE, ContributionName.CAMERA)
 STREAM = 23  # of the seeds
 SMALL_BOARD = "chessboard:8x6:20"
 SMALL = Camera(

@@ -13,8 +13,8 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.observations import observe_centers
 from lightpen.detection.pose import fit_poses
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.joint import ContactModel, reduce
-from lightpen.estimation.uncertainty import ShareName
+from lightpen.estimation.contact.joint import ContactModel, reduce
+from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -123,7 +123,9 @@ def _calibration(seed: int) -> _Trials:
     centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
     seen = observe_centers(centers, camera, pen)
     calibration = calibrate(camera, pen, seen)
-    noise = next(s for s in calibration.budget.shares if s.name is ShareName.NOISE)
+    noise = next(
+        s for s in calibration.budget.shares if s.name is ContributionName.NOISE
+    )
     poses = fit_poses(camera, pen, pixels, seen.rotations, seen.translations)
 
     def error(tip_pen: FloatArray) -> FloatArray:

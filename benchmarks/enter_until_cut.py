@@ -21,21 +21,23 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.hostile_records import NAMES, NOON
 from benchmarks.write_until_killed import tell
+from msgspec import structs
 
 from lightpen.archive.chains import copy_entries, heads
-from lightpen.archive.entries import Event, Head, Kind, chained, text_sha256
+from lightpen.archive.entries import ChainHead, Event, Kind, chained, text_sha256
 from lightpen.archive.logbook import Logbook
-from lightpen.archive.queries import Wanted, newest
+from lightpen.archive.queries import EntryFilter, newest
 from lightpen.errors import LightpenError
-from lightpen.record.folder_archive import FolderArchive
-from lightpen.record.library_changes import Author, add_item, change_item
-from lightpen.record.results import Result
-from lightpen.record.tip_library import (
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.record.library.library_changes import Author, add_item, change_item
+from lightpen.record.library.tip_library import (
     ItemKind,
     ListedCone,
     library_files,
     read_library,
 )
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.results.results import Result
 
 CONE = ListedCone(id="C-1")
 BY = Author("Bench", "Ann")
@@ -49,9 +51,9 @@ def accept(data: Path, logbook: Logbook, rng: random.Random) -> None:
     results = FolderArchive(data)
     before = results.in_force(NAMES.pen, NAMES.tip)
     assert isinstance(before, Result)
-    filled = {"filler": "x" * rng.randrange(LONGEST_RECORD)}
+    filler = StoredMessage("filler", "x" * rng.randrange(LONGEST_RECORD), {})
     at = before.accepted + timedelta(seconds=1)
-    calibration = {**before.calibration, **filled}
+    calibration = structs.replace(before.calibration, warnings=(filler,))
     results.store(replace(before, accepted=at, calibration=calibration))
     tell("file", results.place_of(results.all_files()[-1]))
     logbook.enter_owed()
@@ -69,7 +71,7 @@ def change_library(data: Path, logbook: Logbook, rng: random.Random) -> None:
 
 def note(data: Path, logbook: Logbook, rng: random.Random) -> None:
     """Have something to say of an entry."""
-    found = newest(logbook.database, Wanted(kinds=(Kind.ACCEPTED,)), 1)
+    found = newest(logbook.database, EntryFilter(kinds=(Kind.ACCEPTED,)), 1)
     for each in found:
         logbook.enter_note(each, "word " * rng.randrange(1000), "Ann")
 
@@ -77,7 +79,7 @@ def note(data: Path, logbook: Logbook, rng: random.Random) -> None:
 def take_up(data: Path, logbook: Logbook, rng: random.Random) -> None:
     """Copy what was entered at another station."""
     known = {head.chain: head for head in heads(logbook.database)}
-    head = known.get(FOREIGN, Head(FOREIGN))
+    head = known.get(FOREIGN, ChainHead(FOREIGN))
     record = f'{{"filler": "{"y" * rng.randrange(LONGEST_RECORD)}"}}'
     event = Event(
         kind=Kind.ACCEPTED,
@@ -100,12 +102,12 @@ def write_until_cut(data: Path) -> None:
     rng = random.Random(os.getpid())
     tell("begun")
     while True:
-        with telling_troubles():
+        with telling_faults():
             logbook = Logbook(data)
             try:
                 logbook.enter_owed()
                 for write in rng.sample(WRITES, len(WRITES)):
-                    with telling_troubles():
+                    with telling_faults():
                         write(data, logbook, rng)
                         for head in heads(logbook.database):
                             tell("entry", head.sha256)
@@ -115,7 +117,7 @@ def write_until_cut(data: Path) -> None:
 
 
 @contextmanager
-def telling_troubles() -> Iterator[None]:
+def telling_faults() -> Iterator[None]:
     """Go on after what the program says of a write that failed."""
     try:
         yield

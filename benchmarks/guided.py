@@ -17,7 +17,7 @@ from benchmarks.workers import Workers
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import SkippingClock
-from lightpen.detection.sighting import Sighting, sight_centers
+from lightpen.detection.pen_detection import PenDetection, detect_from_centers
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import Posture, angles_between, rotations_of
 from lightpen.simulator.hand import Operator
@@ -30,12 +30,7 @@ from lightpen.simulator.swings import (
     swing_poses,
 )
 from lightpen.swing.rules import advance_swing
-from lightpen.swing.state import (
-    Phase,
-    SwingSetup,
-    SwingState,
-    start_swing,
-)
+from lightpen.swing.state import Phase, SwingSetup, SwingState, start_swing
 
 SEEDS = tuple(range(20))
 N_ROUND = 8  # of these for the hand that goes round
@@ -120,9 +115,9 @@ def _swing(seed: int, kind: str) -> GuidedSwing:
     while state.phase is not Phase.SOLVING and clock.now_ns() < LONGEST * 1e9:
         clock.wait(PERIOD)
         now = clock.now_ns() * 1e-9
-        sighting = _sight(setup, operator, now, rng)
+        detection = _sight(setup, operator, now, rng)
         start = time.thread_time()
-        state = advance_swing(setup, state, sighting, now).state
+        state = advance_swing(setup, state, detection, now).state
         slowest = max(slowest, time.thread_time() - start)
         if state.phase is not Phase.CAPTURING:
             continue
@@ -130,7 +125,7 @@ def _swing(seed: int, kind: str) -> GuidedSwing:
         if kind == "operator":
             operator.swing()
             continue
-        wish = state.target if kind == "guided" else anywhere.aim(sighting, now)
+        wish = state.target if kind == "guided" else anywhere.aim(detection, now)
         if wish is not None and wish is not aim:
             operator.lean_towards(wish.tilt, wish.direction, wish.turn)
             aim = wish
@@ -155,7 +150,7 @@ class _Wandering:
         )
         self._aim, self._since = next(self._left), 0.0
 
-    def aim(self, sighting: Sighting, now: float) -> Posture:
+    def aim(self, detection: PenDetection, now: float) -> Posture:
         """Return where to lean the pen."""
         there = rotations_of(
             self._pen,
@@ -163,7 +158,7 @@ class _Wandering:
             np.array([self._aim.direction]),
             np.array([self._aim.turn]),
         )
-        near = angles_between(there, sighting.rotation[None])[0, 0] < REACHED
+        near = angles_between(there, detection.rotation[None])[0, 0] < REACHED
         if near or now - self._since > PATIENCE:
             self._aim, self._since = next(self._left), now
         return self._aim
@@ -171,13 +166,13 @@ class _Wandering:
 
 def _sight(
     setup: SwingSetup, operator: Operator, now: float, rng: np.random.Generator
-) -> Sighting:
+) -> PenDetection:
     """Return what the camera sees of the pen in the operator's hand."""
     held = operator.held(np.array([now]))
     R = held.postures.rotations
     t = PAPER_CONE + held.offsets - R @ PAPER_TIP
     pixels = simulate_centers(setup.camera, setup.pen, R, t, SIGMA, rng)
-    return sight_centers(setup.camera, setup.pen, pixels[0], R[0], t[0])
+    return detect_from_centers(setup.camera, setup.pen, pixels[0], R[0], t[0])
 
 
 def _errors(state: SwingState) -> FloatArray:

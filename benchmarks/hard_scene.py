@@ -11,9 +11,7 @@ from benchmarks.tips import UM
 from benchmarks.workers import Workers
 
 from lightpen.arrays import BoolArray, Image
-from lightpen.detection.observations import (
-    observe_images,
-)
+from lightpen.detection.observations import observe_images
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.formats.images import ImageSource

@@ -111,9 +111,12 @@ def _camera_samples(folder: Path) -> Iterator[Sample]:
     root = rng.normal(size=(9, 9))
     camera = replace(paper_camera(), covariance=root @ root.T)
     path = folder / "camera.yaml"
-    for layout in ("opencv", "ros"):
-        write_camera(camera, path, layout)
-        yield Sample(f"{layout}.yaml", path.read_bytes(), read_camera)
+    write_camera(camera, path)
+    opencv = path.read_bytes()
+    yield Sample("opencv.yaml", opencv, read_camera)
+    ros = opencv.replace(b"%YAML:1.0\n---\n", b"distortion_model: plumb_bob\n")
+    ros = ros.replace(b" !!opencv-matrix", b"").replace(b"   dt: d\n", b"")
+    yield Sample("ros.yaml", ros, read_camera)
     matrix, distortion = camera.matrix, camera.distortion
     storage = cv2.FileStorage(".xml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     storage.write("image_width", camera.width)
@@ -227,26 +230,26 @@ def hostile_file_rows() -> list[Row]:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:  # it may have crashed, too
         return [Row(f"{N_FILES} spoiled files", done.stdout[-200:], "read", met=False)]
-    tally = json.loads(done.stdout.splitlines()[-1])
-    n_right = tally["read"] + tally["refused"]
+    counters = json.loads(done.stdout.splitlines()[-1])
+    n_right = counters["read"] + counters["refused"]
     return [
         Row(
-            "spoiled files of every kind that are read, or refused in words",
+            "spoiled files of every kind that are images loaded, or refused in words",
             f"{n_right} of {N_FILES}",
             "all",
             met=n_right == N_FILES,
         ),
         Row(
             "- the longest",
-            f"{tally['seconds']:.2f} s",
+            f"{counters['seconds']:.2f} s",
             f"{MOST_SECONDS:.0f} s",
-            met=tally["seconds"] <= MOST_SECONDS,
+            met=counters["seconds"] <= MOST_SECONDS,
         ),
         Row(
             "- memory at most",
-            f"{tally['memory']:.0f} MB",
+            f"{counters['memory']:.0f} MB",
             f"{MOST_MEMORY:.0f} MB",
-            met=tally["memory"] <= MOST_MEMORY,
+            met=counters["memory"] <= MOST_MEMORY,
         ),
     ]
 

@@ -30,11 +30,11 @@ from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
 from lightpen.formats.files import write_whole
-from lightpen.record.folder_archive import RECORDS, FolderArchive
-from lightpen.record.leftovers import OLDEST, sweep_leftovers
-from lightpen.record.reading import Record, open_record
-from lightpen.record.recorded_source import source
-from lightpen.record.unfinished import find_unfinished
+from lightpen.record.folder.data_folder import OLDEST, sweep_leftovers
+from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen.record.swings.interrupted import find_unfinished
+from lightpen.record.swings.reading import Record, open_record
+from lightpen.record.swings.recorded_source import source
 from lightpen_app.work.settings_store import load
 
 SEED = 5

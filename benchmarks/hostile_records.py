@@ -23,21 +23,21 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.json_mutations import flipped, mutated
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
+from benchmarks.small_records import small_record
 
 from lightpen.errors import LightpenError
-from lightpen.estimation.verdict import Grade
-from lightpen.live.sources import Surroundings, sample_files
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.live.sources import SourceEnvironment, sample_files
 from lightpen.model.origin import Origin
-from lightpen.record.archive import Archive
-from lightpen.record.folder_archive import RECORDS, FolderArchive
-from lightpen.record.header import HEADER
-from lightpen.record.journal import JOURNAL
-from lightpen.record.names import Names
-from lightpen.record.reading import OPENER, open_record, record_files
-from lightpen.record.recorded_source import source
-from lightpen.record.results import Result
-from lightpen.record.unfinished import find_unfinished
-from lightpen.record.writing import RecordWriter
+from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.header import HEADER
+from lightpen.record.swings.interrupted import find_unfinished
+from lightpen.record.swings.journal import JOURNAL
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import OPENER, open_record, record_files
+from lightpen.record.swings.recorded_source import source
+from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import (
     paper_camera,
@@ -47,7 +47,8 @@ from lightpen.simulator.swings import (
 )
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
-from lightpen_app.work.settings import Settings, Station
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import Station
 
 SEED = 11
 N_FLIPS, N_MUTATIONS = 2000, 5000
@@ -67,14 +68,14 @@ class Data:
     settings: Path
 
     @property
-    def archive(self) -> Archive:
+    def archive(self) -> FolderArchive:
         """Of the results."""
         return FolderArchive(self.folder)
 
 
 def make_data(folder: Path) -> Data:
     """Make a data folder to be damaged."""
-    around = Surroundings(Scene(camera=paper_camera(binning=4)))
+    around = SourceEnvironment(Scene(camera=paper_camera(binning=4)))
     files = sample_files(around, folder / "samples")
     preparation = Preparation(
         names=NAMES, camera_file=files.camera_file, pen_file=files.pen_file
@@ -87,13 +88,13 @@ def make_data(folder: Path) -> Data:
     with RecordWriter.create(swing, preparation.header()) as writer:
         for i in range(N_IMAGES):
             writer.append(IMAGE, pixels[i], R[i], t[i], i / 20)
-        writer.set_taken_out({2: "taken out"})
+        writer.set_taken_out({2: "excluded"})
     archive = FolderArchive(folder)
     for x in (1.0, 2.0):
         archive.store(_result(x, swing))
     _, newest = sorted(archive.folder.iterdir())
     settings = Settings(folder / "lightpen.json")
-    settings.set_station("Hall 3", Station(operator="Ann", pen="LP-04"))
+    settings.set_station("Hall 3", Station(Names(operator="Ann", pen="LP-04")))
     settings.set_last_station("Hall 3")
     settings.await_saved(60.0)
     return Data(folder, swing, newest, settings.file)
@@ -183,13 +184,15 @@ def _result(x: float, swing: Path) -> Result:
         record=swing,
         images=tuple(range(1, N_IMAGES + 1)),
         origin=Origin.LIVE,
-        calibration={
-            "tip_pen_mm": [x / 3, -90.0 / 7, -25.0 / 3],
-            "expanded_uncertainty_mm": [0.001, 0.004 / 3, 0.005 / 3],
-            "cone_cam_mm": [x, 200.0, 1000.0],
-            "covariance": (np.eye(6) / 3e6).tolist(),
-            "warnings": [],
-        },
+        calibration=small_record(
+            {
+                "tip_pen_mm": [x / 3, -90.0 / 7, -25.0 / 3],
+                "expanded_uncertainty_mm": [0.001, 0.004 / 3, 0.005 / 3],
+                "cone_cam_mm": [x, 200.0, 1000.0],
+                "covariance": (np.eye(6) / 3e6).tolist(),
+                "warnings": [],
+            }
+        ),
     )
 
 

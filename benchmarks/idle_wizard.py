@@ -20,10 +20,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the program does
 
 from PySide6.QtCore import QEventLoop, QTimer
 
-from lightpen.record.names import Names
+from lightpen.record.swings.names import Names
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.wizard_pages import make_pages
-from lightpen_app.work.settings import Settings, Station
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import Station
 
 NAMES = Names("Bench", "Ann", "SIM-1", "T-1", "C-1", 10.0)
 PAGES = ("start", "camera", "leds", "swing")
@@ -39,12 +40,16 @@ def main() -> int:
     application = make_application(sys.argv[:1])
     with tempfile.TemporaryDirectory() as folder:
         settings = Settings(Path(folder) / "lightpen.json")
-        settings.set_station(NAMES.station, Station("Ann", "SIM-1", "T-1", "C-1"))
+        settings.set_station(
+            NAMES.station, Station(Names("", "Ann", "SIM-1", "T-1", "C-1"))
+        )
         settings.set_last_station(NAMES.station)
         wizard = Wizard(application, make_pages, settings, Path(folder))
         wizard.window.show()
         wizard.workbench.start()
-        _until(lambda: not wizard.workbench.preparation.camera_lacks())
+        _until(
+            lambda: not wizard.workbench.selection.preparation.camera_missing_inputs()
+        )
         shares = {name: _share_of(wizard, name, seconds) for name in PAGES}
         _put_in_force(wizard)
         shares |= {name: _share_of(wizard, name, seconds) for name in LATER_PAGES}

@@ -24,9 +24,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
-from lightpen.record.reading import Record, open_record
-from lightpen.record.solving import solve_record
-from lightpen.record.unfinished import find_unfinished
+from lightpen.record.swings.interrupted import find_unfinished
+from lightpen.record.swings.reading import Record, open_record
+from lightpen.record.swings.solving import solve_record
 from lightpen.simulator.swings import PAPER_TIP
 
 N_KILLS = 20
@@ -65,11 +65,11 @@ def killed_rows() -> list[Row]:
     if sys.platform == "win32":
         return [Row(f"{what}images that survived", "needs SIGKILL")]
     with tempfile.TemporaryDirectory(prefix="lightpen-killed-") as folder:
-        tally = _killed_again_and_again(Path(folder))
+        counters = _killed_again_and_again(Path(folder))
         (record,) = find_unfinished(Path(folder) / "records").interrupted
-        n_left = len(tally.acknowledged & _on_disk(record))
+        n_left = len(counters.acknowledged & _on_disk(record))
         calibration = solve_record(record).calibration
-    n_kept = len(tally.acknowledged)
+    n_kept = len(counters.acknowledged)
     n_resumptions = N_KILLS - 1
     error = np.linalg.norm(calibration.joint.tip_pen - PAPER_TIP) * MICROMETRES
     return [
@@ -81,15 +81,15 @@ def killed_rows() -> list[Row]:
         ),
         Row(
             "- kills after which the record opened and was offered",
-            f"{tally.n_opened} of {N_KILLS}",
+            f"{counters.n_opened} of {N_KILLS}",
             "all",
-            met=tally.n_opened == N_KILLS,
+            met=counters.n_opened == N_KILLS,
         ),
         Row(
             "- resumed with all images on the disk",
-            f"{tally.n_resumed} of {n_resumptions}",
+            f"{counters.n_resumed} of {n_resumptions}",
             "all",
-            met=tally.n_resumed == n_resumptions,
+            met=counters.n_resumed == n_resumptions,
         ),
         Row(
             "- tip of that swing, distance from the true one",
@@ -100,15 +100,15 @@ def killed_rows() -> list[Row]:
 
 def _killed_again_and_again(folder: Path) -> Losses:
     rng = np.random.default_rng(SEED)
-    tally = Losses()
+    counters = Losses()
     for n_images in rng.integers(1, MOST_IMAGES + 1, N_KILLS).tolist():
         before = find_unfinished(folder / "records").interrupted
         kept, resumed = _killed_once(folder, n_images, rng.uniform(0, SOON))
-        tally.acknowledged |= kept
+        counters.acknowledged |= kept
         found = find_unfinished(folder / "records").interrupted
-        tally.n_opened += len(found) == 1 and kept <= _on_disk(found[0])
-        tally.n_resumed += bool(before) and resumed == len(before[0].images)
-    return tally
+        counters.n_opened += len(found) == 1 and kept <= _on_disk(found[0])
+        counters.n_resumed += bool(before) and resumed == len(before[0].images)
+    return counters
 
 
 def _killed_once(

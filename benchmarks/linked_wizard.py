@@ -26,12 +26,16 @@ from PySide6.QtCore import QEventLoop, QTimer
 
 from lightpen.cameras.protocol import CameraSettings, Region
 from lightpen.cameras.worker_events import Connection
+from lightpen.model.limits import SwingLimits
+from lightpen.record.swings.names import Names
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
+from lightpen.swing.preparation import SourceChoice
 from lightpen.swing.state import Phase
 from lightpen_app.application import Wizard, ended, make_application
 from lightpen_app.wizard_pages import make_pages
-from lightpen_app.work.settings import Settings, Station
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import FilePaths, Station, StoredCamera
 
 CAMERA = Path(__file__).with_name("linked_camera.py")
 ADDRESS, SERIAL = "127.0.0.1", "LP01"
@@ -53,7 +57,7 @@ def main() -> int:
         )
         wizard.window.show()
         wizard.workbench.start()
-        _until(lambda: not wizard.workbench.preparation.lacks())
+        _until(lambda: not wizard.workbench.selection.preparation.missing_inputs())
         while wizard.window.page().key != "swing":
             wizard.window.press_main()
             _run(0.1)
@@ -112,13 +116,13 @@ def _settings(folder: Path, scene: Scene) -> Settings:
         ),
     )
     station = Station(
-        *("Ann", "LP-04", "T-1", "C-1", 10.0),
-        source="aravis",
-        source_place=ADDRESS,
-        camera_file=str(shutil.copy(files.camera, measured)),
-        pen_file=str(shutil.copy(files.pen, measured)),
-        min_images=N_IMAGES,
-        max_images=N_IMAGES,
+        Names("", "Ann", "LP-04", "T-1", "C-1", 10.0),
+        camera=StoredCamera(SourceChoice("aravis", ADDRESS)),
+        files=FilePaths(
+            str(shutil.copy(files.camera, measured)),
+            str(shutil.copy(files.pen, measured)),
+        ),
+        limits=SwingLimits(min_images=N_IMAGES, max_images=N_IMAGES),
     )
     settings.set_station("Bench", station)
     settings.set_last_station("Bench")

@@ -1,6 +1,6 @@
 """Print every figure of speed and accuracy beside its limit and what others reach.
 
-Usage: python benchmarks/run.py [--update-readme] [SECTION ...]
+Usage: python benchmarks/run.py [--update-docs] [SECTION ...]
 
 Figures on the image sets need LIGHTPEN_DATA. Nothing else should run meanwhile: the
 sections `files`, `hostile`, `archive` and `soak` take from ten minutes to an hour, all
@@ -27,7 +27,7 @@ from benchmarks.image_sets import data_folder
 from benchmarks.killed import killed_rows
 from benchmarks.labelling import labelling_rows
 from benchmarks.machine import description
-from benchmarks.readme import with_section
+from benchmarks.published import with_section
 from benchmarks.rows import NEEDS_DATA, Row, table
 from benchmarks.speed import speed_rows
 from benchmarks.tips import repeat_rows, tip_rows
@@ -38,7 +38,7 @@ from benchmarks.wizard import idle_rows, link_rows, soak_rows, start_rows
 from benchmarks.workers import Workers, one_core_workers
 from benchmarks.wrong_files import wrong_file_rows
 
-README = Path(__file__).resolve().parents[1] / "README.md"
+FIGURES = Path(__file__).resolve().parents[1] / "docs" / "benchmark.md"
 
 Section = Callable[[Workers, Path | None], list[Row]]
 
@@ -76,15 +76,19 @@ def main() -> int:
         "sections", nargs="*", metavar="SECTION", help=f"of {', '.join(SECTIONS)}; all"
     )
     parser.add_argument(
-        "--update-readme", action="store_true", help="put these sections into README.md"
+        "--update-docs",
+        action="store_true",
+        help="put these sections into docs/benchmark.md",
     )
     options = parser.parse_args()
     unknown = set(options.sections) - set(SECTIONS)
     if unknown:
         parser.error(f"unknown: {', '.join(sorted(unknown))}")
     data = data_folder()
-    if options.update_readme and data is None:
-        parser.error("README.md takes whole sections only, which need LIGHTPEN_DATA.")
+    if options.update_docs and data is None:
+        parser.error(
+            "docs/benchmark.md takes whole sections only, which need LIGHTPEN_DATA."
+        )
     if data is not None and not (data / "swing-full").is_dir():
         parser.error(f"LIGHTPEN_DATA names {data}, which holds no folder swing-full.")
     rows: list[Row] = []
@@ -96,10 +100,10 @@ def main() -> int:
             text = f"{description()}\n\n{table(of_section)}"
             print(f"{name}\n\n{text}\n", flush=True)
             _say(f"{name}: {time.perf_counter() - start:.0f} s")
-            if options.update_readme:
-                content = README.read_text(encoding="utf-8")
+            if options.update_docs:
+                content = FIGURES.read_text(encoding="utf-8")
                 renewed = with_section(content, name, text, list(SECTIONS))
-                README.write_text(renewed, encoding="utf-8")
+                FIGURES.write_text(renewed, encoding="utf-8")
     missed = [row for row in rows if not row.met]
     n_without_data = sum(row.measured == NEEDS_DATA for row in rows)
     _say(

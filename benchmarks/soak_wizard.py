@@ -28,10 +28,8 @@ from typing_extensions import override
 
 from lightpen.formats.decoding import keep_freed_memory
 from lightpen.model.limits import SwingLimits
-from lightpen.record.names import Names
-from lightpen.swing.state import (
-    Phase,
-)
+from lightpen.record.swings.names import Names
+from lightpen.swing.state import Phase
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Preferences, Settings
@@ -133,7 +131,7 @@ class Soak(QObject):
         if run.status.state is not None and run.status.state.phase is Phase.VERDICT:
             self._n_swings += 1
             run.runner.set_aside()
-            run.runner.begin(self._wizard.workbench.preparation)
+            run.runner.begin(self._wizard.workbench.selection.preparation)
 
 
 def _memory_mb() -> float:
@@ -154,8 +152,8 @@ def main() -> int:
         wizard.window.show()
         wizard.workbench.start()
         workbench = wizard.workbench
-        workbench.set_preparation(
-            replace(workbench.preparation, names=NAMES, limits=LIMITS)
+        workbench.selection.set_preparation(
+            replace(workbench.selection.preparation, names=NAMES, limits=LIMITS)
         )
         soak = Soak(wizard, float(sys.argv[1]))
         QTimer.singleShot(0, soak.start)

@@ -18,21 +18,26 @@ from benchmarks.peers import (
 )
 from benchmarks.rows import Row
 from benchmarks.workers import Workers, elapsed_ms, median_ms
+from tests.simulated_plans import live_plan
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.labelling.labels import Labels, label_spots, track_spots
 from lightpen.detection.observations import observe_centers
+from lightpen.detection.pen_detection import (
+    PenDetection,
+    detect_from_centers,
+    detect_pen,
+)
 from lightpen.detection.pose import fit_paper_poses, fit_poses
-from lightpen.detection.sighting import Sighting, look, sight_centers
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.joint import fit_joint
-from lightpen.estimation.pivot import fit_pivot
-from lightpen.estimation.two_stage import fit_two_stage
+from lightpen.estimation.contact.joint import fit_joint
+from lightpen.estimation.pivot.pivot import fit_pivot
+from lightpen.estimation.pivot.two_stage import fit_two_stage
 from lightpen.formats.observation_files import Centers
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.rig import rig_of
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.image_plans import ImagePlan, live_plan, render_plan
+from lightpen.simulator.image_plans import ImagePlan, render_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import leds_in_camera, simulate_centers, swing_poses
 from lightpen.swing.kept_images import keep, kept_before
@@ -141,13 +146,15 @@ def _image_times() -> _ImageTimes:
     images = [render_plan(SCENE, image_plan) for image_plan in image_plans]
     blobs, default_blobs = blob_detector(), blob_detector(DEFAULT_BLOB_STEP)
 
-    def start(i: int) -> Sighting:
-        return look(images[i], CAMERA, PEN)
+    def start(i: int) -> PenDetection:
+        return detect_pen(images[i], CAMERA, PEN)
 
-    sightings = [start(i) for i in range(N_IMAGES)]
+    detections = [start(i) for i in range(N_IMAGES)]
 
-    def track(i: int) -> Sighting:
-        return look(*(images[i], CAMERA, PEN, None, sightings[i - 1]), is_followed=True)
+    def track(i: int) -> PenDetection:
+        return detect_pen(
+            *(images[i], CAMERA, PEN, None, detections[i - 1]), is_followed=True
+        )
 
     def solve(detector: cv2.SimpleBlobDetector, i: int) -> None:
         found = blob_centers(detector, images[i])
@@ -213,7 +220,7 @@ def _fit_times() -> _FitTimes:
     rig, places = rig_of(CAMERA), poses.translations
     numbers = np.arange(N_FRAMES - 1)
     but_one = kept_before(rig, PEN, numbers, pixels[:-1, None], R[:-1], places[:-1])
-    one_more = sight_centers(CAMERA, PEN, pixels[-1], R[-1], places[-1])
+    one_more = detect_from_centers(CAMERA, PEN, pixels[-1], R[-1], places[-1])
 
     def two_stage() -> None:
         paper = fit_paper_poses(CAMERA, PEN, pixels, R, poses.translations)

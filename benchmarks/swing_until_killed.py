@@ -18,15 +18,10 @@ from PySide6.QtCore import QCoreApplication
 
 from lightpen.live.sources import sample_files
 from lightpen.model.limits import SwingLimits
-from lightpen.record.names import Names
-from lightpen.record.unfinished import (
-    find_unfinished,
-)
+from lightpen.record.swings.interrupted import find_unfinished
+from lightpen.record.swings.names import Names
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.state import (
-    Happening,
-    SwingEvent,
-)
+from lightpen.swing.state import SwingEvent, SwingEventKind
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 
@@ -42,21 +37,21 @@ def main() -> int:
     run = workbench.run
 
     def tell(event: SwingEvent) -> None:
-        if event.what is Happening.KEPT and run.status.record_folder is not None:
+        if event.what is SwingEventKind.KEPT and run.status.record_folder is not None:
             _say("kept", run.status.record_folder.name, *event.numbers)
 
     run.happened.connect(tell)
     files = sample_files(workbench.around, folder / "samples")
-    workbench.set_preparation(
+    workbench.selection.set_preparation(
         replace(
-            workbench.preparation,
+            workbench.selection.preparation,
             names=NAMES,
             limits=ENDLESS,
             camera_file=files.camera_file,
             pen_file=files.pen_file,
         )
     )
-    workbench.open_camera()
+    workbench.camera.open()
     operator = workbench.live.operator
     if operator is not None:
         operator.seat()
@@ -67,7 +62,7 @@ def main() -> int:
         run.runner.go_on(read_resumable(record.folder))
         _say("resumed", record.folder.name, len(record.images))
     else:
-        run.runner.begin(workbench.preparation)
+        run.runner.begin(workbench.selection.preparation)
     return application.exec()
 
 

@@ -26,7 +26,7 @@ from lightpen.detection.observations import (
 )
 from lightpen.detection.pose import Poses, fit_poses
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.pivot import PivotFit, fit_pivot
+from lightpen.estimation.pivot.pivot import PivotFit, fit_pivot
 from lightpen.formats.observation_files import read_centers
 
 TIP_LIMITS = {"swing-full": 3.5, "swing-clean": 4.0, "fixed-point": None}  # um

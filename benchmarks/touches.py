@@ -22,7 +22,11 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.verification.touch import StillFrames, TouchFrame, measure_touches
+from lightpen.verification.tasks.probed_point import (
+    ProbingFrame,
+    StillFrames,
+    measure_touches,
+)
 
 N_IMAGES, N_FRAMES = 60, 5
 SIGMA = 0.03  # px
@@ -52,7 +56,7 @@ def covered_share(n_calibrations: int, n_touches: int, seed: int) -> float:
             t = np.repeat(held.translations, N_FRAMES, axis=0)
             images = simulate_centers(camera, pen, R, t, SIGMA, rng)
             frames = tuple(
-                TouchFrame(str(i), each[None], R[i], t[i])
+                ProbingFrame(str(i), each[None], R[i], t[i])
                 for i, each in enumerate(images)
             )
             (touch,) = measure_touches(instrument, [StillFrames(frames)])

@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 from benchmarks.rows import Row, numbers, without_data
 from benchmarks.workers import Workers
+from tests.simulated_centers import correlated_noise
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.estimation.pivot import fit_pivot
+from lightpen.estimation.pivot.pivot import fit_pivot
 from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.formats.observation_files import PoseTable, read_poses
-from lightpen.simulator.swings import correlated_noise, swing_poses
+from lightpen.simulator.swings import swing_poses
 
 # scikit-surgerycalibration, algebraic one-step, in its tests
 PUBLISHED_TIP = np.array([-14.476, 395.143, -7.558])  # mm

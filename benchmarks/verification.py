@@ -11,19 +11,19 @@ from benchmarks.workers import Workers
 
 from lightpen.detection.observations import observe_images
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.instrument import Instrument
+from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.pen_files import read_pen
-from lightpen.model.limits import VerificationLimits
-from lightpen.verification.circle import measure_circle
-from lightpen.verification.fixed_point import measure_fixed_point
-from lightpen.verification.places import touch_place
-from lightpen.verification.sources import touch_run
-from lightpen.verification.touching import TouchRules
+from lightpen.verification.probing.image_locations import touch_place
+from lightpen.verification.probing.probing import ProbingRules
+from lightpen.verification.probing.sources import touch_run
+from lightpen.verification.tasks.circle import CircleOptions, measure_circle
+from lightpen.verification.tasks.fixed_point import measure_fixed_point
+from lightpen.verification.tasks.task import Conditions
 
 UM = 1000.0  # in a millimetre
-ONE_IMAGE = TouchRules(n_frames=1, n_settling=0)
+ONE_IMAGE = ProbingRules(n_frames=1, n_settling=0)
 NOMINAL_TIP = np.array([0.0, -90.0, -25.0])  # mm, the paper's
 POINT_LIMITS = np.array([2.0, 2.0, 10.0])  # um
 RADIUS, ERROR_LIMIT, SCATTER_LIMIT, N_RUNS = 31.751, 1.5, 1.0, 8  # mm, um
@@ -68,28 +68,20 @@ def _covered(n_calibrations: int, n_touches: int, seed: int) -> float:
 
 def _of_sets(data: Path) -> list[Row]:
     instrument = _instrument(data / "swing-full")
-    limits = VerificationLimits()
-
-    point = measure_fixed_point(
-        touch_run(
-            touch_place((str(data / "fixed-point" / "images"),)),
-            instrument,
-            ONE_IMAGE,
-        ).touches,
-        instrument,
-        limits,
-        NOMINAL_TIP,
-    )
+    conditions = Conditions(instrument, nominal_tip=NOMINAL_TIP)
+    place = touch_place((str(data / "fixed-point" / "images"),))
+    touched = touch_run(place, instrument, ONE_IMAGE)
+    point = measure_fixed_point([(touched.name, touched.touches)], conditions)
     runs = [
         touch_run(
-            touch_place((str(data / "circle" / f"run_{i:02d}"),)),
-            instrument,
-            ONE_IMAGE,
+            touch_place((str(data / "circle" / f"run_{i:02d}"),)), instrument, ONE_IMAGE
         )
         for i in range(1, N_RUNS + 1)
     ]
     circle = measure_circle(
-        [(run.name, run.touches) for run in runs], instrument, RADIUS, limits
+        [(run.name, run.touches) for run in runs],
+        conditions,
+        CircleOptions(radius=RADIUS),
     )
     deviation = UM * point.calibrated.deviation
     assert point.nominal is not None

@@ -7,17 +7,20 @@ import numpy as np
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.detection.observations import observe_centers
-from lightpen.detection.sighting import look
+from lightpen.detection.pen_detection import detect_pen
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.instrument import Instrument
+from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.observation_files import Centers
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers, swing_poses
-from lightpen.simulator.toucher import Artefacts, Toucher
-from lightpen.verification.choices import TaskKind, VerificationChoices
-from lightpen.verification.session import advance_session
-from lightpen.verification.session_state import SessionSetup, SessionState
+from lightpen.simulator.toucher import ProbingOperator
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.session.session import advance_session
+from lightpen.verification.session.session_state import SessionSetup, SessionState
+from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleOptions
+from lightpen.verification.tasks.fixed_point import FIXED_POINT
+from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
 
 N_IMAGES = 60  # of the swing that the tip is by
 SIGMA = 0.03  # px
@@ -43,11 +46,12 @@ class Verified:
 def verified(seed: int = 1) -> Verified:
     """Verify a tip by fixed point, ring and length; nothing but the hand is moved."""
     scene = Scene(seed=seed)
-    artefacts = Artefacts()
     choices = VerificationChoices(
-        (TaskKind.FIXED_POINT, TaskKind.CIRCLE, TaskKind.LENGTH),
-        radius=artefacts.ring_radius,
-        length=artefacts.length,
+        (FIXED_POINT.kind, CIRCLE.kind, LENGTH.kind),
+        (
+            CircleOptions(radius=SIMULATED_RADIUS),
+            LengthOptions(length=SIMULATED_LENGTH),
+        ),
     )
     instrument = _instrument(scene, np.random.default_rng(seed))
     setup = SessionSetup(instrument, choices, cone_cam=scene.cone_cam)
@@ -55,12 +59,14 @@ def verified(seed: int = 1) -> Verified:
     camera = SimulatedCamera(scene, clock)
     camera.open()
     camera.start()
-    toucher, state = Toucher(camera.operator, artefacts), SessionState()
+    probing_operator, state = (ProbingOperator(camera.operator), SessionState())
     first, before = 0, None
     while state.task(setup) is not None and clock.now_ns() < GIVE_UP * 1e9:
-        toucher.follow(setup, state)
+        probing_operator.follow(setup, state)
         frame = camera.read(1.0)
-        before = look(frame.image, instrument.camera, instrument.pen, None, before)
+        before = detect_pen(
+            frame.image, instrument.camera, instrument.pen, None, before
+        )
         transition = advance_session(setup, state, str(frame.seq), before)
         state = transition.state
         if transition.events and not first:

@@ -18,11 +18,21 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.hostile_records import IMAGE, NAMES
+from msgspec import structs
 
+from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.files import write_whole
-from lightpen.record.folder_archive import RECORDS, FolderArchive
-from lightpen.record.reading import open_record
-from lightpen.record.writing import RecordWriter, make_record_folder, note_taken_out
+from lightpen.formats.pen_files import PEN_FILE
+from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.header import FileCopy
+from lightpen.record.swings.reading import open_record
+from lightpen.record.swings.recorded_source import source
+from lightpen.record.swings.writing import (
+    RecordWriter,
+    make_record_folder,
+    note_taken_out,
+)
 from lightpen_app.work.settings_store import Content, load, save
 
 N_ROWS = 20_000  # of a JSON that takes a while to be written
@@ -37,9 +47,15 @@ def tell(*words: object) -> None:
 def swing(data: Path) -> None:
     """Begin swings, and keep three images of each."""
     model = open_record(data / RECORDS / "swing")
+    files = source(model)
+    header = structs.replace(
+        model.header,
+        camera_file=FileCopy.of(files.camera_files[0], CAMERA_FILE),
+        pen_file=FileCopy.of(files.pen_file, PEN_FILE),
+    )
     for _ in count():
         folder = make_record_folder(data / RECORDS, NAMES, datetime.now(UTC))
-        with RecordWriter.create(folder, model.header) as writer:
+        with RecordWriter.create(folder, header) as writer:
             for image in model.images[:3]:
                 number = writer.append(
                     IMAGE, image.pixels, image.rotation, image.translation, image.time
@@ -64,7 +80,7 @@ def take_out(data: Path) -> None:
     """Put back what is out, and take out others, in one edit."""
     for n in count():
         out = EDITS[n % 2]
-        note_taken_out(data / RECORDS / "swing", dict.fromkeys(out, "taken out"))
+        note_taken_out(data / RECORDS / "swing", dict.fromkeys(out, "excluded"))
         tell(n)
 
 
@@ -75,26 +91,29 @@ def accept(data: Path) -> None:
     assert before is not None
     start = int(before.tip_pen[0])
     for n in count(start + 1):
-        tip = {"tip_pen_mm": [float(n), float(n), 0.0]}
-        archive.store(replace(before, calibration={**before.calibration, **tip}))
+        archive.store(_with_tip(before, float(n)))
         tell(n)
 
 
-def take_back(data: Path) -> None:
+def _with_tip(result: Result, x: float) -> Result:
+    moved = structs.replace(result.calibration, tip_pen_mm=(x, x, 0.0))
+    return replace(result, calibration=moved)
+
+
+def revoke(data: Path) -> None:
     """Put a tip in force beside one that stays, and take it back, again and again."""
     archive = FolderArchive(data)
     before = archive.in_force(NAMES.pen, NAMES.tip)
     assert before is not None
     if before.tip_pen[0] < 0:  # killed before it was taken back
-        archive.take_back(before, "Ann", before.accepted)
+        archive.revoke(before, "Ann", before.accepted)
         before = archive.in_force(NAMES.pen, NAMES.tip)
         assert before is not None
     for n in count(1):
-        tip = {"tip_pen_mm": [-float(n), -float(n), 0.0]}
-        result = replace(before, calibration={**before.calibration, **tip})
+        result = _with_tip(before, -float(n))
         archive.store(result)
         tell(-n)
-        archive.take_back(result, "Ann", before.accepted)
+        archive.revoke(result, "Ann", before.accepted)
         tell(0)
 
 
@@ -121,7 +140,7 @@ KINDS: dict[str, Callable[[Path], None]] = {
     "resume": resume,
     "take out": take_out,
     "accept": accept,
-    "take back": take_back,
+    "take back": revoke,
     "settings": settings,
     "json": write_json,
 }

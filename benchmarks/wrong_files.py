@@ -8,18 +8,19 @@ from pathlib import Path
 import numpy as np
 from benchmarks.rows import Row, numbers
 from benchmarks.workers import Workers
+from tests.simulated_centers import simulate_rig_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.detection.pose import fit_poses
+from lightpen.estimation.bundle.priors import priors_of
+from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, lean_modes
+from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import calibrate, calibrate_rig
-from lightpen.estimation.joint import ContactModel, fit_contact, fit_joint
-from lightpen.estimation.pivot import fit_pivot
-from lightpen.estimation.priors import priors_of
-from lightpen.estimation.seat_forms import FORMS, lean_forms
-from lightpen.estimation.uncertainty import POSTURES, once_round
-from lightpen.estimation.unknowns import led_basis
-from lightpen.estimation.verdict import Grade, judge
+from lightpen.estimation.contact.joint import ContactModel, fit_contact, fit_joint
+from lightpen.estimation.pivot.pivot import fit_pivot
+from lightpen.estimation.reports.verdict import Grade, judge
+from lightpen.estimation.uncertainty.budget import POSTURES, one_wave_variance
 from lightpen.formats.observation_files import Centers
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
@@ -28,14 +29,13 @@ from lightpen.model.pen import Pen
 from lightpen.model.posture import directions_of
 from lightpen.model.rig import Rig, from_first, rig_of
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.sample_rigs import row_of_cameras
+from lightpen.simulator.samples import row_of_cameras
 from lightpen.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,
     seen_from,
     simulate_centers,
-    simulate_rig_centers,
     swing_poses,
 )
 
@@ -276,9 +276,11 @@ def _moves_of_seat(trial: Flaws, swing: Swing, rng: np.random.Generator) -> Floa
     out = trial.out_of_round * np.cos(2 * (directions - rng.uniform(0, 2 * np.pi)))
     zero = np.zeros_like(out)
     one_way = np.stack([out * np.cos(directions), zero, out * np.sin(directions)], 1)
-    forms = lean_forms(swing.rotations)
+    forms = lean_modes(swing.rotations)
     by_form = USUAL.form_error * rng.standard_normal((forms.shape[1], 3))
-    by_form[: FORMS[0]] @= np.linalg.cholesky(once_round(swing.rotations)).T
+    by_form[: MODE_COUNTS[0]] @= np.linalg.cholesky(
+        one_wave_variance(swing.rotations)
+    ).T
     return jitter + one_way + forms @ by_form
 
 
@@ -331,7 +333,5 @@ def _drawn_pen(trial: Flaws, pen: Pen, rng: np.random.Generator) -> Pen:
     moves += scale * (pen.leds - center).ravel()
     width = rng.normal(0, np.sqrt(priors.diameter.covariance[0, 0]))
     return replace(
-        stated,
-        leds=pen.leds + moves.reshape(-1, 3),
-        diameter=pen.diameter + width,
+        stated, leds=pen.leds + moves.reshape(-1, 3), diameter=pen.diameter + width
     )

@@ -22,7 +22,11 @@ from typing import NoReturn, TypeVar
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
+sys.path.append(str(Path(__file__).parents[1]))
+
 import numpy as np
+from benchmarks.small_records import small_record
+from msgspec import structs
 from PySide6.QtCore import QDeadlineTimer, QEvent, QSize, QThreadPool, QTimer
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
@@ -32,40 +36,41 @@ from lightpen.archive.chains import append
 from lightpen.archive.entries import Event, Kind
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, sealed
-from lightpen.detection.sighting import look, sight_centers
-from lightpen.live.looking import LiveImage
-from lightpen.live.sources import Surroundings, sample_files
+from lightpen.detection.pen_detection import detect_from_centers, detect_pen
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.live.pipeline import LiveImage
+from lightpen.live.sources import SourceEnvironment, sample_files
+from lightpen.messages import message
 from lightpen.model.origin import Origin
-from lightpen.record.folder_archive import RECORDS, SIMULATED, FolderArchive
-from lightpen.record.names import Names
-from lightpen.record.results import Result
-from lightpen.record.writing import RecordWriter
-from lightpen.sentences import sentence
+from lightpen.record.results.result_folder import RECORDS, SIMULATED, FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.follower import Follower
+from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.motion import lean_vectors, postures_of
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers
-from lightpen.simulator.toucher import Artefacts
-from lightpen.swing.preparation import (
-    Preparation,
-)
+from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.rules import advance_swing
 from lightpen.swing.state import SwingSetup, SwingState, start_swing
-from lightpen.verification.choices import TaskKind, VerificationChoices
-from lightpen.verification.session import advance_session
-from lightpen.verification.session_state import SessionSetup, SessionState
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.session.session import advance_session
+from lightpen.verification.session.session_state import SessionSetup, SessionState
+from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleOptions
+from lightpen.verification.tasks.fixed_point import FIXED_POINT
+from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
 from lightpen_app.application import Wizard, make_application
-from lightpen_app.look.languages import Language
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.theme import GRID, Appearance
 from lightpen_app.steps.history.history_table import HistoryTable
 from lightpen_app.wizard_pages import make_pages
-from lightpen_app.work.live_view import Shown
+from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.settings import Preferences, Settings
+from lightpen_resources import languages
 
 Seen = TypeVar("Seen")
 
@@ -80,11 +85,9 @@ PERIOD = 0.05  # s
 N_KEPT = 60  # when the swing is drawn
 N_RECORDED = 60  # images that are reviewed
 N_SHOWN = 40  # live images that a page is shown
-ARTEFACTS = Artefacts()
 CHOICES = VerificationChoices(
-    (TaskKind.FIXED_POINT, TaskKind.CIRCLE, TaskKind.LENGTH),
-    radius=ARTEFACTS.ring_radius,
-    length=ARTEFACTS.length,
+    (FIXED_POINT.kind, CIRCLE.kind, LENGTH.kind),
+    (CircleOptions(radius=SIMULATED_RADIUS), LengthOptions(length=SIMULATED_LENGTH)),
 )
 N_ON_RING = 7  # touches when the verification is drawn
 N_HELD = 10  # images through which the pen is held still
@@ -99,7 +102,7 @@ PATIENCE_MS = 120_000  # of all that is waited for, on a machine that does other
 class Look:
     """How the wizard is drawn."""
 
-    language: Language
+    language: str
     appearance: Appearance
     size: QSize
 
@@ -119,7 +122,7 @@ def looks_of(step: str) -> tuple[Look, ...]:
     return tuple(
         Look(language, appearance, size)
         for appearance in appearances[:: 1 if STEPS.index(step) % 2 else -1]
-        for language in Language
+        for language in languages()
         for size in SIZES
     )
 
@@ -135,7 +138,7 @@ class StillCamera(SimulatedCamera):
     @override
     def read(self, timeout_s: float) -> NoReturn:
         threading.Event().wait(timeout_s / 20)
-        raise FrameTimeout(sentence("screens.no-image", "No image was asked for."))
+        raise FrameTimeout(message("file.image"))
 
 
 class Stage:
@@ -145,18 +148,18 @@ class Stage:
         self._application = application
         application.setCursorFlashTime(0)  # a cursor that blinks is not the same twice
         self._scene = Scene(n_images=N_SHOWN)
-        self._looked_at: dict[int, Shown] = {}
+        self._looked_at: dict[int, DisplayedImage] = {}
         self._image_plans = plan_scene(self._scene).image_plans
         settings = Settings(DATA / "lightpen.json")
         settings.set_preferences(Preferences())
         FolderArchive(DATA).store(_earlier_result())
-        around = Surroundings(self._scene, SkippingClock(), lambda: NOW)
+        around = SourceEnvironment(self._scene, SkippingClock(), lambda: NOW)
         self.wizard = Wizard(application, make_pages, settings, DATA, around)
         workbench = self._workbench = self.wizard.workbench
         files = sample_files(around, DATA / SIMULATED)
-        workbench.set_preparation(
+        workbench.selection.set_preparation(
             replace(
-                workbench.preparation,
+                workbench.selection.preparation,
                 names=NAMES,
                 camera_file=files.camera_file,
                 pen_file=files.pen_file,
@@ -178,17 +181,17 @@ class Stage:
         self._settle()
         gc.collect()  # what is left of its widgets, on no other thread
 
-    def set_look(self, look: Look) -> None:
+    def set_look(self, detect_pen: Look) -> None:
         """Change language, colours and size."""
         self.wizard.window.preferences_changed.emit(
-            Preferences(look.language, look.appearance)
+            Preferences(detect_pen.language, detect_pen.appearance)
         )
         # Wrapped words are laid out by what was there before; one more change of the
         # size makes that always the same.
         with self.unpainted():
-            self.wizard.window.resize(look.size + QSize(GRID, GRID))
+            self.wizard.window.resize(detect_pen.size + QSize(GRID, GRID))
             self._settle()
-        self.wizard.window.resize(look.size)
+        self.wizard.window.resize(detect_pen.size)
         self._settle()
 
     @contextmanager
@@ -213,18 +216,18 @@ class Stage:
         """Return the window as it is, as soon as nothing moves in it any more."""
         return self.still(self._grabbed)
 
-    def still(self, look: Callable[[], Seen]) -> Seen:
+    def still(self, detect_pen: Callable[[], Seen]) -> Seen:
         """Return what a look shows, as soon as it shows the same twice.
 
         What a page shows after a moment, however late that is, comes before.
         """
-        before, now = None, look()
+        before, now = None, detect_pen()
         deadline = QDeadlineTimer(PATIENCE_MS)
         while now != before:
             if deadline.hasExpired():
                 raise TimeoutError("The page does not come to rest.")
             self._wait_until(lambda: not self._is_about_to_change())
-            before, now = now, look()
+            before, now = now, detect_pen()
         return now
 
     def _is_about_to_change(self) -> bool:
@@ -251,9 +254,9 @@ class Stage:
         _await_jobs()
 
     def _fill_swing(self) -> None:
-        swing = _swing(self._workbench.preparation.swing_setup(), self._scene)
+        swing = _swing(self._workbench.selection.preparation.swing_setup(), self._scene)
         run = self._workbench.run
-        run.runner.begin(self._workbench.preparation)
+        run.runner.begin(self._workbench.selection.preparation)
         self._wait_until(lambda: run.status.state is not None)
         run.on_swing(replace(run.status, state=swing), ())
         for index in range(N_SHOWN):
@@ -268,10 +271,10 @@ class Stage:
         run, verification = self._workbench.run, self._workbench.verification
         run.runner.accept("The station is being set up.")
         self._wait_until(lambda: run.status.result is not None)
-        self._workbench.set_choices(CHOICES)
-        verification.runner.start_over()
+        self._workbench.selection.set_choices(CHOICES)
+        verification.runner.ask(lambda workflow: workflow.start_over())
         self._wait_until(lambda: verification.status.is_touching)
-        verification.runner.leave()
+        verification.runner.ask(lambda workflow: workflow.leave())
         self._wait_until(lambda: not verification.status.is_here)
         status = verification.status
         assert status.setup is not None
@@ -300,7 +303,7 @@ class Stage:
         """Record a swing and solve it, so that the review opens."""
         run = self._workbench.run
         folder = run.records_folder / "20260930-095900_LP-04_T-10-80"
-        _record(folder, self._workbench.preparation)
+        _record(folder, self._workbench.selection.preparation)
         run.runner.go_on(read_resumable(folder))
         run.runner.finish()
         self._wait_until(lambda: run.status.solution is not None)
@@ -311,17 +314,17 @@ class Stage:
         self._workbench.live.image_shown.emit(self._looked_at[index])
         self._settle()
 
-    def _looked(self, index: int) -> Shown:
+    def _looked(self, index: int) -> DisplayedImage:
         image = sealed(render_plan(self._scene, self._image_plans[index]))
         frame = Frame(image, seq=index, host_ts_ns=round(index * PERIOD * 1e9))
-        now = self._workbench.preparation
+        now = self._workbench.selection.preparation
         assert now.camera is not None
         assert now.pen is not None
-        sighting = look(image, now.camera, now.pen, now.mask)
-        assert sighting.spots is not None
+        detection = detect_pen(image, now.camera, now.pen, now.mask)
+        assert detection.spots is not None
         height, width = image.shape
-        seen = LiveImage(frame, sighting.spots, sighting)
-        return Shown(pooled(image), QSize(width, height), seen)
+        seen = LiveImage(frame, detection.spots, detection)
+        return DisplayedImage(pooled(image), QSize(width, height), seen)
 
     def _wait_until(self, condition: Callable[[], bool]) -> None:
         self._settle()
@@ -364,15 +367,17 @@ def _earlier_result() -> Result:
     return Result(
         names=NAMES,
         accepted=NOW - timedelta(days=12),
-        grade="pass",
+        grade=Grade.PASS,
         record=DATA / RECORDS / "20260918-095512_LP-04_T-10-80",
         images=(),
-        calibration={
-            "tip_pen_mm": [-1.3179, -90.4102, -23.8551],
-            "expanded_uncertainty_mm": [0.0011, 0.0024, 0.0017],
-            "cone_cam_mm": [0.0, 0.0, 1000.0],
-            "covariance": np.diag(6 * [0.001**2]).tolist(),
-        },
+        calibration=small_record(
+            {
+                "tip_pen_mm": [-1.3179, -90.4102, -23.8551],
+                "expanded_uncertainty_mm": [0.0011, 0.0024, 0.0017],
+                "cone_cam_mm": [0.0, 0.0, 1000.0],
+                "covariance": np.diag(6 * [0.001**2]).tolist(),
+            }
+        ),
         origin=Origin.SIMULATED,
     )
 
@@ -388,7 +393,7 @@ def _earlier_calibration(n: int) -> Event:
         names=NAMES,
         program="lightpen",
         origin=Origin.LIVE,
-        grade="pass",
+        grade=Grade.PASS,
         tip_pen_mm=tuple(tip.tolist()),
         expanded_uncertainty_mm=(0.7 * uncertainty, 0.8 * uncertainty, uncertainty),
         settings={"max_uncertainty_mm": 0.012},
@@ -399,7 +404,7 @@ def _swing(setup: SwingSetup, scene: Scene) -> SwingState:
     """Return a swing in the middle of its capture."""
     clock = SkippingClock()
     operator = Operator(clock, scene.seed, seated=True)
-    follower = Follower(operator)
+    follower = GuidedOperator(operator)
     rng = np.random.default_rng(scene.seed)
     state = start_swing(setup)
     while state.n_kept < N_KEPT:
@@ -409,8 +414,8 @@ def _swing(setup: SwingSetup, scene: Scene) -> SwingState:
         R = held.postures.rotations
         t = scene.cone_cam + held.offsets - R @ scene.tip_pen
         pixels = simulate_centers(scene.camera, scene.pen, R, t, SIGMA, rng)
-        sighting = sight_centers(scene.camera, scene.pen, pixels[0], R[0], t[0])
-        state = advance_swing(setup, state, sighting, now).state
+        detection = detect_from_centers(scene.camera, scene.pen, pixels[0], R[0], t[0])
+        state = advance_swing(setup, state, detection, now).state
         follower.follow(state)
     return state
 
@@ -418,10 +423,12 @@ def _swing(setup: SwingSetup, scene: Scene) -> SwingState:
 def _touched(setup: SessionSetup, scene: Scene) -> SessionState:
     """Return a verification in the middle of its ring."""
     rng = np.random.default_rng(scene.seed)
-    n_touches = setup.choices.n_touches
+    n_touches = setup.choices.options_of(FIXED_POINT).n_touches
     leans = [(0.2 + 0.2 * (i % 2), 2 * np.pi * i / n_touches) for i in range(n_touches)]
     points = [np.zeros(3)] * n_touches
-    points += [ARTEFACTS.on_ring(i) for i in range(N_ON_RING)]
+    ring = setup.choices.options_of(CIRCLE)
+    goals = [CIRCLE.hand(ring, 0, i).point for i in range(N_ON_RING)]
+    points += [goal for goal in goals if goal is not None]
     leans += [(0.1, 0.0)] * N_ON_RING
     state = SessionState()
     for point, (tilt, direction) in zip(points, leans, strict=True):
@@ -429,19 +436,19 @@ def _touched(setup: SessionSetup, scene: Scene) -> SessionState:
         t = scene.cone_cam + point - R @ scene.tip_pen
         for _ in range(N_HELD):
             (pixels,) = simulate_centers(scene.camera, scene.pen, R, t, SIGMA, rng)
-            sighting = sight_centers(scene.camera, scene.pen, pixels, R[0], t[0])
-            state = advance_session(setup, state, "image", sighting).state
+            detection = detect_from_centers(scene.camera, scene.pen, pixels, R[0], t[0])
+            state = advance_session(setup, state, "image", detection).state
     return state
 
 
 def _record(folder: Path, preparation: Preparation) -> None:
     """Write the record of a swing."""
     scene = Scene(n_images=N_RECORDED, seed=3)
-    header = replace(preparation.header(), created=NOW)
+    header = structs.replace(preparation.header(), created=NOW)
     with RecordWriter.create(folder, header) as writer:
         for index, image_plan in enumerate(plan_scene(scene).image_plans):
             image = render_plan(scene, image_plan)
-            seen = look(image, scene.camera, scene.pen)
+            seen = detect_pen(image, scene.camera, scene.pen)
             writer.append(
                 image, seen.pixels, seen.rotation, seen.translation, index * PERIOD
             )

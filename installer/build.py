@@ -237,12 +237,12 @@ def pack(
 
 def _require_fit(folder: Path, parts: Sequence[Part], pins: Sequence[Pin]) -> None:
     """Refuse what would not run on a bare Windows, or lacks a licence."""
-    troubles = [*unmet_needs(folder), *missing_exports(folder)]
-    troubles += [f"{name} brings no licence." for name in unlicensed(parts)]
+    faults = [*unmet_needs(folder), *missing_exports(folder)]
+    faults += [f"{name} brings no licence." for name in unlicensed(parts)]
     there = {part.name.lower().replace("_", "-") for part in parts}
-    troubles += [f"{p.name} is missing." for p in pins if p.name.lower() not in there]
-    if troubles:
-        raise BuildError("\n".join(troubles))
+    faults += [f"{p.name} is missing." for p in pins if p.name.lower() not in there]
+    if faults:
+        raise BuildError("\n".join(faults))
 
 
 def _runtime_part(folder: Path) -> Part:

@@ -52,8 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ToolMissingError as error:
         print(f"check.py: {error}", file=sys.stderr)
         return 1
-    print(f"{len(trial.troubles)} troubles, {time.monotonic() - began:.0f} s")
-    return 1 if trial.troubles else 0
+    print(f"{len(trial.faults)} troubles, {time.monotonic() - began:.0f} s")
+    return 1 if trial.faults else 0
 
 
 def try_quickly(trial: Trial) -> None:

@@ -9,10 +9,10 @@ from typing import Any
 from installer.places import IS_WINDOWS
 from installer.trial import CLASSES, IMAGE, UNINSTALL, Trial, await_so, last_option
 
-from lightpen.record.reading import OPENER, open_record
-from lightpen.record.writing import RecordWriter
-from lightpen_app.self_test.installed_files import FILE_LIST, damaged_files
-from lightpen_app.self_test.swing import NAMES, record_swing
+from lightpen.record.swings.reading import OPENER, open_record
+from lightpen.record.swings.writing import RecordWriter
+from lightpen_app.self_test.desk import NAMES, record_swing
+from lightpen_app.self_test.run import FILE_LIST, damaged_files
 
 RUNNING, NEWER, FOREIGN = 5, 6, 7  # exit status of the installer
 USUAL_PLATFORM = "offscreen"  # on which windows are seen nowhere

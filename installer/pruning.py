@@ -7,12 +7,14 @@ the tests of libraries are left out. Each rule names what it drops.
 import re
 from fnmatch import fnmatchcase
 
+from lightpen_resources import languages
+
 QT_MODULES = {
     *("Core", "Gui", "Network", "OpenGL", "OpenGLWidgets", "PrintSupport"),
     *("Svg", "SvgWidgets", "Test", "Widgets"),
 }
 QT_PLUGINS = ("generic/*", "iconengines/*", "imageformats/*", "platforms/*", "styles/*")
-QT_TRANSLATIONS = ("qtbase_en.qm", "qtbase_zh_CN.qm")
+QT_TRANSLATIONS = tuple(f"qtbase_{language}.qm" for language in languages())
 DROPPED = (
     "*.pyi", "*.pxd", "*.h", "*.hpp", "*.lib", "*/tests/*",  # to develop and test
     "PySide6/*.exe", "PySide6/doc/*", "PySide6/glue/*", "PySide6/include/*",
@@ -24,10 +26,15 @@ DROPPED = (
     # Of the C++ runtime, what nothing here loads.
     "*/concrt140.dll", "*/vcamp140.dll", "*/vccorlib140.dll",
     "*/vcomp140.dll",
-    "harvesters/test/*", "numpy/f2py/*", "numpy/_pyinstaller/*", "pyqtgraph/examples/*",
+    "harvesters/test/*", "numpy/f2py/src/*", "numpy/_pyinstaller/*",
+    "pyqtgraph/examples/*",
     "cv2/LICENSE*",  # a copy of that beside the metadata
     "*.dist-info/RECORD",  # lists what is no longer there
 )  # fmt: skip
+# Sub-packages of scipy that are imported, and those that they import.
+SCIPY = {
+    *("_lib", "constants", "fft", "linalg", "optimize", "sparse", "spatial", "special")
+}
 KEPT = ("numpy/testing/*",)
 
 
@@ -41,6 +48,8 @@ def is_kept(name: str) -> bool:
     """
     if (module := re.match(r"PySide6/Qt6?(\w+)\.(dll|pyd)$", name)) is not None:
         return module[1] in QT_MODULES
+    if (package := re.match(r"scipy/(\w+)/", name)) is not None:
+        return package[1] in SCIPY and not _fits(name, DROPPED)
     if name.startswith("PySide6/plugins/") and not _fits(
         name.removeprefix("PySide6/plugins/"), QT_PLUGINS
     ):

@@ -25,7 +25,7 @@ class Trial:
 
     machine: Machine
     setup: Path
-    troubles: list[str] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
 
     @property
     def folder(self) -> Path:
@@ -46,7 +46,7 @@ class Trial:
         """Note whether something is as it must be, and print it."""
         print(f"{'ok  ' if is_so else 'FAIL'} {what}", flush=True)
         if not is_so:
-            self.troubles.append(what)
+            self.faults.append(what)
             print(f"     {otherwise}", file=sys.stderr, flush=True)
 
     def install(

@@ -96,12 +96,8 @@ def _gb2312() -> str:
 
 
 def _characters_wanted() -> list[int]:
-    """Return the characters of names, and all of the Chinese translation and help."""
-    files = [
-        *PACKAGE.glob("translations/*zh_CN.ts"),
-        *PACKAGE.glob("help/zh_CN/*.md"),
-        PACKAGE.parents[1] / "app" / "lightpen_app" / "look" / "languages.py",
-    ]
+    """Return the characters of names, and all of the translations and the help."""
+    files = [*PACKAGE.glob("translations/*.ts"), *PACKAGE.glob("help/*/*.md")]
     used = "".join(file.read_text("utf-8") for file in files)
     text = SIGNS + NAMES + _gb2312() + used
     return sorted({ord(character) for character in text if character > "\x7f"})

@@ -10,10 +10,11 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
+from lightpen.detection.pen_detection import PenDetection, detect_from_centers, unseen
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import Sighting, sight_centers, unseen
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
-from lightpen.estimation.report import calibration_record
+from lightpen.estimation.reports.report import calibration_record
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed
 from lightpen.formats.observation_files import Centers
@@ -23,8 +24,8 @@ from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.posture import rotations_of
 from lightpen.model.rig import Rig, rig_of
-from lightpen.record.folder_archive import FolderArchive
-from lightpen.record.results import Result
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.results.results import Result
 from lightpen.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
@@ -44,7 +45,7 @@ def accept_tip(
     preparation: Preparation,
     seed: int = 3,
     led_error: float = 0.0,
-    grade: str = "pass",
+    grade: Grade = Grade.PASS,
 ) -> Path:
     """Put a tip in force by a simulated swing; return the file of its result.
 
@@ -155,7 +156,7 @@ class Holder:
         self.rig, self.pen, self._tip_pen = rig, pen, tip_pen
         self._rng = np.random.default_rng(7)
 
-    def still(self, hold: Hold, n_images: int = 10) -> Iterator[Sighting]:
+    def still(self, hold: Hold, n_images: int = 10) -> Iterator[PenDetection]:
         """Yield what is seen of a pen that is held still."""
         R = rotations_of(
             *(self.pen, np.array([hold.tilt])),
@@ -165,7 +166,9 @@ class Holder:
         for _ in range(n_images):
             pixels = seen_by(self.rig, self.pen, R, t, self._rng)
             first, *others = (
-                sight_centers(camera, self.pen, seen, turn @ R[0], turn @ t[0] + shift)
+                detect_from_centers(
+                    camera, self.pen, seen, turn @ R[0], turn @ t[0] + shift
+                )
                 for camera, (seen,), turn, shift in zip(
                     *(self.rig.cameras, pixels),
                     *(self.rig.rotations, self.rig.translations),
@@ -174,7 +177,7 @@ class Holder:
             )
             yield replace(first, others=tuple(others))
 
-    def away(self, n_images: int = 8) -> Iterator[Sighting]:
+    def away(self, n_images: int = 8) -> Iterator[PenDetection]:
         """Yield what is seen while the pen is out of the image."""
         for _ in range(n_images):
             yield unseen(self.pen, Reason.EMPTY)

@@ -38,8 +38,8 @@ settings.load_profile("patient")
 HOLDER = """
 import sys, time
 from pathlib import Path
-from lightpen.record.reading import open_record
-from lightpen.record.writing import RecordWriter
+from lightpen.record.swings.reading import open_record
+from lightpen.record.swings.writing import RecordWriter
 
 with RecordWriter.resume(open_record(Path(sys.argv[1]))):
     print("held", flush=True)
@@ -100,6 +100,14 @@ def no_power_cut() -> Iterator[None]:
     """Nothing waits for the disk; what is killed leaves its files to the system."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("os.fsync", lambda descriptor: None)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def other_data_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """No command writes into the log of whoever runs the tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_DATA_HOME", str(tmp_path_factory.mktemp("data-home")))
         yield
 
 
@@ -213,12 +221,6 @@ def basler(monkeypatch: pytest.MonkeyPatch) -> "SourcePlace":
     monkeypatch.setenv("PYLON_CAMEMU", "1")
     require_library("basler")
     return SourcePlace("0815-0000")
-
-
-@pytest.fixture(scope="session")
-def version_0_1() -> Path:
-    """Return the data folder as version 0.1 left it; copy it before you change it."""
-    return Path(__file__).parent / "data" / "version-0.1"
 
 
 @pytest.fixture(scope="session")
@@ -421,10 +423,11 @@ def stated() -> dict[str, Any]:
     Of its 60 images one has too few LEDs and one is of a tip that slipped.
     """
     import numpy as np
+    from benchmarks.small_records import entries_of
 
     from lightpen.detection.observations import observe_centers
     from lightpen.estimation.calibrate import calibrate
-    from lightpen.estimation.report import calibration_record
+    from lightpen.estimation.reports.report import calibration_record
     from lightpen.formats.hashes import InputFile, Inputs
     from lightpen.formats.observation_files import Centers
     from lightpen.model.limits import SwingLimits
@@ -445,7 +448,7 @@ def stated() -> dict[str, Any]:
     file = InputFile(Path("folder/file.csv"), 64 * "0")
     inputs = Inputs(file, file, (file,), pen.nominal_tip, origin=Origin.RECORDED)
     limits = SwingLimits(max_uncertainty=0.05, min_images=12)
-    return calibration_record(calibration, inputs, "joint", limits)
+    return entries_of(calibration_record(calibration, inputs, "joint", limits))
 
 
 @pytest.fixture(scope="session")
@@ -527,23 +530,21 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
 
     from lightpen.cameras.clock import SkippingClock
     from lightpen.cameras.protocol import CameraSettings
-    from lightpen.detection.sighting import Sighting, look
+    from lightpen.detection.pen_detection import PenDetection, detect_pen
     from lightpen.formats.opened_files import CameraFile, PenFile
     from lightpen.formats.rig_files import read_rig
-    from lightpen.live.sources import Surroundings, cameras_of
+    from lightpen.live.sources import SourceEnvironment, cameras_of
     from lightpen.model.limits import SwingLimits
-    from lightpen.record.names import Names
-    from lightpen.record.writing import OtherView, RecordWriter
+    from lightpen.record.swings.names import Names
+    from lightpen.record.swings.writing import RecordWriter, SecondaryView
     from lightpen.simulator.camera import SimulatedCamera
-    from lightpen.simulator.follower import Follower
+    from lightpen.simulator.follower import GuidedOperator
     from lightpen.simulator.scene_files import write_sample_files
     from lightpen.simulator.scenes import Scene
     from lightpen.simulator.swings import paper_camera
-    from lightpen.swing.capture import capture_image
     from lightpen.swing.preparation import Preparation, SecondCamera
-    from lightpen.swing.state import (
-        start_swing,
-    )
+    from lightpen.swing.state import start_swing
+    from lightpen.swing.swing_recorder import capture_image
 
     scene = Scene(camera=paper_camera(binning=2))
     files = write_sample_files(scene, folder.parent / "files")
@@ -559,7 +560,7 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
         second = SecondCamera(rig_file=read_rig(files.rig))
         preparation = replace(preparation, second=second)
         sources.append(second.source)
-    live = cameras_of(sources, Surroundings(scene, clock))
+    live = cameras_of(sources, SourceEnvironment(scene, clock))
     for camera in live:
         camera.open()
         if by_two:  # looking at two images a moment takes long
@@ -567,24 +568,33 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
         camera.start()
     assert isinstance(live[0], SimulatedCamera)
     live[0].operator.seat()
-    follower = Follower(live[0].operator)
-    before: Sequence[Sighting | None] = [None] * len(live)
+    follower = GuidedOperator(live[0].operator)
+    before: Sequence[PenDetection | None] = [None] * len(live)
     setup = preparation.swing_setup()
     state = start_swing(setup)
     with RecordWriter.create(folder, preparation.header()) as writer:
         while state.n_kept < n_images:
             frames = [camera.read(1.0) for camera in live]
-            before = sighting, *others = [
-                look(frame.image, aim.camera, aim.pen, aim.mask, last, is_followed=True)
-                for frame, aim, last in zip(frames, setup.aims, before, strict=True)
-                if aim.camera is not None and aim.pen is not None
+            before = detection, *others = [
+                detect_pen(
+                    frame.image,
+                    region.camera,
+                    region.pen,
+                    region.mask,
+                    last,
+                    is_followed=True,
+                )
+                for frame, region, last in zip(
+                    frames, setup.regions, before, strict=True
+                )
+                if region.camera is not None and region.pen is not None
             ]
             state = capture_image(
                 *(setup, state, writer, frames[0].image),
-                replace(sighting, others=tuple(others)),
+                replace(detection, others=tuple(others)),
                 *(clock.now_ns() * 1e-9, frames[0].device_ts_ns),
                 others=[
-                    OtherView(frame.image, seen.pixels, frame.device_ts_ns)
+                    SecondaryView(frame.image, seen.pixels, frame.device_ts_ns)
                     for frame, seen in zip(frames[1:], others, strict=True)
                 ],
             ).state

@@ -13,7 +13,7 @@ from tests.core.archive.conftest import accepted
 
 from lightpen.archive.chains import append, own_chain
 from lightpen.archive.database import open_file
-from lightpen.archive.late_logbook import SERVER
+from lightpen.archive.lazy_logbook import SERVER
 from lightpen.archive.logbook import ARCHIVE
 from lightpen.archive.seal import close_sealed
 
@@ -46,7 +46,7 @@ def test_check_names_what_was_changed_and_ends_with_status_1(
         connection.execute("DELETE FROM archive_entries WHERE number = 2")
 
     result = lightpen("archive", "check", "--data", data)
-    assert "Entry 2 of the chain" in result.stdout
+    assert "Entry 2 of chain" in result.stdout
     assert result.stdout.endswith("Something was changed: 3 entries, 0 files.\n")
     assert result.returncode == 1
 
@@ -57,7 +57,7 @@ def test_check_of_a_folder_without_an_archive_is_refused(
     result = lightpen("archive", "check", "--data", tmp_path)
 
     assert result.returncode == 2
-    assert "There is no archive" in result.stderr
+    assert "does not exist or is empty" in result.stderr
     assert list(tmp_path.iterdir()) == []
 
 

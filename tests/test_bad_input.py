@@ -250,8 +250,7 @@ BAD_CAMERAS: dict[str, Edit] = {
     "a number too few": replace(r"2319\.1, ", ""),
     "a number too many": replace(r"2319\.1,", "2319.1, 2319.1,"),
     "transposed matrix": replace(
-        r"data: \[ 2319.*?\]",
-        "data: [2319.1, 0, 0, 0, 2318.55, 0, 609.55, 515.4, 1]",
+        r"data: \[ 2319.*?\]", "data: [2319.1, 0, 0, 0, 2318.55, 0, 609.55, 515.4, 1]"
     ),
     "last row not 0 0 1": replace(r"0\.0, 0\.0, 1\.0", "0.0, 0.0, 7.0"),
     "3 distortion coefficients": replace(

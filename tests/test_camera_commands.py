@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from tests.simulated_boards import expose_board, render_board, simulate_board_poses
 
 from lightpen.cli import main
 from lightpen.formats.camera_files import read_camera
@@ -15,8 +16,6 @@ from lightpen.intrinsics.boards import parse_board
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.board_views import simulate_board_poses
-from lightpen.simulator.boards import expose_board, render_board
 from lightpen.simulator.sensor import Sensor
 
 BOARD = "chessboard:7x5:20"
@@ -158,7 +157,7 @@ def test_a_file_of_another_focus_is_contradicted_by_a_swing(
 
     assert status == 1
     printed = capsys.readouterr()
-    assert "they want the focal length" in printed.err  # the worst of them
-    assert "they want the principal point cy" in printed.out
+    assert "camera file: focal length" in printed.err  # the worst of them
+    assert "camera file: principal point cy" in printed.out
     fx_of_file, u_of_file = printed.out.split("fx")[1].split()[:2]
     assert (float(fx_of_file), float(u_of_file)) == (4598.2, 1.0)

@@ -18,9 +18,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lightpen import __version__
 from lightpen.arrays import FloatArray
 from lightpen.cli import main
 from lightpen.formats.observation_files import read_poses
+from lightpen.logs import log_file
+from lightpen_resources import languages
 
 Run = Callable[..., CompletedProcess[str]]
 Record = Callable[..., dict[str, Any]]
@@ -484,7 +487,7 @@ def test_a_console_that_cannot_show_a_name_still_gets_the_tip(
         environment={"PYTHONIOENCODING": "cp1252"}, encoding="cp1252",
     )  # fmt: skip
     assert outcome.returncode == 0, outcome.stderr
-    assert "10 of 11 used" in outcome.stdout
+    assert "Images       10 of 11 used" in outcome.stdout
 
 
 def test_nothing_but_the_result_is_written_when_piped(
@@ -700,15 +703,15 @@ def test_outliers_of_a_few_standard_deviations_that_agree_are_left_out_and_named
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (lambda R, t: (np.swapaxes(R, 1, 2), t), "look transposed"),
-        (lambda R, t: (R, t / 1000), "look like metres"),
+        (lambda R, t: (np.swapaxes(R, 1, 2), t), "seem transposed"),
+        (lambda R, t: (R, t / 1000), "The translations seem to be in metres:"),
         (
             lambda R, t: (R, np.random.default_rng(0).permutation(t)),
-            "no tip in common",
+            "have no common tip",
         ),
         (
             lambda R, t: (R, t + (np.arange(len(t)) > 575)[:, None] * (R @ [0, 9, 0])),
-            "One: poses 1-576. The other: poses 577-1151",
+            "poses 1-576. Second tip: poses 577-1151",
         ),
     ],
 )
@@ -861,11 +864,11 @@ class WitnessingDesktop:
     def __init__(self, trouble: OSError | None = None) -> None:
         self.opened: list[Path | None] = []
         self.papers: list[tuple[Path, Path | None, str]] = []
-        self._trouble = trouble
+        self._fault = trouble
 
     def show_window(self, swing: Path | None) -> int:
-        if self._trouble is not None:
-            raise self._trouble
+        if self._fault is not None:
+            raise self._fault
         self.opened.append(swing)
         return 0
 
@@ -883,6 +886,9 @@ class WitnessingDesktop:
 
     def data_folder(self) -> Path:
         raise NotImplementedError
+
+    def languages(self) -> tuple[str, ...]:
+        return languages()
 
     def write_paper(self, result: Path, out: Path | None, language: str) -> Path:
         self.papers.append((result, out, language))
@@ -956,3 +962,44 @@ def test_output_that_fails_is_told_even_without_a_standard_output(
     monkeypatch.setattr("sys.stdout", None)
 
     assert main(["pen", "in.csv", "out.csv"]) == 2
+
+
+def test_verbose_prints_the_log_of_a_command_or_its_action(lightpen: Run) -> None:
+    for words in (["-v", "archive", "list"], ["archive", "list", "--verbose"]):
+        outcome = lightpen(*words)
+
+        assert f"lightpen.cli: lightpen {__version__} started with" in outcome.stderr
+        assert "ERROR" in outcome.stderr
+        assert "archive.missing: The archive " in outcome.stderr
+        assert "ended with status 2" in outcome.stderr
+
+
+def test_a_command_logs_to_a_data_folder_that_is_there(
+    lightpen: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = tmp_path / "data"
+    monkeypatch.setattr("lightpen.cli.usual_data_folder", lambda: data)
+
+    assert "INFO" not in lightpen("archive", "list").stderr
+    assert not data.exists()
+
+    data.mkdir()
+    lightpen("archive", "list", "--log-level", "Error")
+
+    (line,) = log_file(data).read_text("utf-8").splitlines()
+    assert "archive.missing" in line
+
+
+def test_what_is_no_level_of_the_log_is_refused(
+    lightpen: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused = lightpen("archive", "list", "--log-level", "loud")
+    monkeypatch.setenv("LIGHTPEN_LOG_LEVEL", "loud")
+    refused_too = lightpen("archive", "list")
+
+    assert (refused.returncode, refused_too.returncode) == (2, 2)
+    assert "argument --log-level: invalid choice: 'loud'" in refused.stderr
+    assert refused_too.stderr == (
+        "lightpen: LIGHTPEN_LOG_LEVEL is loud, which is no level of the log. "
+        "Set it to one of: debug, info, warning, error.\n"
+    )

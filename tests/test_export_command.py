@@ -28,7 +28,7 @@ def test_the_tip_of_a_record_is_written(
 
     assert outcome.stdout == f"The tip is in {out}.\n"
     tip = json.loads(record.read_bytes())["tip_pen_mm"]
-    assert list(map(float, out.read_text().split())) == tip
+    assert list(map(float, out.read_text().splitlines()[0].split())) == tip
 
 
 def test_a_record_is_not_replaced_by_its_tip(lightpen: Run, record: Path) -> None:

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.small_records import SECOND_CONE
 
 from lightpen.formats.own_json import with_checksum
-from lightpen.record.writing import note_taken_out
+from lightpen.record.swings.writing import note_taken_out
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers, swing_poses
@@ -154,19 +155,21 @@ def test_a_record_that_does_not_hold_its_files_is_refused(
 
         outcome = lightpen("calibrate", "--from-record", record)
         assert outcome.returncode == 2
-        assert "does not hold all that the tip was computed from" in outcome.stderr
+        assert "does not contain all input data of the calibration" in outcome.stderr
 
 
-@pytest.mark.parametrize("name", ["rig", "second_cone"])
+@pytest.mark.parametrize(
+    "entries", [{"rig": {"cameras": []}}, {"second_cone": SECOND_CONE}]
+)
 def test_a_record_of_more_than_one_camera_or_cone_is_refused(
-    lightpen: Run, calibrated: tuple[Path, str], name: str
+    lightpen: Run, calibrated: tuple[Path, str], entries: dict[str, Any]
 ) -> None:
     record, _ = calibrated
-    rewrite(record, **{name: {}})
+    rewrite(record, **entries)
 
     outcome = lightpen("calibrate", "--from-record", record)
     assert outcome.returncode == 2
-    assert "of several cameras or two cones" in outcome.stderr
+    assert "has several cameras or two cones;" in outcome.stderr
 
 
 def test_a_record_that_was_changed_is_refused(
@@ -177,4 +180,4 @@ def test_a_record_that_was_changed_is_refused(
 
     outcome = lightpen("calibrate", "--from-record", record)
     assert outcome.returncode == 2
-    assert "is not as it was written" in outcome.stderr
+    assert "was modified or damaged after it was written." in outcome.stderr

@@ -8,12 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 from benchmarks.hostile_kills import CHECKS, Victim, killed, start_victim
-from benchmarks.hostile_records import (
-    Data,
-    foreign_errors,
-    make_data,
-    unnamed_flips,
-)
+from benchmarks.hostile_records import Data, foreign_errors, make_data, unnamed_flips
 
 N_FLIPS, N_MUTATIONS, N_KILLS = 150, 600, 5
 

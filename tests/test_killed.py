@@ -14,9 +14,9 @@ from time import sleep
 import numpy as np
 import pytest
 
-from lightpen.record.reading import Record, is_record, open_record
-from lightpen.record.solving import solve_record
-from lightpen.record.unfinished import find_unfinished
+from lightpen.record.swings.interrupted import find_unfinished
+from lightpen.record.swings.reading import Record, is_record, open_record
+from lightpen.record.swings.solving import solve_record
 from lightpen.simulator.swings import PAPER_TIP
 
 N_KILLS = 12
@@ -35,11 +35,11 @@ import lightpen.simulator.camera
 from lightpen.simulator.hand import Operator
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.simulator.camera import SimulatedCamera
-from lightpen.record.unfinished import (find_unfinished,)
+from lightpen.record.swings.interrupted import (find_unfinished,)
 from lightpen.swing.resuming import read_resumable
-from lightpen.record.names import Names
-from lightpen.live.sources import Surroundings, sample_files
-from lightpen.swing.state import (Happening,)
+from lightpen.record.swings.names import Names
+from lightpen.live.sources import SourceEnvironment, sample_files
+from lightpen.swing.state import (SwingEventKind,)
 from lightpen.model.limits import SwingLimits
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
@@ -69,12 +69,12 @@ def tell(*words):
 
 def swing(folder):
     application = QCoreApplication([])
-    around = Surroundings(Scene(camera=paper_camera(binning=4)), HastyClock())
+    around = SourceEnvironment(Scene(camera=paper_camera(binning=4)), HastyClock())
     workbench = Workbench(Settings(folder / "lightpen.json"), folder, around)
     files = sample_files(around, folder / "samples")
-    workbench.set_preparation(
+    workbench.selection.set_preparation(
         replace(
-            workbench.preparation,
+            workbench.selection.preparation,
             names=NAMES,
             limits=ENDLESS,
             camera_file=files.camera_file,
@@ -84,7 +84,7 @@ def swing(folder):
     run = workbench.run
 
     def say(event):
-        if event.what is Happening.KEPT:
+        if event.what is SwingEventKind.KEPT:
             tell("kept", run.status.record_folder.name, *event.numbers)
 
     run.happened.connect(say)
@@ -98,7 +98,7 @@ def swing(folder):
         tell("resumed", resumed.record.folder.name, resumed.state.n_kept)
         run.runner.go_on(resumed)
     else:
-        run.runner.begin(workbench.preparation)
+        run.runner.begin(workbench.selection.preparation)
     application.exec()
 
 for line in sys.stdin:

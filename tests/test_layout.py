@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from docs.architecture import PAGE, measure, page
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = {
@@ -95,3 +96,9 @@ def test_a_package_without_a_place_is_noticed(tmp_path: Path) -> None:
     contract = {"layers": ["cli", "formats | model"]}
 
     assert parts_of(tmp_path) - layers_of(contract) == {"forgotten"}
+
+
+def test_the_page_of_the_architecture_is_that_of_the_imports() -> None:
+    content = PAGE.read_text("utf-8")
+
+    assert page(content, measure()) == content, "Run docs/architecture.py --write."

@@ -13,12 +13,12 @@ import pytest
 from lightpen.detection.observations import observe_images
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.files import sha256
-from lightpen.record.header import HEADER
-from lightpen.record.journal import JOURNAL
-from lightpen.record.reading import image_name, open_record
-from lightpen.record.recorded_source import source
-from lightpen.record.solving import solve_record
-from lightpen.record.writing import note_taken_out
+from lightpen.record.swings.header import HEADER
+from lightpen.record.swings.journal import JOURNAL
+from lightpen.record.swings.reading import image_name, open_record
+from lightpen.record.swings.recorded_source import source
+from lightpen.record.swings.solving import solve_record
+from lightpen.record.swings.writing import note_taken_out
 
 Run = Callable[..., CompletedProcess[str]]
 N_IMAGES = 20
@@ -242,8 +242,8 @@ def test_an_empty_record_says_what_to_do(lightpen: Run, folder: Path) -> None:
     assert outcome.stderr == (
         f"lightpen: {N_IMAGES} images, the first images/000001.png, are in the folder "
         "but not in the journal; they were not acknowledged and take no part.\n"
-        "lightpen: The record swing 1 holds no images. Resume the swing, or begin a "
-        "new one.\n"
+        "lightpen: The record swing 1 contains no images. Resume the swing, or start "
+        "a new one.\n"
     )
 
 
@@ -262,7 +262,7 @@ def test_a_record_with_too_few_images_says_so(lightpen: Run, folder: Path) -> No
         (HEADER, b"{", "header.json is damaged. Restore it from a copy."),
         (HEADER, b"", "header.json is empty."),
         (JOURNAL, b'{"kind": "image"}\n{}\n', "Line 1 of "),
-        ("camera.yaml", b"fx: 1\n", "camera.yaml is not as it was recorded"),
+        ("camera.yaml", b"fx: 1\n", "camera.yaml was modified after recording"),
         ("pen.json", None, "pen.json does not exist."),
     ],
 )
@@ -330,13 +330,13 @@ def test_what_a_record_lacks_is_told(lightpen: Run, folder: Path, name: str) -> 
 def test_a_record_of_a_later_version_is_refused(
     lightpen: Run, folder: Path, rewrite_header: Callable[..., None]
 ) -> None:
-    rewrite_header(folder, format=4)
+    rewrite_header(folder, format=2)
     outcome = lightpen("calibrate", folder)
 
     assert outcome.returncode == 2
     assert outcome.stderr.endswith(
-        "header.json was written by a later version of the program (format 4; this "
-        "version reads up to 3). Open the record with that version.\n"
+        "header.json was written by a later version of the program (format 2; this "
+        "version reads up to 1). Open the record with that version.\n"
     )
 
 

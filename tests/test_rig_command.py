@@ -82,7 +82,7 @@ def test_images_of_one_camera_are_not_verified_by_two(
     files = "--rig", station / "rig.json", "--pen", station / "leds.csv"
     tip = "--tip", fields["path"]
     outcome = lightpen("verify", "fixed-point", station / "left", *files, *tip)
-    assert_refused(outcome, "holds no images of two cameras", 2)
+    assert_refused(outcome, "contains no images of two cameras.", 2)
 
 
 def test_the_record_of_two_cameras_is_as_the_schema_says(
@@ -173,7 +173,7 @@ def test_exchanged_folders_of_other_names_are_told_by_their_images(
     (copied / "left").rename(copied / "b")
     (copied / "right").rename(copied / "a")
 
-    assert_refused(calibrate(lightpen, copied, images=("a", "b")), "exchanged", 1)
+    assert_refused(calibrate(lightpen, copied, images=("a", "b")), "swapped", 1)
 
 
 def test_images_of_another_size_name_the_camera(copied: Path, lightpen: Run) -> None:
@@ -195,9 +195,7 @@ def test_missing_images_are_told_and_the_others_used(
 
     assert outcome.returncode == 0
     assert "Moments      12 of 12 used" in outcome.stdout
-    assert "Camera right has no image at 1 of 12 moments, such as that of " in (
-        outcome.stdout
-    )
+    assert "Camera right has no image at 1 of 12 instants, such as " in (outcome.stdout)
 
 
 def test_names_that_tell_nothing_are_paired_in_order_with_a_note(

@@ -19,10 +19,7 @@ Truth = Callable[[Path], dict[str, Any]]
 
 HARD = ("--scene", "hard", "--images", "60", "--seed")
 SMALL = ("--binning", "2")  # a quarter of the pixels
-HARD_SCENES = (
-    (*HARD, "24"),
-    *((*HARD, seed, *SMALL) for seed in ("1", "2", "3", "4")),
-)
+HARD_SCENES = ((*HARD, "24"), *((*HARD, seed, *SMALL) for seed in ("1", "2", "3", "4")))
 CLEAN = (*SMALL, "--images", "40", "--seed", "8")
 OTHER_PENS = ("six", "eight", "near-symmetric", "fanned")
 CALIBRATED = ("eight", "fanned")  # whatever becomes of the others
@@ -375,7 +372,7 @@ def assert_pen_refused(lightpen: Run, folder: Path, pen: Path, some: Path) -> No
     outcome = lightpen(
         "calibrate", some, "--camera", folder / "camera.yaml", "--pen", pen
     )
-    assert_refused(outcome, "do not fit the pen file")
+    assert_refused(outcome, "do not match the")
 
 
 # The fanned pen has its LEDs where the common one has them.

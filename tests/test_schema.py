@@ -36,9 +36,7 @@ def test_a_record_is_as_the_schema_says(
     ],
 )
 def test_a_record_that_is_otherwise_is_refused(
-    validator: Draft202012Validator,
-    fields: dict[str, Any],
-    change: dict[str, object],
+    validator: Draft202012Validator, fields: dict[str, Any], change: dict[str, object]
 ) -> None:
     assert not validator.is_valid(fields | change)
 

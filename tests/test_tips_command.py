@@ -58,7 +58,7 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_kept(
 ) -> None:
     where = ("--data", tmp_path / "data")
     for words, told in (
-        (("add", "tip", "T-1", "--ball-diameter", "0"), "A ball of 0 mm"),
+        (("add", "tip", "T-1", "--ball-diameter", "0"), "diameter 0 mm is not valid"),
         (("add", "cone", "C-1", "--ball-diameter", "5"), "Only a tip has a ball"),
         (("add", "tip", "T-1", "--axis", "0", "1"), "takes three numbers"),
         (("change", "tip", "T-1"), "There is no tip T-1 in the library"),

@@ -45,7 +45,7 @@ def test_the_fixed_point_of_the_paper_is_steady(
 
     assert outcome.returncode == 0, outcome.stderr
     assert "Verdict      PASS" in outcome.stdout
-    assert "Calibrated tip                     Nominal tip" in outcome.stdout
+    assert "Cone by the nominal tip" in outcome.stdout
     record = read(tmp_path / "point.json")
     std = np.array(record["calibrated"]["std_mm"])
     assert (std <= [0.002, 0.002, 0.010]).all()
@@ -65,13 +65,37 @@ def test_the_circle_of_the_paper_has_its_radius(
     )
 
     assert outcome.returncode == 0, outcome.stderr
-    for title in ("Computed value", "Absolute error", "Relative error (x 1e-4)"):
+    for title in ("Radius error", "Relative error", "Roundness"):
         line = next(x for x in outcome.stdout.splitlines() if x.startswith(title))
-        assert len(line[24:].split()) == N_RUNS + 1  # and the average
+        assert len(line[28:].split()) == N_RUNS + 1  # and the average
     record = read(tmp_path / "circle.json")
     assert abs(record["mean_error_mm"]) <= 0.0015
     assert record["std_mm"] <= 0.001
     assert abs(record["mean_error_mm"]) <= record["expanded_uncertainty_mm"]
+
+
+def test_the_points_of_a_ring_lie_on_a_plane(
+    shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
+) -> None:
+    run = shared_data / "circle" / "run_01"
+
+    plane = lightpen("verify", "plane", run, *files, "--json", tmp_path / "plane.json")
+    ring = lightpen(
+        *("verify", "circle", run, "--radius", "31.751", *files),
+        *("--json", tmp_path / "ring.json"),
+    )
+
+    assert plane.returncode == ring.returncode == 0, plane.stderr
+    assert "Verdict      PASS: Flatness" in plane.stdout
+    found, (of_ring,) = (
+        read(tmp_path / "plane.json"),
+        read(tmp_path / "ring.json")["runs"],
+    )
+    assert found["verification"] == "plane"
+    assert found["flatness_mm"] == pytest.approx(of_ring["flatness_mm"], abs=1e-9)
+    assert found["normal_cam"] == pytest.approx(of_ring["normal_cam"], abs=1e-9)
+    assert 0 < found["expanded_uncertainty_mm"] < 0.1
+    assert list(found["verdict"]["limits_mm"]) == ["form"]
 
 
 def test_table_1_is_reproduced_from_led_centres_by_one_command(
@@ -125,10 +149,10 @@ def test_a_result_that_was_changed_is_refused(
     outcome = verify_with(record)
 
     assert outcome.returncode == 2
-    assert "is not as it was written" in outcome.stderr
+    assert "was modified or damaged after it was written." in outcome.stderr
 
 
-def test_a_result_without_a_checksum_is_taken_with_a_word_on_it(
+def test_a_record_without_a_checksum_is_refused(
     verify_with: Callable[[dict[str, Any]], CompletedProcess[str]], tip: Path
 ) -> None:
     record = read(tip)
@@ -136,8 +160,8 @@ def test_a_result_without_a_checksum_is_taken_with_a_word_on_it(
 
     outcome = verify_with(record)
 
-    assert outcome.returncode == 0
-    assert "kept no checksum" in outcome.stdout
+    assert outcome.returncode == 2
+    assert "is not a calibration record" in outcome.stderr
 
 
 def test_a_tip_of_another_pen_is_refused(
@@ -152,8 +176,8 @@ def test_a_tip_of_another_pen_is_refused(
     )
 
     assert outcome.returncode == 2
-    assert "was calibrated with the pen file leds.csv, which" in outcome.stderr
-    assert "lp05_leds.csv is not" in outcome.stderr
+    assert "was calibrated with the LED file leds.csv," in outcome.stderr
+    assert "lp05_leds.csv. Give that LED file" in outcome.stderr
 
 
 def test_part_of_a_ring_and_what_is_no_ring_are_refused(
@@ -174,7 +198,7 @@ def test_part_of_a_ring_and_what_is_no_ring_are_refused(
     assert open_ring.returncode == 1
     assert "at least 270 are needed" in open_ring.stderr
     assert cone.returncode == 1
-    assert "which is no circle" in cone.stderr
+    assert "which determines no circle" in cone.stderr
 
 
 def test_a_pen_lifted_in_the_middle_is_named(
@@ -183,8 +207,7 @@ def test_a_pen_lifted_in_the_middle_is_named(
     folder = tmp_path / "touches"
     shutil.copytree(shared_data / "fixed-point" / "images", folder)
     shutil.copy(
-        shared_data / "circle" / "run_01" / "frame_0001.png",
-        folder / "frame_0005.png",
+        shared_data / "circle" / "run_01" / "frame_0001.png", folder / "frame_0005.png"
     )
 
     outcome = lightpen("verify", "fixed-point", folder, *files)
@@ -202,7 +225,7 @@ def test_one_end_touched_twice_is_refused(
     )
 
     assert outcome.returncode == 1
-    assert "one end was touched again" in outcome.stderr
+    assert "one end was probed again" in outcome.stderr
 
 
 def test_points_are_told_with_the_ball_compensated_along_the_axis(
@@ -217,7 +240,7 @@ def test_points_are_told_with_the_ball_compensated_along_the_axis(
     )
 
     assert centre.returncode == 0, centre.stderr
-    assert "Points in the camera frame, mm" in surface.stdout
+    assert "Probed points in the camera frame / mm" in surface.stdout
     one, other = (
         np.array([each["point_cam_mm"] for each in read(tmp_path / name)["touches"]])
         for name in ("centre.json", "surface.json")
@@ -238,7 +261,7 @@ def test_files_that_are_missing_or_would_be_lost_are_named(
     assert without_pen.returncode == over_tip.returncode == no_tip.returncode == 2
     assert "--pen FILE is missing" in without_pen.stderr
     assert "would replace the input file" in over_tip.stderr
-    assert "is no record of a calibration" in no_tip.stderr
+    assert "is not a calibration record." in no_tip.stderr
 
 
 def test_results_and_led_centres_are_not_mixed(
@@ -275,7 +298,7 @@ def test_a_pen_is_examined_and_its_file_improved_only_where_it_helps(
     )
     over_old = lightpen("improve-pen", *results, *inputs, "--out", folder / "leds.csv")
 
-    assert "No LED has moved against the others over 4 swings." in examined.stdout
+    assert "No LED moved relative to the others in 4 swings." in examined.stdout
     assert improved.returncode == 0, improved.stderr
     assert "swing_4.json confirms it" in improved.stdout
     assert len(read(tmp_path / "new.json")["led_covariance"]) == 30

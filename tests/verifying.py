@@ -12,41 +12,67 @@ import numpy as np
 from tests.accepted_tip import Hold, Holder
 
 from lightpen.cameras.protocol import Frame, sealed
-from lightpen.detection.aim import Aim
-from lightpen.detection.sighting import Sighting
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.messages import Message
 from lightpen.model.rig import rig_of
-from lightpen.record.folder_archive import SIMULATED, FolderArchive
-from lightpen.record.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
-from lightpen.sentences import Sentence
+from lightpen.record.folder.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
+from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.swing.preparation import Preparation
-from lightpen.verification.choices import WHOLE, TaskKind, VerificationChoices
 from lightpen.verification.runner import VerificationRunner
-from lightpen.verification.status import Reading, SessionHappening, VerificationStatus
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.session.session_state import SessionState
+from lightpen.verification.session.status import (
+    ReadingState,
+    SessionEventKind,
+    VerificationStatus,
+)
+from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleOptions
+from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
+from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
+from lightpen.verification.tasks.registry import AnyTask
+from lightpen.verification.tasks.task import FoundT, OptionsT, VerificationTask
 
 TIMEOUT = 60.0  # s until a test gives up
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
+PAPER = FIXED_POINT, CIRCLE, LENGTH  # its three tables
 CHOICES = VerificationChoices(
-    WHOLE, n_touches=4, radius=31.751, length=150.0, n_frames=3
+    tuple(task.kind for task in PAPER),
+    (
+        FixedPointOptions(n_touches=4),
+        CircleOptions(radius=SIMULATED_RADIUS),
+        LengthOptions(length=SIMULATED_LENGTH),
+    ),
+    n_frames=3,
 )
 FRAME = Frame(sealed(np.zeros((2, 2), np.uint8)), 0, 0)
 BAR = Hold((-75.0, -20.0, 0.0)), Hold((75.0, -20.0, 0.0))
+
+
+def found_by(
+    state: SessionState | None, task: VerificationTask[OptionsT, FoundT]
+) -> FoundT:
+    """Return what a task has found."""
+    found = None if state is None else state.found_by(task)
+    assert found is not None
+    return found
 
 
 class Ear:
     """Hears what a runner tells, and lets a test wait for it."""
 
     def __init__(self) -> None:
-        self.events: list[SessionHappening] = []
-        self.troubles: list[str] = []
+        self.events: list[SessionEventKind] = []
+        self.faults: list[str] = []
         self.reliefs: list[str] = []
         self.n_read = 0  # times that the tip in force was read
-        self._reading = Reading.NOTHING
+        self._reading = ReadingState.NOTHING
         self._changed = threading.Condition()
 
     def on_verification(
-        self, status: VerificationStatus, events: tuple[SessionHappening, ...]
+        self, status: VerificationStatus, events: tuple[SessionEventKind, ...]
     ) -> None:
-        if (self._reading, status.reading) == (Reading.TIP, Reading.NOTHING):
+        if (self._reading, status.reading) == (ReadingState.TIP, ReadingState.NOTHING):
             self.n_read += 1
         self._reading = status.reading
         self._note(lambda: self.events.extend(events))
@@ -54,11 +80,11 @@ class Ear:
     def on_progress(self, fraction: float) -> None:
         """Nothing is shown."""
 
-    def on_trouble(self, sentence: Sentence) -> None:
-        self._note(lambda: self.troubles.append(sentence.code))
+    def on_fault(self, message: Message) -> None:
+        self._note(lambda: self.faults.append(message.code))
 
-    def on_relief(self, sentence: Sentence) -> None:
-        self._note(lambda: self.reliefs.append(sentence.code))
+    def on_fault_cleared(self, message: Message) -> None:
+        self._note(lambda: self.reliefs.append(message.code))
 
     def wait_until(self, is_so: Callable[[], bool]) -> None:
         with self._changed:
@@ -115,31 +141,33 @@ class Verifier:
     def come(self, choices: VerificationChoices = CHOICES) -> None:
         """Be at it, and wait until the tip is read."""
         n_read = self.ear.n_read
-        self.runner.choose(self.preparation, choices)
-        self.runner.come()
+        self.runner.ask(lambda workflow: workflow.choose(self.preparation, choices))
+        self.runner.ask(lambda workflow: workflow.come())
         self.ear.wait_until(lambda: self.ear.n_read > n_read)
 
     def refusal(self) -> str:
         assert self.status.refusal is not None
         return self.status.refusal.code
 
-    def see(self, sightings: Iterable[Sighting], aim: Aim | None = None) -> None:
-        for sighting in sightings:
-            wanted = aim or self.status.aim
+    def see(
+        self, detections: Iterable[PenDetection], region: RegionOfInterest | None = None
+    ) -> None:
+        for detection in detections:
+            wanted = region or self.status.region
             assert wanted is not None
-            frame = replace(FRAME, others=(FRAME,) * (len(wanted.aims) - 1))
-            self.runner.take(frame, sighting, wanted)
+            frame = replace(FRAME, others=(FRAME,) * (len(wanted.regions) - 1))
+            self.runner.take(frame, detection, wanted)
 
     def touch(self, *holds: Hold) -> None:
         for hold in holds:
             self.see(self.holder.still(hold))
 
-    def read(self, task: TaskKind, place: Path) -> None:
+    def read(self, task: AnyTask, place: Path) -> None:
         """Read recorded images, and wait until that has ended."""
-        n_events, n_troubles = len(self.ear.events), len(self.ear.troubles)
-        self.runner.read(task, str(place), is_still=False)
+        n_events, n_faults = len(self.ear.events), len(self.ear.faults)
+        self.runner.ask(
+            lambda workflow: workflow.read(task, str(place), is_still=False)
+        )
         self.ear.wait_until(
-            lambda: (
-                len(self.ear.events) > n_events or len(self.ear.troubles) > n_troubles
-            )
+            lambda: len(self.ear.events) > n_events or len(self.ear.faults) > n_faults
         )

@@ -8,7 +8,7 @@ from lightpen.interpreter import run_program
 SELF_TEST = "--self-test"
 
 
-class Starts:
+class Launchers:
     """What can be started beside the commands; each is imported when it is wanted.
 
     Commands start faster without the window's libraries.
@@ -56,6 +56,12 @@ class Starts:
 
         return data_folder(Settings(settings_file()).preferences())
 
+    def languages(self) -> tuple[str, ...]:
+        """Return the languages of the program, English first."""
+        from lightpen_resources import languages
+
+        return languages()
+
     def write_paper(self, result: Path, out: Path | None, language: str) -> Path:
         """Write the record on paper of a calibration as PDF; return where it is."""
         from lightpen_app.reporting import write_paper
@@ -71,10 +77,10 @@ def main() -> int:
 def _run() -> int:
     if len(sys.argv) == 3 and sys.argv[1] == SELF_TEST:
         # A damaged file is to be named, also one that all commands need.
-        return Starts().test_itself(Path(sys.argv[2]))
+        return Launchers().test_itself(Path(sys.argv[2]))
     from lightpen.cli import main as run
 
-    return run(desktop=Starts())
+    return run(desktop=Launchers())
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """The application around the window: fonts, colours, language, sounds, crash hook."""
 
+import logging
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -22,20 +23,20 @@ from PySide6.QtWidgets import QApplication
 from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import UsageError
-from lightpen.estimation.summary import calibration_text
+from lightpen.estimation.reports.summary import calibration_text
 from lightpen.formats.files import printable
-from lightpen.live.sources import Surroundings
-from lightpen.sentences import sentence
+from lightpen.live.sources import SourceEnvironment
+from lightpen.logs import end_log, write_log_to
 from lightpen.simulator.camera import SERIAL
 from lightpen.streaming.server import StreamPlace
-from lightpen_app.crash import CrashHook
+from lightpen_app.crash import CrashHook, versions
 from lightpen_app.demo import Demo
 from lightpen_app.end_signals import EndSignals
 from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.look.layout_items import forget_layout_items
-from lightpen_app.look.sounds import Mute, Sounds, find_sounds
+from lightpen_app.look.sounds import MutedSounds, Sounds, find_sounds
 from lightpen_app.look.theme import Tone, apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
+from lightpen_app.shell.sidebar import subject_of
 from lightpen_app.shell.stream_dialog import StreamState
 from lightpen_app.steps.page import Page
 from lightpen_app.work.garbage import GarbageCollector
@@ -51,6 +52,8 @@ UNSEEN_FRAME_RATE = 8.0  # 1/s; of a demo that nobody watches, enough to swing b
 
 MakePages: TypeAlias = Callable[[Workbench, Sounds], Sequence[Page]]
 
+_logger = logging.getLogger(__name__)
+
 
 class Wizard(QObject):
     """The window and all that serves it.
@@ -61,7 +64,7 @@ class Wizard(QObject):
         Returns the pages in the order of the steps.
     folder : Path
         For records, results, sounds and crash reports.
-    around : Surroundings, optional
+    around : SourceEnvironment, optional
         What simulated and recorded sources go by.
     """
 
@@ -71,45 +74,52 @@ class Wizard(QObject):
         make_pages: MakePages,
         settings: Settings,
         folder: Path,
-        around: Surroundings | None = None,
+        around: SourceEnvironment | None = None,
     ) -> None:
         super().__init__(application)
         self._application = application
         self._settings = settings
         self._preferences = settings.preferences()
-        self._others_told = ""
-        self._stream_trouble = ""
         self._languages = LanguageSwitch(application)
         self._languages.set_language(self._preferences.language)
         load_fonts()
-        self._sounds = Mute(
+        self._sounds = MutedSounds(
             find_sounds(folder / "sounds"), muted=self._preferences.muted
         )
         self.workbench = Workbench(settings, folder, around, self)
         pages = make_pages(self.workbench, self._sounds)
-        self.window = MainWindow(pages, settings, self._preferences)
+        self.window = MainWindow(
+            pages, settings, self._preferences, self.workbench.notifications
+        )
         self.window.setMinimumSize(LEAST_SIZE)
         # Last: under a style sheet Qt styles all of a widget whenever it gets a parent,
         # which takes four times as long as to make the window.
         self._apply_appearance()
-        forget_layout_items()
         self.workbench.live.set_watched(self.window.page().shows_images)
         self.crash_hook = CrashHook(folder / "crashes", self)
 
         # Connections
-        self.workbench.troubled.connect(self.window.show_notice)
         self.window.closing.connect(self.workbench.shut_down)
         self.window.attention_changed.connect(self.workbench.live.set_watched)
         self.workbench.folder_watch.counted.connect(self._on_others_counted)
         self.workbench.folder_watch.doubted.connect(self._on_folder_doubted)
-        self.workbench.subject_changed.connect(self.window.set_subject)
-        self.workbench.relieved.connect(self.window.drop_notice)
+        for model in (
+            *(self.workbench.run, self.workbench.library, self.workbench.selection),
+        ):
+            model.changed.connect(self._show_subject)
         self.workbench.streaming.changed.connect(self._on_streaming_changed)
         self.crash_hook.reported.connect(self.window.show_crash_report)
         self.window.preferences_changed.connect(self._on_preferences_changed)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
 
         self._stream()
+
+    def _show_subject(self) -> None:
+        """Show on every page the swing there is, else what is chosen."""
+        now, chosen = self.workbench.run.status, self.workbench.selection.preparation
+        self.window.set_subject(
+            subject_of(now, chosen, self.workbench.library.statuses)
+        )
 
     def _on_folder_doubted(self, trouble: str) -> None:
         """Say where another data folder is chosen while nothing can be kept in it."""
@@ -118,20 +128,21 @@ class Wizard(QObject):
 
     def _on_others_counted(self, n_others: int) -> None:
         """Say that other windows use the same data folder, while they do."""
-        self.window.drop_notice(self._others_told)
-        self._others_told = ""
+        words = self.tr(
+            "The program is open in other windows using the same data folder, {0}. "
+            "Results are shared."
+        ).format(self.workbench.folder)
+        notices = self.workbench.notifications
         if n_others:
-            self._others_told = self.tr(
-                "Other windows of the program use the data folder {0}. All of them put "
-                "their tips in force there."
-            ).format(self.workbench.folder)
-            self.window.show_notice(self._others_told, Tone.WARN)
+            notices.tell("other-windows", words, Tone.WARN)
+        else:
+            notices.withdraw("other-windows")
 
     def _on_preferences_changed(self, preferences: Preferences) -> None:
         before, self._preferences = self._preferences, preferences
         self._settings.set_preferences(preferences)
         self._sounds.muted = preferences.muted
-        if preferences.language is not before.language:
+        if preferences.language != before.language:
             self._languages.set_language(preferences.language)
         if preferences.appearance is not before.appearance:
             self._apply_appearance()
@@ -145,12 +156,11 @@ class Wizard(QObject):
         self.workbench.streaming.want(place if now.streams else None)
 
     def _on_streaming_changed(self) -> None:
-        streaming = self.workbench.streaming
-        if self._stream_trouble and self._stream_trouble != streaming.trouble:
-            self.window.drop_notice(self._stream_trouble)
-        if streaming.trouble and streaming.trouble != self._stream_trouble:
-            self.window.show_notice(streaming.trouble)
-        self._stream_trouble = streaming.trouble
+        streaming, notices = self.workbench.streaming, self.workbench.notifications
+        if not streaming.trouble:
+            notices.withdraw(streaming)
+        elif streaming.trouble != notices.text(streaming):
+            notices.tell(streaming, streaming.trouble)
         self.window.set_stream(
             StreamState(streaming.status, streaming.has_tip, streaming.trouble)
         )
@@ -179,7 +189,7 @@ def run(make_pages: MakePages, swing: Path | None = None) -> int:
     Parameters
     ----------
     swing : Path, optional
-        What leads to a swing that is to be shown, see `lightpen.record.opening`.
+        The swing to show, see `lightpen.record.results.opening`.
 
     Raises
     ------
@@ -187,20 +197,16 @@ def run(make_pages: MakePages, swing: Path | None = None) -> int:
         There is no display to show it on.
     """
     if not has_display():
-        raise UsageError(
-            sentence(
-                "application.no-display",
-                "There is no display to open a window on. Start the program at a "
-                "screen, or give a command; lightpen --help lists them.",
-            )
-        )
+        raise UsageError("application.no-display")
     application = make_application(sys.argv)
     with EndSignals(application) as signals:
         settings = Settings(settings_file())
         folder = data_folder(settings.preferences())
+        write_log_to(folder)
+        _logger.info("window with the data folder %s; %s", folder, versions())
         wizard = Wizard(application, make_pages, settings, folder)
         if swing is not None:
-            open_swing = partial(wizard.workbench.swing_wanted.emit, swing)
+            open_swing = partial(wizard.workbench.run.open_requested.emit, swing)
             QTimer.singleShot(0, open_swing)
         status = _shown(application, wizard, signals)
     return ended(wizard, status)
@@ -214,7 +220,7 @@ def run_demo(make_pages: MakePages) -> int:
     records of the user are left alone.
     """
     is_seen = has_display() and os.environ.get("QT_QPA_PLATFORM") != "offscreen"
-    around = Surroundings(
+    around = SourceEnvironment(
         clock=MachineClock() if is_seen else SkippingClock(rests=True)
     )
     if not is_seen:
@@ -276,6 +282,8 @@ def ended(wizard: Wizard, status: int) -> int:
     is on the disk, as after any kill.
     """
     if not wizard.workbench.shut_down(0.0):
+        _logger.warning("something has not ended; the process is")
+        end_log()
         for stream in (sys.stdout, sys.stderr):
             if stream is not None:  # as it is without a console on Windows
                 stream.flush()

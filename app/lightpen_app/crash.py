@@ -6,6 +6,7 @@ the program, leaves its trace in a file that the next report points to.
 """
 
 import faulthandler
+import logging
 import platform
 import sys
 import threading
@@ -18,6 +19,7 @@ from types import TracebackType
 from PySide6.QtCore import QObject, Signal, qVersion
 
 from lightpen.local_time import local_now
+from lightpen.logs import recent_lines
 
 PACKAGES = (
     "lightpen",
@@ -28,6 +30,8 @@ PACKAGES = (
 )
 MAX_REPORTS = 20  # of one run; a bug in a paint event would fill the disk
 NATIVE_FILE = "library-crash.txt"
+
+_logger = logging.getLogger(__name__)
 
 
 class CrashHook(QObject):
@@ -90,6 +94,7 @@ class CrashHook(QObject):
                 return
             self._seen.add(text)
             number = len(self._seen)
+        _logger.critical("exception that nobody caught:\n%s", text)
         if sys.stderr is not None:
             sys.stderr.write(text)
         self.reported.emit(self._write(text, number))
@@ -105,7 +110,11 @@ class CrashHook(QObject):
         path = self._folder / f"crash-{now:%Y%m%d-%H%M%S}-{number}.txt"
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            path.write_text(f"{_circumstances(now)}\n\n{text}", encoding="utf-8")
+            path.write_text(
+                f"{_circumstances(now)}\n\n{text}\n{_log()}",
+                encoding="utf-8",
+                errors="backslashreplace",
+            )
         except OSError:
             return ""
         return str(path)
@@ -128,3 +137,7 @@ def _circumstances(now: datetime) -> str:
     lines.extend(f"{name}: {number}" for name, number in versions().items())
     lines.append(f"thread: {threading.current_thread().name}")
     return "\n".join(lines)
+
+
+def _log() -> str:
+    return "\n".join(("The last lines of the log:", *recent_lines(), ""))

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from lightpen.estimation.verdict import Grade
-from lightpen.record.names import Names
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.record.swings.names import Names
 from lightpen.swing.state import Phase
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
@@ -69,8 +69,8 @@ class Demo(QObject):
 
     def start(self) -> None:
         """Begin on the page that is shown."""
-        now = self._workbench.preparation
-        self._workbench.set_preparation(replace(now, names=NAMES))
+        now = self._workbench.selection.preparation
+        self._workbench.selection.set_preparation(replace(now, names=NAMES))
         self._timer.start()
 
     def _on_tick(self) -> None:
@@ -86,7 +86,7 @@ class Demo(QObject):
             self._is_accepted = True
             self._end(self._farewell())
         elif self._has_failed() or self._n_ticks * TICK_MS > 1000 * LONGEST_S:
-            self._end(self.tr("The demo ends here: there is no tip to accept."))
+            self._end(self.tr("Demo ended: no tip to accept."))
         elif key != "swing" or status.solution is not None:
             self._window.press_main()
 
@@ -98,19 +98,16 @@ class Demo(QObject):
 
     def _enter(self, key: str) -> None:
         words = {
-            "start": self.tr("Demo: station, pen, tip and cone are named."),
+            "start": self.tr("Demo: enter station, pen, tip and cone."),
             "camera": self.tr(
-                "Demo: the simulated camera sends images; exposure, focus and the "
-                "intrinsics are checked."
+                "Demo: check exposure, focus and intrinsics of the simulated camera."
             ),
-            "leds": self.tr(
-                "Demo: the LEDs of the file are compared with those in the image."
-            ),
+            "leds": self.tr("Demo: compare the LED file with the image."),
             "swing": self.tr(
-                "Demo: the simulated operator seats the tip and follows the arrow. No "
-                "key is pressed from here to the verdict."
+                "Demo: the simulated operator seats the tip and follows the arrow. "
+                "No key is needed up to the verdict."
             ),
-            "review": self.tr("Demo: the tip, what it is worth, and why."),
+            "review": self.tr("Demo: review the tip and its uncertainty."),
         }
         if key in words:  # else somebody looks round
             self.told.emit(words[key])
@@ -121,14 +118,14 @@ class Demo(QObject):
             self._workbench.live.set_following(True)
 
     def _show(self, words: str) -> None:
-        self._window.show_notice(words, Tone.ACTIVE)
+        self._workbench.notifications.tell(self, words, Tone.ACTIVE)
 
     def _farewell(self) -> str:
         if not self._is_watched:
-            return self.tr("The tip is accepted, and nothing of the demo is kept.")
+            return self.tr("Tip accepted. Demo data is not saved.")
         return self.tr(
-            "That was the demo. Look around as long as you like; nothing of it is "
-            "kept. Start the program without the demo to calibrate a tip."
+            "Demo finished. You can look around; demo data is not saved. To "
+            "calibrate a tip, start the program without the demo."
         )
 
     def _end(self, words: str) -> None:

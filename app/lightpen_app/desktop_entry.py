@@ -14,7 +14,6 @@ from pathlib import Path
 from lightpen.errors import FileError, UsageError
 from lightpen.formats.files import printable, write_whole
 from lightpen.formats.system_reasons import strerror
-from lightpen.sentences import sentence
 from lightpen_app.look.theme import RESOURCES
 
 MIME_TYPE = "application/x-lightpen-swing"
@@ -75,11 +74,7 @@ def install_entry() -> int:
         program=_quoted(str(program)), tried=program, mime_type=MIME_TYPE
     )
     icon = (RESOURCES / "icons" / "lightpen.svg").read_bytes()
-    contents = {
-        ENTRY_FILE: entry.encode(),
-        TYPES_FILE: TYPES.encode(),
-        ICON_FILE: icon,
-    }
+    contents = {ENTRY_FILE: entry.encode(), TYPES_FILE: TYPES.encode(), ICON_FILE: icon}
     for name, content in contents.items():
         _make_folder((data / name).parent)
         write_whole(data / name, content)
@@ -109,13 +104,7 @@ def remove_entry() -> int:
 
 def _data_folder() -> Path:
     if not sys.platform.startswith("linux"):
-        raise UsageError(
-            sentence(
-                "desktop-entry.not-linux",
-                "Desktop entries are of Linux. On Windows the installer makes the "
-                "entry of the start menu.",
-            )
-        )
+        raise UsageError("desktop-entry.not-linux")
     chosen = os.environ.get("XDG_DATA_HOME", "")
     # By the standard, a path that is not absolute counts as none.
     if Path(chosen).is_absolute():
@@ -138,12 +127,7 @@ def _make_folder(folder: Path) -> None:
 
 def _refused(path: Path, error: OSError) -> FileError:
     return FileError(
-        sentence(
-            "desktop-entry.refused",
-            "{path} cannot be changed: {reason}. Make sure that it is yours to write.",
-            path=printable(str(path)),
-            reason=strerror(error),
-        )
+        "desktop-entry.refused", path=printable(str(path)), reason=strerror(error)
     )
 
 

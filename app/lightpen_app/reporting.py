@@ -5,12 +5,12 @@ import sys
 from pathlib import Path
 
 from lightpen.formats.files import write_whole
-from lightpen.record.exports import save_new
+from lightpen.record.exports.exports import save_new
 from lightpen_app.application import has_display, make_application
-from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import load_fonts
-from lightpen_app.paper.printing import paper_of, paper_stem, pdf_of
-from lightpen_app.paper.showing import read_calibration_file
+from lightpen_app.print_report.control import read_calibration_file
+from lightpen_app.print_report.printing import paper_of, paper_stem, pdf_of
 
 
 def write_paper(result: Path, out: Path | None, language: str) -> Path:
@@ -42,10 +42,10 @@ def write_paper(result: Path, out: Path | None, language: str) -> Path:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
     application = make_application(sys.argv[:1])
     languages = LanguageSwitch(application)
-    languages.set_language(Language(language))
+    languages.set_language(language)
     load_fonts()
-    pdf = pdf_of(paper_of(found.statement, found.retraced, found.entered))
+    pdf = pdf_of(paper_of(found.calibration_file, found.reestimated, found.entered))
     if out is None:
-        return save_new(Path(), f"{paper_stem(found.statement)}.pdf", pdf)
+        return save_new(Path(), f"{paper_stem(found.calibration_file)}.pdf", pdf)
     write_whole(out, pdf)
     return out

@@ -13,4 +13,8 @@ Conventions used everywhere in this package:
   the axis before the coordinates.
 """
 
-__version__ = "0.1.0"
+import logging
+
+__version__ = "1.0.0"
+
+logging.getLogger(__name__).addHandler(logging.NullHandler())

@@ -5,23 +5,27 @@ usage or unreadable input.
 """
 
 import argparse
+import logging
 import re
 import sys
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from io import TextIOWrapper
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import cv2
+from typing_extensions import override
 
 from lightpen import __version__
 from lightpen.commands.archive import add_archive, usual_data_folder
 from lightpen.commands.console import BAD_INPUT, NO_TIP, Command, shown
 from lightpen.commands.desktop import Desktop, add_desktop, add_open, add_report
 from lightpen.commands.tips import add_tips
-from lightpen.errors import CalibrationError, LightpenError
-from lightpen.sentences import Sentence
+from lightpen.errors import CalibrationError, LightpenError, UsageError
+from lightpen.logs import LEVEL_VARIABLE, LEVELS, log_level, running_log, write_log_to
+from lightpen.messages import Message
 
 # Each with what adds its options, which is imported only for what was given.
 COMMANDS = (
@@ -72,6 +76,8 @@ ADVICE = {
     "images.ambiguous": "They are given by --centers FILE.csv.",
 }
 
+_logger = logging.getLogger(__name__)
+
 
 def main(arguments: Sequence[str] | None = None, desktop: Desktop | None = None) -> int:
     """Run the command line and return the exit status.
@@ -95,28 +101,72 @@ def main(arguments: Sequence[str] | None = None, desktop: Desktop | None = None)
         if isinstance(stream, TextIOWrapper):  # a console may lack letters of a name
             stream.reconfigure(errors="backslashreplace")
     cv2.setNumThreads(1)  # images are spread over threads, one each
+    try:
+        level = log_level(options.log_level)
+    except UsageError as error:
+        _complain(error.message)
+        return BAD_INPUT
+    with running_log(level, is_verbose=options.verbose):
+        if options.log_folder is not None:
+            _write_log_to_existing(options.log_folder())
+        _logger.info("lightpen %s started with %s", __version__, given)
+        status = _run(options)
+        _logger.info("ended with status %d", status)
+        return status
+
+
+def _write_log_to_existing(data: Path) -> None:
+    """Log to a data folder; a command does not make one."""
+    with suppress(OSError):  # it cannot be looked at
+        if data.is_dir():
+            write_log_to(data)
+
+
+def _run(options: argparse.Namespace) -> int:
     run: Command = options.run
     try:
-        status = run(options)
+        return run(options)
     except CalibrationError as error:
-        _complain(error.sentence)
+        _complain(error.message)
         return NO_TIP
     except LightpenError as error:
-        _complain(error.sentence)
+        _complain(error.message)
         return BAD_INPUT
     except KeyboardInterrupt:
         print("lightpen: stopped.", file=sys.stderr)
+        _logger.info("stopped by the user")
         return BAD_INPUT
-    return status
 
 
-def _complain(trouble: Sentence) -> None:
+def _complain(trouble: Message) -> None:
     """Print what is wrong, and what to type about it."""
     advice = [ADVICE[each.code] for each in trouble.parts() if each.code in ADVICE]
     print(shown(" ".join(map(str, ["lightpen:", trouble, *advice]))), file=sys.stderr)
+    _logger.error("%s: %s", trouble.code, trouble)
 
 
 class _Parser(argparse.ArgumentParser):
+    """A parser, also of a command, that takes the options of the log."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        log = self.add_argument_group("log")
+        log.add_argument(
+            "-v",
+            "--verbose",
+            action="store_true",
+            default=argparse.SUPPRESS,
+            help="also print the log on standard error",
+        )
+        log.add_argument(
+            "--log-level",
+            type=str.lower,
+            choices=LEVELS,
+            default=argparse.SUPPRESS,
+            help=f"log level (default: info, or {LEVEL_VARIABLE})",
+        )
+
+    @override
     def error(self, message: str) -> NoReturn:
         super().error(shown(message))
 
@@ -133,17 +183,19 @@ def _parser(
         epilog="Exit status: 0 done, 1 the data cannot give a tip or the archive was "
         "changed, 2 wrong usage or unreadable input.",
     )
+    parser.set_defaults(verbose=False, log_level=None, log_folder=None)
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=not has_window, metavar="COMMAND")
     if desktop is not None:
         add_desktop(parser, desktop)
-        add_open(commands.add_parser("open", help="show a recorded swing"), desktop)
+        add_open(commands.add_parser("open", help="open a recorded swing"), desktop)
         add_report(
-            commands.add_parser("report", help="write the record on paper, as PDF"),
+            commands.add_parser("report", help="write the calibration report as PDF"),
             desktop,
         )
     for name, told, function in COMMANDS:
         command = commands.add_parser(name, help=told)
+        command.set_defaults(log_folder=usual_data_folder)
         if name in given:
             resolve_name(f"lightpen.commands.{function}")(command)
     data_folder = usual_data_folder if desktop is None else desktop.data_folder
@@ -152,6 +204,7 @@ def _parser(
         ("tips", "the library of pens, tips and cones", add_tips),
     ):
         command = commands.add_parser(name, help=told)
+        command.set_defaults(log_folder=usual_data_folder)
         if name in given:
             add(command, data_folder)
     return parser, commands.choices

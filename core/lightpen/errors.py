@@ -1,6 +1,6 @@
 """Errors the user can put right; anything else is a bug and is left to crash."""
 
-from lightpen.sentences import Sentence
+from lightpen.messages import Message, Value
 
 
 class LightpenError(Exception):
@@ -8,13 +8,15 @@ class LightpenError(Exception):
 
     Parameters
     ----------
-    sentence : Sentence
-        What was found, what is needed and what to do.
+    told : Message or str
+        What was found, what is needed and what to do; or the code of such a message.
+    **values : Value
+        Of a message given by its code.
     """
 
-    def __init__(self, sentence: Sentence) -> None:
-        super().__init__(sentence)
-        self.sentence = sentence
+    def __init__(self, told: Message | str, /, **values: Value) -> None:
+        self.message = Message(told, values) if isinstance(told, str) else told
+        super().__init__(self.message)
 
 
 class FileError(LightpenError):

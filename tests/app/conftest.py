@@ -33,6 +33,7 @@ from PySide6.QtWidgets import (
     QGroupBox,
     QLabel,
     QLineEdit,
+    QListWidget,
     QMenu,
     QMessageBox,
     QScrollArea,
@@ -49,16 +50,15 @@ from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.formats.opened_files import OpenedFiles
-from lightpen.live.sources import Surroundings, sample_files
-from lightpen.record.names import Names
-from lightpen.record.reading import Record
-from lightpen.record.solving import solve_record
+from lightpen.live.sources import SourceEnvironment, sample_files
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import Record
+from lightpen.record.swings.solving import solve_record
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen_app.application import SWITCH_INTERVAL, Wizard
 from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.look.layout_items import forget_layout_items
 from lightpen_app.look.theme import DARK, apply_theme, load_fonts
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.garbage import collect_if_due
@@ -115,7 +115,6 @@ def collected(kept_to_one_thread: None) -> Iterator[None]:
     """What a test has closed is gone before the next one: each would be styled anew."""
     yield
     QThreadPool.globalInstance().waitForDone(PATIENCE_MS)  # its jobs are told of there
-    forget_layout_items()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     collect_if_due()
 
@@ -178,9 +177,9 @@ def small_scene() -> Scene:
 
 
 @pytest.fixture(scope="session")
-def around(small_scene: Scene) -> Surroundings:
+def around(small_scene: Scene) -> SourceEnvironment:
     """Return the small scene, in which all goes four times as fast as usual."""
-    return Surroundings(small_scene, HastyClock())
+    return SourceEnvironment(small_scene, HastyClock())
 
 
 SolvingOn: TypeAlias = Callable[[], AbstractContextManager[None]]
@@ -193,16 +192,16 @@ def samples(
 ) -> OpenedFiles:
     """The simulated pen's files, written and read once; copy before you change them."""
     folder = tmp_path_factory.mktemp("samples")
-    return sample_files(Surroundings(small_scene), folder)
+    return sample_files(SourceEnvironment(small_scene), folder)
 
 
 @pytest.fixture
 def workbench(
-    settings: Settings, tmp_path: Path, around: Surroundings, samples: OpenedFiles
+    settings: Settings, tmp_path: Path, around: SourceEnvironment, samples: OpenedFiles
 ) -> Iterator[Workbench]:
     """A workbench with names and the simulated pen's files; its camera is not open yet.
 
-    `workbench.open_camera()` opens it; images then come four times as fast as usual.
+    `workbench.camera.open()` opens it; images then come four times as fast as usual.
     """
     workbench = Workbench(settings, tmp_path / "data", around)
     choose_samples(workbench, samples, tmp_path / "samples")
@@ -216,9 +215,9 @@ def choose_samples(workbench: Workbench, samples: OpenedFiles, folder: Path) -> 
     assert camera is not None
     assert pen is not None
     shutil.copytree(camera.path.parent, folder)
-    workbench.set_preparation(
+    workbench.selection.set_preparation(
         replace(
-            workbench.preparation,
+            workbench.selection.preparation,
             names=NAMES,
             camera_file=replace(camera, path=folder / camera.path.name),
             pen_file=replace(pen, path=folder / pen.path.name),
@@ -239,7 +238,7 @@ def solving_on(monkeypatch: pytest.MonkeyPatch) -> SolvingOn:
     @contextmanager
     def patched() -> Iterator[None]:
         with monkeypatch.context() as endless:
-            endless.setattr("lightpen.swing.course.solve_record", solve)
+            endless.setattr("lightpen.swing.workflow.solve_record", solve)
             yield
 
     return patched
@@ -503,6 +502,8 @@ def texts_of(widget: QWidget) -> Iterator[str]:
             yield widget.toPlainText()
         case QTableView():
             yield from _cells_of(widget)
+        case QListWidget():
+            yield from (widget.item(index).text() for index in range(widget.count()))
     yield widget.accessibleName()
     yield widget.accessibleDescription()
 
@@ -563,12 +564,12 @@ def open_wizard(
     dressed: QApplication,
     tmp_path: Path,
     settings: Settings,
-    around: Surroundings,
+    around: SourceEnvironment,
 ) -> Iterator[OpenWizard]:
     """Return a function that starts the program, always on the same folder."""
     opened: list[Walker] = []
 
-    def start(source: Surroundings = around) -> Walker:
+    def start(source: SourceEnvironment = around) -> Walker:
         folder = tmp_path / "data"
         dressed.setStyleSheet("")  # which the wizard gives it
         wizard = Wizard(dressed, make_pages, settings, folder, source)

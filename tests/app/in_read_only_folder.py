@@ -6,18 +6,23 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QLabel
 
-from lightpen.live.sources import Surroundings, sample_files
+from lightpen.live.sources import SourceEnvironment, sample_files
+from lightpen.record.swings.names import Names
 from lightpen_app.look.theme import TextSize
-from lightpen_app.work.settings import Settings, Station
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import FilePaths, Station
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
 
-WAY = "The data folder is chosen at the step Start, or in the options (F10)."
+WAY = "Choose the data folder at the step Start or in the options (F10)."
 
 
 def test_a_read_only_data_folder_is_told_with_the_way_to_another(
-    settings: Settings, open_wizard: "OpenWizard", around: Surroundings, tmp_path: Path
+    settings: Settings,
+    open_wizard: "OpenWizard",
+    around: SourceEnvironment,
+    tmp_path: Path,
 ) -> None:
     data = tmp_path / "data"
     data.mkdir()
@@ -29,15 +34,14 @@ def test_a_read_only_data_folder_is_told_with_the_way_to_another(
     settings.set_station(
         "Hall 2",
         Station(
-            *("Ann", "LP-04", "T-10", "C-1"),
-            camera_file=str(files.camera_file.path),
-            pen_file=str(files.pen_file.path),
+            Names("", "Ann", "LP-04", "T-10", "C-1"),
+            files=FilePaths(str(files.camera_file.path), str(files.pen_file.path)),
         ),
     )
     settings.set_last_station("Hall 2")
 
     walker = open_wizard()
-    walker.until_tells(f"Nothing can be kept in the data folder {data}: the disk is")
+    walker.until_tells(f"The data folder {data} is not writable: the disk is")
     walker.until_tells(WAY)
     assert walker.offers("Choose another data folder")
 

@@ -19,9 +19,11 @@ from tests.app.walks import (
 )
 
 from lightpen.arrays import Image
-from lightpen.record.reading import open_record
-from lightpen.record.unfinished import find_unfinished
-from lightpen_app.work.settings import Settings, Station
+from lightpen.record.swings.interrupted import find_unfinished
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import open_record
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import Station
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -44,7 +46,7 @@ def test_the_operator_view_fills_the_screen(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
     assert QGuiApplication.platformName() == "xcb"
-    settings.set_station(STATION, Station("Ann", "LP-04", "T-10", "C-1"))
+    settings.set_station(STATION, Station(Names("", "Ann", "LP-04", "T-10", "C-1")))
     settings.set_last_station(STATION)
     walker = open_wizard()
     while walker.title() != "Swing":
@@ -75,7 +77,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     assert walker.title() == "Camera"
     walker.until_says("Live")
     walker.until_tells("10 of 10 LEDs")
-    assert walker.tells("Fits the live images: 1224 x 1024")
+    assert walker.tells("Matches the live images: 1224 x 1024")
     walker.click("Continue to the LEDs")
 
     assert walker.title() == "LEDs"
@@ -86,7 +88,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
 
     assert walker.title() == "Swing"
     assert walker.main_button().text() == "Finish early"
-    assert walker.says("No image is kept yet.")
+    assert walker.says("No image captured yet")
     walker.swing()
     watch_the_swing(walker)
     n_inputs = walker.n_inputs
@@ -95,7 +97,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     walker.until_shows("Review")
     assert walker.n_inputs == n_inputs
 
-    assert walker.says("PASS: Good")
+    assert walker.says("PASS: Within limits")
     walker.until(walker.main_button().isEnabled)
     shown = read_out(walker)
     # Four standard deviations: U is two.
@@ -104,7 +106,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     ).all()
     walker.click("Accept")
 
-    walker.until_says("PRACTICE KEPT")
+    walker.until_says("PRACTICE SAVED")
     steps = walker.steps()
     assert steps.pop("Verify") == "to do"
     assert set(steps.values()) == {"done", "now"}
@@ -116,7 +118,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     assert find_unfinished(record.folder.parent).interrupted == ()
     assert calibrated(lightpen, record.folder) == result.tip_pen.tolist()
     walker.until(walker.main_button().isEnabled)
-    walker.click("Start the next calibration")
+    walker.click("Start next calibration")
 
     assert walker.title() == "Start"
     walker.until_says("Today")
@@ -147,5 +149,5 @@ def pixels_of(image: QImage) -> Image:
 
 
 def _misfit(walker: "Walker") -> float:
-    """The misfit that is told with the LEDs, px."""
-    return float(re.findall(r"misfit (\S+) px", told(walker))[0])
+    """The RMS residual shown with the LEDs, px."""
+    return float(re.findall(r"RMS residual (\S+) px", told(walker))[0])

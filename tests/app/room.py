@@ -18,7 +18,7 @@ from lightpen_app.widgets.plots import Plot
 
 
 @dataclass(frozen=True)
-class Room:
+class SizeClass:
     """What there is to complain about in a window.
 
     Attributes
@@ -37,7 +37,7 @@ class Room:
     sideways: tuple[str, ...]
 
 
-def lack_of(widget: QWidget) -> str:
+def missing_input_of(widget: QWidget) -> str:
     """Return which words of a widget need more room than it has, or nothing."""
     needed = has = QSize()
     words = ""
@@ -82,7 +82,7 @@ def _title_end(plot: Plot) -> int:
 
 def clipped_words(root: QWidget) -> tuple[str, ...]:
     widgets = (each for each in root.findChildren(QWidget) if each.isVisible())
-    return tuple(filter(None, map(lack_of, widgets)))
+    return tuple(filter(None, map(missing_input_of, widgets)))
 
 
 def scrolled_sideways(root: QWidget) -> tuple[str, ...]:
@@ -93,7 +93,7 @@ def scrolled_sideways(root: QWidget) -> tuple[str, ...]:
     )
 
 
-def room_of(window: MainWindow) -> Room:
+def room_of(window: MainWindow) -> SizeClass:
     page = window.page()
     layout = page.layout()
     assert layout is not None
@@ -101,4 +101,6 @@ def room_of(window: MainWindow) -> Room:
     lack = QSize(
         max(least.width() - page.width(), 0), max(least.height() - page.height(), 0)
     )
-    return Room(window.size(), lack, clipped_words(window), scrolled_sideways(page))
+    return SizeClass(
+        window.size(), lack, clipped_words(window), scrolled_sideways(page)
+    )

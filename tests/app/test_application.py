@@ -13,7 +13,6 @@ from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
 from lightpen_app.application import Wizard
-from lightpen_app.look.languages import Language
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import LIGHT, Appearance, colors_of
 from lightpen_app.shell.main_window import LEAST_SIZE
@@ -79,7 +78,7 @@ def test_choices_take_effect_at_once_and_are_remembered(
 ) -> None:
     settings.set_preferences(Preferences())
     wizard = open_wizard(qtbot, settings)
-    chosen = Preferences(language=Language.CHINESE, appearance=Appearance.LIGHT)
+    chosen = Preferences(language="zh_CN", appearance=Appearance.LIGHT)
 
     wizard.window.preferences_changed.emit(chosen)
     QApplication.processEvents()
@@ -102,7 +101,10 @@ def test_settings_that_cannot_be_saved_are_told_and_stop_nothing(
     wizard.window.preferences_changed.emit(Preferences(muted=True))
 
     qtbot.waitUntil(
-        lambda: any("cannot be saved" in each for each in wizard.window.words())
+        lambda: any(
+            "). Check free space and write permission of its folder." in each
+            for each in wizard.window.words()
+        )
     )
     wizard.setParent(None)
 
@@ -114,20 +116,20 @@ def test_a_crash_is_shown_in_the_window(qtbot: QtBot, settings: Settings) -> Non
     wizard.crash_hook.report(RuntimeError, error, None)
 
     words = " ".join(wizard.window.words())
-    assert "The program made a mistake of its own" in words
+    assert "An internal error occurred" in words
     assert str(settings.file.parent / "crashes") in words
     wizard.setParent(None)
 
 
-def test_a_trouble_that_is_over_is_no_longer_told(
+def test_a_fault_that_is_over_is_no_longer_told(
     qtbot: QtBot, settings: Settings
 ) -> None:
     wizard = open_wizard(qtbot, settings)
-    run = wizard.workbench.run
+    notifications = wizard.workbench.notifications
 
-    run.troubled.emit("The disk is full.")
+    notifications.tell("a swing", "The disk is full.")
     assert "The disk is full." in wizard.window.words()
-    run.relieved.emit("The disk is full.")
+    notifications.withdraw("a swing")
 
     assert "The disk is full." not in wizard.window.words()
     wizard.setParent(None)

@@ -18,12 +18,10 @@ from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.record.reading import Record, open_record
-from lightpen.record.solving import Solution, solve_record
-from lightpen.record.unfinished import (
-    find_unfinished,
-)
-from lightpen.record.writing import RecordWriter
+from lightpen.record.swings.interrupted import find_unfinished
+from lightpen.record.swings.reading import Record, open_record
+from lightpen.record.swings.solving import Solution, solve_record
+from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Operator
 from lightpen.swing.resuming import read_resumable
@@ -224,7 +222,7 @@ def test_closing_waits_for_all_that_is_under_way_together(
         stuck.wait()
         return solve_record(record, report)
 
-    monkeypatch.setattr("lightpen.swing.course.solve_record", solve)
+    monkeypatch.setattr("lightpen.swing.workflow.solve_record", solve)
     swing_before(workbench, stuck)
     workbench.run.runner.go_on(read_resumable(interrupted))
     qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2)
@@ -281,7 +279,7 @@ def test_a_solution_that_ends_in_time_is_waited_for(
         ended.set()
         return solution
 
-    monkeypatch.setattr("lightpen.swing.course.solve_record", solve)
+    monkeypatch.setattr("lightpen.swing.workflow.solve_record", solve)
     workbench.run.runner.go_on(read_resumable(interrupted))
     workbench.run.runner.finish()
     qtbot.waitUntil(began.is_set)
@@ -308,7 +306,7 @@ def test_the_window_closes_in_time_and_the_swing_is_offered_again(
     folder = run.records_folder / "interrupted"
     shutil.copytree(swung(), folder)
     with monkeypatch.context() as slow:
-        slow.setattr("lightpen.swing.course.solve_record", solve)
+        slow.setattr("lightpen.swing.workflow.solve_record", solve)
         run.runner.go_on(read_resumable(folder))
         run.runner.finish()
         walker.until(stuck.is_reached.is_set)
@@ -320,7 +318,7 @@ def test_the_window_closes_in_time_and_the_swing_is_offered_again(
     took = time.monotonic() - began
     stuck.may_end.set()
 
-    assert "The swing is not finished." in asked[0]
+    assert "Swing not finished." in asked[0]
     assert took < TIMEOUT / 2000  # the computation goes on twice as long
     assert_whole(folder, N_IMAGES)
     again = open_wizard()

@@ -1,5 +1,6 @@
 """A bug is written down and told, and the program goes on."""
 
+import logging
 import subprocess
 import sys
 import threading
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
+from lightpen.logs import running_log
 from lightpen_app.crash import MAX_REPORTS, CrashHook, versions
 
 # The hooks are taken over in a process of its own, as pytest has its own hooks.
@@ -57,9 +59,7 @@ def hook(tmp_path: Path) -> Iterator[CrashHook]:
     hook.deleteLater()
 
 
-def test_a_bug_in_a_slot_or_a_thread_leaves_the_program_running(
-    tmp_path: Path,
-) -> None:
+def test_a_bug_in_a_slot_or_a_thread_leaves_the_program_running(tmp_path: Path) -> None:
     result = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(tmp_path)],
         capture_output=True,
@@ -88,6 +88,23 @@ def test_a_report_says_what_happened_where_and_with_which_versions(
     assert "raise_and_report" in text
     for name, number in versions().items():
         assert f"{name}: {number}" in text
+
+
+def test_a_report_ends_with_the_last_lines_of_the_log(
+    qtbot: QtBot, hook: CrashHook
+) -> None:
+    with running_log(logging.INFO):
+        logging.getLogger("lightpen").info("camera 7: lost")
+        with qtbot.waitSignal(hook.reported) as blocker:
+            raise_and_report(hook, "the bug")
+
+    assert blocker.args is not None
+    text = Path(blocker.args[0]).read_text("utf-8")
+    _, _, log = text.partition("The last lines of the log:\n")
+    assert "INFO" in log
+    assert "lightpen: camera 7: lost\n" in log
+    assert "CRITICAL" in log
+    assert "RuntimeError: the bug" in log
 
 
 def test_the_same_bug_is_told_once(qtbot: QtBot, hook: CrashHook) -> None:

@@ -12,7 +12,7 @@ from lightpen_app.work.settings import Preferences, Settings, data_folder
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
 
-SHARED = "Other windows of the program use the data folder"
+SHARED = "The program is open in other windows using the same data folder, "
 
 
 def test_two_windows_on_one_data_folder_both_say_so_until_one_closes(
@@ -25,7 +25,9 @@ def test_two_windows_on_one_data_folder_both_say_so_until_one_closes(
 
     second.until_tells(SHARED)
     first.until_tells(SHARED)
-    assert first.tells("Other windows of the program that use this folder: 1.")
+    assert first.tells(
+        "The program is open in other windows using the same data folder (1)."
+    )
 
     second.window.close_unasked()
     first.until(lambda: not first.tells(SHARED))
@@ -52,7 +54,7 @@ def test_the_data_folder_is_shown_and_chosen(
     dialog.fileSelected.emit(str(other))
     dialog.close()
 
-    walker.until_tells("from the next start of the program on")
+    walker.until_tells("From the next start, swings and results are saved in")
     assert data_folder(settings.preferences()) == other
     assert walker.workbench.folder != other
 

@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
+from lightpen.model.limits import SwingLimits
 from lightpen.simulator.scenes import Scene
 from lightpen_app.demo import NAMES, Demo
-from lightpen_app.work.settings import Settings, Station
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import Station
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard
@@ -58,9 +60,7 @@ def test_the_demo_plays_without_a_screen_in_1_5_gb_and_prints_the_tip(
 
     assert outcome.returncode == 0, outcome.stderr
     assert outcome.stdout.count("Demo: ") == 5  # one for each step
-    assert outcome.stdout.endswith(
-        "The tip is accepted, and nothing of the demo is kept.\n"
-    )
+    assert outcome.stdout.endswith("Tip accepted. Demo data is not saved.\n")
     tip = [float(number) for number in JOINT.findall(outcome.stdout)[0]]
     assert np.linalg.norm(np.array(tip) - Scene().tip_pen) <= 0.005
     assert list(tmp_path.rglob("*")) == []  # nothing of it is kept
@@ -91,7 +91,7 @@ def test_an_unseen_demo_that_fails_asks_nobody_before_it_closes(tmp_path: Path) 
     )
 
     assert outcome.returncode == 1, outcome.stderr
-    assert "there is no tip to accept" in outcome.stdout
+    assert "Demo ended:" in outcome.stdout
 
 
 def test_the_window_is_refused_in_a_sentence_without_a_screen(newcomer: Run) -> None:
@@ -106,7 +106,7 @@ def test_the_window_is_refused_in_a_sentence_without_a_screen(newcomer: Run) -> 
 def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
     open_wizard: "OpenWizard", settings: Settings, qtbot: QtBot
 ) -> None:
-    hopeless = Station(max_uncertainty=1e-6, min_images=10, max_images=12)
+    hopeless = Station(limits=SwingLimits(1e-6, 10, 12))
     settings.set_station(NAMES.station, hopeless)
     settings.set_last_station(NAMES.station)
     walker = open_wizard()
@@ -116,7 +116,7 @@ def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
         demo.start()
 
     assert walker.workbench.run.status.result is None
-    assert "The demo ends here: there is no tip to accept." in walker.window.words()
+    assert "Demo ended: no tip to accept." in walker.window.words()
 
 
 def test_a_demo_goes_on_after_somebody_looked_at_another_step(
@@ -130,5 +130,5 @@ def test_a_demo_goes_on_after_somebody_looked_at_another_step(
     demo.start()
 
     walker.until(lambda: bool(told))
-    assert told[0].startswith("Demo: station, pen, tip and cone are named.")
+    assert told[0].startswith("Demo: enter station, pen, tip and cone.")
     demo.deleteLater()

@@ -45,16 +45,16 @@ def test_who_listens_follows_the_pen_and_every_page_says_so(
     port.setValue(chosen)
     walker.click_on(walker.control("Stream pose and tip", dialog))
 
-    walker.until_tells(f"Live stream at {LOOPBACK}:{chosen}, listening: 0")
+    walker.until_tells(f"Live stream at {LOOPBACK}:{chosen}, clients: 0")
     assert settings.preferences().streams
-    assert "On at" in dialog.words()
+    assert "Active at" in dialog.words()
     dialog.close()
     walker.operator.seat()
     client = OpenIGTLinkClient(port=chosen)
-    walker.until_tells("listening: 1")
+    walker.until_tells("clients: 1")
     walker.until(lambda: client.wait_for_message("PenToCamera", timeout=0) is not None)
     client.stop()
-    walker.until_tells("listening: 0")
+    walker.until_tells("clients: 0")
 
 
 def test_the_tip_in_force_is_streamed_and_one_that_comes_into_force(
@@ -65,7 +65,7 @@ def test_the_tip_in_force_is_streamed_and_one_that_comes_into_force(
     qtbot.waitUntil(lambda: streaming.status.place is not None)
     assert not streaming.has_tip
 
-    accept_tip(workbench.folder, workbench.preparation)
+    accept_tip(workbench.folder, workbench.selection.preparation)
     streaming.read_tip()
 
     qtbot.waitUntil(lambda: streaming.has_tip)
@@ -105,7 +105,11 @@ def test_an_address_beyond_this_computer_is_warned_of(qtbot: QtBot) -> None:
 
     def warns() -> bool:
         remarks = (each.value().text for each in dialog.findChildren(SignLabel))
-        return any("Every computer in that network" in text for text in remarks)
+        return any(
+            "Every computer in this network can receive the data without signing in."
+            in text
+            for text in remarks
+        )
 
     dialog.set_value(is_on=False, place=StreamPlace())
     assert not warns()

@@ -29,7 +29,7 @@ from pathlib import Path
 from PySide6.QtCore import QLocale, QTimer
 import lightpen.simulator.camera
 from lightpen.cameras.clock import SkippingClock
-from lightpen.live.sources import Surroundings
+from lightpen.live.sources import SourceEnvironment
 from lightpen.model.limits import SwingLimits
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
@@ -42,14 +42,16 @@ lightpen.simulator.camera.USUAL_FRAME_RATE = 7.0  # looking at images takes long
 folder = Path(sys.argv[1])
 application = make_application(["lightpen"])
 settings = Settings(folder / "lightpen.json")
-around = Surroundings(Scene(camera=paper_camera(binning=2)), SkippingClock(rests=True))
+scene = Scene(camera=paper_camera(binning=2))
+around = SourceEnvironment(scene, SkippingClock(rests=True))
 wizard = Wizard(application, make_pages, settings, folder, around)
 demo = Demo(wizard.window, wizard.workbench, is_watched=False)
 demo.ended.connect(wizard.window.close_unasked)
 wizard.window.show()
 wizard.workbench.start()
 limits = SwingLimits(max_uncertainty=0.05, min_images=12, min_per_field=0)
-wizard.workbench.set_preparation(replace(wizard.workbench.preparation, limits=limits))
+selection = wizard.workbench.selection
+selection.set_preparation(replace(selection.preparation, limits=limits))
 QTimer.singleShot(0, demo.start)
 application.exec()
 print(QLocale.system().name(), demo.is_accepted, wizard.workbench.shut_down(60.0))

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from lightpen.record.folder_archive import RECORDS
-from lightpen.record.reading import OPENER, open_record
-from lightpen.record.writing import RecordWriter
+from lightpen.record.results.result_folder import RECORDS
+from lightpen.record.swings.reading import OPENER, open_record
+from lightpen.record.swings.writing import RecordWriter
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard
@@ -31,7 +31,7 @@ def test_a_swing_with_a_verdict_is_shown_at_the_step_review(
         writer.conclude("check")
     walker = open_wizard()
 
-    walker.workbench.swing_wanted.emit(record / OPENER)
+    walker.workbench.run.open_requested.emit(record / OPENER)
 
     walker.until(lambda: walker.window.page().key == "review")
     assert walker.workbench.run.status.record_folder == record
@@ -43,7 +43,7 @@ def test_an_interrupted_swing_goes_on_at_the_step_swing(
 ) -> None:
     walker = open_wizard()
 
-    walker.workbench.swing_wanted.emit(record)
+    walker.workbench.run.open_requested.emit(record)
 
     walker.until(lambda: walker.window.page().key == "swing")
     assert walker.workbench.run.status.is_capturing
@@ -54,7 +54,7 @@ def test_what_is_no_swing_is_told_in_a_sentence(
 ) -> None:
     walker = open_wizard()
 
-    walker.workbench.swing_wanted.emit(tmp_path / "thesis.docx")
+    walker.workbench.run.open_requested.emit(tmp_path / "thesis.docx")
 
     walker.until(
         lambda: any("neither a recorded swing" in text for text in walker.texts())

@@ -42,8 +42,10 @@ def display() -> Iterator[str]:
         with os.fdopen(reading) as pipe:
             number = pipe.readline().strip()
         assert number, "Xvfb did not start"
-        yield f":{number}"
-        process.terminate()
+        try:
+            yield f":{number}"
+        finally:
+            process.terminate()
 
 
 def passed(test: str, environment: dict[str, str]) -> str:

@@ -5,7 +5,7 @@ from PySide6.QtCore import QSize
 from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QWidget
 from pytestqt.qtbot import QtBot
-from tests.app.room import lack_of
+from tests.app.room import missing_input_of
 
 from lightpen_app.look.theme import TextSize, font, text_label
 from lightpen_app.widgets.plots import Axes, Curve, TracePlot
@@ -18,7 +18,7 @@ def test_words_that_are_clipped_are_noticed(qtbot: QtBot, room: int) -> None:
     wrapped = text_label()
     wrapped.setText("Swing the pen first and then review what has come of it.")
     button.setText("Let the simulated operator swing")
-    plot = TracePlot(Axes("Misfit of each image / px"), [Curve("misfit_px")])
+    plot = TracePlot(Axes("RMS residual per image / px"), [Curve("misfit_px")])
     shelf = QWidget()  # a window of its own could not be made so small
     qtbot.addWidget(shelf)
     shelf.show()
@@ -26,12 +26,12 @@ def test_words_that_are_clipped_are_noticed(qtbot: QtBot, room: int) -> None:
         widget.setParent(shelf)
         widget.resize(widget.sizeHint().expandedTo(QSize(400, 200)))
         widget.show()
-        assert lack_of(widget) == ""
+        assert missing_input_of(widget) == ""
 
         widget.resize(room, 20)
         QApplication.processEvents()
 
-        assert lack_of(widget)
+        assert missing_input_of(widget)
 
 
 def test_a_button_is_not_made_narrower_than_its_words(qtbot: QtBot) -> None:
@@ -47,4 +47,4 @@ def test_a_button_is_not_made_narrower_than_its_words(qtbot: QtBot) -> None:
 
     words = QFontMetricsF(font(TextSize.BODY)).horizontalAdvance(button.text())
     assert button.width() > words
-    assert lack_of(button) == ""
+    assert missing_input_of(button) == ""

@@ -19,9 +19,9 @@ import pytest
 from PySide6.QtCore import QPoint, QRect, QSize
 from PySide6.QtGui import QImage, QPainter
 from PySide6.QtWidgets import QApplication, QTabWidget
-from tests.app.room import Room, room_of
+from tests.app.room import SizeClass, room_of
 
-from lightpen_app.look.languages import Language
+from lightpen_resources import languages
 
 ROOT = Path(__file__).parents[2]
 DIFFERENT = ROOT / "screens-different"
@@ -50,7 +50,7 @@ SIZES = (LEAST, QSize(960, 540), QSize(1280, 800))
 KEYS = [
     (step, str(language), size.width())
     for step in SCREENS.STEPS
-    for language in Language
+    for language in languages()
     for size in SIZES
 ]
 
@@ -123,7 +123,7 @@ class Seen:
     """
 
     pictures: dict[str, QImage]
-    rooms: dict[Key, list[Room]]
+    rooms: dict[Key, list[SizeClass]]
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +139,7 @@ def seen(dressed: QApplication) -> Iterator[Seen]:
         stage.close()
 
 
-def rooms_of(stage: Any, step: str) -> Iterator[tuple[Key, list[Room]]]:
+def rooms_of(stage: Any, step: str) -> Iterator[tuple[Key, list[SizeClass]]]:
     """Yield what room the step that is shown has in each language and width.
 
     In the appearance that it was drawn in last: to change it takes long.
@@ -147,10 +147,10 @@ def rooms_of(stage: Any, step: str) -> Iterator[tuple[Key, list[Room]]]:
     window = stage.wizard.window
     appearance = SCREENS.looks_of(step)[-1].appearance
 
-    def room() -> Room:
+    def room() -> SizeClass:
         return room_of(window)
 
-    for language in Language:
+    for language in languages():
         for size in SIZES:
             with stage.unpainted():
                 stage.set_look(SCREENS.Look(language, appearance, size))

@@ -28,11 +28,13 @@ from tests.app.walks import (
     watch_the_swing,
 )
 
-from lightpen.live.sources import Surroundings
+from lightpen.live.sources import SourceEnvironment
+from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
+from lightpen.record.swings.names import Names
 from lightpen.simulator.scenes import Scene
-from lightpen_app.look.languages import Language
-from lightpen_app.work.settings import Preferences, Settings, Station
+from lightpen_app.work.settings import Preferences, Settings
+from lightpen_app.work.stations import Station
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -48,7 +50,7 @@ HANDLES = (
 )
 WHOLE = (QAbstractItemView, QAbstractSpinBox, QComboBox)  # the Tab key passes parts by
 PATH = re.compile(r"\S*/\S*")
-TOO_SLOW = "This computer is too slow"  # an error of the core, for the clock is hasty
+TOO_SLOW = "Processing cannot keep up"  # an error of the core, for the clock is hasty
 WORD = re.compile(r"[A-Za-z]{2,}")
 SAME_EVERYWHERE = {
     *("Mono", "LED", "LEDs", "px", "mm", "dB", "ms", "fx", "fy"),
@@ -75,20 +77,20 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
     _check_round(walker)
     walker.press(Key.Key_PageDown)
 
-    walker.until_says("Show the pen")
+    walker.until_says("Hold the pen in view")
     _check_round(walker)
     walker.tab_to("Let the simulated operator swing")
     walker.press(Key.Key_Return)
     watch_the_swing(walker)
     walker.press(Key.Key_PageDown)
 
-    assert walker.says("PASS: Good")
+    assert walker.says("PASS: Within limits")
     walker.until(walker.main_button().isEnabled)
     _check_round(walker)
     walker.tab_to("Accept")
     walker.press(Key.Key_Return)
 
-    walker.until_says("PRACTICE KEPT")
+    walker.until_says("PRACTICE SAVED")
     assert result_on_disk(walker).names.operator == "Ann"
     walker.until(walker.main_button().isEnabled)
     walker.press(Key.Key_PageDown)
@@ -97,7 +99,7 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
 
 def test_a_recorded_swing_gives_its_tip(
     open_wizard: "OpenWizard",
-    around: Surroundings,
+    around: SourceEnvironment,
     shared_data: Path,
     truth: Callable[[Path], dict[str, Any]],
     lightpen: Run,
@@ -107,7 +109,7 @@ def test_a_recorded_swing_gives_its_tip(
     for name, text in NAMES.items():
         walker.click_into(name, text)
     walker.click("Continue to the camera")
-    walker.tab_to("Source of the images")
+    walker.tab_to("Image source")
     walker.press(Key.Key_Down)
     walker.until_tells("Choose the folder of the recorded images.")
     walker.click_into("Folder, record or video", str(folder))
@@ -115,19 +117,19 @@ def test_a_recorded_swing_gives_its_tip(
     walker.until_says("RECORDED")
     # Those of the simulated pen are not.
     walker.until_says("Open the intrinsics file.")
-    walker.until_says("Beside the images: camera.yaml and leds.csv")
-    walker.click("Use both")
-    walker.until_tells("Fits the live images: 2448 x 2048")
+    walker.until_says("Found with the images: camera.yaml and leds.csv")
+    walker.click("Use both files")
+    walker.until_tells("Matches the live images: 2448 x 2048")
     walker.until(walker.main_button().isEnabled)
-    assert not walker.offers("Use both")
+    assert not walker.offers("Use both files")
     walker.click("Continue to the LEDs")
     walker.until_says("10 of 10 LEDs")
     walker.click("Continue to the swing")
 
     n_inputs = walker.n_inputs
     walker.until_says("READING")
-    walker.until(lambda: bool(re.search(r"\d+ of 60 read", told(walker))))
-    assert not walker.tells("Lean")
+    walker.until(lambda: bool(re.search(r"\d+ of 60 images loaded", told(walker))))
+    assert not walker.tells("Tilt")
     walker.until_says("Review")
     walker.until(walker.main_button().isEnabled)
     assert walker.n_inputs == n_inputs
@@ -139,20 +141,21 @@ def test_a_recorded_swing_gives_its_tip(
     # A solver that knows the images' model comes as near as 3.1 um.
     assert np.linalg.norm(tip - true_tip) <= 0.004
     walker.click("Accept")
-    walker.until_says("IN FORCE")
+    walker.until_says("IN USE")
     assert walker.says("RECORDED")
     result = result_on_disk(walker)
     assert result.origin is Origin.RECORDED
     assert calibrated(lightpen, Path(result.record)) == result.tip_pen.tolist()
-    names = [frame["file"] for frame in result.calibration["frames"]]
+    names = [frame.file for frame in result.calibration.frames]
     assert len(names) == 60
 
 
 def test_in_chinese_no_english_word_is_left(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
-    settings.set_preferences(Preferences(language=Language.CHINESE))
-    station = Station("\u738b", "4", "10", "1", max_uncertainty=0.02, min_images=20)
+    settings.set_preferences(Preferences(language="zh_CN"))
+    names = Names("", "\u738b", "4", "10", "1")
+    station = Station(names, limits=SwingLimits(0.02, min_images=20))
     settings.set_station("2\u53f7", station)
     settings.set_last_station("2\u53f7")
     walker = open_wizard()

@@ -13,23 +13,26 @@ import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMessageBox
+from tests.faulty_camera import FaultyCamera
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import ImageCamera
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.pen_files import write_pen
-from lightpen.live.sources import Surroundings, camera_of
-from lightpen.record.folder_archive import RESULTS, SIMULATED
-from lightpen.record.reading import DISCARDED, open_record
-from lightpen.record.unfinished import find_unfinished
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.sample_pens import eight_led_pen
+from lightpen.live.sources import SourceEnvironment, camera_of
+from lightpen.model.limits import SwingLimits
+from lightpen.record.results.result_folder import RESULTS, SIMULATED
+from lightpen.record.swings.interrupted import find_unfinished
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import DISCARDED, open_record
+from lightpen.simulator.samples import eight_led_pen
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_pen
 from lightpen.swing.preparation import SourceChoice
 from lightpen.swing.state import Phase
-from lightpen_app.work.settings import Settings, Station
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import Station
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, SolvingOn, Walker
@@ -39,7 +42,10 @@ pytestmark = pytest.mark.qt_log_ignore("^This plugin does not support ")
 
 Key = Qt.Key
 STATION = "Hall 2"
-LONG = Station("Ann", "LP-04", "T-10", "C-1", max_uncertainty=1e-4, min_images=300)
+LONG = Station(
+    Names("", "Ann", "LP-04", "T-10", "C-1"),
+    limits=SwingLimits(max_uncertainty=1e-4, min_images=300),
+)
 N_MASHED = 300  # keys and clicks
 KEYS = (
     *(Key.Key_Tab, Key.Key_Return, Key.Key_Space, Key.Key_Escape, Key.Key_Backspace),
@@ -59,7 +65,7 @@ def prepared(
 
     It begins a second after the tip was seated; whole swings are walked elsewhere.
     """
-    for module in ("lightpen.swing.rules", "lightpen_app.steps.swing.moment"):
+    for module in ("lightpen.swing.rules", "lightpen_app.steps.swing.view_state"):
         monkeypatch.setattr(f"{module}.COUNTDOWN", 1.0)
     settings.set_station(STATION, LONG)
     settings.set_last_station(STATION)
@@ -76,16 +82,17 @@ def capturing(prepared: "Walker") -> "Walker":
 
 
 @pytest.fixture
-def cameras(monkeypatch: pytest.MonkeyPatch) -> list[SimulatedCamera]:
+def cameras(monkeypatch: pytest.MonkeyPatch) -> list[FaultyCamera]:
     """The simulated cameras that are opened, so that something can befall them."""
-    opened: list[SimulatedCamera] = []
+    opened: list[FaultyCamera] = []
 
-    def noted(choice: SourceChoice, around: Surroundings) -> ImageCamera:
+    def noted(choice: SourceChoice, around: SourceEnvironment) -> ImageCamera:
         camera = camera_of(choice, around)
-        assert isinstance(camera, SimulatedCamera)
+        assert isinstance(camera, FaultyCamera)
         opened.append(camera)
         return camera
 
+    monkeypatch.setattr("lightpen.live.sources.SimulatedCamera", FaultyCamera)
     monkeypatch.setattr("lightpen.live.sources.camera_of", noted)
     return opened
 
@@ -167,13 +174,13 @@ def picture_in(folder: Path) -> Path:
 def test_a_picture_is_refused_as_intrinsics(prepared: "Walker", tmp_path: Path) -> None:
     go_to(prepared, "Camera")
     workbench = prepared.workbench
-    prepared.until(lambda: not workbench.preparation.camera_lacks())
-    before = workbench.preparation.camera_file
+    prepared.until(lambda: not workbench.selection.preparation.camera_missing_inputs())
+    before = workbench.selection.preparation.camera_file
 
     give_path(prepared, "Intrinsics file", picture_in(tmp_path))
 
     prepared.until_tells("picture.png is not text")
-    assert workbench.preparation.camera_file is before
+    assert workbench.selection.preparation.camera_file is before
 
 
 def test_intrinsics_of_another_size_are_told_and_close_the_next_steps(
@@ -185,9 +192,11 @@ def test_intrinsics_of_another_size_are_told_and_close_the_next_steps(
 
     give_path(prepared, "Intrinsics file", whole.camera)
 
-    prepared.until_tells("The camera sends 1224 x 1024, the calibration file was made")
+    prepared.until_tells("Image size is 1224 x 1024; the intrinsics file is for")
     assert not prepared.main_button().isEnabled()
-    assert prepared.says("The intrinsics file is for images of another size.")
+    assert prepared.says(
+        "The intrinsics file is for another image size. Open the file of this camera."
+    )
     assert prepared.steps()["LEDs"] == "closed"
     prepared.press(Key.Key_PageDown)
     assert prepared.title() == "Camera"
@@ -217,8 +226,8 @@ def test_exchanged_leds_are_named(prepared: "Walker", tmp_path: Path) -> None:
 
     give_path(prepared, "LED file", pen_in(tmp_path, leds))
 
-    prepared.until_tells("LEDs 6 and 9 are exchanged")
-    assert prepared.tells("Mend the LED table first: what is wrong is told above.")
+    prepared.until_tells("LEDs 6 and 9 are swapped")
+    assert prepared.tells("Correct the LED table first (see the message above).")
     assert prepared.steps()["Swing"] == "closed"
 
 
@@ -230,7 +239,7 @@ def test_a_displaced_led_is_named(prepared: "Walker", tmp_path: Path) -> None:
     give_path(prepared, "LED file", pen_in(tmp_path, leds))
     prepared.operator.swing()
 
-    prepared.until_tells("LED 6 sits 0.80 mm off its place")
+    prepared.until_tells("LED 6 is 0.80 mm from its file position")
 
 
 def pen_in(folder: Path, leds: FloatArray) -> Path:
@@ -256,16 +265,16 @@ def test_a_folder_without_images_can_be_tried_again(
     empty = tmp_path / "empty"
     empty.mkdir()
     go_to(prepared, "Camera")
-    prepared.tab_to("Source of the images")
+    prepared.tab_to("Image source")
     prepared.press(Key.Key_Down)
 
     give_path(prepared, "Folder, record or video", empty)
 
     prepared.until(lambda: prepared.offers("Try again"))
     assert prepared.says("Not connected")
-    assert prepared.tells("holds no images")
+    assert prepared.tells("). Choose the folder with the images.")
     assert not prepared.main_button().isEnabled()
-    assert prepared.says("No image has come from the camera yet.")
+    assert prepared.says("No image received from the camera yet.")
 
     picture_in(empty)
     prepared.click("Try again")
@@ -276,25 +285,25 @@ def test_a_folder_without_images_can_be_tried_again(
 
 
 def test_a_camera_that_is_gone_is_told_and_comes_back(
-    cameras: list[SimulatedCamera], prepared: "Walker"
+    cameras: list[FaultyCamera], prepared: "Walker"
 ) -> None:
     go_to(prepared, "Camera")
     prepared.until_says("Live")
 
-    cameras[-1].faults.unplug()
+    cameras[-1].unplug()
     prepared.until_says("Lost, reconnecting")
-    assert prepared.tells("Check its cable and its power.")
-    cameras[-1].faults.plug_in()
+    assert prepared.tells("). Check cable and power.")
+    cameras[-1].plug_in()
     prepared.until_says("Live")
 
     go_to(prepared, "Swing")
     prepared.swing()
     keep_on(prepared)
-    cameras[-1].faults.unplug()
+    cameras[-1].unplug()
     prepared.until_says("NO IMAGES")
-    assert prepared.tells("The swing goes on by itself as soon as they come")
+    assert prepared.tells("The camera sends no images.")
     n_before = n_kept(prepared)
-    cameras[-1].faults.plug_in()
+    cameras[-1].plug_in()
     keep_on(prepared)
 
     assert n_kept(prepared) > n_before
@@ -311,20 +320,20 @@ def test_what_befalls_the_pen_is_told_and_the_swing_goes_on(
 
     capturing.operator.cover()
     capturing.until_says("PEN LOST")
-    assert capturing.tells("nothing is lost meanwhile")
+    assert capturing.tells("Turn the LEDs towards the camera.")
     capturing.operator.uncover()
     keep_on(capturing)
 
     capturing.operator.lift()
     capturing.until_says("LIFTED")
-    assert capturing.tells("Put the tip back to go on.")
+    assert capturing.tells("The pen is lifted.")
     capturing.swing()
     keep_on(capturing)
 
     n_before = n_kept(capturing)
     capturing.operator.slip(0.5, 1.5)
     capturing.until_says("TIP SLIPPED")
-    assert capturing.tells("Images dropped: ")
+    assert capturing.tells("Images rejected:")
     keep_on(capturing)
     assert n_kept(capturing) >= n_before - 5
     assert capturing.n_inputs == n_inputs
@@ -335,12 +344,12 @@ def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
 ) -> None:
     first = record_folder(capturing)
     capturing.click("Finish early")
-    assert capturing.tells("Too little tilt ")
-    assert capturing.tells("Lean the pen further that way.")
-    unknown = "The images do not tell yet where the tip is."
+    assert capturing.tells("Not enough tilt ")
+    assert capturing.tells(". Tilt the pen further. Images needed: about")
+    unknown = "The images do not determine the tip yet."
     assert capturing.tells(unknown) or capturing.tells("U (k = 2) of the tip is ")
-    assert capturing.tells("Images kept: ")
-    capturing.click("Go on swinging")
+    assert capturing.tells("Images captured:")
+    capturing.click("Continue swinging")
     keep_on(capturing, 20)
     assert phase(capturing) is Phase.CAPTURING
 
@@ -349,7 +358,7 @@ def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
     capturing.click("Review")
     assert capturing.tells("REPEAT: ")
     assert not capturing.offers("Accept...")
-    assert capturing.control("Accept...").toolTip().startswith("Not good enough: ")
+    assert capturing.control("Accept...").toolTip().startswith("Result not acceptable.")
     assert not list(capturing.workbench.folder.rglob("results"))
 
     n_before = n_kept(capturing)
@@ -362,12 +371,12 @@ def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
     capturing.until(capturing.main_button().isEnabled)
     capturing.click("Review")
 
-    capturing.click("Repeat")
+    capturing.click("Repeat swing")
     assert capturing.tells("Repeat the swing from the start?")
-    capturing.click("Go on with these")
+    capturing.click("Continue with these")
     assert capturing.title() == "Review"
-    capturing.click("Repeat")
-    (again,) = (w for w in capturing.seen() if capturing.names(w) == {"Repeat"})
+    capturing.click("Repeat swing")
+    (again,) = (w for w in capturing.seen() if capturing.names(w) == {"Repeat swing"})
     capturing.click_on(again)
     capturing.until_shows("Swing")
     capturing.until(
@@ -392,7 +401,7 @@ def test_computing_is_cancelled_and_begun_again(
         capturing.until(lambda: capturing.offers("Stop computing"))
         capturing.click("Stop computing")
         capturing.until_says("STOPPED")
-    assert capturing.says("The tip is not computed yet.")
+    assert capturing.says("Tip not computed yet")
 
     capturing.click("Compute again")
     capturing.until(lambda: capturing.workbench.run.status.solution is not None)
@@ -400,12 +409,12 @@ def test_computing_is_cancelled_and_begun_again(
     capturing.click("Review")
 
     n_images = n_kept(capturing)
-    capturing.until_tells(f"{n_images} of {n_images} images used")
-    capturing.click("Take out")
-    capturing.until_tells(f"{n_images - 1} of {n_images} images used")
-    capturing.until(lambda: capturing.offers("Put back"))
-    capturing.click("Put back")
-    capturing.until_tells(f"{n_images} of {n_images} images used")
+    capturing.until_tells(f"{n_images} of {n_images} images included")
+    capturing.click("Exclude")
+    capturing.until_tells(f"{n_images - 1} of {n_images} images included")
+    capturing.until(lambda: capturing.offers("Include"))
+    capturing.click("Include")
+    capturing.until_tells(f"{n_images} of {n_images} images included")
 
 
 # The disk
@@ -447,7 +456,7 @@ def test_going_back_and_forth_pauses_the_swing_and_goes_on(capturing: "Walker") 
 
     capturing.click_step("Camera")
     assert capturing.title() == "Camera"
-    assert capturing.tells("A swing is under way.")
+    assert capturing.tells("A swing is in progress.")
     capturing.click_step("Swing")
     keep_on(capturing)
     capturing.click_step("Review")
@@ -472,8 +481,8 @@ def test_space_pauses_and_starting_over_asks(capturing: "Walker") -> None:
     keep_on(capturing)
 
     capturing.click("Start over")
-    assert capturing.tells("Begin anew? The ")
-    capturing.click("Begin anew")
+    assert capturing.tells("Start over? The images of this swing (")
+    capturing.click("Restart swing")
     capturing.until(
         lambda: capturing.workbench.run.status.record_folder not in (None, first)
     )
@@ -488,7 +497,7 @@ def test_a_swing_closed_in_the_middle_is_resumed_at_the_next_start(
     folder = record_folder(capturing)
     with capturing.answering(QMessageBox.ButtonRole.RejectRole) as asked:
         capturing.window.close()
-    assert "The swing is not finished." in asked[0]
+    assert "Swing not finished." in asked[0]
     assert capturing.window.isVisible()
     keep_on(capturing)
 
@@ -617,14 +626,14 @@ def test_the_operator_view_leads_the_swing_by_its_keys(capturing: "Walker") -> N
 def test_pressing_enter_again_and_again_accepts_once(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
-    short = replace(LONG, max_uncertainty=0.02, min_images=20, max_images=150)
+    short = replace(LONG, limits=SwingLimits(0.02, 20, 150))
     settings.set_station(STATION, short)
     settings.set_last_station(STATION)
     walker = open_wizard()
     go_to(walker, "LEDs")
-    now = walker.workbench.preparation
+    now = walker.workbench.selection.preparation
     limits = replace(now.limits, min_per_field=0)  # few images will do
-    walker.workbench.set_preparation(replace(now, limits=limits))
+    walker.workbench.selection.set_preparation(replace(now, limits=limits))
     go_to(walker, "Swing")
     walker.swing()
     walker.until(lambda: walker.workbench.run.status.solution is not None)
@@ -679,7 +688,9 @@ def test_any_keys_and_clicks_leave_a_window_that_answers(
     prepared.click_step("Start")
     assert prepared.title() == "Start"
     prepared.enter("Operator", "Bob")
-    prepared.until(lambda: prepared.workbench.preparation.names.operator == "Bob")
+    prepared.until(
+        lambda: prepared.workbench.selection.preparation.names.operator == "Bob"
+    )
 
 
 def leave_dialog() -> None:

@@ -12,14 +12,18 @@ from typing_extensions import override
 from lightpen.arrays import Image
 from lightpen.cameras.clock import MachineClock
 from lightpen.cameras.protocol import CameraSettings, Region
-from lightpen.live.sources import Surroundings
+from lightpen.live.sources import SourceEnvironment
+from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
-from lightpen.record.reading import open_record
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import open_record
 from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.follower import Follower
+from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
-from lightpen_app.work.settings import Settings, Station
+from lightpen.swing.preparation import SourceChoice
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import FilePaths, Station, StoredCamera
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard
@@ -68,28 +72,24 @@ def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
     settings.set_station(
         "Hall 2",
         Station(
-            *("Ann", "LP-04", "T-10", "C-1", 10.0),
-            source="aravis",
-            source_place=ADDRESS,
-            camera_file=str(camera_file),
-            pen_file=str(pen_file),
-            max_uncertainty=0.02,
-            min_images=15,
-            max_images=80,
+            Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
+            camera=StoredCamera(SourceChoice("aravis", ADDRESS)),
+            files=FilePaths(str(camera_file), str(pen_file)),
+            limits=SwingLimits(0.02, min_images=15, max_images=80),
         ),
     )
     settings.set_last_station("Hall 2")
 
-    walker = open_wizard(Surroundings(scene, clock))
+    walker = open_wizard(SourceEnvironment(scene, clock))
     rendered.operator.seat()
     walker.click("Continue to the camera")
     walker.until_tells("10 of 10 LEDs")
-    assert walker.tells("Fits the live images: 1224 x 1024")
-    assert walker.tells("incomplete: 0")
+    assert walker.tells("Matches the live images: 1224 x 1024")
+    assert walker.tells("Incomplete: 0")
     walker.click("Continue to the LEDs")
     walker.until(walker.main_button().isEnabled)
     walker.click("Continue to the swing")
-    walker.workbench.run.follower = Follower(rendered.operator)
+    walker.workbench.run.follower = GuidedOperator(rendered.operator)
     walker.until(lambda: walker.says("Review"))
     walker.workbench.run.follower = None
     walker.until(lambda: walker.workbench.run.status.solution is not None)
@@ -98,7 +98,7 @@ def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
         walker.click("Review")
     walker.until(walker.main_button().isEnabled)
     walker.click("Accept")
-    walker.until_says("IN FORCE")
+    walker.until_says("IN USE")
 
     result = walker.workbench.run.status.result
     assert result is not None

@@ -8,11 +8,15 @@ from PySide6.QtCore import Qt
 from tests.accepted_tip import Holder, accept_tip, leant
 from tests.verifying import FRAME
 
-from lightpen.estimation.verdict import Grade
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.rig import rig_of
-from lightpen.record.supervision import read_supervision
+from lightpen.record.library.supervision import read_supervision
+from lightpen.record.swings.names import Names
 from lightpen.simulator.swings import PAPER_TIP
-from lightpen_app.work.settings import Settings, Station
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.tasks.fixed_point import FixedPointOptions
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import Station
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -20,11 +24,10 @@ if TYPE_CHECKING:
 STATION = "Hall 2"
 STRICT = "0.0010"
 CHOSEN = Station(
-    *("Ann", "LP-04", "T-10", "C-1"),
-    ball_diameter=10.0,
-    verified="fixed point",
-    fixed_point_touches=3,
-    touch_images=2,
+    Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
+    verification=VerificationChoices(
+        options=(FixedPointOptions(n_touches=3),), n_frames=2
+    ),
 )
 
 
@@ -34,20 +37,22 @@ def known(settings: Settings, open_wizard: "OpenWizard") -> "Walker":
     settings.set_station(STATION, CHOSEN)
     settings.set_last_station(STATION)
     walker = open_wizard()
-    walker.until(lambda: not walker.workbench.preparation.lacks())
-    accept_tip(walker.workbench.folder, walker.workbench.preparation)
+    walker.until(lambda: not walker.workbench.selection.preparation.missing_inputs())
+    accept_tip(walker.workbench.folder, walker.workbench.selection.preparation)
     return walker
 
 
 def sign(walker: "Walker", name: str, password: str) -> None:
     walker.click_into("Supervisor", name)
-    walker.click_into("Supervisor's password", password)
+    walker.click_into("Supervisor password", password)
     walker.press(Qt.Key.Key_Return)
 
 
 def lay_down_limits(walker: "Walker", password: str, limit: str) -> None:
     walker.click("All limits...")
-    walker.click_into("Fixed point: std across the view", limit)
+    walker.click_into(
+        "Fixed point: std. deviation perpendicular to the line of sight", limit
+    )
     sign(walker, "Eve", password)
 
 
@@ -56,15 +61,15 @@ def test_a_wrong_password_lays_down_nothing_and_is_asked_for_again(
 ) -> None:
     walker, folder = known, known.workbench.folder
     lay_down_limits(walker, "correct horse", STRICT)
-    walker.until(lambda: walker.workbench.supervision.is_guarded)
+    walker.until(lambda: walker.workbench.selection.supervision.is_guarded)
     assert read_supervision(folder).limits[STATION].verification.across == 0.001
 
     lay_down_limits(walker, "wrong horse", "1.0000")
-    walker.until_tells("password is another one")
+    walker.until_tells("Wrong supervisor password.")
     assert read_supervision(folder).limits[STATION].verification.across == 0.001
     walker.type("correct horse")  # the password waits for it
     walker.press(Qt.Key.Key_Return)
-    walker.until(lambda: walker.workbench.choices.limits.across == 1.0)
+    walker.until(lambda: walker.workbench.selection.choices.limits.across == 1.0)
 
 
 def test_beyond_the_limits_a_supervisor_accepts_after_a_wrong_password(
@@ -72,28 +77,31 @@ def test_beyond_the_limits_a_supervisor_accepts_after_a_wrong_password(
 ) -> None:
     walker, workbench = known, known.workbench
     lay_down_limits(walker, "correct horse", STRICT)
-    walker.until(lambda: workbench.supervision.is_guarded)
+    walker.until(lambda: workbench.selection.supervision.is_guarded)
     walker.take_window()  # of several windows none is active by itself here
     walker.click_step("Verify")
-    walker.until_says("Touch the cone")
-    camera, pen = workbench.preparation.camera, workbench.preparation.pen
+    walker.until_says("Probe the cone")
+    camera, pen = (
+        workbench.selection.preparation.camera,
+        workbench.selection.preparation.pen,
+    )
     assert camera is not None
     assert pen is not None
     bent = Holder(rig_of(camera), pen, PAPER_TIP + np.array([0.3, 0.0, 0.0]))
     status = workbench.verification.status
-    assert status.aim is not None
+    assert status.region is not None
     for hold in leant(3):
-        for sighting in bent.still(hold):
-            workbench.verification.runner.take(FRAME, sighting, status.aim)
-    walker.until_says("Not proven")
+        for detection in bent.still(hold):
+            workbench.verification.runner.take(FRAME, detection, status.region)
+    walker.until_says("Not verified")
     assert workbench.verification.status.assessment is not None
     assert workbench.verification.status.assessment.grade is Grade.REPEAT
 
     walker.click("Accept...")
     walker.click_into("Reason", "Roughing only.")
-    assert not walker.offers("Accept with this reason")
+    assert not walker.offers("Accept with reason")
     sign(walker, "Eve", "wrong horse")
-    walker.until_tells("password is another one")
+    walker.until_tells("Wrong supervisor password.")
     assert workbench.verification.status.accepted_by == ""
     walker.type("correct horse")  # name and reason are still there
     walker.press(Qt.Key.Key_Return)

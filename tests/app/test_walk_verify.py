@@ -11,23 +11,27 @@ from PySide6.QtCore import Qt
 from tests.accepted_tip import Hold, accept_tip, leant
 from tests.verifying import TIMEOUT, Verifier
 
-from lightpen.record.folder_archive import SIMULATED
-from lightpen.record.verifications import CONCLUSION, VERIFICATIONS
-from lightpen.simulator.toucher import Artefacts
-from lightpen.verification.choices import TaskKind, VerificationChoices
-from lightpen.verification.session import VISIT_TOUCHES
-from lightpen_app.work.settings import Settings, Station
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
+from lightpen.record.results.result_folder import SIMULATED
+from lightpen.record.swings.names import Names
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.tasks.drift import DRIFT, VISIT_POINTS
+from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
+from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH
+from lightpen.verification.tasks.registry import TASKS
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import Station
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
 
 STATION = "Hall 2"
-TABS_BEFORE_PEN = 5
+TASKS_BEFORE_PEN = len(TASKS)
+THREE = (FixedPointOptions(n_touches=3),)
 TOUCHES = Station(
-    *("Ann", "LP-04", "T-10", "C-1"),
-    ball_diameter=10.0,
-    fixed_point_touches=3,
-    touch_images=2,
+    Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
+    verification=VerificationChoices(options=THREE, n_frames=2),
 )
 
 
@@ -37,8 +41,8 @@ def known(settings: Settings, open_wizard: "OpenWizard") -> "Walker":
     settings.set_station(STATION, TOUCHES)
     settings.set_last_station(STATION)
     walker = open_wizard()
-    walker.until(lambda: not walker.workbench.preparation.lacks())
-    accept_tip(walker.workbench.folder, walker.workbench.preparation)
+    walker.until(lambda: not walker.workbench.selection.preparation.missing_inputs())
+    accept_tip(walker.workbench.folder, walker.workbench.selection.preparation)
     return walker
 
 
@@ -53,32 +57,32 @@ def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
     walker = known
     walker.click_step("Camera")
     walker.click_step("Start")
-    walker.until_says("Verify it")
-    walker.click("Verify it")
+    walker.until_says("Verify tip")
+    walker.click("Verify tip")
     assert walker.title() == "Verify"
-    walker.until_says("Touch the cone")
+    walker.until_says("Probe the cone")
     assert walker.says("SIMULATED")
     assert walker.tells("Length")
     for _ in range(2):
-        walker.press(Qt.Key.Key_Right)
-    walker.click("Touch both ends")
+        walker.press(Qt.Key.Key_Down)
+    walker.click("Probe both ends")
     walker.until_says("NOT POSSIBLE")
-    assert walker.tells("The length is not known. Enter the certified one.")
-    walker.click_into("Certified length", f"{Artefacts().length:g}")
+    assert walker.tells("The length is not specified. Enter the certified one.")
+    walker.click_into("Certified length", f"{SIMULATED_LENGTH:g}")
     walker.press(Qt.Key.Key_Tab)
     # The pen that came by itself may have touched the cone meanwhile.
     walker.until(lambda: not walker.says("NOT POSSIBLE"))
-    walker.click("Let the simulated operator touch")
+    walker.click("Let the simulated operator probe")
     n_inputs = walker.n_inputs
-    walker.until_says("Tip proven")
+    walker.until_says("Tip verified")
 
     assert walker.n_inputs == n_inputs
     assert walker.says("PASS")
     assert walker.says("Fixed point: PASS")
     assert walker.says("Length: PASS")
     assert [each["verification"] for each in records(walker)] == [
-        TaskKind.FIXED_POINT,
-        TaskKind.LENGTH,
+        FIXED_POINT.kind,
+        LENGTH.kind,
         CONCLUSION,
     ]
     assert {each["origin"] for each in records(walker)} == {"simulated"}
@@ -90,24 +94,30 @@ def test_a_tip_that_was_accepted_with_doubts_is_verified_under_that_word(
     known: "Walker",
 ) -> None:
     walker = known
-    accept_tip(walker.workbench.folder, walker.workbench.preparation, grade="check")
+    accept_tip(
+        walker.workbench.folder,
+        walker.workbench.selection.preparation,
+        grade=Grade.CHECK,
+    )
     walker.click_step("Verify")
 
-    walker.until_tells("Tip T-10 of pen LP-04, in force since")
-    (lead,) = (text for text in walker.texts() if "in force since" in text)
+    walker.until_tells("Tip T-10 of pen LP-04, in use since")
+    (lead,) = (text for text in walker.texts() if "in use since" in text)
     assert lead.endswith("CHECK")
 
 
 def test_without_a_tip_in_force_the_step_says_so(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
-    settings.set_station(STATION, replace(TOUCHES, tip="T-99"))
+    settings.set_station(
+        STATION, replace(TOUCHES, names=replace(TOUCHES.names, tip="T-99"))
+    )
     settings.set_last_station(STATION)
     walker = open_wizard()
-    walker.until(lambda: not walker.workbench.preparation.lacks())
+    walker.until(lambda: not walker.workbench.selection.preparation.missing_inputs())
     walker.click_step("Verify")
 
-    walker.until_tells("No tip is in force for tip T-99 of pen LP-04.")
+    walker.until_tells("Tip T-99 of pen LP-04 has no accepted calibration.")
     assert walker.says("NOT POSSIBLE")
     assert not walker.main_button().isEnabled()
 
@@ -117,19 +127,19 @@ def test_the_pen_is_shown_over_its_swings_and_no_file_is_made_that_is_no_better(
 ) -> None:
     walker = known
     workbench = walker.workbench
-    accept_tip(workbench.folder, workbench.preparation, seed=4)
+    accept_tip(workbench.folder, workbench.selection.preparation, seed=4)
     walker.click_step("Verify")
-    walker.until_says("Touch the cone")
-    for _ in range(TABS_BEFORE_PEN):
-        walker.press(Qt.Key.Key_Right)
-    walker.until_says("No LED has moved against the others over 2 swings.")
+    walker.until_says("Probe the cone")
+    for _ in range(TASKS_BEFORE_PEN):
+        walker.press(Qt.Key.Key_Down)
+    walker.until_says("No LED moved relative to the others in 2 swings.")
     assert not walker.offers("Improve the LED file")
 
     for seed in (5, 6):
-        accept_tip(workbench.folder, workbench.preparation, seed=seed)
-    walker.press(Qt.Key.Key_Left)
-    walker.press(Qt.Key.Key_Right)
-    walker.until_says("No LED has moved against the others over 4 swings.")
+        accept_tip(workbench.folder, workbench.selection.preparation, seed=seed)
+    walker.press(Qt.Key.Key_Up)
+    walker.press(Qt.Key.Key_Down)
+    walker.until_says("No LED moved relative to the others in 4 swings.")
     walker.click("Improve the LED file")
     walker.until_tells("does not confirm the new LED file")
     assert not list(workbench.folder.rglob("led files/*"))
@@ -141,12 +151,15 @@ def test_the_pen_is_shown_over_its_swings_and_no_file_is_made_that_is_no_better(
 @pytest.fixture
 def interrupted(known: "Walker", tmp_path: Path) -> "Walker":
     """Somebody was killed amid a verification by fixed point and witness."""
-    folder, copy = known.workbench.folder, tmp_path / "as it was"
+    folder, copy = (
+        known.workbench.folder,
+        tmp_path / "reinstated from the earlier calibration.",
+    )
     kept = folder / SIMULATED / VERIFICATIONS
-    verifier = Verifier(folder, known.workbench.preparation)
-    kinds = (TaskKind.FIXED_POINT, TaskKind.DRIFT)
-    verifier.come(VerificationChoices(kinds, n_touches=3, n_frames=2))
-    for _ in range(VISIT_TOUCHES):
+    verifier = Verifier(folder, known.workbench.selection.preparation)
+    kinds = (FIXED_POINT.kind, DRIFT.kind)
+    verifier.come(VerificationChoices(kinds, THREE, n_frames=2))
+    for _ in range(VISIT_POINTS):
         verifier.touch(Hold(tilt=0.0))
         verifier.see(verifier.holder.away())
     verifier.touch(*leant(3)[:2])
@@ -167,13 +180,13 @@ def test_a_verification_that_was_interrupted_is_gone_on_with(
     walker = interrupted
     walker.click("Continue")
     walker.until(lambda: walker.title() == "Verify")
-    walker.until_says("2 of 3 touches")
-    walker.click("Let the simulated operator touch")
+    walker.until_says("2 of 3 points")
+    walker.click("Let the simulated operator probe")
     walker.until(lambda: walker.main_button().text() == "Back to Start")
 
-    walker.until_tells("The witness stays within")
+    walker.until_tells("The drift reference stays within")
     kinds = [each["verification"] for each in records(walker)]
-    assert kinds == [TaskKind.FIXED_POINT, TaskKind.DRIFT, CONCLUSION]
+    assert kinds == [FIXED_POINT.kind, DRIFT.kind, CONCLUSION]
     walker.click_step("Start")
     walker.until(lambda: not walker.says("Interrupted verification"))
 
@@ -182,9 +195,11 @@ def test_a_verification_that_was_interrupted_is_closed_after_a_question(
     interrupted: "Walker",
 ) -> None:
     walker = interrupted
-    walker.click("Close it")
-    assert walker.tells("Close it as abandoned? All that is kept of it stays.")
-    walker.click("Close it")
+    walker.click("Close verification")
+    assert walker.tells(
+        "Close this verification as abandoned? Its recorded data remains."
+    )
+    walker.click("Close verification")
     walker.until(lambda: not walker.says("Interrupted verification"))
 
     (conclusion,) = records(walker)

@@ -12,7 +12,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.model.origin import Origin
-from lightpen.record.results import Result
+from lightpen.record.results.results import Result
 
 if TYPE_CHECKING:
     from tests.app.conftest import Walker
@@ -21,11 +21,15 @@ Run = Callable[..., CompletedProcess[str]]
 NAMES = {
     "Station": "Hall 2",
     "Operator": "Ann",
-    "Pen, serial number": "LP-04",
+    "Pen serial number": "LP-04",
     "Probe tip": "T-10",
     "Cone": "C-1",
 }
-FEW = {"U (k = 2) at most": "0.01", "Images at least": "20", "Images at most": "150"}
+FEW = {
+    "Max. expanded uncertainty U (k = 2)": "0.01",
+    "Min. images": "20",
+    "Max. images": "150",
+}
 
 
 @dataclass(frozen=True)
@@ -47,8 +51,8 @@ def watch_the_swing(walker: "Walker") -> None:
     """See a swing go by itself from the seat to a good verdict."""
     n_inputs = walker.n_inputs
     walker.until_tells("Starts in ")
-    walker.until_says("Lean RIGHT")
-    walker.until(lambda: bool(re.search(r"\d+ kept, \d+ to go", told(walker))))
+    walker.until_says("Tilt RIGHT")
+    walker.until(lambda: bool(re.search(r"\d+ of about \d+ images", told(walker))))
     walker.until_says("CAPTURING")
     walker.until_tells("10 of 10 LEDs, ")
     assert walker.main_button().isEnabled()
@@ -76,8 +80,8 @@ def result_on_disk(walker: "Walker") -> Result:
     """The only result there is, which is in force."""
     archive, folder = walker.workbench.run.archive, walker.workbench.folder
     assert len(list(folder.rglob("results/*.json"))) == 1
-    is_simulated = walker.workbench.preparation.origin is Origin.SIMULATED
-    pen, tip = NAMES["Pen, serial number"], NAMES["Probe tip"]
+    is_simulated = walker.workbench.selection.preparation.origin is Origin.SIMULATED
+    pen, tip = NAMES["Pen serial number"], NAMES["Probe tip"]
     result = archive.in_force(pen, tip, is_simulated=is_simulated)
     assert result is not None
     return result

@@ -7,23 +7,23 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
+from tests.faulty_camera import FaultyCamera
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.detection.sighting import Sighting, look
+from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.rig_files import read_rig
+from lightpen.messages import Message
 from lightpen.model.limits import SwingLimits
-from lightpen.record.folder_archive import RESULTS, SIMULATED, FolderArchive
-from lightpen.record.names import Names
-from lightpen.record.reading import open_record
-from lightpen.record.results import Result
-from lightpen.record.solving import Solution
-from lightpen.record.unfinished import find_unfinished
-from lightpen.record.writing import RecordWriter
-from lightpen.sentences import Sentence
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.follower import Follower
+from lightpen.record.results.result_folder import RESULTS, SIMULATED, FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.interrupted import find_unfinished
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import open_record
+from lightpen.record.swings.solving import Solution
+from lightpen.record.swings.writing import RecordWriter
+from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
@@ -31,7 +31,7 @@ from lightpen.simulator.swings import paper_camera
 from lightpen.swing.preparation import Preparation, SecondCamera
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.runner import SwingRunner
-from lightpen.swing.state import Happening, Phase, SwingEvent, SwingState
+from lightpen.swing.state import Phase, SwingEvent, SwingEventKind, SwingState
 from lightpen.swing.status import SwingStatus
 
 TIMEOUT = 60.0  # s until a test gives up, on a machine that does other things besides
@@ -45,11 +45,11 @@ class Witness:
 
     def __init__(self) -> None:
         self.told: list[tuple[SwingStatus, tuple[SwingEvent, ...]]] = []
-        self.troubles: list[str] = []
+        self.faults: list[str] = []
         self.reliefs: list[str] = []
         self.fractions: list[float] = []
         self.threads: set[threading.Thread] = set()  # that told of the swing
-        self.follower: Follower | None = None
+        self.follower: GuidedOperator | None = None
         self._changed = threading.Condition()
 
     def on_swing(self, status: SwingStatus, events: tuple[SwingEvent, ...]) -> None:
@@ -61,11 +61,11 @@ class Witness:
     def on_progress(self, fraction: float) -> None:
         self._note(lambda: self.fractions.append(fraction))
 
-    def on_trouble(self, sentence: Sentence) -> None:
-        self._note(lambda: self.troubles.append(str(sentence)))
+    def on_fault(self, message: Message) -> None:
+        self._note(lambda: self.faults.append(str(message)))
 
-    def on_relief(self, sentence: Sentence) -> None:
-        self._note(lambda: self.reliefs.append(str(sentence)))
+    def on_fault_cleared(self, message: Message) -> None:
+        self._note(lambda: self.reliefs.append(str(message)))
 
     @property
     def statuses(self) -> list[SwingStatus]:
@@ -76,7 +76,7 @@ class Witness:
         return [event for _, events in self.told for event in events]
 
     @property
-    def happenings(self) -> list[Happening]:
+    def event_kinds(self) -> list[SwingEventKind]:
         return [event.what for event in self.events]
 
     def wait_until(self, is_so: Callable[[], bool]) -> None:
@@ -102,8 +102,8 @@ class Station:
     witness: Witness
     clock: SkippingClock
     operator: Operator
-    camera: SimulatedCamera
-    _last: Sighting | None = None
+    camera: FaultyCamera
+    _last: PenDetection | None = None
     _first: SwingStatus = field(init=False)
 
     def __post_init__(self) -> None:
@@ -162,9 +162,9 @@ class Station:
         names = self.preparation.names
         return self.archive.in_force(names.pen, names.tip, is_simulated=True)
 
-    def new_camera(self) -> SimulatedCamera:
+    def new_camera(self) -> FaultyCamera:
         """Return another camera before the same pen, not open yet."""
-        return SimulatedCamera(self.camera.scene, self.clock, self.operator)
+        return FaultyCamera(self.camera.scene, self.clock, self.operator)
 
     def begin(self, limits: SwingLimits = SHORT) -> None:
         """Begin a swing, and wait until it has begun."""
@@ -187,10 +187,10 @@ class Station:
         for _ in range(n_images):
             frame = self.camera.read(1.0)
             setup = self.status.setup if self.status.is_capturing else None
-            wanted = setup or self.preparation.aim
+            wanted = setup or self.preparation.region
             assert wanted.camera is not None
             assert wanted.pen is not None
-            self._last = look(
+            self._last = detect_pen(
                 *(frame.image, wanted.camera, wanted.pen, wanted.mask, self._last)
             )
             self.runner.take(frame, self._last, setup)
@@ -263,9 +263,9 @@ def prepared_by_two(
 def station(tmp_path: Path, prepared: Preparation) -> Iterator[Station]:
     witness, clock = Witness(), SkippingClock()
     operator = Operator(clock, seated=True)
-    witness.follower = Follower(operator)
+    witness.follower = GuidedOperator(operator)
     assert prepared.camera is not None
-    camera = SimulatedCamera(Scene(camera=prepared.camera), clock, operator)
+    camera = FaultyCamera(Scene(camera=prepared.camera), clock, operator)
     camera.open()
     camera.configure(CameraSettings(frame_rate=FRAME_RATE))
     camera.start()

@@ -1,6 +1,6 @@
 """How the grades of a calibration look, wherever they are shown."""
 
-from lightpen.estimation.verdict import Grade
+from lightpen.estimation.reports.verdict import Grade
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 

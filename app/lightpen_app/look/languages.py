@@ -1,25 +1,34 @@
 """The languages of the program, changed while it runs."""
 
-from enum import StrEnum
-
-from PySide6.QtCore import QLibraryInfo, QLocale, QObject, QTranslator
+from PySide6.QtCore import (
+    QT_TRANSLATE_NOOP,
+    QLibraryInfo,
+    QLocale,
+    QObject,
+    QTranslator,
+)
 from PySide6.QtWidgets import QApplication
 
-from lightpen_app.look.theme import RESOURCES
+from lightpen_resources import SOURCE_LANGUAGE, TRANSLATIONS, languages
 
-TRANSLATIONS = RESOURCES / "translations"
+# Each language is named in itself, so that whoever cannot read the others finds it.
+OWN_NAME = str(QT_TRANSLATE_NOOP("language", "English"))
 
 
-class Language(StrEnum):
-    """Each is named in itself, so that whoever cannot read the others finds it."""
+def own_name(language: str) -> str:
+    """Return the name of a language in itself, from its translation."""
+    translator = QTranslator()
+    translator.load(f"lightpen_{language}", str(TRANSLATIONS))
+    return translator.translate("language", OWN_NAME) or OWN_NAME
 
-    ENGLISH = "en"
-    CHINESE = "zh_CN"
 
-    @property
-    def own_name(self) -> str:
-        """Return how speakers call it."""
-        return {Language.ENGLISH: "English", Language.CHINESE: "简体中文"}[self]
+def system_language() -> str:
+    """Return the language of the system where the program has it, else English."""
+    system = QLocale.system()
+    for language in languages():
+        if QLocale(language).language() == system.language():
+            return language
+    return SOURCE_LANGUAGE
 
 
 class LanguageSwitch(QObject):
@@ -31,18 +40,18 @@ class LanguageSwitch(QObject):
     def __init__(self, application: QApplication) -> None:
         super().__init__(application)
         self._application = application
-        self._language = Language.ENGLISH
+        self._language = SOURCE_LANGUAGE
         self._translators: list[QTranslator] = []
 
-    def language(self) -> Language:
+    def language(self) -> str:
         """Return the language in use."""
         return self._language
 
-    def set_language(self, language: Language) -> None:
+    def set_language(self, language: str) -> None:
         """Use another language, of numbers and of Qt's own texts too."""
         self.remove()
         self._language = language
-        QLocale.setDefault(QLocale(language.value))
+        QLocale.setDefault(QLocale(language))
         qt_folder = QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)
         self._install(f"qtbase_{language}", qt_folder)
         self._install(f"lightpen_{language}", str(TRANSLATIONS))

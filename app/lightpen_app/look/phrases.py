@@ -1,37 +1,31 @@
 """The words for what the core says in codes, in the language that is chosen."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from PySide6.QtCore import QCoreApplication
 
 from lightpen.detection.reasons import Reason
-from lightpen.estimation.uncertainty import ShareName
-from lightpen.estimation.verdict import Grade
-from lightpen.messages import MOST_SIDES, SIDES, Code
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.estimation.uncertainty.budget import ContributionName
+from lightpen.messages import COMMA, Message
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
 from lightpen.model.origin import Origin
 from lightpen.model.posture import Posture
-from lightpen.sentences import COMMA, Sentence
-from lightpen.swing.preparation import Lack
+from lightpen.swing.preparation import MissingInput
 from lightpen.swing.state import Pause, Phase
+from lightpen.swing_messages import MOST_SIDES, SIDES, Code
 from lightpen_app.look.sentences import worded
+from lightpen_app.look.translatable import QT_TRANSLATE_NOOP
 
 CONTEXT = "phrases"
 WORTH_A_TURN = math.radians(15)  # about the pen's own axis, to be told of
 
-if TYPE_CHECKING:
-
-    def QT_TRANSLATE_NOOP(context: str, text: str) -> str:  # noqa: N802 - Qt's
-        """Return the text; PySide6 gives it the type of any object."""
-else:
-    from PySide6.QtCore import QT_TRANSLATE_NOOP
-
 
 @dataclass(frozen=True)
-class Phrase:
+class Instruction:
     """What an operator is told.
 
     Attributes
@@ -48,95 +42,112 @@ class Phrase:
 
 # lupdate finds the texts by this macro.
 _SHORTS: dict[Code, str] = {
-    Code.SHOW_PEN: QT_TRANSLATE_NOOP("phrases", "Show the pen"),
+    Code.SHOW_PEN: QT_TRANSLATE_NOOP("phrases", "Hold the pen in view"),
     Code.SEAT_TIP: QT_TRANSLATE_NOOP("phrases", "Seat the tip"),
     Code.SWING_TO_SEAT: QT_TRANSLATE_NOOP("phrases", "Seat and swing"),
     Code.HOLD_STILL: QT_TRANSLATE_NOOP("phrases", "Seated"),
     Code.STARTS_IN: QT_TRANSLATE_NOOP("phrases", "Starts in {seconds}"),
-    Code.LEAN_TO_YOUR_RIGHT: QT_TRANSLATE_NOOP("phrases", "Lean RIGHT"),
+    Code.LEAN_TO_YOUR_RIGHT: QT_TRANSLATE_NOOP("phrases", "Tilt RIGHT"),
     Code.FOLLOW_ARROW: QT_TRANSLATE_NOOP("phrases", "Follow the arrow"),
     Code.FEW_LEDS: QT_TRANSLATE_NOOP("phrases", "Show the LEDs"),
     Code.TOO_FAST: QT_TRANSLATE_NOOP("phrases", "Slower"),
     Code.BAD_FIT: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
     Code.TIP_SLIPPED: QT_TRANSLATE_NOOP("phrases", "Tip slipped"),
-    Code.PEN_LOST: QT_TRANSLATE_NOOP("phrases", "Pen not seen"),
+    Code.PEN_LOST: QT_TRANSLATE_NOOP("phrases", "Pen not detected"),
     Code.PEN_LIFTED: QT_TRANSLATE_NOOP("phrases", "Paused"),
     Code.TIP_ELSEWHERE: QT_TRANSLATE_NOOP("phrases", "Tip not in place"),
-    Code.IMAGES_READ: QT_TRANSLATE_NOOP("phrases", "Reading"),
+    Code.IMAGES_READ: QT_TRANSLATE_NOOP("phrases", "Loading"),
     Code.PAUSED: QT_TRANSLATE_NOOP("phrases", "Paused"),
-    Code.SOLVING: QT_TRANSLATE_NOOP("phrases", "Captured"),
+    Code.SOLVING: QT_TRANSLATE_NOOP("phrases", "Capture complete"),
     Code.TOO_FEW_IMAGES: QT_TRANSLATE_NOOP("phrases", "More images"),
-    Code.TOO_LITTLE_TILT: QT_TRANSLATE_NOOP("phrases", "Lean further"),
+    Code.TOO_LITTLE_TILT: QT_TRANSLATE_NOOP("phrases", "Tilt further"),
     Code.NOT_UPRIGHT: QT_TRANSLATE_NOOP("phrases", "Hold it upright"),
-    Code.UNKNOWN: QT_TRANSLATE_NOOP("phrases", "Not known yet"),
-    Code.UNCERTAIN: QT_TRANSLATE_NOOP("phrases", "Not certain enough"),
-    Code.HALVES_DIFFER: QT_TRANSLATE_NOOP("phrases", "Halves differ"),
-    Code.MANY_DROPPED: QT_TRANSLATE_NOOP("phrases", "Many images dropped"),
+    Code.UNKNOWN: QT_TRANSLATE_NOOP("phrases", "Not determined yet"),
+    Code.UNCERTAIN: QT_TRANSLATE_NOOP("phrases", "Uncertainty too large"),
+    Code.HALVES_DIFFER: QT_TRANSLATE_NOOP("phrases", "Odd and even differ"),
+    Code.MANY_DROPPED: QT_TRANSLATE_NOOP("phrases", "Many images rejected"),
     Code.LEDS_OFF: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
-    Code.LED_DISPLACED: QT_TRANSLATE_NOOP("phrases", "LED out of place"),
+    Code.LED_DISPLACED: QT_TRANSLATE_NOOP("phrases", "LED displaced"),
     Code.LEDS_MISFIT: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
-    Code.FILE_UNCERTAIN: QT_TRANSLATE_NOOP("phrases", "Not certain enough"),
-    Code.FILE_ASSUMED: QT_TRANSLATE_NOOP("phrases", "Not certain enough"),
+    Code.FILE_UNCERTAIN: QT_TRANSLATE_NOOP("phrases", "Uncertainty too large"),
+    Code.FILE_ASSUMED: QT_TRANSLATE_NOOP("phrases", "Uncertainty too large"),
     Code.FILE_CONTRADICTED: QT_TRANSLATE_NOOP("phrases", "File does not fit"),
     Code.CAMERA_MOVED: QT_TRANSLATE_NOOP("phrases", "Camera or cone moved"),
-    Code.NOT_SIMULTANEOUS: QT_TRANSLATE_NOOP("phrases", "Not at the same time"),
-    Code.OUT_OF_REACH: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
+    Code.NOT_SIMULTANEOUS: QT_TRANSLATE_NOOP("phrases", "Cameras not synchronised"),
+    Code.OUT_OF_REACH: QT_TRANSLATE_NOOP("phrases", "Uncertainty of files too large"),
     Code.TIP_CHANGED: QT_TRANSLATE_NOOP("phrases", "Tip has changed"),
     Code.CHANGE_BEYOND_LIMIT: QT_TRANSLATE_NOOP("phrases", "Tip has changed"),
-    Code.LAST_UNKNOWN: QT_TRANSLATE_NOOP("phrases", "Nothing to compare with"),
+    Code.LAST_UNKNOWN: QT_TRANSLATE_NOOP("phrases", "No comparison possible"),
     Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
-    Code.GOOD: QT_TRANSLATE_NOOP("phrases", "Good"),
+    Code.GOOD: QT_TRANSLATE_NOOP("phrases", "Within limits"),
 }
 # What to do at the screen; the core's own sentence stands in the braces.
 _AT_THE_SCREEN: dict[Code, str] = {
-    Code.PAUSED: QT_TRANSLATE_NOOP("phrases", "Press Space to go on."),
-    Code.MANY_DROPPED: QT_TRANSLATE_NOOP("phrases", "{0} Review has their reasons."),
-    Code.GOOD: QT_TRANSLATE_NOOP("phrases", "{0} Accept it at the screen."),
+    Code.PAUSED: QT_TRANSLATE_NOOP("phrases", "Press Space to continue."),
+    Code.MANY_DROPPED: QT_TRANSLATE_NOOP("phrases", "{0} See the list in Review."),
+    Code.GOOD: QT_TRANSLATE_NOOP("phrases", "{0} Accept at the computer."),
 }
-_SHARES: dict[ShareName, str] = {
-    ShareName.NOISE: QT_TRANSLATE_NOOP("phrases", "noise"),
-    ShareName.CENTERS: QT_TRANSLATE_NOOP("phrases", "centres"),
-    ShareName.FORM: QT_TRANSLATE_NOOP("phrases", "ball, cone"),
-    ShareName.TEMPERATURE: QT_TRANSLATE_NOOP("phrases", "warmth"),
-    ShareName.DISTANCE: QT_TRANSLATE_NOOP("phrases", "cone distance"),
-    ShareName.SEAT: QT_TRANSLATE_NOOP("phrases", "seat"),
-    ShareName.DRIFT: QT_TRANSLATE_NOOP("phrases", "drift"),
-    ShareName.LEDS: QT_TRANSLATE_NOOP("phrases", "LEDs"),
-    ShareName.SCALE: QT_TRANSLATE_NOOP("phrases", "scale"),
-    ShareName.DIAMETER: QT_TRANSLATE_NOOP("phrases", "discs"),
-    ShareName.CAMERA: QT_TRANSLATE_NOOP("phrases", "camera"),
-    ShareName.EXTRINSICS: QT_TRANSLATE_NOOP("phrases", "rig"),
-    ShareName.HELD_BACK: QT_TRANSLATE_NOOP("phrases", "doubt"),
+_SHARES: dict[ContributionName, str] = {
+    ContributionName.NOISE: QT_TRANSLATE_NOOP("phrases", "noise"),
+    ContributionName.CENTERS: QT_TRANSLATE_NOOP("phrases", "centres"),
+    ContributionName.FORM: QT_TRANSLATE_NOOP("phrases", "form of ball, cone"),
+    ContributionName.TEMPERATURE: QT_TRANSLATE_NOOP("phrases", "temperature"),
+    ContributionName.DISTANCE: QT_TRANSLATE_NOOP("phrases", "cone distance"),
+    ContributionName.SEAT: QT_TRANSLATE_NOOP("phrases", "seating"),
+    ContributionName.DRIFT: QT_TRANSLATE_NOOP("phrases", "drift"),
+    ContributionName.LEDS: QT_TRANSLATE_NOOP("phrases", "LEDs"),
+    ContributionName.SCALE: QT_TRANSLATE_NOOP("phrases", "scale"),
+    ContributionName.DIAMETER: QT_TRANSLATE_NOOP("phrases", "disc diameter"),
+    ContributionName.CAMERA: QT_TRANSLATE_NOOP("phrases", "camera"),
+    ContributionName.EXTRINSICS: QT_TRANSLATE_NOOP("phrases", "rig"),
+    ContributionName.SHRINKAGE: QT_TRANSLATE_NOOP("phrases", "unmodelled effects"),
 }
-_LACKS: dict[Lack, str] = {
-    Lack.STATION: QT_TRANSLATE_NOOP("phrases", "Enter the name of the station."),
-    Lack.OPERATOR: QT_TRANSLATE_NOOP("phrases", "Enter the name of the operator."),
-    Lack.PEN: QT_TRANSLATE_NOOP("phrases", "Enter the serial number of the pen."),
-    Lack.TIP: QT_TRANSLATE_NOOP("phrases", "Enter the name of the probe tip."),
-    Lack.CONE: QT_TRANSLATE_NOOP("phrases", "Enter the name of the cone."),
-    Lack.SOURCE_PLACE: QT_TRANSLATE_NOOP(
+_LACKS: dict[MissingInput, str] = {
+    MissingInput.STATION: QT_TRANSLATE_NOOP(
+        "phrases", "Enter the name of the station."
+    ),
+    MissingInput.OPERATOR: QT_TRANSLATE_NOOP(
+        "phrases", "Enter the name of the operator."
+    ),
+    MissingInput.PEN: QT_TRANSLATE_NOOP(
+        "phrases", "Enter the serial number of the pen."
+    ),
+    MissingInput.TIP: QT_TRANSLATE_NOOP("phrases", "Enter the name of the probe tip."),
+    MissingInput.CONE: QT_TRANSLATE_NOOP("phrases", "Enter the name of the cone."),
+    MissingInput.SOURCE_PLACE: QT_TRANSLATE_NOOP(
         "phrases", "Choose the folder of the recorded images."
     ),
-    Lack.DEVICE: QT_TRANSLATE_NOOP("phrases", "Search for the camera and choose it."),
-    Lack.IMAGES: QT_TRANSLATE_NOOP("phrases", "No image has come from the camera yet."),
-    Lack.CAMERA_FILE: QT_TRANSLATE_NOOP("phrases", "Open the intrinsics file."),
-    Lack.IMAGE_SIZE: QT_TRANSLATE_NOOP(
-        "phrases", "The intrinsics file is for images of another size."
+    MissingInput.DEVICE: QT_TRANSLATE_NOOP(
+        "phrases", "Search for the camera and choose it."
     ),
-    Lack.SECOND_DEVICE: QT_TRANSLATE_NOOP("phrases", "Choose the second camera."),
-    Lack.SECOND_IMAGES: QT_TRANSLATE_NOOP(
-        "phrases", "The second camera is not open yet."
+    MissingInput.IMAGES: QT_TRANSLATE_NOOP(
+        "phrases", "No image received from the camera yet."
     ),
-    Lack.RIG_FILE: QT_TRANSLATE_NOOP("phrases", "Open the rig file of both cameras."),
-    Lack.RIG_OF_TWO: QT_TRANSLATE_NOOP(
-        "phrases", "The rig file is not of two cameras."
+    MissingInput.CAMERA_FILE: QT_TRANSLATE_NOOP("phrases", "Open the intrinsics file."),
+    MissingInput.IMAGE_SIZE: QT_TRANSLATE_NOOP(
+        "phrases",
+        "The intrinsics file is for another image size. Open the file of this camera.",
     ),
-    Lack.SECOND_IMAGE_SIZE: QT_TRANSLATE_NOOP(
-        "phrases", "The rig file has another image size for the second camera."
+    MissingInput.SECOND_DEVICE: QT_TRANSLATE_NOOP(
+        "phrases", "Choose the second camera."
     ),
-    Lack.PEN_FILE: QT_TRANSLATE_NOOP("phrases", "Open the LED geometry file."),
-    Lack.SAVED_LEDS: QT_TRANSLATE_NOOP(
-        "phrases", "The LED table is not that of the file in use: save or discard it."
+    MissingInput.SECOND_IMAGES: QT_TRANSLATE_NOOP(
+        "phrases", "The second camera is not open. Open it."
+    ),
+    MissingInput.RIG_FILE: QT_TRANSLATE_NOOP(
+        "phrases", "Open the rig file of both cameras."
+    ),
+    MissingInput.RIG_OF_TWO: QT_TRANSLATE_NOOP(
+        "phrases", "The rig file does not describe two cameras. Open another file."
+    ),
+    MissingInput.SECOND_IMAGE_SIZE: QT_TRANSLATE_NOOP(
+        "phrases",
+        "The rig file is for another image size of the second camera. Open the file "
+        "of these cameras.",
+    ),
+    MissingInput.PEN_FILE: QT_TRANSLATE_NOOP("phrases", "Open the LED geometry file."),
+    MissingInput.SAVED_LEDS: QT_TRANSLATE_NOOP(
+        "phrases", "The LED table has unsaved changes. Save or discard them."
     ),
 }
 # A word for a sign to stand beside, read from a distance.
@@ -168,41 +179,41 @@ _GRADES: dict[Grade, str] = {
 }
 # What to do for a posture in each direction; as `_SIDES`.
 _LEANS = (
-    QT_TRANSLATE_NOOP("phrases", "Lean right"),
-    QT_TRANSLATE_NOOP("phrases", "Away, right"),
-    QT_TRANSLATE_NOOP("phrases", "Lean away"),
-    QT_TRANSLATE_NOOP("phrases", "Away, left"),
-    QT_TRANSLATE_NOOP("phrases", "Lean left"),
-    QT_TRANSLATE_NOOP("phrases", "To you, left"),
-    QT_TRANSLATE_NOOP("phrases", "Lean to you"),
-    QT_TRANSLATE_NOOP("phrases", "To you, right"),
+    QT_TRANSLATE_NOOP("phrases", "Tilt right"),
+    QT_TRANSLATE_NOOP("phrases", "Away and right"),
+    QT_TRANSLATE_NOOP("phrases", "Tilt away"),
+    QT_TRANSLATE_NOOP("phrases", "Away and left"),
+    QT_TRANSLATE_NOOP("phrases", "Tilt left"),
+    QT_TRANSLATE_NOOP("phrases", "Towards you and left"),
+    QT_TRANSLATE_NOOP("phrases", "Tilt towards you"),
+    QT_TRANSLATE_NOOP("phrases", "Towards you and right"),
 )
 # How far, by the ring of the dial.
 _TILTS = (
     QT_TRANSLATE_NOOP("phrases", "Keep the tip pressed into the cone."),
-    QT_TRANSLATE_NOOP("phrases", "A little. Keep the tip pressed in."),
-    QT_TRANSLATE_NOOP("phrases", "Far. Keep the tip pressed in."),
+    QT_TRANSLATE_NOOP("phrases", "Slight tilt. Keep the tip pressed in."),
+    QT_TRANSLATE_NOOP("phrases", "Large tilt. Keep the tip pressed in."),
 )
 # From the operator's right, against the clock seen from above.
 _SIDES = (
     QT_TRANSLATE_NOOP("phrases", "to the right"),
-    QT_TRANSLATE_NOOP("phrases", "away to the right"),
+    QT_TRANSLATE_NOOP("phrases", "away and right"),
     QT_TRANSLATE_NOOP("phrases", "away from you"),
-    QT_TRANSLATE_NOOP("phrases", "away to the left"),
+    QT_TRANSLATE_NOOP("phrases", "away and left"),
     QT_TRANSLATE_NOOP("phrases", "to the left"),
-    QT_TRANSLATE_NOOP("phrases", "towards you to the left"),
+    QT_TRANSLATE_NOOP("phrases", "towards you and left"),
     QT_TRANSLATE_NOOP("phrases", "towards you"),
-    QT_TRANSLATE_NOOP("phrases", "towards you to the right"),
+    QT_TRANSLATE_NOOP("phrases", "towards you and right"),
 )
 
 
-def phrase(message: Sentence, heading: float | None = None) -> Phrase:
+def phrase(message: Message, heading: float | None = None) -> Instruction:
     """Return the words of a message.
 
     Parameters
     ----------
-    message : Sentence
-        One of `lightpen.messages`.
+    message : Message
+        One of `lightpen.swing_messages`.
     heading : float, optional
         The operator's right as the camera sees it, rad; without it sides are told as
         the camera sees them.
@@ -214,10 +225,12 @@ def phrase(message: Sentence, heading: float | None = None) -> Phrase:
     hint = worded(message)
     if code in _AT_THE_SCREEN:
         hint = _translated(_AT_THE_SCREEN[code]).format(hint)
-    return Phrase(short, hint)
+    return Instruction(short, hint)
 
 
-def lean_phrase(target: Posture, present: Posture | None, heading: float) -> Phrase:
+def lean_phrase(
+    target: Posture, present: Posture | None, heading: float
+) -> Instruction:
     """Return the words that lead to a posture.
 
     Parameters
@@ -238,7 +251,7 @@ def lean_phrase(target: Posture, present: Posture | None, heading: float) -> Phr
             if target.turn > present.turn
             else QT_TRANSLATE_NOOP("phrases", "Turn it clockwise, seen from above.")
         )
-    return Phrase(short, _translated(hint))
+    return Instruction(short, _translated(hint))
 
 
 def n_images_text(n_images: int) -> str:
@@ -249,9 +262,14 @@ def n_images_text(n_images: int) -> str:
     return many.format(n_images)
 
 
-def lack_text(lack: Lack) -> str:
+def missing_input_text(lack: MissingInput) -> str:
     """Return what to do about something that is missing, a sentence."""
     return _translated(_LACKS[lack])
+
+
+def first_missing(missing_inputs: Sequence[MissingInput]) -> str:
+    """Return what is missing first, a sentence; nothing where all is there."""
+    return missing_input_text(missing_inputs[0]) if missing_inputs else ""
 
 
 def reason_text(reason: Reason) -> str:
@@ -259,7 +277,7 @@ def reason_text(reason: Reason) -> str:
     return worded(reason.words) if reason else ""
 
 
-def share_text(name: ShareName) -> str:
+def share_text(name: ContributionName) -> str:
     """Return a part of the uncertainty in the user's language."""
     return _translated(_SHARES[name])
 
@@ -275,25 +293,23 @@ def grade_text(grade: Grade) -> str:
 
 
 def origin_text(origin: Origin | None) -> str:
-    """Return the word of what images are of; None is of an earlier version."""
+    """Return the word of what images are of; None where nothing says."""
     return _translated(_ORIGINS[origin])
 
 
-def accepted_phrase(origin: Origin | None) -> Phrase:
+def accepted_phrase(origin: Origin | None) -> Instruction:
     """Return what has become of a tip that was accepted."""
     if origin is not Origin.SIMULATED:
-        return Phrase(_translated(QT_TRANSLATE_NOOP("phrases", "IN FORCE")))
-    return Phrase(
-        _translated(QT_TRANSLATE_NOOP("phrases", "PRACTICE KEPT")),
+        return Instruction(_translated(QT_TRANSLATE_NOOP("phrases", "IN USE")))
+    return Instruction(
+        _translated(QT_TRANSLATE_NOOP("phrases", "PRACTICE SAVED")),
         _translated(
-            QT_TRANSLATE_NOOP(
-                "phrases", "A simulated tip is in force for no pen; it is kept apart."
-            )
+            QT_TRANSLATE_NOOP("phrases", "Simulated result; not used for any pen.")
         ),
     )
 
 
-def _by_own_sides(message: Sentence, heading: float) -> Sentence:
+def _by_own_sides(message: Message, heading: float) -> Message:
     """Tell sides as the operator has them who sees the camera's right at an angle."""
     sides = message.values["sides"]
     if sides == MOST_SIDES:

@@ -2,14 +2,17 @@
 
 from PySide6.QtCore import QCoreApplication
 
-from lightpen.sentences import Sentence
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.messages import Message
 
 CONTEXT = "core"
 
 
-def worded(sentence: Sentence | None) -> str:
-    """Return the words of a sentence of the core; empty if there is none."""
-    return "" if sentence is None else sentence.text(translated)
+def worded(message: Message | StoredMessage | None) -> str:
+    """Return the words of a message of the core; empty if there is none."""
+    if isinstance(message, StoredMessage):
+        return message.worded(translated)
+    return "" if message is None else message.text(translated)
 
 
 def translated(template: str) -> str:

@@ -189,9 +189,4 @@ _OUTLINES = {
     Sign.WAIT: _wait,
     Sign.RING: _ring,
 }
-_SOLIDS = {
-    Sign.PLAY: _play,
-    Sign.PAUSE: _pause,
-    Sign.RECORD: _record,
-    Sign.LOCK: _lock,
-}
+_SOLIDS = {Sign.PLAY: _play, Sign.PAUSE: _pause, Sign.RECORD: _record, Sign.LOCK: _lock}

@@ -1,7 +1,7 @@
 """Sounds that accompany the swing; each also has a picture and a word.
 
 The program runs without any: what plays them is looked for when it starts, and if
-there is nothing, `Silence` takes its place and says why.
+there is nothing, `SilentSounds` takes its place and says why.
 """
 
 import io
@@ -58,7 +58,7 @@ class Sounds(Protocol):
         """Return why nothing can be heard, or nothing."""
 
 
-class Silence:
+class SilentSounds:
     """Plays nothing.
 
     Parameters
@@ -114,7 +114,7 @@ class FileSounds:
         return ""
 
 
-class Mute:
+class MutedSounds:
     """Passes sounds on unless it is muted."""
 
     def __init__(self, sounds: Sounds, *, muted: bool = False) -> None:
@@ -139,7 +139,7 @@ def find_sounds(folder: Path) -> Sounds:
         path = shutil.which(program)
         if path is not None:
             return FileSounds(folder, _player(path, options))
-    return Silence([program for program, *_ in PLAYERS])
+    return SilentSounds([program for program, *_ in PLAYERS])
 
 
 def sound_wav(sound: Sound, step: int = 0) -> bytes:

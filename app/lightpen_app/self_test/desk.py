@@ -2,25 +2,151 @@
 
 import os
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QFont, QFontDatabase, QFontMetrics, QGuiApplication
 
 from lightpen.cameras.clock import SkippingClock
-from lightpen.live.sources import Surroundings
-from lightpen.record.folder_archive import RECORDS, RESULTS, FolderArchive
-from lightpen.record.reading import open_record
-from lightpen.record.results import Result
+from lightpen.detection.pen_detection import detect_pen
+from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.live.sources import SourceEnvironment
+from lightpen.model.limits import SwingLimits
+from lightpen.record.results.result_folder import RECORDS, RESULTS, FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import open_record
+from lightpen.record.swings.writing import RecordWriter
+from lightpen.simulator.image_plans import plan_scene, render_plan
+from lightpen.simulator.scene_files import write_sample_files
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import paper_camera
+from lightpen.swing.preparation import Preparation
 from lightpen_app.application import Wizard, has_display, make_application
 from lightpen_app.crash import versions
 from lightpen_app.look.theme import FAMILIES, load_fonts
 from lightpen_app.self_test.report import SelfTestError, Tip
-from lightpen_app.self_test.swing import N_IMAGES, NAMES, SCENE, record_swing
-from lightpen_app.self_test.walk import Walk
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Settings
+
+TICK_MS = 50
+
+
+class Walk(QObject):
+    """Opens an interrupted swing, ends it, reviews it and accepts its tip.
+
+    Signals
+    -------
+    ended()
+        The tip is accepted.
+    """
+
+    ended = Signal()
+
+    def __init__(self, wizard: Wizard, swing: Path) -> None:
+        super().__init__(wizard)
+        self._window = wizard.window
+        self._workbench = wizard.workbench
+        self._swing = swing
+        self._next: Callable[[], bool] = self._open
+        self._timer = QTimer(self)
+        self._timer.setInterval(TICK_MS)
+        self._timer.timeout.connect(self._on_tick)
+
+    def start(self) -> None:
+        """Begin on the first page."""
+        self._timer.start()
+
+    def _on_tick(self) -> None:
+        if self._next():
+            self._timer.stop()
+            self.ended.emit()
+
+    def _open(self) -> bool:
+        if self._workbench.selection.preparation.image_size is not None:
+            self._workbench.run.open_requested.emit(self._swing)
+            self._next = self._finish
+        return False
+
+    def _finish(self) -> bool:
+        status = self._workbench.run.status
+        is_whole = status.verdict is not None  # its tip was computed at once
+        if self._window.page().key == "swing" and (status.is_capturing or is_whole):
+            if not is_whole:
+                self._workbench.run.runner.finish()
+            self._next = self._review
+        return False
+
+    def _review(self) -> bool:
+        status = self._workbench.run.status
+        if status.verdict is None:
+            return False
+        if not status.verdict.can_be_accepted:
+            raise SelfTestError(f"The tip cannot be accepted: {status.verdict}.")
+        return self._press_on("swing", self._accept)
+
+    def _accept(self) -> bool:
+        return self._press_on("review", self._end)
+
+    def _end(self) -> bool:
+        return self._workbench.run.status.result is not None
+
+    def _press_on(self, key: str, then: Callable[[], bool]) -> bool:
+        """Press the main button of a page once it can be, and go on."""
+        page = self._window.page()
+        if page.key == key and not page.main_action().why_not:
+            self._window.press_main()
+            self._next = then
+        return False
+
+
+N_IMAGES = 60
+PERIOD = 0.1  # s from image to image
+# With blanks and letters that a Windows of another language has no code page for.
+NAMES = Names("Prüfstand 1", "自检", "SELF-TEST", "T-1 ä", "C-1", 10.0)
+# A quarter of the usual pixels: the test is to be over soon.
+SCENE = Scene(n_images=N_IMAGES, camera=paper_camera(binning=2), led_noise=0.0)
+
+
+def record_swing(folder: Path, files: Path) -> None:
+    """Render the images of `SCENE` and record them, each with what it shows.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the record.
+    files : Path
+        Folder for the files of camera and pen.
+
+    Raises
+    ------
+    SelfTestError
+        The pen is not found in an image.
+    """
+    written = write_sample_files(SCENE, files)
+    preparation = Preparation(
+        names=NAMES,
+        camera_file=CameraFile.read(written.camera),
+        pen_file=PenFile.read(written.pen),
+        limits=replace(SwingLimits(), min_per_field=0),
+    )
+    setup = preparation.swing_setup()
+    with RecordWriter.create(folder, preparation.header()) as writer:
+        for image_plan in plan_scene(SCENE).image_plans:
+            image = render_plan(SCENE, image_plan)
+            seen = detect_pen(image, setup.camera, setup.pen)
+            if not seen.has_pose:
+                raise SelfTestError(
+                    f"The pen is not found in rendered image {image_plan.index + 1}."
+                )
+            writer.append(
+                *(image, seen.pixels, seen.rotation, seen.translation),
+                image_plan.index * PERIOD,
+            )
+
 
 LETTERS = "Aaµ°±光笔校准"
 
@@ -73,29 +199,29 @@ class Desk:
 
     def walked_wizard(self, picture: Path) -> str:
         """Have the wizard find and accept the tip of the swing; draw it at its end."""
-        around = Surroundings(SCENE, SkippingClock(rests=True))
+        around = SourceEnvironment(SCENE, SkippingClock(rests=True))
         settings = Settings(self._settings)
         wizard = Wizard(self._application, make_pages, settings, self._data, around)
         walk = Walk(wizard, self._record)
-        troubles: list[str] = []
+        faults: list[str] = []
 
         def end() -> None:
             if not wizard.window.grab().save(str(picture)):
-                troubles.append(f"The picture {picture} cannot be written.")
+                faults.append(f"The picture {picture} cannot be written.")
             wizard.window.close()
 
         def give_up(
-            kind: type[BaseException],
-            error: BaseException,
-            trace: TracebackType | None,
+            kind: type[BaseException], error: BaseException, trace: TracebackType | None
         ) -> None:
             previous(kind, error, trace)
-            troubles.append(f"{kind.__name__}: {error}")
+            faults.append(f"{kind.__name__}: {error}")
             wizard.window.close_unasked()
 
         previous, sys.excepthook = sys.excepthook, give_up
         walk.ended.connect(end)
-        wizard.workbench.troubled.connect(troubles.append)
+        wizard.workbench.notifications.raised.connect(
+            lambda text, _: faults.append(text)
+        )
         wizard.window.show()
         wizard.workbench.start()
         QTimer.singleShot(0, walk.start)
@@ -103,8 +229,8 @@ class Desk:
             self._application.exec()
         finally:
             sys.excepthook = previous
-        if troubles:
-            raise SelfTestError(" ".join(troubles))
+        if faults:
+            raise SelfTestError(" ".join(faults))
         return "opened, finished, reviewed and accepted"
 
     def tested_result(self) -> str:
@@ -115,9 +241,7 @@ class Desk:
         """Return the tip of the accepted result, and the true one."""
         result = self._result()
         return Tip(
-            result.tip_pen.tolist(),
-            SCENE.tip_pen.tolist(),
-            result.uncertainty.tolist(),
+            result.tip_pen.tolist(), SCENE.tip_pen.tolist(), result.uncertainty.tolist()
         )
 
     def _result(self) -> Result:

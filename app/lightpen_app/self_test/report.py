@@ -5,7 +5,7 @@ import platform
 import sys
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -57,6 +57,7 @@ class Report:
     screenshot: str = ""
     versions: dict[str, str] = field(default_factory=dict)
     is_complete: bool = False
+    last_lines: Callable[[], Sequence[str]] = tuple
     _lock: Lock = field(default_factory=Lock)
 
     @property
@@ -92,6 +93,7 @@ class Report:
             "checks": [asdict(check) for check in self.checks],
             "tip": None if self.tip is None else asdict(self.tip),
             "screenshot": self.screenshot,
+            "log": list(self.last_lines()),
         }
         with self._lock:
             text = json.dumps(entries, indent=1, ensure_ascii=False)

@@ -4,16 +4,41 @@ Only modules of Python itself are imported before the files are found to be whol
 """
 
 import importlib
+import logging
 import os
 import sys
 from contextlib import ExitStack
+from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Timer
 
-from lightpen_app.self_test.installed_files import damaged_files, file_list
 from lightpen_app.self_test.report import Report, SelfTestError, Tip
+
+FILE_LIST = "files.sha256"
+
+
+def file_list() -> Path:
+    """Return where the list is if the program was installed by its installer."""
+    return Path(sys.prefix).parent / FILE_LIST
+
+
+def damaged_files(files: Path) -> tuple[str, ...]:
+    """Return the files of a list that are missing, or not as they were built."""
+    lines = files.read_text(encoding="utf-8").splitlines()
+    entries = [line.split("  ", maxsplit=1) for line in lines]
+    return tuple(
+        name for digest, name in entries if _digest(files.parent / name) != digest
+    )
+
+
+def _digest(path: Path) -> str:
+    try:
+        return sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return "unreadable"
+
 
 LONGEST = 600.0  # s, after which something hangs
 UNWRITTEN, HUNG = 2, 3  # exit status
@@ -44,15 +69,19 @@ def test_program(file: Path) -> int:
         stack.callback(watchdog.cancel)
         folder = Path(stack.enter_context(TemporaryDirectory(prefix="lightpen-试 ")))
         try:
-            _test_all(report, folder)
+            _test_all(report, folder, stack)
         except SelfTestError as failed:
             _say(str(failed))
     return 0 if report.ok else 1
 
 
-def _test_all(report: Report, folder: Path) -> None:
+def _test_all(report: Report, folder: Path, stack: ExitStack) -> None:
     with report.check("files") as found:
         found.append(_checked_files())
+    from lightpen.logs import recent_lines, running_log
+
+    stack.enter_context(running_log(logging.INFO))
+    report.last_lines = recent_lines
     with report.check("imports") as found:
         there = (name for name in OPTIONAL if find_spec(name.partition(".")[0]))
         names = (*MODULES, *there)

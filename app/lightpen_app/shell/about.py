@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QWidget
 
+from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 
 
@@ -28,7 +29,7 @@ class About(QDialog):
         heading = text_label(TextSize.TITLE)
         heading.setText("Lightpen")
         purpose = text_label(TextSize.BODY)
-        purpose.setText(self.tr("Calibrates the probe tip of a light pen."))
+        purpose.setText(self.tr("Calibration of the probe tip of a light pen"))
         self._versions = text_label(TextSize.BODY)
         self._versions.setText(
             "\n".join(f"{name} {number}" for name, number in versions.items())
@@ -48,12 +49,8 @@ class About(QDialog):
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
 
         # Layout
-        layout = QVBoxLayout(self)
-        margin = 3 * GRID
-        layout.setContentsMargins(margin, margin, margin, margin)
-        layout.setSpacing(2 * GRID)
-        for widget in (heading, purpose, self._versions, licences, buttons):
-            layout.addWidget(widget)
+        parts = (heading, purpose, self._versions, licences, buttons)
+        vertical_layout(self, *parts, spacing=2 * GRID, margins=3 * GRID)
 
         # Connections
         buttons.rejected.connect(self.reject)

@@ -4,13 +4,14 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QMouseEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QWidget
 from typing_extensions import override
 
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.page import MainAction
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.rearranged import Room
+from lightpen_app.widgets.responsive_layout import SizeClass
 from lightpen_app.widgets.translated import Translated
 
 MAIN_WIDTH = 22 * GRID + 34  # px; with the padding and the border
@@ -42,23 +43,17 @@ class ActionBar(Translated, QFrame):
         self._main.setObjectName("main_button")
 
         # Layout
-        words = QVBoxLayout()
-        words.setSpacing(0)
-        words.addStretch(1)
-        words.addWidget(self._why_not)
-        words.addWidget(self._status)
-        words.addStretch(1)
-        self._layout = layout = QHBoxLayout(self)
-        layout.setSpacing(2 * GRID)
-        layout.addLayout(words, 1)
-        layout.addWidget(self._back)
-        layout.addWidget(self._main)
+        self._layout = horizontal_layout(self, spacing=2 * GRID)
+        vertical_layout(
+            *(self._layout, 1, self._why_not, self._status, 1), spacing=0, stretch=1
+        )
+        fill(self._layout, self._back, self._main)
 
         # Connections
         self._back.clicked.connect(self.back_pressed)
         self._main.clicked.connect(self.main_pressed)
 
-        self.set_room(Room())
+        self.set_room(SizeClass())
         self.set_status("")
         self._retranslate()
 
@@ -96,7 +91,7 @@ class ActionBar(Translated, QFrame):
     def _refresh_status(self) -> None:
         self._status.setVisible(bool(self._told_status()))
 
-    def set_room(self, room: Room) -> None:
+    def set_room(self, room: SizeClass) -> None:
         """Take less of a window that has little."""
         self.setMinimumHeight(LOW_HEIGHT if room.is_low else HEIGHT)
         side = room.margin

@@ -10,20 +10,21 @@ from PySide6.QtGui import (
     QTextDocument,
     QTextTable,
 )
-from PySide6.QtWidgets import QTextBrowser, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QTextBrowser, QWidget
 from typing_extensions import override
 
-from lightpen_app.look.languages import Language
+from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID, RESOURCES
 from lightpen_app.widgets.translated import Translated
+from lightpen_resources import SOURCE_LANGUAGE
 
 HELP = RESOURCES / "help"
 _PROPORTIONAL = QTextBlockFormat.LineHeightTypes.ProportionalHeight.value
 
 
-def help_text(key: str, language: Language) -> str:
+def help_text(key: str, language: str) -> str:
     """Return the help about a step or a method, as Markdown; in English if need be."""
-    for folder in (language, Language.ENGLISH):
+    for folder in (language, SOURCE_LANGUAGE):
         path = HELP / folder / f"{key}.md"
         if path.is_file():
             return path.read_text("utf-8")
@@ -37,7 +38,7 @@ class HelpWindow(Translated, QWidget):
         super().__init__(parent, Qt.WindowType.Window)
         self.setObjectName("help")
         self._key = ""
-        self._language = Language.ENGLISH
+        self._language = SOURCE_LANGUAGE
         self.resize(80 * GRID, 90 * GRID)
 
         # Widgets
@@ -46,9 +47,7 @@ class HelpWindow(Translated, QWidget):
         self._browser.anchorClicked.connect(self._on_anchor_clicked)
 
         # Layout
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(2 * GRID, 2 * GRID, 2 * GRID, 2 * GRID)
-        layout.addWidget(self._browser)
+        vertical_layout(self, self._browser, margins=2 * GRID)
 
         self._retranslate()
 
@@ -56,13 +55,13 @@ class HelpWindow(Translated, QWidget):
         """Return the words shown."""
         return self._browser.toPlainText()
 
-    def set_topic(self, key: str, language: Language) -> None:
+    def set_topic(self, key: str, language: str) -> None:
         """Show the help about a step or a method."""
         self._key, self._language = key, language
         self._browser.setMarkdown(help_text(key, language))
         _space_out(self._browser.document())
 
-    def set_language(self, language: Language) -> None:
+    def set_language(self, language: str) -> None:
         """Show the same help in another language."""
         if self._key:
             self.set_topic(self._key, language)

@@ -1,22 +1,14 @@
 """The window of the wizard: steps at the left, one page, one main button."""
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
-from PySide6.QtCore import QEvent, QPoint, QSize, Qt, Signal
-from PySide6.QtGui import (
-    QAction,
-    QCloseEvent,
-    QGuiApplication,
-    QIcon,
-    QKeyEvent,
-)
+from PySide6.QtCore import QEvent, QPoint, QRect, QSize, Qt, Signal
+from PySide6.QtGui import QAction, QCloseEvent, QGuiApplication, QIcon, QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
     QCheckBox,
     QFileDialog,
-    QGridLayout,
     QMainWindow,
     QMessageBox,
     QWidget,
@@ -25,33 +17,42 @@ from typing_extensions import override
 
 from lightpen.streaming.server import StreamPlace
 from lightpen_app.crash import versions
-from lightpen_app.look.theme import (
-    GRID,
-    RESOURCES,
-    Tone,
-)
+from lightpen_app.look.layouts import grid_layout
+from lightpen_app.look.theme import GRID, RESOURCES, Tone
 from lightpen_app.shell.about import About
 from lightpen_app.shell.action_bar import ActionBar
 from lightpen_app.shell.help_window import HelpWindow
 from lightpen_app.shell.options_menu import OptionsMenu
 from lightpen_app.shell.page_area import PageArea
-from lightpen_app.shell.placement import FRAME, fitted_place
-from lightpen_app.shell.sidebar import Sidebar
-from lightpen_app.shell.step_states import Status, Step, list_steps
+from lightpen_app.shell.sidebar import Sidebar, Subject
+from lightpen_app.shell.step_list import Status, Step, list_steps
 from lightpen_app.shell.stream_dialog import StreamDialog, StreamState
 from lightpen_app.steps.page import Page
 from lightpen_app.widgets.keys import ENTER_KEYS, PAGE_KEYS
 from lightpen_app.widgets.operator_view import OperatorView
-from lightpen_app.widgets.rearranged import Rearranged
+from lightpen_app.widgets.responsive_layout import ResponsiveLayout
+from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.settings import Preferences, Settings, data_folder
-from lightpen_app.work.workbench import Subject
+
+FRAME = QSize(GRID, 5 * GRID)  # of a window, at most; not known before it is shown
+
+
+def fitted_place(place: QRect, available: QRect) -> QRect:
+    """Return the place of a window without its frame, within what a screen has."""
+    size = place.size().boundedTo(available.size() - FRAME)
+    last = available.bottomRight() - QPoint(size.width() - 1, size.height() - 1)
+    left = max(available.left(), min(place.left(), last.x()))
+    top = max(available.top(), min(place.top(), last.y()))
+    return QRect(QPoint(left, top), size)
+
 
 LEAST_SIZE = QSize(116 * GRID, 62 * GRID)  # for the wizard; fits 1920 x 1080 at 200 %
 FIRST_SIZE = QSize(160 * GRID, 100 * GRID)
+OPTIONS = "options"  # cause of a notification
 KEYS_THAT_LEAD_ON = (*ENTER_KEYS, *PAGE_KEYS)
 
 
-class MainWindow(Rearranged, QMainWindow):
+class MainWindow(ResponsiveLayout, QMainWindow):
     """Shows one page at a time and leads from step to step.
 
     Keys: Enter and PageDown press the main button, PageUp goes back, Space pauses,
@@ -66,6 +67,8 @@ class MainWindow(Rearranged, QMainWindow):
         Where the window's place is kept.
     preferences : Preferences
         What is in use now.
+    notifications : Notifications
+        What is to be read; what a page published, by its key, goes with the page.
 
     Signals
     -------
@@ -89,6 +92,7 @@ class MainWindow(Rearranged, QMainWindow):
         pages: Sequence[Page],
         settings: Settings,
         preferences: Preferences,
+        notifications: Notifications,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -98,6 +102,7 @@ class MainWindow(Rearranged, QMainWindow):
         self.setWindowIcon(QIcon(str(RESOURCES / "icons" / "lightpen.svg")))
         self._pages = tuple(pages)
         self._settings = settings
+        self._notifications = notifications
         self._now = 0
         self._asks = True
 
@@ -133,6 +138,9 @@ class MainWindow(Rearranged, QMainWindow):
         self._operator_view.advance_requested.connect(self._on_advance_wanted_afar)
         self._operator_view.pause_requested.connect(self._on_pause_pressed)
         self._notice.value_changed.connect(self._operator_view.set_notice)
+        notifications.raised.connect(self._notice.show_text)
+        notifications.withdrawn.connect(self._notice.drop)
+        notifications.status_changed.connect(self._action_bar.set_status)
         self._sidebar.subject_told.connect(self._operator_view.set_subject)
         for page in self._pages:
             self._connect_page(page)
@@ -173,7 +181,7 @@ class MainWindow(Rearranged, QMainWindow):
         self.page().left()
         self._now = index
         self._action_bar.set_status("")
-        self._notice.clear_page()
+        self._notifications.withdraw(*(page.key for page in self._pages))
         self._area.show_page(self.page())
         self._tell_attention()
         self.page().entered()
@@ -194,14 +202,6 @@ class MainWindow(Rearranged, QMainWindow):
         """Press the main button, if it can be pressed."""
         self._action_bar.press_main()
 
-    def show_notice(self, text: str, tone: Tone = Tone.BAD) -> None:
-        """Show a sentence until the user has read it."""
-        self._notice.show_text(text, tone)
-
-    def drop_notice(self, text: str) -> None:
-        """Take a sentence away whose cause is gone, and no other."""
-        self._notice.drop(text)
-
     def set_unwritable(self, folder: str, trouble: str) -> None:
         """Say why nothing can be kept in the data folder, until that is empty."""
         self._notice.set_unwritable(folder, trouble)
@@ -210,16 +210,16 @@ class MainWindow(Rearranged, QMainWindow):
         """Tell that the program met a bug of its own; path "" if none is written."""
         if path:
             text = self.tr(
-                "The program made a mistake of its own and goes on. All images taken "
-                "so far are safe. Please send this report to its makers: {0}"
+                "An internal error occurred. The program can continue; all images "
+                "are saved. Please send this report to the developers: {0}"
             ).format(path)
         else:
             text = self.tr(
-                "The program made a mistake of its own and goes on. All images taken "
-                "so far are safe. No report could be written: the disk is full or not "
-                "yours to write."
+                "An internal error occurred. The program can continue; all images "
+                "are saved. No report was written: the disk is full or "
+                "write-protected."
             )
-        self.show_notice(text)
+        self._notifications.tell("crash", text)
 
     def close_unasked(self) -> None:
         """Close without a question, as there may be nobody to answer."""
@@ -241,11 +241,7 @@ class MainWindow(Rearranged, QMainWindow):
 
     def words(self) -> tuple[str, ...]:
         """Return what the window itself says now, besides the page."""
-        said = (
-            self._sidebar.subject(),
-            *self._area.words(),
-            *self._action_bar.words(),
-        )
+        said = (self._sidebar.subject(), *self._area.words(), *self._action_bar.words())
         return tuple(filter(None, said))
 
     def is_seen(self) -> bool:
@@ -275,7 +271,7 @@ class MainWindow(Rearranged, QMainWindow):
             ):
                 focused.click()
             elif self.page().main_action().why_not:
-                self.page().show_lack()
+                self.page().show_missing_input()
             else:
                 self._action_bar.press_main()
         elif key == Qt.Key.Key_PageDown:
@@ -315,8 +311,6 @@ class MainWindow(Rearranged, QMainWindow):
         page.changed.connect(self._refresh)
         page.advance_requested.connect(self.advance)
         page.step_requested.connect(self._on_step_requested)
-        page.status_changed.connect(self._action_bar.set_status)
-        page.notice_raised.connect(partial(self._on_notice_raised, page))
         page.operator_value_changed.connect(self._operator_view.set_value)
         page.data_folder_requested.connect(self._on_data_folder_asked)
 
@@ -357,9 +351,7 @@ class MainWindow(Rearranged, QMainWindow):
     def _arranged(self) -> QWidget:
         """Return all widgets in their places."""
         central = QWidget()
-        layout = QGridLayout(central)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
+        layout = grid_layout(central, spacing=0)
         layout.addWidget(self._sidebar, 0, 0, 2, 1)
         layout.addWidget(self._area, 0, 1)
         layout.addWidget(self._action_bar, 1, 1)
@@ -388,10 +380,7 @@ class MainWindow(Rearranged, QMainWindow):
         page = self.page()
         statuses = [
             Status(
-                each.title(),
-                each.is_complete(),
-                each.why_closed(),
-                each.is_doubtful(),
+                each.title(), each.is_complete(), each.why_closed(), each.is_doubtful()
             )
             for each in self._pages
         ]
@@ -441,7 +430,7 @@ class MainWindow(Rearranged, QMainWindow):
     def _on_advance_pressed(self) -> None:
         """Do as a presenter's remote asks, unless someone must be at the screen."""
         if self.page().main_action().at_screen:
-            words = self.tr("Press this button at the screen.")
+            words = self.tr("Press this button at the computer.")
             self._action_bar.set_status(
                 words, lambda: self.page().main_action().at_screen
             )
@@ -457,12 +446,6 @@ class MainWindow(Rearranged, QMainWindow):
     def _on_step_requested(self, key: str) -> None:
         keys = [page.key for page in self._pages]
         self.go_to(keys.index(key))
-
-    def _on_notice_raised(self, page: Page, text: str) -> None:
-        if text:
-            self._notice.show_text(text, page=page)
-        else:
-            self._notice.clear_page(page)
 
     def _on_space_pressed(self) -> None:
         """Press the button that has the focus; pause where none has."""
@@ -515,10 +498,10 @@ class MainWindow(Rearranged, QMainWindow):
     def _on_data_folder_chosen(self, folder: str) -> None:
         self._options.set_data_folder(folder)
         words = self.tr(
-            "Swings and results are kept in {0} from the next start of the program "
-            "on. Those of now stay where they are."
+            "From the next start, swings and results are saved in {0}. Existing "
+            "ones remain in place."
         )
-        self.show_notice(words.format(folder), Tone.ACTIVE)
+        self._notifications.tell(OPTIONS, words.format(folder), Tone.ACTIVE)
 
     def _on_stream_asked(self) -> None:
         now = self._options.value()
@@ -533,7 +516,7 @@ class MainWindow(Rearranged, QMainWindow):
         box = QMessageBox(self)
         box.setIcon(QMessageBox.Icon.Question)
         box.setText(question)
-        stay = box.addButton(self.tr("Stay"), QMessageBox.ButtonRole.RejectRole)
+        stay = box.addButton(self.tr("Keep open"), QMessageBox.ButtonRole.RejectRole)
         box.addButton(self.tr("Close anyway"), QMessageBox.ButtonRole.AcceptRole)
         box.setDefaultButton(stay)
         box.setEscapeButton(stay)

@@ -8,11 +8,12 @@ from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu, QWidget
 
 from lightpen.streaming.server import StreamPlace
-from lightpen_app.look.languages import Language
+from lightpen_app.look.languages import own_name
 from lightpen_app.look.theme import Appearance
 from lightpen_app.widgets.operator_view import DISTANCES_M
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.settings import Preferences
+from lightpen_resources import languages
 
 
 class OptionsMenu(Translated, QMenu):
@@ -52,7 +53,7 @@ class OptionsMenu(Translated, QMenu):
 
         # Widgets
         self._languages = self._choice_menu(
-            "language", tuple(Language), preferences.language
+            "language", languages(), preferences.language
         )
         self._appearances = self._choice_menu(
             "appearance", tuple(Appearance), preferences.appearance
@@ -116,21 +117,21 @@ class OptionsMenu(Translated, QMenu):
 
     def _choice_name(self, value: object) -> str:
         match value:
-            case Language():
-                return value.own_name
             case Appearance.SYSTEM:
-                return self.tr("As the system")
+                return self.tr("System default")
             case Appearance.LIGHT:
                 return self.tr("Light")
             case Appearance.DARK:
                 return self.tr("Dark")
+            case str():
+                return own_name(value)
         return self.tr("{0} m").format(f"{value:g}")
 
     def _retranslate(self) -> None:
         self._languages.setTitle(self.tr("Language"))
         self._appearances.setTitle(self.tr("Appearance"))
         self._distances.setTitle(self.tr("Viewing distance"))
-        self.mute_action.setText(self.tr("Mute the sounds"))
+        self.mute_action.setText(self.tr("Mute sounds"))
         self._data_folder.setText(self.tr("Data folder..."))
         self._stream.setText(self.tr("Live stream..."))
         self._about.setText(self.tr("About Lightpen"))

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QPoint, QRect
+from PySide6.QtCore import QCoreApplication, QPoint, QRect, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
@@ -10,14 +10,103 @@ from PySide6.QtWidgets import (
     QFrame,
     QSizePolicy,
     QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 from typing_extensions import override
 
+from lightpen_app.look.announcements import announce
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
-from lightpen_app.shell.notice_bar import NoticeBar
-from lightpen_app.widgets.rearranged import Room
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.responsive_layout import SizeClass
+from lightpen_app.widgets.translated import Translated
+
+
+class NoticeBar(Translated, QFrame):
+    """Hidden until it has something to say; Close puts it away.
+
+    While nothing can be kept in the data folder, whatever is told of it says where
+    another one is chosen, and is told once.
+
+    Signals
+    -------
+    value_changed(str)
+        What it says; empty once it says nothing any more.
+    """
+
+    value_changed = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setProperty("area", "notice")
+        self._unwritable = self._fault = ""  # the data folder, and why
+
+        # Widgets
+        self._text = text_label(TextSize.BODY)
+        self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._close = PushButton()
+
+        # Layout
+        margins = (2 * GRID, GRID, GRID, GRID)
+        horizontal_layout(
+            *(self, (self._text, 1), self._close), spacing=2 * GRID, margins=margins
+        )
+
+        # Connections
+        self._close.clicked.connect(self.clear)
+
+        self._retranslate()
+        self.hide()
+
+    def text(self) -> str:
+        """Return what it says; empty while it is hidden."""
+        return self._text.text()
+
+    def show_text(self, text: str, tone: Tone = Tone.BAD) -> None:
+        """Say a sentence, instead of an earlier one."""
+        told, is_of_folder = self.text(), self._with_way(text) != text
+        if is_of_folder and told == self._with_way(self._fault):
+            return
+        text = self._with_way(text)
+        self._text.setText(text)
+        self._text.setAccessibleName(text)
+        set_tone(self, tone)
+        self.show()
+        announce(self, text)
+        self.value_changed.emit(text)
+
+    def drop(self, text: str) -> None:
+        """Take a sentence away whose cause is gone, and no other."""
+        if self.text() in (text, self._with_way(text)):
+            self.clear()
+
+    def set_unwritable(self, folder: str, trouble: str) -> None:
+        """Say why nothing can be kept in the data folder, until that is empty."""
+        if trouble:
+            self._unwritable, self._fault = folder, trouble
+            self.show_text(trouble)
+        else:
+            self.drop(self._fault)
+            self._unwritable = self._fault = ""
+
+    def clear(self) -> None:
+        """Say nothing."""
+        self._text.clear()
+        self.hide()
+        self.value_changed.emit("")
+
+    def _with_way(self, text: str) -> str:
+        """Return a sentence, of an unwritable data folder with the way to another."""
+        if not self._unwritable or self._unwritable not in text:
+            return text
+        way = QCoreApplication.translate(
+            "MainWindow",
+            "Choose the data folder at the step Start or in the options (F10).",
+        )
+        return f"{text} {way}"
+
+    def _retranslate(self) -> None:
+        self._close.setText(self.tr("Close"))
 
 
 class PageArea(QFrame):
@@ -48,13 +137,11 @@ class PageArea(QFrame):
             self._stack.addWidget(page)
 
         # Layout
-        self._heading = QBoxLayout(QBoxLayout.Direction.TopToBottom)
-        self._heading.addWidget(self._title)
-        self._heading.addWidget(self._lead, 1)
-        self._layout = layout = QVBoxLayout(self)
-        layout.setSpacing(GRID)
+        self._layout = layout = vertical_layout(self, margins=None)
         layout.addSpacing(GRID)
-        layout.addLayout(self._heading)
+        self._heading = vertical_layout(
+            layout, self._title, (self._lead, 1), spacing=-1
+        )
         layout.addSpacing(GRID)
         layout.addWidget(self._stack, 1)
 
@@ -91,7 +178,7 @@ class PageArea(QFrame):
         set_tone(self._lead, tone)
         self._lead.setVisible(bool(lead))
 
-    def set_room(self, room: Room) -> None:
+    def set_room(self, room: SizeClass) -> None:
         """Arrange title, lead and margins as the size of the window allows."""
         side = room.margin
         if room.is_low:

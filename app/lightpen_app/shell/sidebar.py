@@ -1,28 +1,59 @@
 """The left side of the window: what is calibrated, the steps, and where help is."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 from PySide6.QtCore import QPoint, Signal
-from PySide6.QtWidgets import QFrame, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QWidget
 
 from lightpen.model.origin import Origin
-from lightpen.record.names import Names
+from lightpen.record.library.calibration_status import StationStatus
+from lightpen.record.swings.names import Names
 from lightpen.streaming.server import StreamStatus
+from lightpen.swing.preparation import Preparation
+from lightpen.swing.status import SwingStatus
+from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, shortened
-from lightpen_app.shell.step_list import StepList
-from lightpen_app.shell.step_states import Step
-from lightpen_app.widgets.origin_mark import origin_remark
+from lightpen_app.shell.step_list import Step, StepList
+from lightpen_app.widgets.origin_mark import origin_message
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.rearranged import Room
-from lightpen_app.widgets.sign_label import Remark, SignLabel
-from lightpen_app.widgets.standing_mark import subject_remark
+from lightpen_app.widgets.responsive_layout import SizeClass
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
+from lightpen_app.widgets.status_mark import subject_message
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.workbench import Subject
 
 WIDTH, NARROW_WIDTH = 30 * GRID, 18 * GRID
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is calibrated, for all that is shown besides the steps.
+
+    Attributes
+    ----------
+    names : Names
+        Of the swing there is; else those that are chosen.
+    origin : Origin or None
+        What its images are of; None where the swing does not say.
+    statuses : StationStatus
+        How all tips stand.
+    """
+
+    names: Names
+    origin: Origin | None
+    statuses: StationStatus = field(default_factory=StationStatus)
+
+
+def subject_of(
+    status: SwingStatus, chosen: Preparation, statuses: StationStatus
+) -> Subject:
+    """Return what is calibrated: by the swing there is, else by what is chosen."""
+    if status.state is not None:
+        return Subject(status.names, status.origin, statuses)
+    return Subject(chosen.names, chosen.origin, statuses)
 
 
 class Sidebar(Translated, QFrame):
@@ -48,7 +79,7 @@ class Sidebar(Translated, QFrame):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("sidebar")
-        self._room = Room()
+        self._room = SizeClass()
 
         # Widgets
         self._name = text_label(TextSize.LEAD)
@@ -64,30 +95,18 @@ class Sidebar(Translated, QFrame):
         buttons = (self._operator_view, self._help, self._options)
 
         # Layout
-        self._head = head = QVBoxLayout()
-        head.setSpacing(GRID // 2)
-        head.addWidget(self._name)
-        head.addWidget(self._subject)
-        head.addWidget(self._standing)
-        head.addWidget(self._origin)
-        head.addWidget(self._stream)
-        self._foot = foot = QVBoxLayout()
-        foot.setSpacing(0)
-        for button in buttons:
-            button.setFlat(True)
-            foot.addWidget(button)
+        self._layout = layout = vertical_layout(self)
+        self._head = vertical_layout(layout, self._name, self._subject)
+        self._head.setSpacing(GRID // 2)
+        fill(self._head, self._standing, self._origin, self._stream)
         content = QWidget()
-        steps = QVBoxLayout(content)
-        steps.setContentsMargins(0, 0, 0, 0)
-        steps.addWidget(self._steps)
-        steps.addStretch(1)
+        vertical_layout(content, self._steps, 1)
         self._scroll = PageScroll()
         self._scroll.setWidget(content)
-        self._layout = layout = QVBoxLayout(self)
-        layout.setSpacing(GRID)
-        layout.addLayout(head)
-        layout.addWidget(self._scroll, 1)
-        layout.addLayout(foot)
+        fill(layout, (self._scroll, 1))
+        self._foot = vertical_layout(layout, *buttons, spacing=0)
+        for button in buttons:
+            button.setFlat(True)
 
         # Connections
         self._steps.step_chosen.connect(self.step_chosen)
@@ -97,7 +116,7 @@ class Sidebar(Translated, QFrame):
         self._scroll.height_changed.connect(self._reveal_present)
 
         self._value = Subject(Names(), Origin.LIVE)
-        self.set_room(Room())
+        self.set_room(SizeClass())
 
     def steps(self) -> tuple[Step, ...]:
         """Return the steps shown."""
@@ -112,25 +131,26 @@ class Sidebar(Translated, QFrame):
         """Return what is being calibrated, in words, a line for each name."""
         return self._subject.text()
 
-    def standing(self) -> Remark:
+    def standing(self) -> StatusMessage:
         """Return what of it must not be measured with."""
         return self._standing.value()
 
     def set_subject(self, subject: Subject) -> None:
         """Say what is being calibrated, and what its images are of."""
-        self._value = subject
-        self._show_subject()
+        if subject != self._value:
+            self._value = subject
+            self._show_subject()
 
     def set_stream(self, status: StreamStatus) -> None:
         """Say where the pen can be followed, and how many do; nothing if nowhere."""
         self._streamed = status
-        remark = Remark()
+        remark = StatusMessage()
         if status.place is not None:
-            text = self.tr("Live stream at {0}, listening: {1}").format(
+            text = self.tr("Live stream at {0}, clients: {1}").format(
                 status.place, status.n_clients
             )
             tone = Tone.ACTIVE if status.place.is_local else Tone.WARN
-            remark = Remark(text, Sign.RING, tone)
+            remark = StatusMessage(text, Sign.RING, tone)
         self._stream.set_value(remark)
 
     def _reveal_present(self) -> None:
@@ -149,14 +169,14 @@ class Sidebar(Translated, QFrame):
         parts = [words.format(shortened(name)) for words, name in told if name]
         self._subject.setText("\n".join(parts))
         self._subject.setVisible(bool(parts))
-        standing = subject_remark(names, self._value.origin, self._value.standings)
+        standing = subject_message(names, self._value.origin, self._value.statuses)
         self._standing.set_value(standing)
-        origin = origin_remark(self._value.origin)
+        origin = origin_message(self._value.origin)
         self._origin.set_value(origin)
         line = filter(None, (*parts, standing.text, origin.text))
         self.subject_told.emit(PARTED.join(line), bool(standing.text))
 
-    def set_room(self, room: Room) -> None:
+    def set_room(self, room: SizeClass) -> None:
         """Take less of a window that has little."""
         self._room = room
         narrow = room.is_narrow

@@ -1,16 +1,85 @@
 """The steps of the wizard: done, now, to do, or closed with the reason."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 from typing_extensions import override
 
+from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font
-from lightpen_app.shell.step_states import Step, StepState
 from lightpen_app.widgets.translated import Translated
+
+
+class StepState(Enum):
+    """How far a step is."""
+
+    DONE = auto()
+    DOUBTFUL = auto()
+    NOW = auto()
+    TO_DO = auto()
+    CLOSED = auto()
+
+
+@dataclass(frozen=True)
+class Status:
+    """What a page says of itself.
+
+    Attributes
+    ----------
+    complete : bool
+        All that the step asks for is there.
+    why_closed : str
+        Why the step cannot be entered; empty when it can.
+    doubtful : bool
+        Whether what is complete was taken with doubts.
+    """
+
+    title: str
+    complete: bool
+    why_closed: str
+    doubtful: bool = False
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step as the list shows it.
+
+    Attributes
+    ----------
+    why_closed : str
+        A sentence for a closed step, else empty.
+    """
+
+    title: str
+    state: StepState
+    why_closed: str = ""
+
+
+def list_steps(statuses: Sequence[Status], now: int) -> tuple[Step, ...]:
+    """Return the steps when the page of index `now` is shown.
+
+    The page that is shown is never closed, and going back is always free: a step
+    before it is closed only by its own reason.
+    """
+    return tuple(
+        _step(status, is_now=index == now) for index, status in enumerate(statuses)
+    )
+
+
+def _step(status: Status, *, is_now: bool) -> Step:
+    if is_now:
+        return Step(status.title, StepState.NOW)
+    if status.why_closed:
+        return Step(status.title, StepState.CLOSED, status.why_closed)
+    done = StepState.DOUBTFUL if status.doubtful else StepState.DONE
+    state = done if status.complete else StepState.TO_DO
+    return Step(status.title, state)
+
 
 SIGN_SIZE = 2 * GRID
 SIGN_LEFT, NARROW_SIGN_LEFT = 5 * GRID // 2, 3 * GRID // 2
@@ -124,7 +193,7 @@ class StepButton(Translated, QAbstractButton):
     def _retranslate(self) -> None:
         words = {
             StepState.DONE: self.tr("done"),
-            StepState.DOUBTFUL: self.tr("done, with doubts"),
+            StepState.DOUBTFUL: self.tr("done, check needed"),
             StepState.NOW: self.tr("now"),
             StepState.TO_DO: self.tr("to do"),
             StepState.CLOSED: self.tr("closed"),
@@ -148,9 +217,7 @@ class StepList(Translated, QWidget):
         super().__init__(parent)
         self._buttons: list[StepButton] = []
         self._is_narrow = False
-        self._layout = QVBoxLayout(self)
-        self._layout.setContentsMargins(0, 0, 0, 0)
-        self._layout.setSpacing(GRID // 2)
+        self._layout = vertical_layout(self, spacing=GRID // 2)
         self._retranslate()
 
     def steps(self) -> tuple[Step, ...]:

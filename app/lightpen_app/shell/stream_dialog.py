@@ -3,27 +3,16 @@
 from dataclasses import dataclass, field
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QDialog,
-    QDialogButtonBox,
-    QFormLayout,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QFormLayout, QWidget
 from typing_extensions import override
 
-from lightpen.streaming.server import (
-    LAST_PORT,
-    LOOPBACK,
-    StreamPlace,
-    StreamStatus,
-)
+from lightpen.streaming.server import LAST_PORT, LOOPBACK, StreamPlace, StreamStatus
+from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 EVERYWHERE = "0.0.0.0"  # every network of the computer
@@ -78,20 +67,13 @@ class StreamDialog(Translated, QDialog):
         self._buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
 
         # Layout
+        layout = vertical_layout(self, self._lead, spacing=2 * GRID, margins=3 * GRID)
         form = QFormLayout()
+        layout.addLayout(form)
         form.setHorizontalSpacing(2 * GRID)
         form.addRow(self._address_label, self._address)
         form.addRow(self._port_label, self._port)
-        layout = QVBoxLayout(self)
-        margin = 3 * GRID
-        layout.setContentsMargins(margin, margin, margin, margin)
-        layout.setSpacing(2 * GRID)
-        layout.addWidget(self._lead)
-        layout.addLayout(form)
-        layout.addWidget(self._reach)
-        layout.addWidget(self._on)
-        layout.addWidget(self._told)
-        layout.addWidget(self._buttons)
+        fill(layout, self._reach, self._on, self._told, self._buttons)
         self.setMinimumWidth(72 * GRID)
 
         # Connections
@@ -128,28 +110,28 @@ class StreamDialog(Translated, QDialog):
         for each in (self._address, self._port):
             each.setEnabled(not is_on)
         self._on.setEnabled(bool(self._address.currentText().strip()))
-        reach = Remark()
+        reach = StatusMessage()
         if not self.place().is_local:
             text = self.tr(
-                "Every computer in that network can follow the pen. Nobody has to sign "
-                "in, and a firewall may ask for permission."
+                "Every computer in this network can receive the data without "
+                "signing in. A firewall may ask for permission."
             )
-            reach = Remark(text, Sign.WARNING, Tone.WARN)
+            reach = StatusMessage(text, Sign.WARNING, Tone.WARN)
         self._reach.set_value(reach)
-        self._told.set_value(self._state_remark() if is_on else Remark())
+        self._told.set_value(self._state_message() if is_on else StatusMessage())
 
-    def _state_remark(self) -> Remark:
+    def _state_message(self) -> StatusMessage:
         state = self._state
         if state.trouble:
-            return Remark(state.trouble, Sign.CROSS, Tone.BAD)
+            return StatusMessage(state.trouble, Sign.CROSS, Tone.BAD)
         if state.status.place is None:
-            return Remark()
-        text = self.tr("On at {0}. Programs that listen: {1}.").format(
+            return StatusMessage()
+        text = self.tr("Active at {0}. Clients: {1}").format(
             state.status.place, state.status.n_clients
         )
         if not state.has_tip:
-            text += " " + self.tr("The pose alone is sent: no tip is in force.")
-        return Remark(text, Sign.CHECK, Tone.GOOD)
+            text += " " + self.tr("Only the pose is sent; there is no current tip.")
+        return StatusMessage(text, Sign.CHECK, Tone.GOOD)
 
     def _on_toggled(self, is_on: bool) -> None:
         self._refresh()
@@ -160,16 +142,16 @@ class StreamDialog(Translated, QDialog):
         self.setWindowTitle(self.tr("Live stream"))
         self._lead.setText(
             self.tr(
-                "Other programs, such as 3D Slicer, can follow the pen and its tip "
-                "live, by OpenIGTLink."
+                "Sends pose and tip live by OpenIGTLink to other programs such as "
+                "3D Slicer."
             )
         )
         self._address_label.setText(self.tr("Address"))
         self._address.setAccessibleName(self.tr("Address"))
         self._address.setToolTip(
             self.tr(
-                "{0} for programs of this computer alone, {1} for every network of it, "
-                "or one of its own addresses."
+                "{0} for this computer only, {1} for all networks, or an address of "
+                "this computer."
             ).format(LOOPBACK, EVERYWHERE)
         )
         self._port_label.setText(self.tr("Port"))

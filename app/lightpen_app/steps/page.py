@@ -54,11 +54,6 @@ class Page(Translated, QWidget):
         The step is done; show the next.
     step_requested(str)
         The step of this key must be shown, such as that of a swing to go on with.
-    status_changed(str)
-        A sentence for the status line.
-    notice_raised(str)
-        A sentence that must be read, such as the text of an error; an empty one takes
-        that of this page away, and so does another page.
     operator_value_changed(OperatorValue)
         What the operator view shows.
     data_folder_requested()
@@ -70,8 +65,6 @@ class Page(Translated, QWidget):
     changed = Signal()
     advance_requested = Signal()
     step_requested = Signal(str)
-    status_changed = Signal(str)
-    notice_raised = Signal(str)
     operator_value_changed = Signal(object)
     data_folder_requested = Signal()
 
@@ -107,7 +100,7 @@ class Page(Translated, QWidget):
         """Do it; a page that has more to do than to go on overrides this."""
         self.advance_requested.emit()
 
-    def show_lack(self) -> None:
+    def show_missing_input(self) -> None:
         """Put the focus where that can be given for want of which it cannot go on."""
 
     def is_hands_free(self) -> bool:

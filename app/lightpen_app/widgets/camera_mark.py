@@ -14,7 +14,7 @@ DISTANCE = 1.085  # from the middle of the dial to that of the mark; rim = 1
 
 
 @dataclass(frozen=True, eq=False)
-class Stand:
+class CameraPosition:
     """Where a camera stands.
 
     Attributes
@@ -39,7 +39,7 @@ class Stand:
 
 
 def draw_camera(
-    painter: QPainter, room: QRectF, stand: Stand, words: str, color: QColor
+    painter: QPainter, room: QRectF, stand: CameraPosition, words: str, color: QColor
 ) -> None:
     """Draw a camera that looks at a dial, and words beside it that stay in a room."""
     rim = stand.rim
@@ -67,7 +67,7 @@ def draw_camera(
     turns = (0.0, along, *(along + each for each in TURNS))
     turn, box = min(
         ((turn, box) for turn in turns for box in (right, left)),
-        key=lambda each: _lack(each[0], each[1], room, stand),
+        key=lambda each: _shortage(each[0], each[1], room, stand),
     )
     painter.translate(stand.place)
     painter.rotate(turn)
@@ -75,7 +75,7 @@ def draw_camera(
     painter.restore()
 
 
-def _lack(turn: float, box: QRectF, room: QRectF, stand: Stand) -> float:
+def _shortage(turn: float, box: QRectF, room: QRectF, stand: CameraPosition) -> float:
     """Return by how much words leave their room or cover the dial, px.
 
     Their box is about the mark and is turned by an angle in degrees, clockwise.

@@ -1,9 +1,9 @@
 """Which of two cameras is shown and set."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QButtonGroup, QWidget
 
-from lightpen_app.look.theme import GRID
+from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
@@ -33,11 +33,7 @@ class CameraSwitch(Translated, QWidget):
         self._buttons[0].setChecked(True)
 
         # Layout
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        for button in self._buttons:
-            layout.addWidget(button)
+        horizontal_layout(self, *self._buttons)
 
         # Connections
         self._group.idClicked.connect(self.value_changed)

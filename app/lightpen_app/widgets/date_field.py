@@ -53,4 +53,6 @@ class DateField(Translated, EnterEdit):
             self.value_changed.emit()
 
     def _retranslate(self) -> None:
-        self.setToolTip(self.tr("A day such as {0}; empty for any.").format(EXAMPLE))
+        self.setToolTip(
+            self.tr("Date, for example {0}; empty for any date").format(EXAMPLE)
+        )

@@ -1,7 +1,8 @@
 """A field below its name."""
 
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
+from lightpen_app.look.layouts import GridPlace, Place, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 
 
@@ -13,10 +14,13 @@ def field_label(field: QWidget) -> QLabel:
     return label
 
 
-def stacked(label: QLabel, field: QWidget) -> QVBoxLayout:
-    """Return a label with its field below."""
-    layout = QVBoxLayout()
-    layout.setSpacing(GRID // 2)
-    layout.addWidget(label)
-    layout.addWidget(field)
-    return layout
+def add_labelled(
+    place: Place,
+    label: QLabel,
+    field: QWidget,
+    *,
+    stretch: int = 0,
+    at: GridPlace = (0, 0),
+) -> None:
+    """Add a label with its field below; for the place see `vertical_layout`."""
+    vertical_layout(place, label, field, spacing=GRID // 2, stretch=stretch, at=at)

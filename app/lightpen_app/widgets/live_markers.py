@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.live.looking import LiveImage
+from lightpen.live.pipeline import LiveImage
 from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.image_view import Marker
 
@@ -23,7 +23,7 @@ def live_markers(seen: LiveImage) -> tuple[Marker, ...]:
     numbers = led_numbers(seen)
     radii = RING * np.sqrt(spots.areas / np.pi) + CLEARANCE
     angles = _free_angles(spots.centers)
-    other = Tone.ACTIVE if seen.sighting is None else Tone.WARN
+    other = Tone.ACTIVE if seen.detection is None else Tone.WARN
     return tuple(
         Marker(
             *(x, y, radius, numbers.get(i, "")),
@@ -60,9 +60,9 @@ def _free_angles(places: FloatArray) -> FloatArray:
 
 def led_numbers(seen: LiveImage) -> dict[int, str]:
     """Return the number of the LED of each spot that is one."""
-    if seen.sighting is None or seen.sighting.labels is None:
+    if seen.detection is None or seen.detection.labels is None:
         return {}
-    spot_of_led = seen.sighting.labels.spot
+    spot_of_led = seen.detection.labels.spot
     labelled: BoolArray = spot_of_led >= 0
     return {
         int(spot_of_led[led]): str(led + 1) for led in np.flatnonzero(labelled).tolist()

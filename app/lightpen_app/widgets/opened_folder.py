@@ -11,6 +11,6 @@ def open_folder(folder: Path) -> str:
     if QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
         return ""
     words = QCoreApplication.translate(
-        "opened_folder", "No program here shows folders. This one is {0}"
+        "opened_folder", "No file manager found. Folder: {0}"
     )
     return words.format(folder)

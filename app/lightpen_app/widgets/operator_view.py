@@ -4,9 +4,10 @@ from dataclasses import dataclass, field
 
 from PySide6.QtCore import QRect, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent, QScreen
-from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QProgressBar, QWidget
 from typing_extensions import override
 
+from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.theme import GRID, Tone, letters_for
 from lightpen_app.look.words import PARTED
 from lightpen_app.widgets.fitted_text import FittedText
@@ -95,23 +96,27 @@ class OperatorView(Translated, QWidget):
         self._keys = FittedText(43, 1)
 
         # Layout
-        self._side = side = QVBoxLayout()
-        side.addStretch(1)
-        side.addWidget(self._count)
-        side.addWidget(self._progress)
-        side.addWidget(self._time_left)
-        side.addStretch(1)
-        side.addWidget(self._banner)
-        side.addStretch(1)
-        self._layout = layout = QGridLayout(self)
-        layout.setContentsMargins(4 * GRID, 3 * GRID, 4 * GRID, 3 * GRID)
-        layout.setHorizontalSpacing(4 * GRID)
-        layout.setVerticalSpacing(GRID)
+        self._layout = layout = grid_layout(
+            self,
+            spacing=(4 * GRID, GRID),
+            margins=(4 * GRID, 3 * GRID, 4 * GRID, 3 * GRID),
+        )
         for widget in (self._subject, self._notice, self._instruction, self._hint):
             layout.addWidget(widget, layout.rowCount(), 0, 1, 2)
         row = layout.rowCount()
         layout.addWidget(self._dial, row, 0)
-        layout.addLayout(side, row, 1)
+        self._side = vertical_layout(
+            layout,
+            1,
+            self._count,
+            self._progress,
+            self._time_left,
+            1,
+            self._banner,
+            1,
+            at=(row, 1),
+            spacing=-1,
+        )
         layout.addWidget(self._keys, row + 1, 0, 1, 2)
         layout.setRowStretch(row, 1)
         layout.setColumnStretch(0, DIAL_SHARE)

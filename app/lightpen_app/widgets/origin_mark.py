@@ -4,12 +4,12 @@ from lightpen.model.origin import Origin
 from lightpen_app.look.phrases import origin_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
-from lightpen_app.widgets.sign_label import Remark
+from lightpen_app.widgets.sign_label import StatusMessage
 
 
-def origin_remark(origin: Origin | None) -> Remark:
+def origin_message(origin: Origin | None) -> StatusMessage:
     """Return the word for images that are not of a live camera; nothing for those."""
     if origin is Origin.LIVE:
-        return Remark()
+        return StatusMessage()
     tone = Tone.ACTIVE if origin is Origin.RECORDED else Tone.WARN
-    return Remark(origin_text(origin), Sign.RING, tone)
+    return StatusMessage(origin_text(origin), Sign.RING, tone)

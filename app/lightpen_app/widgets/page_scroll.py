@@ -2,8 +2,10 @@
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QScrollArea, QWidget
 from typing_extensions import override
+
+from lightpen_app.look.layouts import vertical_layout
 
 
 class PageScroll(QScrollArea):
@@ -73,7 +75,7 @@ class PageScroll(QScrollArea):
         event.ignore()
 
 
-class Squeezed(QWidget):
+class ShrinkingScrollContent(QWidget):
     """Content that scrolls only once it cannot be made smaller.
 
     Other content with words that wrap, and this where it is not to be squeezed, scrolls
@@ -89,10 +91,7 @@ class Squeezed(QWidget):
         super().__init__()
         self._is_squeezed = True
         if content is not None:
-            # Layout
-            layout = QVBoxLayout(self)
-            layout.setContentsMargins(0, 0, 0, 0)
-            layout.addWidget(content)
+            vertical_layout(self, content)
 
     def set_squeezed(self, squeezed: bool) -> None:
         """Let it be made as small as it can be, or give it all that it asks for."""

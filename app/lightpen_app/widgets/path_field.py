@@ -4,17 +4,11 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QHBoxLayout,
-    QLineEdit,
-    QPushButton,
-    QSizePolicy,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QPushButton, QSizePolicy, QWidget
 from typing_extensions import override
 
-from lightpen_app.look.theme import GRID, Tone, set_tone
+from lightpen_app.look.layouts import horizontal_layout
+from lightpen_app.look.theme import Tone, set_tone
 from lightpen_app.widgets.keys import ENTER_KEYS
 
 QUOTES = "\"'"
@@ -59,10 +53,7 @@ class PathField(QWidget):
         self.setFocusProxy(self._edit)
 
         # Layout
-        self._layout = QHBoxLayout(self)
-        self._layout.setContentsMargins(0, 0, 0, 0)
-        self._layout.setSpacing(GRID)
-        self._layout.addWidget(self._edit, 1)
+        self._layout = horizontal_layout(self, (self._edit, 1))
 
         # Connections
         self._edit.returnPressed.connect(self._on_return_pressed)

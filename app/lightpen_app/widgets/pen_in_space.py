@@ -26,7 +26,7 @@ SHARE_BELOW = 0.16  # of the height, below the cone
 
 
 @dataclass(frozen=True, eq=False)
-class PenStand:
+class DisplayedPosture:
     """How a pen stands in its cone.
 
     Attributes
@@ -53,15 +53,15 @@ class PenInSpace(Translated, QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._value: PenStand | None = None
+        self._value: DisplayedPosture | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self._retranslate()
 
-    def value(self) -> PenStand | None:
+    def value(self) -> DisplayedPosture | None:
         """Return what is drawn."""
         return self._value
 
-    def set_value(self, value: PenStand | None) -> None:
+    def set_value(self, value: DisplayedPosture | None) -> None:
         """Draw another pen, or none."""
         self._value = value
         self.update()
@@ -105,11 +105,11 @@ class PenInSpace(Translated, QWidget):
     def _retranslate(self) -> None:
         self.setAccessibleName(self.tr("The pen in space"))
         self.setToolTip(
-            self.tr("The pen as it leans, and the outline of where it should go.")
+            self.tr("Current tilt of the pen and outline of the target posture")
         )
 
 
-def seen_from_behind(stand: PenStand, posture: Posture) -> FloatArray:
+def seen_from_behind(stand: DisplayedPosture, posture: Posture) -> FloatArray:
     """Return where the LEDs are seen from the tip, right and up, (L, 2), mm."""
     numbers = posture.tilt, posture.direction, posture.turn
     rotation = rotations_of(stand.pen, *(np.array([each]) for each in numbers))[0]

@@ -21,10 +21,11 @@ from PySide6.QtCore import (
     Signal,
 )
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QResizeEvent
-from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
+from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import (
     GRID,
     Colors,
@@ -142,9 +143,7 @@ class Plot(QWidget):
             axis.setStyle(tickLength=-4, autoExpandTextSpace=True)
 
         # Layout
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._graphics)
+        vertical_layout(self, self._graphics)
 
         self.set_axes(axes)
 

@@ -7,14 +7,7 @@ from functools import partial
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import (
-    QColor,
-    QPainter,
-    QPainterPath,
-    QPaintEvent,
-    QPen,
-    QPixmap,
-)
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
@@ -23,7 +16,7 @@ from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
 from lightpen.model.posture import Posture
 from lightpen_app.look.signs import Sign, draw_arrow, draw_sign
 from lightpen_app.look.theme import Colors, TextSize, colors_of, font
-from lightpen_app.widgets.camera_mark import Stand, draw_camera
+from lightpen_app.widgets.camera_mark import CameraPosition, draw_camera
 from lightpen_app.widgets.fitted_text import fitted_size
 from lightpen_app.widgets.translated import Translated
 
@@ -157,7 +150,7 @@ class PostureDial(Translated, QWidget):
     def _describe(self) -> None:
         self.update()
         self.setAccessibleName(self.tr("Postures"))
-        text = self.tr("{0} of {1} postures are done.")
+        text = self.tr("{0} of {1} postures complete")
         self.setAccessibleDescription(
             text.format(self._value.n_full, self._value.n_fields)
         )
@@ -198,7 +191,7 @@ class PostureDial(Translated, QWidget):
         draw_camera(
             painter,
             QRectF(0, 0, self.width(), bar.top()),
-            Stand(middle, rim, value.heading - math.pi / 2),
+            CameraPosition(middle, rim, value.heading - math.pi / 2),
             camera,
             QColor(colors.muted),
         )
@@ -314,11 +307,7 @@ class PostureDial(Translated, QWidget):
         painter.drawText(below, flags, words)
 
     def _draw_turn_aim(
-        self,
-        painter: QPainter,
-        track: QRectF,
-        x_of: "partial[float]",
-        colors: Colors,
+        self, painter: QPainter, track: QRectF, x_of: "partial[float]", colors: Colors
     ) -> None:
         value = self._value
         if value.posture is None:

@@ -22,9 +22,14 @@ class PushButton(QPushButton):
     """
 
     def __init__(
-        self, least_width: int = LEAST_WIDTH, parent: QWidget | None = None
+        self,
+        least_width: int = LEAST_WIDTH,
+        parent: QWidget | None = None,
+        *,
+        checkable: bool = False,
     ) -> None:
         super().__init__(parent)
+        self.setCheckable(checkable)
         self._least_width = least_width
 
     def set_why_not(self, why_not: str, told: str = "") -> None:

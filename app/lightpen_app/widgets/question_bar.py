@@ -4,11 +4,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
+from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID, TextSize, text_label
-from lightpen_app.widgets.asking_bar import AskingBar
 from lightpen_app.widgets.focus import give_focus
+from lightpen_app.widgets.prompt_bar import AskingBar
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
@@ -36,6 +37,7 @@ class QuestionBar(Translated, AskingBar):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._words: Callable[[], Question] = Question
+        self._on_yes: Callable[[], object] = bool  # does nothing
 
         # Widgets
         self._text = text_label(TextSize.BODY)
@@ -43,12 +45,13 @@ class QuestionBar(Translated, AskingBar):
         self._agree = PushButton()
 
         # Layout
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(2 * GRID, GRID, GRID, GRID)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._text, 1)
-        layout.addWidget(self._decline)
-        layout.addWidget(self._agree)
+        horizontal_layout(
+            self,
+            (self._text, 1),
+            self._decline,
+            self._agree,
+            margins=(2 * GRID, GRID, GRID, GRID),
+        )
 
         # Connections
         self._agree.clicked.connect(self._on_agree_clicked)
@@ -61,9 +64,19 @@ class QuestionBar(Translated, AskingBar):
         self._words = words
         self.refresh()
 
+    def ask_about(
+        self, words: Callable[[], Question], on_yes: Callable[[], object]
+    ) -> None:
+        """Ask something else; what is agreed to is then done."""
+        self._on_yes = on_yes
+        self.set_words(words)
+        self.ask()
+
     def refresh(self) -> None:
-        """Ask by the words as they are now."""
+        """Ask by the words as they are now; where there are none, no more."""
         asked = self._words()
+        if not asked.text:
+            self.hide()
         self._text.setText(asked.text)
         self.setAccessibleName(asked.text)
         self._agree.setText(asked.yes)
@@ -84,6 +97,7 @@ class QuestionBar(Translated, AskingBar):
     def _on_agree_clicked(self) -> None:
         self.hide()
         self.agreed.emit()
+        self._on_yes()
 
     def _on_decline_clicked(self) -> None:
         self.hide()

@@ -2,14 +2,15 @@
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QAbstractButton, QGridLayout, QWidget
+from PySide6.QtWidgets import QAbstractButton, QWidget
 from typing_extensions import override
 
+from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.theme import GRID, TextSize, text_label
-from lightpen_app.widgets.asking_bar import AskingBar
 from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.path_field import EnterEdit
+from lightpen_app.widgets.prompt_bar import AskingBar
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
 
@@ -32,6 +33,7 @@ class ReasonBar(AskingBar):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+
         # Widgets
         self._text = text_label(TextSize.BODY)
         self._edit = EnterEdit()
@@ -42,9 +44,7 @@ class ReasonBar(AskingBar):
         self._is_given = False
 
         # Layout
-        layout = QGridLayout(self)
-        layout.setContentsMargins(2 * GRID, GRID, GRID, GRID)
-        layout.setSpacing(GRID)
+        layout = grid_layout(self, margins=(2 * GRID, GRID, GRID, GRID))
         layout.addWidget(self._text, 0, 0, 1, 3)
         layout.addWidget(self._edit, 1, 0)
         layout.addWidget(self._supervisor, 2, 0)

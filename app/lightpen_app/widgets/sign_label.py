@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
+from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import (
     GRID,
@@ -22,7 +23,7 @@ SIDE = 2 * GRID
 
 
 @dataclass(frozen=True)
-class Remark:
+class StatusMessage:
     """What is found, or is the matter.
 
     Attributes
@@ -47,7 +48,7 @@ class SignLabel(QWidget):
 
     def __init__(self, *, wraps: bool = True, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._value = Remark()
+        self._value = StatusMessage()
 
         # Widgets
         self._mark = _SignMark()
@@ -55,19 +56,17 @@ class SignLabel(QWidget):
         self._words.setWordWrap(wraps)
 
         # Layout
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._mark, 0, Qt.AlignmentFlag.AlignTop)
-        layout.addWidget(self._words, 1)
+        horizontal_layout(
+            self, (self._mark, 0, Qt.AlignmentFlag.AlignTop), (self._words, 1)
+        )
 
         self.hide()
 
-    def value(self) -> Remark:
+    def value(self) -> StatusMessage:
         """Return what is shown."""
         return self._value
 
-    def set_value(self, value: Remark) -> None:
+    def set_value(self, value: StatusMessage) -> None:
         """Show another remark."""
         if value == self._value:
             return
@@ -84,11 +83,11 @@ class _SignMark(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._value = Remark()
+        self._value = StatusMessage()
         fixed = QSizePolicy.Policy.Fixed
         self.setSizePolicy(fixed, fixed)
 
-    def set_value(self, value: Remark) -> None:
+    def set_value(self, value: StatusMessage) -> None:
         self._value = value
         self.update()
 

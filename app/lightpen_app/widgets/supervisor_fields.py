@@ -1,11 +1,11 @@
 """The fields in which a supervisor signs."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QLineEdit, QWidget
 from typing_extensions import override
 
-from lightpen.record.supervision import Signature
-from lightpen_app.look.theme import GRID
+from lightpen.record.library.supervision import Signature
+from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.translated import Translated
@@ -36,11 +36,7 @@ class SupervisorFields(Translated, QWidget):
         self._password.setEchoMode(QLineEdit.EchoMode.Password)
 
         # Layout
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._name, 1)
-        layout.addWidget(self._password, 1)
+        horizontal_layout(self, (self._name, 1), (self._password, 1))
 
         # Connections
         for edit in (self._name, self._password):
@@ -72,7 +68,7 @@ class SupervisorFields(Translated, QWidget):
     def _retranslate(self) -> None:
         for edit, words in (
             (self._name, self.tr("Supervisor")),
-            (self._password, self.tr("Supervisor's password")),
+            (self._password, self.tr("Supervisor password")),
         ):
             edit.setPlaceholderText(words)
             edit.setAccessibleName(words)

@@ -3,16 +3,17 @@
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.verification.trend import Trend
+from lightpen.verification.history.trend import Trend
+from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.quantities import AXES
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.words import moment_text, shortened
 from lightpen_app.widgets.plots import Axes, Plot
-from lightpen_app.widgets.rearranged import Rearranged
+from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.widgets.translated import Translated
 
 DOT, RING = 6, 13  # px
@@ -87,7 +88,7 @@ class TrendPlot(Plot):
             line.setPen(pg.mkPen(colors.muted, width=1, style=style))
 
 
-class TrendPanel(Rearranged, Translated, QWidget):
+class TrendPanel(ResponsiveLayout, Translated, QWidget):
     """Shows the trend of a pen and tip: four plots, in a row where there is room.
 
     The plots take long to be made, and are when there is something to show.
@@ -104,13 +105,10 @@ class TrendPanel(Rearranged, Translated, QWidget):
         self._plots: tuple[TrendPlot, ...] = ()
 
         # Layout
-        self._grid = QGridLayout()
-        self._grid.setSpacing(GRID)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, GRID, 0, 0)
-        layout.setSpacing(GRID // 2)
-        layout.addWidget(self._told)
-        layout.addLayout(self._grid, 1)
+        layout = vertical_layout(
+            self, self._told, spacing=GRID // 2, margins=(0, GRID, 0, 0)
+        )
+        self._grid = grid_layout(layout, stretch=1)
 
         self._retranslate()
 
@@ -169,7 +167,7 @@ class TrendPanel(Rearranged, Translated, QWidget):
 
     def _retranslate(self) -> None:
         for axis, plot in zip(AXES, self._plots, strict=False):
-            title = self.tr("{0} / mm, with U (k = 2)").format(axis)
+            title = self.tr("{0} / mm with U (k = 2)").format(axis)
             plot.set_axes(Axes(title, self.tr("calibration no.")))
         for plot in self._plots[3:]:
             title = self.tr("Largest U (k = 2) / mm")
@@ -178,7 +176,7 @@ class TrendPanel(Rearranged, Translated, QWidget):
 
     def _told_of(self, trend: Trend) -> str:
         if not trend.entries:
-            return self.tr("Choose an entry with a tip: its trend is shown here.")
+            return self.tr("Select an entry with a tip to see its trend.")
         days = (trend.entries[0].entry.event.at, trend.entries[-1].entry.event.at)
         first, last = (moment_text(day, "yyyy-MM-dd") for day in days)
         names = shortened(trend.pen), shortened(trend.tip)
@@ -187,6 +185,6 @@ class TrendPanel(Rearranged, Translated, QWidget):
                 "Pen {0}, tip {1}: one calibration, {2}. Dashed: the limit of U."
             ).format(*names, first)
         return self.tr(
-            "Pen {0}, tip {1}: {2} calibrations, {3} to {4}. Dashed: three standard "
-            "deviations from their mean, and the limit of U."
+            "Pen {0}, tip {1}: {2} calibrations, {3} to {4}. Dashed: mean ± three "
+            "standard deviations, and the limit of U."
         ).format(*names, len(trend.entries), first, last)

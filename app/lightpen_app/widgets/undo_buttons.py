@@ -3,10 +3,10 @@
 from collections.abc import Callable
 
 from PySide6.QtGui import QKeySequence, QShortcut, QUndoCommand, QUndoStack
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen_app.look.theme import GRID
+from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
@@ -46,11 +46,7 @@ class UndoButtons(Translated, QWidget):
         self._redo = PushButton(0)
 
         # Layout
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._undo, 1)
-        layout.addWidget(self._redo, 1)
+        horizontal_layout(self, (self._undo, 1), (self._redo, 1))
 
         # Connections
         for button, standard, act in (
@@ -81,8 +77,8 @@ class UndoButtons(Translated, QWidget):
         self._refresh()
 
     def _refresh(self) -> None:
-        no_undo = "" if self._can_undo else self.tr("Nothing to undo.")
-        no_redo = "" if self._can_redo else self.tr("Nothing to redo.")
+        no_undo = "" if self._can_undo else self.tr("Nothing to undo")
+        no_redo = "" if self._can_redo else self.tr("Nothing to redo")
         shown = [
             (self._undo, no_undo, QKeySequence.StandardKey.Undo),
             (self._redo, no_redo, QKeySequence.StandardKey.Redo),

@@ -4,8 +4,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
 
-from lightpen.record.data_folder import check_writable
-from lightpen.record.presence import Presence
+from lightpen.record.folder.data_folder import Presence, check_writable
 from lightpen_app.work.job import Job
 
 LOOKING_MS = 5000  # from one look to the next
@@ -34,7 +33,7 @@ class FolderWatch(QObject):
         self._folder = folder
         self._presence = Presence(folder)
         self._n_others = 0
-        self._trouble = ""
+        self._fault = ""
         self._counter: Job | None = None
         self._timer = QTimer(self)
         self._timer.setInterval(LOOKING_MS)
@@ -59,7 +58,7 @@ class FolderWatch(QObject):
     def _look(self) -> None:
         if self._counter is not None:  # a disk that does not answer is asked once
             return
-        if self._trouble:
+        if self._fault:
             self._check()
         self._count()
 
@@ -76,8 +75,8 @@ class FolderWatch(QObject):
         self._doubt("")
 
     def _doubt(self, trouble: str) -> None:
-        if trouble != self._trouble:
-            self._trouble = trouble
+        if trouble != self._fault:
+            self._fault = trouble
             self.doubted.emit(trouble)
 
     def _count(self) -> None:

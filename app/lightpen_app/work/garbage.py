@@ -1,4 +1,4 @@
-"""Python's garbage collector, kept to the thread of the window, and what PySide leaves.
+"""Python's garbage collector, kept to the thread of the window.
 
 The collector runs in whatever thread happens to allocate. It may free a Qt object there
 whose thread is another one, and Qt ends the program (PYSIDE-810).
@@ -7,8 +7,6 @@ whose thread is another one, and Qt ends the program (PYSIDE-810).
 import gc
 
 from PySide6.QtCore import QObject, QTimer
-
-from lightpen_app.look.layout_items import forget_layout_items
 
 PERIOD_MS = 500
 LIMITS = (700, 10, 10)  # of the generations: objects, and collections of the younger
@@ -25,7 +23,6 @@ class GarbageCollector(QObject):
         self._timer = QTimer(self)
         self._timer.setInterval(PERIOD_MS)
         self._timer.timeout.connect(collect_if_due)
-        self._timer.timeout.connect(forget_layout_items)
         self._timer.start()
 
 

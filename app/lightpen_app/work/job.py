@@ -1,5 +1,6 @@
 """Run one computation of the core off the GUI thread."""
 
+import logging
 from collections.abc import Callable
 from functools import partial
 from threading import Event
@@ -8,10 +9,12 @@ from typing import TypeAlias
 from PySide6.QtCore import QObject, QThreadPool, Signal
 
 from lightpen.errors import Cancelled, LightpenError
-from lightpen.sentences import Sentence
+from lightpen.messages import Message
 from lightpen_app.look.sentences import worded
 
 Report: TypeAlias = Callable[[float], None]
+
+_logger = logging.getLogger(__name__)
 
 
 class Job(QObject):
@@ -79,7 +82,8 @@ class Job(QObject):
         except Cancelled:
             tell = _tell_nothing
         except LightpenError as error:
-            tell = partial(self._refused.emit, error.sentence)
+            _logger.warning("%s: %s", error.message.code, error.message)
+            tell = partial(self._refused.emit, error.message)
         finally:
             tell()
             self._finished.emit()
@@ -101,7 +105,7 @@ class Job(QObject):
         if not self._cancelled.is_set():
             self.succeeded.emit(result)
 
-    def _on_refused(self, why: Sentence) -> None:
+    def _on_refused(self, why: Message) -> None:
         if not self._cancelled.is_set():
             self.failed.emit(worded(why))
 

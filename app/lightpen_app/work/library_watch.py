@@ -8,13 +8,14 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from lightpen.archive.late_logbook import LateLogbook
+from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.errors import ArchiveError
-from lightpen.model.due_rule import DueRule
-from lightpen.record.folder_archive import FolderArchive
-from lightpen.record.standing import Standings
-from lightpen.record.tip_library import Library, read_library
+from lightpen.model.limits import DueRule
+from lightpen.record.library.calibration_status import StationStatus
+from lightpen.record.library.tip_library import Library, read_library
+from lightpen.record.results.result_folder import FolderArchive
 from lightpen_app.work.job import Job, Report
+from lightpen_app.work.notifications import Notifications
 
 AGAIN_MS = 15 * 60 * 1000  # after which a tip may be overdue that was not
 
@@ -28,7 +29,7 @@ class LibraryWatch(QObject):
     ----------
     folder : Path
         The data folder.
-    logbook : LateLogbook
+    logbook : LazyLogbook
         Of that folder.
     rule : DueRule
         How long a tip may be in force that has no rule of its own.
@@ -38,27 +39,24 @@ class LibraryWatch(QObject):
     Signals
     -------
     changed()
-        `standings` are different.
+        `statuses` are different.
     change_kept(object)
         What was asked for.
     change_failed(object, str)
         What was asked for, and the sentence why it was not kept.
-    troubled(str), relieved(str)
-        A sentence to be read, and that its cause is gone.
     """
 
     changed = Signal()
     change_kept = Signal(object)
     change_failed = Signal(object, str)
-    troubled = Signal(str)
-    relieved = Signal(str)
 
     def __init__(
         self,
         folder: Path,
-        logbook: LateLogbook,
+        logbook: LazyLogbook,
         rule: DueRule,
         now: Callable[[], datetime],
+        notifications: Notifications,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
@@ -66,8 +64,8 @@ class LibraryWatch(QObject):
         self._logbook = logbook
         self._rule = rule
         self._now = now
-        self._standings = Standings()
-        self._trouble = ""
+        self._statuses = StationStatus()
+        self._notifications = notifications
         self._reading: Job | None = None
         self._asked: deque[tuple[object, Change]] = deque()
         self._changing: Job | None = None
@@ -79,14 +77,14 @@ class LibraryWatch(QObject):
         self._timer.timeout.connect(self.refresh)
 
     @property
-    def standings(self) -> Standings:
+    def statuses(self) -> StationStatus:
         """How all tips stand, with the library, as they were read last."""
-        return self._standings
+        return self._statuses
 
     @property
     def library(self) -> Library:
         """The library as it was read last."""
-        return self._standings.library
+        return self._statuses.library
 
     def set_rule(self, rule: DueRule) -> None:
         """Let tips be due by another rule."""
@@ -108,18 +106,18 @@ class LibraryWatch(QObject):
             self._now,
         )
 
-        def read(_: Report) -> Standings:
+        def read(_: Report) -> StationStatus:
             library = read_library(folder)
             if not FolderArchive(folder).all_files():  # nothing was ever in force
-                return Standings(library, now=now())
+                return StationStatus(library, now=now())
             with suppress(ArchiveError):  # which the runner tells of
                 opened = logbook.opened()
                 opened.enter_owed()
                 # A fifth of a second, which the start need not take.
-                from lightpen.archive.standing import standings
+                from lightpen.archive.tip_status import statuses
 
-                return standings(opened.database, opened.chain, rule, library, now())
-            return Standings(library)
+                return statuses(opened.database, opened.chain, rule, library, now())
+            return StationStatus(library)
 
         self._reading = job = Job(read, self)
 
@@ -174,22 +172,15 @@ class LibraryWatch(QObject):
         if self._asked:
             self._change_next()
 
-    def _on_read(self, found: Standings) -> None:
+    def _on_read(self, found: StationStatus) -> None:
         self._reading = None
-        self._relieve()
-        self._standings = found
+        self._notifications.withdraw(self)
+        self._statuses = found
         self.changed.emit()
 
     def _on_read_failed(self, why: str) -> None:
         self._reading = None
-        if why != self._trouble:
-            self._relieve()
-            self._trouble = why
-            self.troubled.emit(why)
-        self._standings = Standings()
+        if why != self._notifications.text(self):
+            self._notifications.tell(self, why)
+        self._statuses = StationStatus()
         self.changed.emit()
-
-    def _relieve(self) -> None:
-        trouble, self._trouble = self._trouble, ""
-        if trouble:
-            self.relieved.emit(trouble)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from threading import Thread
+from threading import Lock, Thread
 from time import monotonic
 
 from PySide6.QtCore import QObject, QSize, Qt, Signal
@@ -10,8 +10,8 @@ from PySide6.QtCore import QObject, QSize, Qt, Signal
 from lightpen.arrays import Image
 from lightpen.cameras.clock import Clock
 from lightpen.cameras.protocol import (
+    CameraCapabilities,
     CameraSettings,
-    Caps,
     DeviceLost,
     FramesSkipped,
     ImageCamera,
@@ -20,32 +20,68 @@ from lightpen.cameras.protocol import (
 from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
-    Ended,
     Failed,
-    KeepsUp,
+    FaultRaised,
+    ProcessingKeepsUp,
     SettingsApplied,
-    Troubled,
     WorkerEvent,
+    WorkerStopped,
 )
-from lightpen.detection.aim import Aim
+from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.errors import LightpenError
-from lightpen.live.looking import Live, LiveImage
+from lightpen.live.pipeline import Live, LiveImage
 from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.follower import Follower
+from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.hand import Operator
-from lightpen.simulator.toucher import Toucher
+from lightpen.simulator.toucher import ProbingOperator
 from lightpen.streaming.server import PoseStream
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.sentences import worded
-from lightpen_app.work.mailbox import Mailbox
+from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.verification_run import VerificationRun
 
+
+class Mailbox(QObject):
+    """One slot between a producing thread and the GUI.
+
+    A queued signal with every image would fill the memory whenever the GUI is busy;
+    here only the newest waits, with one pending `ready`.
+
+    Signals
+    -------
+    ready()
+        A value waits; emitted once until it is taken.
+    """
+
+    ready = Signal()
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._lock = Lock()
+        self._value: object | None = None
+
+    def put(self, value: object) -> None:
+        """Leave a value, from any thread, instead of the one that waits."""
+        with self._lock:
+            waited = self._value is not None
+            self._value = value
+        if not waited:
+            self.ready.emit()
+
+    def take(self) -> object | None:
+        """Return the newest value, or None if it was taken already."""
+        with self._lock:
+            value, self._value = self._value, None
+        return value
+
+
+WITHOUT_IMAGES, SKIPPING = "without-images", "skipping"  # causes of notifications
 CLOSING_TIME = 10.0  # s for all that is under way; a dead camera may take 8
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class DisplayedImage:
     """A live image, ready to be shown.
 
     Attributes
@@ -64,8 +100,8 @@ class Shown:
 class LiveView(QObject):
     """Opens a camera, or two beside each other, and tells what they show.
 
-    Of two, one is `chosen`: what is asked, told and set is of it, but for what goes
-    wrong and `configured`, which are of both.
+    Of two, one is `chosen`: what is asked, told and set is of it, but for `failed`,
+    `configured`, which are of both.
 
     Parameters
     ----------
@@ -75,6 +111,8 @@ class LiveView(QObject):
         Takes every image while somebody is at it.
     stream : PoseStream
         Tells other programs what the first camera shows.
+    notifications : Notifications
+        Where it is published what is wrong with a camera.
 
     Signals
     -------
@@ -87,12 +125,8 @@ class LiveView(QObject):
         The camera has these in force.
     configured(int, CameraSettings)
         A camera, by its number from 0, has these in force.
-    troubled(str)
-        A sentence to be read; the camera carries on.
-    failed(str)
-        A sentence to be read; no more images come until another `open`.
-    relieved(str)
-        The sentence of one of these whose cause is gone.
+    failed()
+        No more images come until another `open`; `why_no_images` tells.
     """
 
     image_shown = Signal(object)
@@ -100,15 +134,15 @@ class LiveView(QObject):
     other_changed = Signal(object)
     settings_applied = Signal(object)
     configured = Signal(int, object)
-    troubled = Signal(str)
-    failed = Signal(str)
-    relieved = Signal(str)
+    failed = Signal()
+    _closing_failed = Signal(str)
 
     def __init__(
         self,
         run: SwingRun,
         verification: VerificationRun,
         stream: PoseStream,
+        notifications: Notifications,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
@@ -118,11 +152,15 @@ class LiveView(QObject):
         self._live: Live | None = None
         self._chosen = 0
         self._states = [_CameraState()]
-        self._aim = Aim()
+        self._region = RegionOfInterest()
         self._is_watched = True
         self._operator: Operator | None = None
         self._listener: _QueuedListener | None = None
         self._closing: list[Thread] = []
+        self._notifications = notifications
+
+        # Connections
+        self._closing_failed.connect(self._on_closing_failed)
 
     def open(
         self,
@@ -149,7 +187,7 @@ class LiveView(QObject):
             verifier=self._verification.runner,
             stream=self._stream,
         )
-        live.set_aim(self._aim)
+        live.set_region(self._region)
         live.set_watched(self._is_watched)
         live.start()
 
@@ -164,7 +202,8 @@ class LiveView(QObject):
         if live is None or listener is None:
             return
         listener.blockSignals(True)
-        self._relieve()
+        for c in range(self.n_cameras):
+            self._withdraw(c, WITHOUT_IMAGES, SKIPPING)
         self.set_following(False)
         self.set_touching(False)
         self._operator = None
@@ -230,6 +269,16 @@ class LiveView(QObject):
         return min(connections, key=_WORST_FIRST.index)
 
     @property
+    def settings(self) -> CameraSettings:
+        """What the camera has in force."""
+        return self._states[self._chosen].settings or CameraSettings()
+
+    @property
+    def why_no_images(self) -> str:
+        """Why the camera was lost, or could not be opened; empty while images come."""
+        return self._notifications.text((self, self._chosen, WITHOUT_IMAGES))
+
+    @property
     def serial(self) -> str:
         """Serial number of the camera; empty where none is open."""
         return self.serial_of(self._chosen)
@@ -239,11 +288,11 @@ class LiveView(QObject):
         return "" if self._live is None else self._live.worker(camera).serial
 
     @property
-    def caps(self) -> Caps | None:
+    def caps(self) -> CameraCapabilities | None:
         """What the camera can do; None until it was open."""
-        return self.caps_of(self._chosen)
+        return self.capabilities_of(self._chosen)
 
-    def caps_of(self, camera: int) -> Caps | None:
+    def capabilities_of(self, camera: int) -> CameraCapabilities | None:
         """Return what a camera can do, by its number from 0."""
         return None if self._live is None else self._live.worker(camera).caps
 
@@ -265,11 +314,11 @@ class LiveView(QObject):
         """The simulated operator, where the pen is simulated."""
         return self._operator
 
-    def set_aim(self, aim: Aim) -> None:
+    def set_region(self, region: RegionOfInterest) -> None:
         """Look for something else in the images, of this camera and later ones."""
-        self._aim = aim
+        self._region = region
         if self._live is not None:
-            self._live.set_aim(aim)
+            self._live.set_region(region)
 
     def set_watched(self, watched: bool) -> None:
         """Say whether anybody looks at the images, of this camera and later ones."""
@@ -308,18 +357,20 @@ class LiveView(QObject):
     def set_following(self, follows: bool) -> None:
         """Let the simulated operator do what the swing asks for, or leave it."""
         operator = self._operator
-        self._run.follower = Follower(operator) if follows and operator else None
+        self._run.follower = GuidedOperator(operator) if follows and operator else None
 
     def set_touching(self, touches: bool) -> None:
         """Let the simulated operator touch what is verified, or leave it."""
         operator = self._operator
-        self._verification.toucher = Toucher(operator) if touches and operator else None
+        self._verification.probing_operator = (
+            ProbingOperator(operator) if touches and operator else None
+        )
 
     def _stop(self, live: Live, listener: "_QueuedListener") -> None:
         try:
             live.stop()
         except DeviceLost as error:
-            self.troubled.emit(worded(error.sentence))
+            self._closing_failed.emit(worded(error.message))
         else:
             listener.deleteLater()
 
@@ -329,23 +380,24 @@ class LiveView(QObject):
             return
         state.connection = connection
         if connection is Connection.STREAMING:
-            self._take_back(state.without_images)
-            state.without_images = ""
+            self._withdraw(camera, WITHOUT_IMAGES)
         if camera == self._chosen:
             self.connection_changed.emit(connection)
         else:
             self.other_changed.emit(connection)
 
-    def _relieve(self) -> None:
-        """Take back all that was told of the cameras."""
-        for state in self._states:
-            for told in (state.without_images, state.skipping):
-                self._take_back(told)
-            state.without_images = state.skipping = ""
+    def _on_closing_failed(self, sentence: str) -> None:
+        self._notifications.tell((self, "closing"), sentence)
 
-    def _take_back(self, told: str) -> None:
-        if told:
-            self.relieved.emit(told)
+    def _tell(self, camera: int, cause: str, error: LightpenError) -> None:
+        """Say what is wrong with a camera, of two with its number."""
+        words = worded(error.message)
+        if self.n_cameras > 1:
+            words = self.tr("Camera {0}: {1}").format(camera + 1, words)
+        self._notifications.tell((self, camera, cause), words)
+
+    def _withdraw(self, camera: int, *causes: str) -> None:
+        self._notifications.withdraw(*((self, camera, cause) for cause in causes))
 
     def _on_told(self, what: WorkerEvent, camera: int) -> None:
         state = self._states[camera]
@@ -358,34 +410,22 @@ class LiveView(QObject):
                 if camera == self._chosen:
                     self.settings_applied.emit(settings)
             case Failed(error):
-                state.without_images = self._worded(error, camera)
-                self.failed.emit(state.without_images)
-            case Troubled(FramesSkipped() as trouble):
-                state.skipping = self._worded(trouble, camera)
-                self.troubled.emit(state.skipping)
-            case Troubled(trouble):
-                state.without_images = self._worded(trouble, camera)
-                self.troubled.emit(state.without_images)
-            case KeepsUp():
-                self._take_back(state.skipping)
-                state.skipping = ""
-
-    def _worded(self, error: LightpenError, camera: int) -> str:
-        """Return what is wrong with a camera, of two with its number."""
-        words = worded(error.sentence)
-        if self.n_cameras == 1:
-            return words
-        return self.tr("Camera {0}: {1}").format(camera + 1, words)
+                self._tell(camera, WITHOUT_IMAGES, error)
+                self.failed.emit()
+            case FaultRaised(FramesSkipped() as fault):
+                self._tell(camera, SKIPPING, fault)
+            case FaultRaised(fault):
+                self._tell(camera, WITHOUT_IMAGES, fault)
+            case ProcessingKeepsUp():
+                self._withdraw(camera, SKIPPING)
 
 
 @dataclass
 class _CameraState:
-    """How a camera is, and what was told of it."""
+    """How a camera is."""
 
     connection: Connection = Connection.CLOSED
     settings: CameraSettings | None = None
-    without_images: str = ""
-    skipping: str = ""
 
 
 _WORST_FIRST = (
@@ -427,16 +467,16 @@ class _QueuedListener(QObject):
         pixels = image.frame.image
         height, width = pixels.shape
         half = pooled(pixels, image.frame.bits)
-        self._images.put(Shown(half, QSize(width, height), image))
+        self._images.put(DisplayedImage(half, QSize(width, height), image))
 
     def on_camera(self, event: WorkerEvent, camera: int) -> None:
         """Hand on what happens to a camera."""
-        if not isinstance(event, Ended):  # the connection closes besides
+        if not isinstance(event, WorkerStopped):  # the connection closes besides
             self._said.emit(event, camera)
 
     # On the thread of the GUI
 
     def _on_image_ready(self) -> None:
         shown = self._images.take()
-        if isinstance(shown, Shown) and shown.seen.camera == self.camera:
+        if isinstance(shown, DisplayedImage) and shown.seen.camera == self.camera:
             self.image_shown.emit(shown)

@@ -5,8 +5,9 @@ from typing import Generic, TypeVar
 
 from PySide6.QtCore import QObject, Qt, Signal
 
-from lightpen.sentences import Sentence
+from lightpen.messages import Message
 from lightpen_app.look.sentences import worded
+from lightpen_app.work.notifications import Notifications
 
 S = TypeVar("S")
 E = TypeVar("E")
@@ -19,6 +20,8 @@ class RunView(QObject, Generic[S, E]):
     ----------
     status : S
         Before anything was told.
+    notifications : Notifications
+        Where it is published what could not be done.
 
     Signals
     -------
@@ -28,41 +31,46 @@ class RunView(QObject, Generic[S, E]):
         Each event, in order and before `changed`.
     progressed(float)
         Of what takes long, 0 to 1.
-    troubled(str)
-        A sentence to be read: nothing is lost.
-    relieved(str)
-        The sentence of `troubled` whose cause is gone.
+    refused()
+        Something could not be done; nothing is lost.
     """
 
     changed = Signal()
     happened = Signal(object)
     progressed = Signal(float)
-    troubled = Signal(str)
-    relieved = Signal(str)
+    refused = Signal()
     _told = Signal()
     _progress_told = Signal(float)
-    _trouble_told = Signal(object)
-    _relief_told = Signal()
+    _fault_told = Signal(object)
+    _fault_cleared_told = Signal()
 
-    def __init__(self, status: S, parent: QObject | None = None) -> None:
+    def __init__(
+        self, status: S, notifications: Notifications, parent: QObject | None = None
+    ) -> None:
         super().__init__(parent)
+        self._notifications = notifications
         self._status = status
         self._lock = Lock()
         self._newest: S | None = None  # what the GUI has not seen yet
         self._events: tuple[E, ...] = ()
-        self._trouble = ""
+        self._progress = 0.0
 
         # Connections
         queued = Qt.ConnectionType.QueuedConnection
         self._told.connect(self._on_told, queued)
-        self._progress_told.connect(self.progressed, queued)
-        self._trouble_told.connect(self._on_trouble_told, queued)
-        self._relief_told.connect(self._on_relief_told, queued)
+        self._progress_told.connect(self._on_progress_told, queued)
+        self._fault_told.connect(self._on_fault_told, queued)
+        self._fault_cleared_told.connect(self._on_fault_cleared_told, queued)
 
     @property
     def status(self) -> S:
         """What the runner told last, as the GUI knows it."""
         return self._status
+
+    @property
+    def progress(self) -> float:
+        """How far the runner was last with what takes long, 0 to 1."""
+        return self._progress
 
     # On the threads of the runner
 
@@ -78,13 +86,13 @@ class RunView(QObject, Generic[S, E]):
         """Hand on how far it is."""
         self._progress_told.emit(fraction)
 
-    def on_trouble(self, sentence: Sentence) -> None:
+    def on_fault(self, message: Message) -> None:
         """Hand on what could not be done."""
-        self._trouble_told.emit(sentence)
+        self._fault_told.emit(message)
 
-    def on_relief(self, sentence: Sentence) -> None:
+    def on_fault_cleared(self, message: Message) -> None:
         """Hand on that the cause of the last trouble is gone."""
-        self._relief_told.emit()
+        self._fault_cleared_told.emit()
 
     # On the thread of the GUI
 
@@ -94,14 +102,22 @@ class RunView(QObject, Generic[S, E]):
             events, self._events = self._events, ()
         if newest is None:
             return
-        self._status = newest
+        before, self._status = self._status, newest
         for event in events:
             self.happened.emit(event)
         self.changed.emit()
+        self._compare(before, newest)
 
-    def _on_trouble_told(self, sentence: Sentence) -> None:
-        self._trouble = worded(sentence)
-        self.troubled.emit(self._trouble)
+    def _compare(self, before: S, now: S) -> None:
+        """Tell what is different beyond `changed`; by default, nothing."""
 
-    def _on_relief_told(self) -> None:
-        self.relieved.emit(self._trouble)  # as it was told, in whatever language
+    def _on_progress_told(self, fraction: float) -> None:
+        self._progress = fraction
+        self.progressed.emit(fraction)
+
+    def _on_fault_told(self, message: Message) -> None:
+        self._notifications.tell(self, worded(message))
+        self.refused.emit()
+
+    def _on_fault_cleared_told(self) -> None:
+        self._notifications.withdraw(self)

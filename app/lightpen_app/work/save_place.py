@@ -1,25 +1,38 @@
 """Where results are saved for use elsewhere, and under which names."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QStandardPaths
+from PySide6.QtCore import QStandardPaths
 
 from lightpen.model.origin import Origin
-from lightpen.record.exports import export_stem
+from lightpen.record.exports.exports import export_stem
 from lightpen_app.look.phrases import origin_text
-from lightpen_app.work.workbench import Workbench
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.swing_run import SwingRun
 
 
-class SavePlace(QObject):
-    """The folder that was chosen last, and names by pen, tip and date."""
+@dataclass(frozen=True)
+class SavePlace:
+    """The folder that was chosen last, and names by pen, tip and date.
 
-    def __init__(self, workbench: Workbench) -> None:
-        super().__init__(workbench)
-        self._workbench = workbench
+    Attributes
+    ----------
+    settings : Settings
+        Remembers the folder, and the laboratory that a certificate names.
+    now : callable
+        Returns the date and time of a result that is not accepted yet.
+    """
+
+    settings: Settings
+    run: SwingRun
+    now: Callable[[], datetime]
 
     def folder(self) -> Path:
         """Return the folder chosen last; that of the user's documents at first."""
-        chosen = self._workbench.export_folder()
+        chosen = self.settings.export_folder()
         if chosen:
             return Path(chosen)
         documents = QStandardPaths.StandardLocation.DocumentsLocation
@@ -27,16 +40,15 @@ class SavePlace(QObject):
 
     def remember(self, folder: Path) -> None:
         """Offer this folder from now on."""
-        self._workbench.set_export_folder(str(folder))
+        self.settings.set_export_folder(str(folder))
 
     def mark(self) -> str:
         """Return what stands on a picture; nothing where a live camera took it."""
-        origin = self._workbench.run.status.origin
+        origin = self.run.status.origin
         return "" if origin in (None, Origin.LIVE) else origin_text(origin)
 
     def stem(self) -> str:
         """Return what the name of a file begins with."""
-        status = self._workbench.run.status
-        now = self._workbench.around.now()
-        moment = now if status.result is None else status.result.accepted
+        status = self.run.status
+        moment = self.now() if status.result is None else status.result.accepted
         return export_stem(status.names, moment, status.origin)

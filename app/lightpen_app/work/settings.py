@@ -1,31 +1,33 @@
-"""What a station remembers from one run to the next, in a JSON file.
+"""What is remembered from one run to the next, in a JSON file.
 
 What is chosen is in force at once, and written by a thread of its own: neither a disk
 that does not answer nor another program that keeps the settings to itself holds the
 window.
 """
 
-import math
-from dataclasses import astuple, dataclass, fields, replace
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any, TypeVar, get_type_hints
 
 import platformdirs
-from PySide6.QtCore import QByteArray, QLocale, QObject, Qt, QTimer, Signal
+from msgspec import json
+from PySide6.QtCore import QByteArray, QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
-from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
+from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import LightpenError
 from lightpen.formats.own_json import DamagedError, in_shape
-from lightpen.model.assumptions import USUAL
-from lightpen.model.due_rule import DueRule
-from lightpen.model.limits import SwingLimits
-from lightpen.sentences import Sentence
+from lightpen.messages import Message
+from lightpen.model.limits import DueRule
+from lightpen.record.exports.dcc import Laboratory
 from lightpen.streaming.server import StreamPlace
-from lightpen_app.look.languages import Language
+from lightpen_app.look.languages import system_language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.work.settings_store import Changes, Content, load, save, with_changes
+from lightpen_app.work.stations import Station
+from lightpen_resources import SOURCE_LANGUAGE, languages
 
 AGAIN_MS = 5000  # after which what could not be written is tried again
 
@@ -46,7 +48,7 @@ class Preferences:
         and where; see `lightpen.streaming.server.StreamPlace`.
     """
 
-    language: Language = Language.ENGLISH
+    language: str = SOURCE_LANGUAGE
     appearance: Appearance = Appearance.SYSTEM
     muted: bool = False
     distance_m: float = 3.0
@@ -56,116 +58,7 @@ class Preferences:
     stream_port: int = StreamPlace.port
 
 
-@dataclass(frozen=True)
-class Station:
-    """What was chosen last at a station.
-
-    Attributes
-    ----------
-    operator, pen, tip, cone : str
-        Names or serial numbers.
-    ball_diameter : float
-        Of the tip, mm; 0 when it is not known.
-    nominal_tip : str
-        Its centre by design, "x y z" in mm, pen frame; empty when it is not known.
-    source : str
-        Kind of the image source; "simulated" unless something else was chosen.
-    source_place : str
-        Folder or serial number that the source needs.
-    pen_units : str
-        Of a pen file that does not say.
-    mask : str
-        Stray light to leave out, "x y radius" in px, circles parted by ";".
-    second_source, second_place, second_producer, second_mask : str
-        Likewise of a second camera; empty where one looks alone.
-    rig_file : str
-        Of both.
-    source_producer : str
-        File of a GenTL producer, where one was chosen.
-    max_uncertainty : float
-        U (k = 2) of the tip that ends a swing, mm.
-    focal_length, scale, form_error, center_bias, temperature, warmth, expansion : float
-        What is assumed where files say nothing; see
-        `lightpen.model.assumptions.Assumptions`.
-    temperature_c : float or None
-        Of the pen, degrees C; None when it was not measured.
-    verified : str
-        Names of what is touched to verify a tip, parted by "; ".
-    ring_radius, ring_uncertainty, bar_length, bar_uncertainty : float
-        What is certified, 0 where it is not known, and U (k = 2) of it, mm.
-    ring_surface : str
-        See `lightpen.verification.choices.Surface`.
-    touch_images : int
-        Of one touch.
-    """
-
-    operator: str = ""
-    pen: str = ""
-    tip: str = ""
-    cone: str = ""
-    ball_diameter: float = 0.0
-    nominal_tip: str = ""
-    source: str = "simulated"
-    source_place: str = ""
-    source_producer: str = ""
-    camera_file: str = ""
-    pen_file: str = ""
-    pen_units: str = ""
-    mask: str = ""
-    second_source: str = ""
-    second_place: str = ""
-    second_producer: str = ""
-    second_mask: str = ""
-    rig_file: str = ""
-    max_uncertainty: float = SwingLimits.max_uncertainty
-    min_images: int = SwingLimits.min_images
-    max_images: int = SwingLimits.max_images
-    focal_length: float = USUAL.focal_length
-    scale: float = USUAL.scale
-    form_error: float = USUAL.form_error
-    center_bias: float = USUAL.center_bias
-    temperature_c: float | None = None
-    temperature: float = USUAL.temperature
-    warmth: float = USUAL.warmth
-    expansion: float = USUAL.expansion
-    verified: str = "fixed point"
-    fixed_point_touches: int = 10
-    ring_radius: float = 0.0
-    ring_uncertainty: float = 0.0
-    ring_surface: str = "groove"
-    ring_runs: int = 1
-    bar_length: float = 0.0
-    bar_uncertainty: float = 0.0
-    bar_surface: str = ""
-    bar_places: int = 1
-    touch_images: int = 5
-
-
-@dataclass(frozen=True)
-class KeptCamera:
-    """How a camera was set up last.
-
-    Attributes
-    ----------
-    exposure_us, gain_db, frame_rate : float or None
-        None when they were never set; likewise the texts are empty and the size of
-        packets is 0.
-    region : str
-        "x y width height" in px.
-    trigger : str
-        See `lightpen.cameras.protocol.TriggerMode`.
-    """
-
-    exposure_us: float | None = None
-    gain_db: float | None = None
-    frame_rate: float | None = None
-    pixel_format: str = ""
-    region: str = ""
-    trigger: str = ""
-    packet_size: int = 0
-
-
-Group = TypeVar("Group", Preferences, Station, KeptCamera)
+Group = TypeVar("Group", Preferences, Station, CameraSettings, DueRule)
 
 
 class Settings(QObject):
@@ -174,9 +67,9 @@ class Settings(QObject):
     Signals
     -------
     troubled(object)
-        The `Sentence` why something is not, or not surely, remembered.
+        The `Message` why something is not, or not surely, remembered.
     relieved(object)
-        The `Sentence` of `troubled` whose cause is gone: they could be written again.
+        The `Message` of `troubled` whose cause is gone: they could be written again.
     """
 
     troubled = Signal(object)
@@ -188,10 +81,10 @@ class Settings(QObject):
         self._file = file
         loaded = load(file)
         self._content: Content = loaded.content
-        self._trouble = loaded.trouble
+        self._fault = loaded.trouble
         self._changes: Changes = {}  # that wait to be written
         self._is_writing = False
-        self._why_unwritten: Sentence | None = None
+        self._why_unwritten: Message | None = None
         self._lock = Lock()
         self._thread: Thread | None = None
 
@@ -204,14 +97,16 @@ class Settings(QObject):
         return self._file
 
     @property
-    def trouble(self) -> Sentence | None:
+    def trouble(self) -> Message | None:
         """Why they could not be read at the start."""
-        return self._trouble
+        return self._fault
 
     def preferences(self) -> Preferences:
         """Return what the user chose; at first, the language of the system."""
-        saved = self._content.get("preferences", {})
-        return _read(saved, Preferences(language=_system_language()))
+        usual = Preferences(language=system_language())
+        read = _read(self._content.get("preferences", {}), usual)
+        known = read.language if read.language in languages() else usual.language
+        return replace(read, language=known)
 
     def set_preferences(self, preferences: Preferences) -> None:
         """Remember what the user chose."""
@@ -235,13 +130,12 @@ class Settings(QObject):
         """Return how cameras were set up last, by their serial numbers."""
         kept = self._content.get("cameras", {})
         return {
-            serial: _camera_settings(_read(entries, KeptCamera()))
-            for serial, entries in kept.items()
+            serial: _read(entries, CameraSettings()) for serial, entries in kept.items()
         }
 
     def set_camera(self, serial: str, settings: CameraSettings) -> None:
         """Remember how a camera is set up."""
-        self._save("cameras", {serial: _entries(_kept_camera(settings))})
+        self._save("cameras", {serial: _entries(settings)})
 
     def last_station(self) -> str:
         """Return the name of the station used last; empty at first."""
@@ -261,17 +155,24 @@ class Settings(QObject):
         """Remember where results are saved."""
         self._save("last", {"export folder": folder})
 
+    def laboratory(self) -> Laboratory | None:
+        """Return the laboratory that was named last in a certificate."""
+        try:
+            return in_shape(self._content["last"]["laboratory"], Laboratory)
+        except (KeyError, DamagedError):
+            return None
+
+    def set_laboratory(self, laboratory: Laboratory) -> None:
+        """Remember the laboratory that a certificate names."""
+        self._save("last", {"laboratory": asdict(laboratory)})
+
     def due_rule(self) -> DueRule:
         """Return how long a tip may be in force."""
-        saved = self._content.get("due", {})
-        try:
-            return DueRule(saved["days"], saved["swings"])
-        except (KeyError, TypeError, ValueError):
-            return DueRule()
+        return _read(self._content.get("due"), DueRule())
 
     def set_due_rule(self, rule: DueRule) -> None:
         """Remember how long a tip may be in force."""
-        self._save("due", {"days": rule.max_days, "swings": rule.max_swings})
+        self._save("due", _entries(rule))
 
     def restore_geometry(self, window: QWidget) -> bool:
         """Put a window where it was when the program ended; False if never."""
@@ -320,11 +221,11 @@ class Settings(QObject):
             try:
                 trouble, unwritten = save(self._file, self._content, changes), {}
             except LightpenError as error:
-                trouble, unwritten = error.sentence, changes
+                trouble, unwritten = error.message, changes
             if trouble is not None or self._why_unwritten is not None:
                 self._written.emit(trouble, not unwritten)
 
-    def _on_written(self, trouble: Sentence | None, is_written: bool) -> None:
+    def _on_written(self, trouble: Message | None, is_written: bool) -> None:
         """Tell what went wrong, once, and when it is over; until then try again."""
         before = self._why_unwritten
         self._why_unwritten = None if is_written else trouble
@@ -357,42 +258,10 @@ def data_folder(preferences: Preferences) -> Path:
     return platformdirs.user_data_path("lightpen", appauthor=False)
 
 
-def _kept_camera(settings: CameraSettings) -> KeptCamera:
-    region = settings.region
-    return KeptCamera(
-        exposure_us=settings.exposure_us,
-        gain_db=settings.gain_db,
-        frame_rate=settings.frame_rate,
-        pixel_format=settings.pixel_format or "",
-        region="" if region is None else " ".join(map(str, astuple(region))),
-        trigger="" if settings.trigger is None else str(settings.trigger),
-        packet_size=settings.packet_size or 0,
-    )
-
-
-def _camera_settings(kept: KeptCamera) -> CameraSettings:
-    """Return settings; what was not kept, or makes no sense, is left as it is."""
-    return CameraSettings(
-        exposure_us=kept.exposure_us,
-        gain_db=kept.gain_db,
-        frame_rate=kept.frame_rate,
-        pixel_format=kept.pixel_format or None,
-        region=_region(kept.region),
-        trigger=next((mode for mode in TriggerMode if mode == kept.trigger), None),
-        packet_size=kept.packet_size or None,
-    )
-
-
-def _region(text: str) -> Region | None:
-    words = text.split()
-    if len(words) != 4 or not all(word.isdecimal() for word in words):
-        return None
-    return Region(*map(int, words))
-
-
-def _entries(value: Preferences | Station | KeptCamera) -> dict[str, Any]:
+def _entries(value: Group) -> dict[str, Any]:
     """Return the fields of a value as they are kept."""
-    return {each.name: getattr(value, each.name) for each in fields(value)}
+    entries: dict[str, Any] = json.decode(json.encode(value))
+    return entries
 
 
 def _read(saved: object, default: Group) -> Group:
@@ -400,15 +269,9 @@ def _read(saved: object, default: Group) -> Group:
     found: dict[str, Any] = {}
     for name, kind in get_type_hints(type(default)).items():
         if isinstance(saved, dict) and name in saved:
-            try:
-                value = in_shape(saved[name], kind, strict=False)
-            except DamagedError:
-                continue
-            if not isinstance(value, float) or math.isfinite(value):
-                found[name] = value
-    return replace(default, **found)
-
-
-def _system_language() -> Language:
-    chinese = QLocale.system().language() == QLocale.Language.Chinese
-    return Language.CHINESE if chinese else Language.ENGLISH
+            with suppress(DamagedError):
+                found[name] = in_shape(saved[name], kind)
+    try:
+        return replace(default, **found)
+    except ValueError:
+        return default

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from PySide6.QtCore import QByteArray, QSettings
-
 from lightpen.errors import FileError
 from lightpen.formats.file_locks import folder_locked
 from lightpen.formats.files import (
@@ -25,9 +23,9 @@ from lightpen.formats.files import (
 from lightpen.formats.own_json import DamagedError, parse_own_json
 from lightpen.formats.part_files import sweep_parts
 from lightpen.formats.system_reasons import strerror
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
-WHAT = sentence("file.settings", "settings file")
+WHAT = message("file.settings")
 LIMIT = 4 * MEGABYTE
 PATIENCE = 0.5  # s for another window to write its own
 
@@ -36,24 +34,24 @@ Changes: TypeAlias = dict[tuple[str, str], Any]  # by section and name
 
 
 @dataclass(frozen=True)
-class Loaded:
+class LoadedSettings:
     """What a file holds, and why it is not all, if anything was wrong."""
 
     content: Content
-    trouble: Sentence | None = None
+    trouble: Message | None = None
 
 
-def load(file: Path) -> Loaded:
-    """Return the settings of a file; of version 0.1 if there is none yet."""
+def load(file: Path) -> LoadedSettings:
+    """Return the settings of a file; nothing if there is none yet."""
     sweep_parts(file.parent)
     if not file.exists():
-        return Loaded(_of_version_0_1(file.with_suffix(".ini")))
+        return LoadedSettings({})
     try:
-        return Loaded(_read(file))
+        return LoadedSettings(_read(file))
     except DamagedError:
-        return Loaded({}, _set_aside(file))
+        return LoadedSettings({}, _set_aside(file))
     except FileError as error:
-        return Loaded({}, error.sentence)
+        return LoadedSettings({}, error.message)
 
 
 def with_changes(content: Content, changes: Changes) -> Content:
@@ -64,7 +62,7 @@ def with_changes(content: Content, changes: Changes) -> Content:
     return sections
 
 
-def save(file: Path, content: Content, changes: Changes) -> Sentence | None:
+def save(file: Path, content: Content, changes: Changes) -> Message | None:
     """Write what was changed, and return what its user should know of it.
 
     Parameters
@@ -97,61 +95,20 @@ def _read(file: Path) -> Content:
     return parse_own_json(read_bytes(file, WHAT, LIMIT), dict[str, dict[str, Any]])
 
 
-def _of_version_0_1(file: Path) -> Content:
-    """Read the settings as version 0.1 wrote them; they are left as they are."""
-    if not file.is_file():
-        return {}
-    ini = QSettings(str(file), QSettings.Format.IniFormat)
-    ini.setFallbacksEnabled(False)
-    content: dict[str, dict[str, Any]] = {}
-    for key in ini.allKeys():
-        section, _, name = key.partition("/")
-        value = ini.value(key)
-        if isinstance(value, QByteArray):
-            value = value.toBase64().toStdString()
-        entries = content.setdefault(section, {})
-        if section == "stations":
-            station, _, name = name.partition("/")
-            entries = entries.setdefault(_decoded(station), {})
-        entries[name] = value
-    return content
-
-
-def _decoded(group: str) -> str:
-    """Return a station's name of characters that would have parted groups."""
-    return group.replace("%5C", "\\").replace("%2F", "/").replace("%25", "%")
-
-
-def _set_aside(file: Path) -> Sentence:
+def _set_aside(file: Path) -> Message:
     aside = file.with_name(f"{file.name}.damaged")
     with suppress(OSError):  # it is told all the same
         file.replace(aside)
-    return sentence(
-        "settings.damaged",
-        "The settings {file} are damaged and were set aside as {aside}. Restore them "
-        "from a copy, or choose anew what is missing.",
-        file=printable(str(file)),
-        aside=printable(aside.name),
+    return message(
+        "settings.damaged", file=printable(str(file)), aside=printable(aside.name)
     )
 
 
-def _held(file: Path) -> Sentence:
-    return sentence(
-        "settings.held",
-        "The settings {file} were saved, though another program kept them to itself "
-        "for {seconds:g} s. End that program if it hangs, or it may change them back.",
-        file=printable(str(file)),
-        seconds=PATIENCE,
-    )
+def _held(file: Path) -> Message:
+    return message("settings.held", file=printable(str(file)), seconds=PATIENCE)
 
 
 def _cannot_be_saved(file: Path, error: OSError) -> FileError:
     return FileError(
-        sentence(
-            "settings.unwritable",
-            "The settings cannot be saved: {file} cannot be written ({reason}). Make "
-            "sure that its folder is yours to write and that the disk is not full.",
-            file=printable(str(file)),
-            reason=strerror(error),
-        )
+        "settings.unwritable", file=printable(str(file)), reason=strerror(error)
     )

@@ -6,11 +6,11 @@ from PySide6.QtCore import QObject, Qt, Signal
 
 from lightpen.cameras.clock import Clock
 from lightpen.errors import LightpenError
-from lightpen.record.folder_archive import FolderArchive
+from lightpen.record.results.result_folder import FolderArchive
 from lightpen.streaming.messages import StreamedTip
 from lightpen.streaming.server import PoseStream, StreamPlace, StreamStatus
 from lightpen.swing.preparation import Preparation
-from lightpen.verification.tip_in_force import read_tip_in_force
+from lightpen.verification.probing.current_tip import read_tip_in_force
 from lightpen_app.work.job import Job, Report
 
 
@@ -49,7 +49,7 @@ class Streaming(QObject):
         self._opening: Job | None = None
         self._reading: Job | None = None
         self._has_tip = False
-        self._trouble = ""
+        self._fault = ""
         self.stream = PoseStream(clock, lambda status: self._told.emit())
 
         # Connections
@@ -68,7 +68,7 @@ class Streaming(QObject):
     @property
     def trouble(self) -> str:
         """Why nobody can listen, in words; empty where one can or is not to."""
-        return self._trouble
+        return self._fault
 
     def want(self, place: StreamPlace | None) -> None:
         """Let others listen at a place; nowhere if it is None."""
@@ -124,7 +124,7 @@ class Streaming(QObject):
         job.start()
 
     def _tell(self, trouble: str) -> None:
-        self._trouble = trouble
+        self._fault = trouble
         self.changed.emit()
 
     def _on_opening_ended(self) -> None:

@@ -5,14 +5,16 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Signal
+from typing_extensions import override
 
-from lightpen.archive.late_logbook import SERVER, LateLogbook
-from lightpen.record.folder_archive import RECORDS, FolderArchive
-from lightpen.simulator.follower import Follower
+from lightpen.archive.lazy_logbook import SERVER, LazyLogbook
+from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen.simulator.follower import GuidedOperator
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.state import SwingEvent
 from lightpen.swing.status import SwingStatus
+from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.run_view import RunView
 
 
@@ -20,6 +22,13 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
     """Shows the GUI what its `runner` does with a swing.
 
     `progressed` tells of solving; the verdict is an event, too.
+
+    Signals
+    -------
+    result_changed()
+        A result was accepted or revoked: another tip may be in force.
+    open_requested(Path)
+        What leads to a recorded swing is to be opened.
 
     Parameters
     ----------
@@ -30,23 +39,27 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
 
     Attributes
     ----------
-    follower : Follower or None
+    follower : GuidedOperator or None
         Leads the hand of a simulated operator, if one is to do what is asked for.
-    logbook : LateLogbook
+    logbook : LazyLogbook
         All that becomes of swings is entered in it; any thread may use it.
     """
+
+    result_changed = Signal()
+    open_requested = Signal(object)
 
     def __init__(
         self,
         folder: Path,
         now: Callable[[], datetime],
+        notifications: Notifications,
         parent: QObject | None = None,
     ) -> None:
-        super().__init__(SwingStatus(), parent)
+        super().__init__(SwingStatus(), notifications, parent)
         self._folder = folder
         self._archive = FolderArchive(folder)
-        self.follower: Follower | None = None
-        self.logbook = LateLogbook(folder, os.environ.get(SERVER, ""))
+        self.follower: GuidedOperator | None = None
+        self.logbook = LazyLogbook(folder, os.environ.get(SERVER, ""))
         self.runner = SwingRunner(
             *(self.records_folder, self.archive, self, now), self.logbook
         )
@@ -67,3 +80,8 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
         if follower is not None and status.state is not None:
             follower.follow(status.state)
         self.tell(status, events)
+
+    @override
+    def _compare(self, before: SwingStatus, now: SwingStatus) -> None:
+        if before.result is not now.result or before.revoked is not now.revoked:
+            self.result_changed.emit()

@@ -4,19 +4,26 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Signal
+from typing_extensions import override
 
-from lightpen.record.folder_archive import FolderArchive
-from lightpen.simulator.toucher import Toucher
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.simulator.toucher import ProbingOperator
 from lightpen.verification.runner import VerificationRunner
-from lightpen.verification.status import SessionHappening, VerificationStatus
+from lightpen.verification.session.status import SessionEventKind, VerificationStatus
+from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.run_view import RunView
 
 
-class VerificationRun(RunView[VerificationStatus, SessionHappening]):
+class VerificationRun(RunView[VerificationStatus, SessionEventKind]):
     """Shows the GUI what its `runner` does to verify a tip.
 
     `progressed` tells of recorded images that are read.
+
+    Signals
+    -------
+    files_changed()
+        A verification was kept in files.
 
     Parameters
     ----------
@@ -29,26 +36,38 @@ class VerificationRun(RunView[VerificationStatus, SessionHappening]):
 
     Attributes
     ----------
-    toucher : Toucher or None
+    probing_operator : ProbingOperator or None
         Leads the hand of a simulated operator, if one is to do what is asked for.
     """
+
+    files_changed = Signal()
 
     def __init__(
         self,
         archive: FolderArchive,
         folder: Path,
         now: Callable[[], datetime],
+        notifications: Notifications,
         parent: QObject | None = None,
     ) -> None:
-        super().__init__(VerificationStatus(), parent)
-        self.toucher: Toucher | None = None
+        super().__init__(VerificationStatus(), notifications, parent)
+        self.probing_operator: ProbingOperator | None = None
         self.runner = VerificationRunner(archive, folder, self, now)
 
     def on_verification(
-        self, status: VerificationStatus, events: tuple[SessionHappening, ...]
+        self, status: VerificationStatus, events: tuple[SessionEventKind, ...]
     ) -> None:
         """Hand on the newest status and every event, on a thread of the runner."""
-        toucher, setup, state = self.toucher, status.setup, status.state
-        if toucher is not None and setup is not None and state is not None:
-            toucher.follow(setup, state)
+        probing_operator, setup, state = (
+            self.probing_operator,
+            status.setup,
+            status.state,
+        )
+        if probing_operator is not None and setup is not None and state is not None:
+            probing_operator.follow(setup, state)
         self.tell(status, events)
+
+    @override
+    def _compare(self, before: VerificationStatus, now: VerificationStatus) -> None:
+        if before.files != now.files:
+            self.files_changed.emit()

@@ -12,10 +12,10 @@ from lightpen.archive.database import Database
 from lightpen.archive.entries import (
     EPOCH,
     NOTHING_BEFORE,
+    ChainHead,
     Event,
-    Head,
     Kind,
-    Written,
+    StoredEntry,
     chained,
     named_entry,
     read_entry,
@@ -25,7 +25,7 @@ from lightpen.archive.entries import (
 from lightpen.archive.tables import CHAINS, ENTRIES, RECORDS
 from lightpen.errors import ArchiveError
 from lightpen.formats.own_json import DamagedError
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
 _AT_HOME = select(CHAINS.c.chain).where(CHAINS.c.is_own)
@@ -35,7 +35,7 @@ BATCH = 200  # entries that are copied in one transaction
 
 
 @dataclass(frozen=True)
-class Copied:
+class CopyResult:
     """What became of entries that were to be copied.
 
     Attributes
@@ -66,7 +66,7 @@ def chain_at_home(database: Database) -> str | None:
 
 def append(
     database: Database, chain: str, event: Event, record: str | None = None
-) -> Written | None:
+) -> StoredEntry | None:
     """Append an entry to a chain that is at home in a database.
 
     When this returns, the entry is kept whatever happens next; when it raises, or is
@@ -96,9 +96,9 @@ def append(
 def copy_entries(
     database: Database,
     chain: str,
-    entries: Iterable[Written],
+    entries: Iterable[StoredEntry],
     records: Mapping[str, str],
-) -> Copied:
+) -> CopyResult:
     """Let the copy of a chain grow by entries, in their order; known ones are passed.
 
     Raises
@@ -117,17 +117,17 @@ def copy_entries(
         _require_next(head, new)
         _keep_records(connection, _named(new, records))
         _put(connection, chain, new)
-    return Copied(len(new), len(known))
+    return CopyResult(len(new), len(known))
 
 
-def heads(database: Database) -> tuple[Head, ...]:
+def heads(database: Database) -> tuple[ChainHead, ...]:
     """Return how far each chain has come."""
     with database.reading() as connection:
         rows = connection.execute(select(CHAINS).order_by(CHAINS.c.chain)).all()
-    return tuple(Head(row.chain, row.number, row.sha256) for row in rows)
+    return tuple(ChainHead(row.chain, row.number, row.sha256) for row in rows)
 
 
-def entries_of(database: Database, chain: str, after: int = 0) -> Iterator[Written]:
+def entries_of(database: Database, chain: str, after: int = 0) -> Iterator[StoredEntry]:
     """Yield the entries of a chain in their order.
 
     Parameters
@@ -148,7 +148,7 @@ def entries_of(database: Database, chain: str, after: int = 0) -> Iterator[Writt
         after = batch[-1].entry.number
 
 
-def batch_of(database: Database, chain: str, after: int) -> tuple[Written, ...]:
+def batch_of(database: Database, chain: str, after: int) -> tuple[StoredEntry, ...]:
     """Return the next few entries of a chain, as `entries_of`."""
     wanted = (
         select(*READ)
@@ -161,7 +161,7 @@ def batch_of(database: Database, chain: str, after: int) -> tuple[Written, ...]:
     return tuple(read_row(database, row) for row in rows)
 
 
-def records_of(database: Database, entries: Sequence[Written]) -> dict[str, str]:
+def records_of(database: Database, entries: Sequence[StoredEntry]) -> dict[str, str]:
     """Return the records that entries vouch for, by their hash."""
     names = [each.entry.event.record_sha256 for each in entries]
     wanted = select(RECORDS).where(RECORDS.c.sha256.in_([n for n in names if n]))
@@ -169,7 +169,7 @@ def records_of(database: Database, entries: Sequence[Written]) -> dict[str, str]
         return {row.sha256: row.text for row in connection.execute(wanted)}
 
 
-def entry_of_result(database: Database, chain: str, place: str) -> Written | None:
+def entry_of_result(database: Database, chain: str, place: str) -> StoredEntry | None:
     """Return the entry of the result file at a place, if there is one."""
     wanted = select(*READ).where(
         ENTRIES.c.chain == chain, ENTRIES.c.result == searchable(place)
@@ -179,7 +179,7 @@ def entry_of_result(database: Database, chain: str, place: str) -> Written | Non
     return None if row is None else read_row(database, row)
 
 
-class EnteredPlaces:
+class ArchivedFiles:
     """The places of the result files and swings that a chain tells of.
 
     What was read once is kept, so that of a long chain only its new entries are.
@@ -222,12 +222,12 @@ class EnteredPlaces:
 
         A swing whose result was taken back was not: it may still be set aside.
         """
-        taken_back = Kind.TAKEN_BACK.value
-        is_swing = self._kinds.get(searchable(place), taken_back) != taken_back
+        revoked = Kind.TAKEN_BACK.value
+        is_swing = self._kinds.get(searchable(place), revoked) != revoked
         return is_swing or searchable(place) in self._results
 
 
-def columns_of(entry: Written) -> dict[str, Any]:
+def columns_of(entry: StoredEntry) -> dict[str, Any]:
     """Return the row of an entry."""
     event, names = entry.entry.event, entry.entry.event.names
     return {
@@ -249,7 +249,7 @@ def columns_of(entry: Written) -> dict[str, Any]:
     }
 
 
-def sound_entry(row: Row[Any]) -> Written | None:
+def sound_entry(row: Row[Any]) -> StoredEntry | None:
     """Return the entry in a row, unless anything in the row was changed.
 
     Parameters
@@ -272,7 +272,7 @@ def searchable(text: str) -> str:
     return text.encode("utf-8", "backslashreplace").decode().replace("\0", "\\x00")
 
 
-def _head(connection: Connection, chain: str) -> Head:
+def _head(connection: Connection, chain: str) -> ChainHead:
     """Return the last entry of a chain as the entries have it."""
     last = (
         select(ENTRIES.c.number, ENTRIES.c.sha256, ENTRIES.c.since_us)
@@ -282,9 +282,9 @@ def _head(connection: Connection, chain: str) -> Head:
     )
     row = connection.execute(last).one_or_none()
     if row is None:
-        return Head(chain)
+        return ChainHead(chain)
     since = EPOCH + timedelta(microseconds=row.since_us)
-    return Head(chain, row.number, row.sha256, since)
+    return ChainHead(chain, row.number, row.sha256, since)
 
 
 def _is_entered(connection: Connection, chain: str, event: Event) -> bool:
@@ -312,7 +312,7 @@ def _begin(connection: Connection, chain: str, *, is_own: bool) -> None:
     )
 
 
-def _put(connection: Connection, chain: str, entries: Sequence[Written]) -> None:
+def _put(connection: Connection, chain: str, entries: Sequence[StoredEntry]) -> None:
     if not entries:
         return
     connection.execute(insert(ENTRIES), list(map(columns_of, entries)))
@@ -334,17 +334,17 @@ def _keep_records(connection: Connection, records: Mapping[str, str]) -> None:
 
 
 def _parted(
-    entries: Iterable[Written], number: int
-) -> tuple[list[Written], list[Written]]:
+    entries: Iterable[StoredEntry], number: int
+) -> tuple[list[StoredEntry], list[StoredEntry]]:
     """Return the entries up to a number, and the others."""
-    known: list[Written] = []
-    new: list[Written] = []
+    known: list[StoredEntry] = []
+    new: list[StoredEntry] = []
     for each in entries:
         (known if each.entry.number <= number else new).append(each)
     return known, new
 
 
-def _require_same(connection: Connection, chain: str, known: list[Written]) -> None:
+def _require_same(connection: Connection, chain: str, known: list[StoredEntry]) -> None:
     numbers = [each.entry.number for each in known]
     wanted = select(ENTRIES.c.number, ENTRIES.c.sha256).where(
         ENTRIES.c.chain == chain, ENTRIES.c.number.in_(numbers)
@@ -355,7 +355,7 @@ def _require_same(connection: Connection, chain: str, known: list[Written]) -> N
             raise ArchiveError(_forked(each))
 
 
-def _require_next(head: Head, new: list[Written]) -> None:
+def _require_next(head: ChainHead, new: list[StoredEntry]) -> None:
     number, sha256 = head.number, head.sha256
     for each in new:
         if (each.entry.number, each.entry.previous) != (number + 1, sha256):
@@ -363,7 +363,9 @@ def _require_next(head: Head, new: list[Written]) -> None:
         number, sha256 = each.entry.number, each.sha256
 
 
-def _named(entries: Sequence[Written], records: Mapping[str, str]) -> dict[str, str]:
+def _named(
+    entries: Sequence[StoredEntry], records: Mapping[str, str]
+) -> dict[str, str]:
     """Return the records that entries vouch for, having looked at each."""
     named = {}
     for each in entries:
@@ -372,33 +374,21 @@ def _named(entries: Sequence[Written], records: Mapping[str, str]) -> dict[str, 
             continue
         text = records.get(wanted)
         if text is None or text_sha256(text) != wanted:
-            raise ArchiveError(
-                sentence(
-                    "archive.record-missing",
-                    "The record of {entry} is missing or was changed. Get the entries "
-                    "from their station again.",
-                    entry=_named_entry(each),
-                )
-            )
+            raise ArchiveError("archive.record-missing", entry=_named_entry(each))
         named[wanted] = text
     return named
 
 
-def _forked(entry: Written) -> Sentence:
-    return sentence(
-        "archive.forked",
-        "What is kept here does not go on with {entry}. A data folder was copied and "
-        "both copies were gone on with, or entries were changed. Check both archives.",
-        entry=_named_entry(entry),
-    )
+def _forked(entry: StoredEntry) -> Message:
+    return message("archive.forked", entry=_named_entry(entry))
 
 
-def _named_entry(entry: Written) -> Sentence:
+def _named_entry(entry: StoredEntry) -> Message:
     place = entry.entry
     return named_entry(place.chain, place.number, place.event.names.station)
 
 
-def read_row(database: Database, row: Row[Any]) -> Written:
+def read_row(database: Database, row: Row[Any]) -> StoredEntry:
     """Return the entry in a row with the columns `READ`.
 
     Raises
@@ -407,13 +397,7 @@ def read_row(database: Database, row: Row[Any]) -> Written:
         It is damaged, or was changed since it was entered.
     """
     damaged = ArchiveError(
-        sentence(
-            "archive.entry-damaged",
-            "Entry {number} of the archive {archive} is damaged. Restore the archive "
-            "from a copy.",
-            number=row.number,
-            archive=database.name,
-        )
+        "archive.entry-damaged", number=row.number, archive=database.name
     )
     try:
         entry = read_entry(row.text)

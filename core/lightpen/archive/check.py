@@ -13,7 +13,7 @@ from lightpen.archive.database import Database, is_open, look_into
 from lightpen.archive.entries import (
     NOTHING_BEFORE,
     SHORT,
-    Head,
+    ChainHead,
     named_entry,
     text_sha256,
 )
@@ -21,7 +21,7 @@ from lightpen.archive.files_check import FilesCheck
 from lightpen.archive.seal import is_sealed_otherwise, lost_heads, read_seal
 from lightpen.archive.tables import CHAINS, ENTRIES, RECORDS
 from lightpen.errors import LightpenError
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 BATCH = 200  # rows that are read at one time
 SOUND = "ok"  # SQLite's word for a file without damage
@@ -30,27 +30,25 @@ Report = Callable[[float], None]
 
 
 @dataclass(frozen=True)
-class Checked:
+class ArchiveCheckResult:
     """What a check came to.
 
     Attributes
     ----------
     n_files : int
         That entries vouch for and that were read, images among them.
-    findings : tuple of Sentence
+    findings : tuple of Message
         What is not as it was entered; empty where all is.
     """
 
     n_entries: int
     n_files: int
-    findings: tuple[Sentence, ...]
+    findings: tuple[Message, ...]
 
 
 def check_archive(
-    database: Database,
-    data: Path | None = None,
-    report: Report = lambda fraction: None,
-) -> Checked:
+    database: Database, data: Path | None = None, report: Report = lambda fraction: None
+) -> ArchiveCheckResult:
     """Look at every entry, every record and every file that an archive vouches for.
 
     Parameters
@@ -81,10 +79,10 @@ def check_archive(
         n_before += head.number
     stages += [_strays(database), _changed_records(database), _lost_records(database)]
     findings = tuple(each for stage in stages for each in _told(stage))
-    return Checked(n_before, files.n_files, findings)
+    return ArchiveCheckResult(n_before, files.n_files, findings)
 
 
-def check_file(archive: Path, data: Path, report: Report) -> Checked:
+def check_file(archive: Path, data: Path, report: Report) -> ArchiveCheckResult:
     """Look at an archive in a file, and at the files that it vouches for.
 
     Of a file that a program began to write meanwhile nothing is known but what a check
@@ -115,15 +113,15 @@ def _last_written(archive: Path) -> int | None:
     return archive.stat().st_mtime_ns
 
 
-def _told(stage: Iterator[Sentence]) -> Iterator[Sentence]:
+def _told(stage: Iterator[Message]) -> Iterator[Message]:
     """Yield what a stage finds, and why it cannot go on."""
     try:
         yield from stage
     except LightpenError as error:
-        yield error.sentence
+        yield error.message
 
 
-def _damage(database: Database) -> Iterator[Sentence]:
+def _damage(database: Database) -> Iterator[Message]:
     """Yield what SQLite itself finds in its file."""
     if database.file is None:
         return
@@ -131,38 +129,24 @@ def _damage(database: Database) -> Iterator[Sentence]:
         found = connection.execute(text("PRAGMA integrity_check(10)")).scalars().all()
     for each in found:
         if each != SOUND:
-            yield sentence(
-                "archive.file-damaged",
-                "The file {file} is damaged: {what}.",
-                file=database.name,
-                what=str(each),
-            )
+            yield message("archive.file-damaged", file=database.name, what=str(each))
 
 
-def _broken_seal(database: Database, ends: tuple[Head, ...]) -> Iterator[Sentence]:
+def _broken_seal(database: Database, ends: tuple[ChainHead, ...]) -> Iterator[Message]:
     seal = None if database.file is None else read_seal(database.file)
     if database.file is None or seal is None:
         return
     for head in lost_heads(database, seal):
-        yield sentence(
-            "archive.sealed-missing",
-            "Entry {number} of the chain {chain} was there when the archive was "
-            "closed, and is not any more: entries were removed, or the archive was "
-            "replaced.",
-            number=head.number,
-            chain=head.chain[:SHORT],
+        yield message(
+            "archive.sealed-missing", number=head.number, chain=head.chain[:SHORT]
         )
     if is_sealed_otherwise(database.file, ends, seal):
-        yield sentence(
-            "archive.seal-broken",
-            "The file {file} was changed since it was closed.",
-            file=database.name,
-        )
+        yield message("archive.seal-broken", file=database.name)
 
 
 def _walked(
-    database: Database, head: Head, files: FilesCheck | None, report: Report
-) -> Iterator[Sentence]:
+    database: Database, head: ChainHead, files: FilesCheck | None, report: Report
+) -> Iterator[Message]:
     """Yield what is not right from the first entry of a chain to its last.
 
     Entries that are added meanwhile are walked over, too.
@@ -196,14 +180,10 @@ def _walked(
     if number < head.number:
         yield _missing(head.chain, number + 1, head.number)
     elif (number, previous) != (head.number, head.sha256) and previous:
-        yield sentence(
-            "archive.head-changed",
-            "The chain {chain} does not end with the entry that was entered last.",
-            chain=head.chain[:SHORT],
-        )
+        yield message("archive.head-changed", chain=head.chain[:SHORT])
 
 
-def _head_now(database: Database, head: Head) -> Head:
+def _head_now(database: Database, head: ChainHead) -> ChainHead:
     """Return how far a chain has come by now; as far as before if it is gone."""
     return next((h for h in heads(database) if h.chain == head.chain), head)
 
@@ -219,21 +199,17 @@ def _rows_after(database: Database, chain: str, number: int) -> list[Row[Any]]:
         return list(connection.execute(rows))
 
 
-def _strays(database: Database) -> Iterator[Sentence]:
+def _strays(database: Database) -> Iterator[Message]:
     """Yield the entries that are of no chain."""
     known = select(CHAINS.c.chain)
     strays = select(ENTRIES.c.chain).where(ENTRIES.c.chain.not_in(known)).distinct()
     with database.reading() as connection:
         found = connection.execute(strays).scalars().all()
     for chain in found:
-        yield sentence(
-            "archive.no-such-chain",
-            "There are entries of the chain {chain}, which the archive does not know.",
-            chain=str(chain)[:SHORT],
-        )
+        yield message("archive.no-such-chain", chain=str(chain)[:SHORT])
 
 
-def _changed_records(database: Database) -> Iterator[Sentence]:
+def _changed_records(database: Database) -> Iterator[Message]:
     last = ""
     while True:
         rows = (
@@ -246,9 +222,8 @@ def _changed_records(database: Database) -> Iterator[Sentence]:
             found = connection.execute(rows).all()
         for row in found:
             if not isinstance(row.text, str) or text_sha256(row.text) != row.sha256:
-                yield sentence(
+                yield message(
                     "archive.record-changed",
-                    "The record {record} of {entries} was changed in the archive.",
                     record=row.sha256[:SHORT],
                     entries=_entries_of(database, row.sha256),
                 )
@@ -257,7 +232,7 @@ def _changed_records(database: Database) -> Iterator[Sentence]:
         last = found[-1].sha256
 
 
-def _lost_records(database: Database) -> Iterator[Sentence]:
+def _lost_records(database: Database) -> Iterator[Message]:
     """Yield the entries whose record is missing."""
     is_there = exists().where(RECORDS.c.sha256 == ENTRIES.c.record_sha256)
     lost = select(ENTRIES.c.chain, ENTRIES.c.number).where(
@@ -266,54 +241,30 @@ def _lost_records(database: Database) -> Iterator[Sentence]:
     with database.reading() as connection:
         rows = connection.execute(lost).all()
     for row in rows:
-        yield sentence(
-            "archive.record-lost",
-            "The record of {entry} is missing.",
-            entry=named_entry(row.chain, row.number),
-        )
+        yield message("archive.record-lost", entry=named_entry(row.chain, row.number))
 
 
-def _entries_of(database: Database, record: str) -> tuple[Sentence, ...]:
+def _entries_of(database: Database, record: str) -> tuple[Message, ...]:
     vouching = select(ENTRIES.c.chain, ENTRIES.c.number).where(
         ENTRIES.c.record_sha256 == record
     )
     with database.reading() as connection:
         rows = connection.execute(vouching).all()
     found = tuple(named_entry(row.chain, row.number) for row in rows)
-    return found or (sentence("archive.no-entry", "no entry"),)
+    return found or (message("archive.no-entry"),)
 
 
-def _changed(chain: str, number: int) -> Sentence:
-    return sentence(
-        "archive.entry-changed",
-        "Entry {number} of the chain {chain} was changed.",
-        number=number,
-        chain=chain[:SHORT],
-    )
+def _changed(chain: str, number: int) -> Message:
+    return message("archive.entry-changed", number=number, chain=chain[:SHORT])
 
 
-def _unchained(chain: str, number: int) -> Sentence:
-    return sentence(
-        "archive.entry-unchained",
-        "Entry {number} of the chain {chain} does not follow the one before it: one of "
-        "the two was replaced.",
-        number=number,
-        chain=chain[:SHORT],
-    )
+def _unchained(chain: str, number: int) -> Message:
+    return message("archive.entry-unchained", number=number, chain=chain[:SHORT])
 
 
-def _missing(chain: str, first: int, last: int) -> Sentence:
+def _missing(chain: str, first: int, last: int) -> Message:
     if first == last:
-        return sentence(
-            "archive.entry-missing",
-            "Entry {number} of the chain {chain} is missing.",
-            number=first,
-            chain=chain[:SHORT],
-        )
-    return sentence(
-        "archive.entries-missing",
-        "Entries {first} to {last} of the chain {chain} are missing.",
-        first=first,
-        last=last,
-        chain=chain[:SHORT],
+        return message("archive.entry-missing", number=first, chain=chain[:SHORT])
+    return message(
+        "archive.entries-missing", first=first, last=last, chain=chain[:SHORT]
     )

@@ -16,6 +16,7 @@ from contextlib import (
     suppress,
 )
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from threading import Timer
 from time import monotonic, sleep
@@ -40,15 +41,13 @@ from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from sqlalchemy.pool import QueuePool
 
-from lightpen.archive import earlier
 from lightpen.archive.tables import METADATA
-from lightpen.archive.uses import Uses
+from lightpen.archive.uses import UseCount
 from lightpen.errors import ArchiveError, FileError, NoArchiveError
 from lightpen.formats.files import A_FILE, printable, unreadable
-from lightpen.record.numbered_files import make_folder
-from lightpen.sentences import sentence
+from lightpen.record.library.numbered_files import make_folder
 
-VERSION = "2"  # of the tables, as the last of the migrations says
+VERSION = "1"  # of the tables, as the last of the migrations says
 VERSION_TABLE = "archive_version"
 MIGRATIONS = Path(__file__).with_name("migrations")
 MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrates
@@ -100,7 +99,9 @@ class Database:
     engine: Engine
     name: str
     file: Path | None = None
-    _uses: Uses = field(default_factory=Uses, init=False, repr=False, compare=False)
+    _uses: UseCount = field(
+        default_factory=UseCount, init=False, repr=False, compare=False
+    )
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -164,7 +165,7 @@ def open_file(path: Path) -> Database:
     try:
         make_folder(path.parent)
     except FileError as error:
-        raise ArchiveError(error.sentence) from error
+        raise ArchiveError(error.message) from error
 
     def connect() -> sqlite3.Connection:
         with _closed_on_failure(_connected(str(path))) as connection:
@@ -190,14 +191,7 @@ def look_into(path: Path) -> Database:
         is_there = path.is_file()
     if not is_there or _require_known(database) is None:
         database.close()
-        raise NoArchiveError(
-            sentence(
-                "archive.missing",
-                "There is no archive {file}, or nothing was entered in it yet. Check "
-                "the data folder.",
-                file=database.name,
-            )
-        )
+        raise NoArchiveError("archive.missing", file=database.name)
     return database
 
 
@@ -236,22 +230,9 @@ def open_server(address: str) -> Database:
         engine = create_engine(url, connect_args=_CALLING)
         event.listen(engine, "connect", _ask_to_notice)
     except (ArgumentError, ValueError) as error:
-        raise ArchiveError(
-            sentence(
-                "archive.no-address",
-                "The address of the archive's server cannot be read. It has the form "
-                "postgresql://user:password@host/database, with %40 for an @ in the "
-                "password.",
-            )
-        ) from error
+        raise ArchiveError("archive.no-address") from error
     except ModuleNotFoundError as error:
-        raise ArchiveError(
-            sentence(
-                "archive.no-driver",
-                "An archive on a server needs the package psycopg, which is not "
-                'installed. Install it with: pip install "lightpen[postgres]".',
-            )
-        ) from error
+        raise ArchiveError("archive.no-driver") from error
     return _brought_up_to_date(Database(engine, _without_password(url)))
 
 
@@ -265,13 +246,7 @@ def _without_password(url: URL) -> str:
 def _read_only(path: Path) -> Database:
     mode = "mode=ro" if is_open(path) else "immutable=1"
     place = f"{path.absolute().as_uri()}?{mode}"
-
-    def connect() -> sqlite3.Connection:
-        with _closed_on_failure(_connected(place)) as connection:
-            earlier.show_as_now(connection)
-            return connection
-
-    engine = _sqlite_engine(connect)
+    engine = _sqlite_engine(partial(_connected, place))
     return Database(engine, printable(str(path)), path)
 
 
@@ -336,12 +311,16 @@ def _require_known(database: Database) -> str | None:
             found = _found_version(connection)
             if found is None and inspect(connection).get_table_names():
                 raise _of_other_program(database.name)
-        if found not in (None, VERSION, *earlier.VERSIONS):
+        if found is not None and not _is_known(found):
             raise _of_later_version(database.name)
     except ArchiveError:
         database.close()
         raise
     return found
+
+
+def _is_known(version: str) -> bool:
+    return version.isdecimal() and int(version) <= int(VERSION)
 
 
 def _brought_up_to_date(database: Database) -> Database:
@@ -425,7 +404,7 @@ def _looking_at(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise ArchiveError(unreadable(path, A_FILE, error).sentence) from error
+        raise ArchiveError(unreadable(path, A_FILE, error).message) from error
 
 
 @contextmanager
@@ -449,47 +428,16 @@ def _reason(error: SQLAlchemyError) -> str:
 
 
 def _unusable(name: str, reason: str) -> ArchiveError:
-    return ArchiveError(
-        sentence(
-            "archive.unusable",
-            "The archive {name} cannot be used: {reason}. See that its disk is not "
-            "full and yours to write, or that its server runs and knows the user and "
-            "the password.",
-            name=name,
-            reason=reason,
-        )
-    )
+    return ArchiveError("archive.unusable", name=name, reason=reason)
 
 
 def _busy(name: str) -> ArchiveError:
-    return ArchiveError(
-        sentence(
-            "archive.busy",
-            "The archive {name} is held by another program, for more than {seconds} s "
-            "now. Let that one finish, or end it, and try again.",
-            name=name,
-            seconds=LONGEST_WAIT_S,
-        )
-    )
+    return ArchiveError("archive.busy", name=name, seconds=LONGEST_WAIT_S)
 
 
 def _of_other_program(name: str) -> ArchiveError:
-    return ArchiveError(
-        sentence(
-            "archive.of-other-program",
-            "{name} holds the tables of another program, and stays as it is. Give the "
-            "archive a database of its own.",
-            name=name,
-        )
-    )
+    return ArchiveError("archive.of-other-program", name=name)
 
 
 def _of_later_version(name: str) -> ArchiveError:
-    return ArchiveError(
-        sentence(
-            "archive.later-version",
-            "The archive {name} was written by a later version of the program, and "
-            "stays as it is. Use that version.",
-            name=name,
-        )
-    )
+    return ArchiveError("archive.later-version", name=name)

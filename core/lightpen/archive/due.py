@@ -10,12 +10,12 @@ from sqlalchemy import select
 
 from lightpen.archive.chains import searchable
 from lightpen.archive.database import Database
-from lightpen.archive.entries import Kind, Written, since_us
+from lightpen.archive.entries import Kind, StoredEntry, since_us
 from lightpen.archive.history import known_names
 from lightpen.archive.queries import calibrating, last_accepted, of_chain
 from lightpen.archive.tables import ENTRIES
-from lightpen.model.due_rule import DueRule
-from lightpen.record.tip_library import Library
+from lightpen.model.limits import DueRule
+from lightpen.record.library.tip_library import Library
 
 EMPTY = Library()
 CLOCKS_AGREE = timedelta(days=1)  # as far as need be to tell an age in days
@@ -28,7 +28,7 @@ class DueTip:
 
     Attributes
     ----------
-    entry : Written
+    entry : StoredEntry
         That put it in force.
     calibrated : datetime
         Of one that was put in force again, when it was calibrated all the same.
@@ -40,7 +40,7 @@ class DueTip:
         Swings until it is due by their count; None if any number may be made.
     """
 
-    entry: Written
+    entry: StoredEntry
     calibrated: datetime
     due: datetime
     n_swings: int
@@ -102,8 +102,8 @@ def _urgency(tip: DueTip) -> tuple[bool, datetime]:
 
 
 def _due_tip(
-    entry: Written,
-    origin: Written,
+    entry: StoredEntry,
+    origin: StoredEntry,
     swings: Mapping[str, list[int]],
     usual: DueRule,
     library: Library,

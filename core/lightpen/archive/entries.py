@@ -20,17 +20,18 @@ from lightpen import __version__
 from lightpen.formats.files import printable
 from lightpen.formats.own_json import (
     Digest,
-    Moment,
     Vector,
+    ZonedTime,
     parse_own_json,
     require_usual,
 )
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.messages import Message, message
 from lightpen.model.origin import Origin
-from lightpen.record.assumed import Plain
-from lightpen.record.names import Names
-from lightpen.record.outcome import TrialOutcome
-from lightpen.record.results import Since, Why
-from lightpen.sentences import Sentence, sentence
+from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.results.results import TipChange
+from lightpen.record.swings.assumed import Plain
+from lightpen.record.swings.names import Names
 
 NOTHING_BEFORE = "0" * 64  # in place of a hash, in the first entry of a chain
 TICK = timedelta(microseconds=1)
@@ -86,11 +87,11 @@ class Event(Struct, frozen=True):
         Name and version.
     grade : str
         Verdict on a calibration; empty of anything else, and where there was none.
-    why : Why or None
+    why : StoredMessage or None
         What the grade is for.
     reason : str
         In the words of the operator; of a note its text.
-    change : Since or None
+    change : TipChange or None
         Since the tip as found, which was in force before.
     outcome : TrialOutcome or None
         What became of a verification or the calibration of a camera.
@@ -112,17 +113,17 @@ class Event(Struct, frozen=True):
     """
 
     kind: Kind
-    at: Moment
+    at: ZonedTime
     names: Names
     program: str
     origin: Origin | None = None
     grade: str = ""
-    why: Why | None = None
+    why: StoredMessage | None = None
     reason: str = ""
     outcome: TrialOutcome | None = None
     tip_pen_mm: Vector | None = None
     expanded_uncertainty_mm: Vector | None = None
-    change: Since | None = None
+    change: TipChange | None = None
     swing: str = ""
     settings: Mapping[str, Plain] = {}
     result: FileHash | None = None
@@ -158,12 +159,12 @@ class Entry(Struct, frozen=True):
     chain: Chain
     number: Annotated[int, Meta(ge=1)]
     previous: Digest
-    since: Moment
+    since: ZonedTime
     event: Event
 
 
 @dataclass(frozen=True)
-class Written:
+class StoredEntry:
     """An entry as it is kept.
 
     Attributes
@@ -180,7 +181,7 @@ class Written:
 
 
 @dataclass(frozen=True)
-class Head:
+class ChainHead:
     """How far a chain has come.
 
     Attributes
@@ -199,7 +200,7 @@ class Head:
     since: datetime | None = None
 
 
-def chained(head: Head, event: Event) -> Written:
+def chained(head: ChainHead, event: Event) -> StoredEntry:
     """Return the next entry of a chain."""
     since = event.at.astimezone(UTC)
     if head.since is not None:
@@ -207,15 +208,15 @@ def chained(head: Head, event: Event) -> Written:
     return written(Entry(head.chain, head.number + 1, head.sha256, since, event))
 
 
-def written(entry: Entry) -> Written:
+def written(entry: Entry) -> StoredEntry:
     """Return an entry with its text and hash."""
     text = json.dumps(
         to_builtins(entry), sort_keys=True, separators=(",", ":"), allow_nan=False
     )
-    return Written(entry, text, text_sha256(text))
+    return StoredEntry(entry, text, text_sha256(text))
 
 
-def read_entry(text: str) -> Written:
+def read_entry(text: str) -> StoredEntry:
     """Return the entry that a text holds.
 
     Raises
@@ -224,7 +225,7 @@ def read_entry(text: str) -> Written:
         It holds none, or was not written so.
     """
     data = text.encode("utf-8", "surrogateescape")
-    return Written(parse_own_json(data, Entry), text, text_sha256(text))
+    return StoredEntry(parse_own_json(data, Entry), text, text_sha256(text))
 
 
 def since_us(moment: datetime) -> int:
@@ -232,37 +233,13 @@ def since_us(moment: datetime) -> int:
     return (moment - EPOCH) // TICK
 
 
-def at_us(text: object, otherwise: int) -> int:
-    """Return when an entry was by its own clock, as `since_us`.
-
-    Parameters
-    ----------
-    text : object
-        Of the entry.
-    otherwise : int
-        What is returned of a text that is damaged.
-    """
-    try:
-        return since_us(datetime.fromisoformat(json.loads(str(text))["event"]["at"]))
-    except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError):
-        return otherwise
-
-
-def named_entry(chain: str, number: int, station: str = "") -> Sentence:
+def named_entry(chain: str, number: int, station: str = "") -> Message:
     """Return what an entry is called: by its station where one is known."""
     if station:
-        return sentence(
-            "archive.entry-of-station",
-            "entry {number} of the station {station}",
-            number=number,
-            station=printable(station),
+        return message(
+            "archive.entry-of-station", number=number, station=printable(station)
         )
-    return sentence(
-        "archive.entry",
-        "entry {number} of the chain {chain}",
-        number=number,
-        chain=chain[:SHORT],
-    )
+    return message("archive.entry", number=number, chain=chain[:SHORT])
 
 
 def text_sha256(text: str) -> str:

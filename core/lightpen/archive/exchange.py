@@ -19,7 +19,7 @@ from msgspec import Struct
 
 from lightpen.archive.chains import (
     BATCH,
-    Copied,
+    CopyResult,
     batch_of,
     copy_entries,
     entries_of,
@@ -27,15 +27,15 @@ from lightpen.archive.chains import (
     records_of,
 )
 from lightpen.archive.database import Database
-from lightpen.archive.entries import Written, read_entry
+from lightpen.archive.entries import StoredEntry, read_entry
 from lightpen.errors import FileError, NameTakenError
 from lightpen.formats.files import MEGABYTE, opened, printable
 from lightpen.formats.own_json import DamagedError, parse_own_json
 from lightpen.formats.system_reasons import strerror
-from lightpen.sentences import sentence
+from lightpen.messages import message
 
-FORMAT = 2
-WHAT = sentence("file.exported-archive", "exported archive")
+FORMAT = 1
+WHAT = message("file.exported-archive")
 DELIVERED = 20  # entries at one time: some MB, which a slow line carries in time
 LIMIT = 10**6 * MEGABYTE  # it is read line by line
 
@@ -54,7 +54,7 @@ class _LastLine(Struct):
     sha256: str
 
 
-def deliver(database: Database, chain: str, server: Database) -> Copied:
+def deliver(database: Database, chain: str, server: Database) -> CopyResult:
     """Copy what a server does not have of a chain yet.
 
     Raises
@@ -67,7 +67,7 @@ def deliver(database: Database, chain: str, server: Database) -> Copied:
     while batch := batch_of(database, chain, last)[:DELIVERED]:
         n_new += copy_entries(server, chain, batch, records_of(database, batch)).n_new
         last = batch[-1].entry.number
-    return Copied(n_new, known)
+    return CopyResult(n_new, known)
 
 
 def export_entries(database: Database, path: Path) -> int:
@@ -94,26 +94,16 @@ def export_entries(database: Database, path: Path) -> int:
             os.fsync(stream.fileno())
     except FileExistsError as error:
         raise NameTakenError(
-            sentence(
-                "archive.export-exists",
-                "There is a file {file} already. Give the export another name.",
-                file=printable(str(path)),
-            )
+            "archive.export-exists", file=printable(str(path))
         ) from error
     except OSError as error:
         raise FileError(
-            sentence(
-                "archive.not-exported",
-                "The archive cannot be exported to {file}: {reason}. Free some space, "
-                "or choose another folder.",
-                file=printable(str(path)),
-                reason=strerror(error),
-            )
+            "archive.not-exported", file=printable(str(path)), reason=strerror(error)
         ) from error
     return n_entries
 
 
-def import_entries(database: Database, path: Path) -> Copied:
+def import_entries(database: Database, path: Path) -> CopyResult:
     """Copy the entries of an exported archive into another; known ones are passed.
 
     Raises
@@ -135,7 +125,7 @@ def import_entries(database: Database, path: Path) -> Copied:
             entries = [entry for entry, _ in batch]
             copied = copy_entries(database, chain, entries, records)
             n_new, n_known = n_new + copied.n_new, n_known + copied.n_known
-    return Copied(n_new, n_known)
+    return CopyResult(n_new, n_known)
 
 
 def _contents(database: Database) -> Iterator[dict[str, object]]:
@@ -154,7 +144,7 @@ def _line(content: object) -> bytes:
     return json.dumps(content).encode() + b"\n"
 
 
-def _read(path: Path) -> Iterator[tuple[Written, str | None]]:
+def _read(path: Path) -> Iterator[tuple[StoredEntry, str | None]]:
     """Yield the entries of an exported archive, each with its record."""
     n_read = 0
     with opened(path, WHAT, LIMIT) as stream:
@@ -177,11 +167,5 @@ def _read(path: Path) -> Iterator[tuple[Written, str | None]]:
             raise DamagedError("Its end is missing.")
         except DamagedError as error:
             raise FileError(
-                sentence(
-                    "archive.no-export",
-                    "{file} is no exported archive, or not as it was exported: line "
-                    "{line}. Export it again, with this version of the program.",
-                    file=printable(str(path)),
-                    line=n_read + 2,
-                )
+                "archive.no-export", file=printable(str(path)), line=n_read + 2
             ) from error

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from lightpen.archive.entries import Entry, FileHash, Written
+from lightpen.archive.entries import Entry, FileHash, StoredEntry
 from lightpen.errors import FileError
 from lightpen.formats.files import A_FILE, printable, unreadable
 from lightpen.formats.own_json import DamagedError, parse_own_json
-from lightpen.record.reading import IMAGES, open_record
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
+from lightpen.record.swings.reading import IMAGES, open_record
 
 
 class _Image(Struct):
@@ -50,8 +50,8 @@ class FilesCheck:
         self.n_files = 0
 
     def findings(
-        self, entries: Iterable[Written], records: Mapping[str, str]
-    ) -> Iterator[Sentence]:
+        self, entries: Iterable[StoredEntry], records: Mapping[str, str]
+    ) -> Iterator[Message]:
         """Yield what is not right with the files of entries.
 
         Parameters
@@ -66,7 +66,7 @@ class FilesCheck:
 
     def _findings(
         self, data: Path, entry: Entry, records: Mapping[str, str]
-    ) -> Iterator[Sentence]:
+    ) -> Iterator[Message]:
         event = entry.event
         files = [] if event.result is None else [event.result]
         if event.files and not event.swing:
@@ -77,9 +77,8 @@ class FilesCheck:
                 files += _images(event.swing, records.get(event.record_sha256 or ""))
                 yield from self._unreadable(data, event.swing)
             elif event.swing not in self._swings:
-                yield sentence(
+                yield message(
                     "archive.swing-missing",
-                    "The swing {folder} of entry {number} is missing.",
                     folder=printable(event.swing),
                     number=entry.number,
                 )
@@ -92,14 +91,14 @@ class FilesCheck:
                 found = executor.map(partial(_finding, data, entry.number), new)
                 yield from filter(None, found)
 
-    def _unreadable(self, data: Path, swing: str) -> Iterator[Sentence]:
+    def _unreadable(self, data: Path, swing: str) -> Iterator[Message]:
         """Yield what is damaged of a swing behind what its entries vouch for."""
         if swing in self._swings:
             return
         try:
             open_record(data / swing)
         except FileError as error:
-            yield error.sentence
+            yield error.message
 
 
 def _images(swing: str, record: str | None) -> list[FileHash]:
@@ -114,25 +113,17 @@ def _images(swing: str, record: str | None) -> list[FileHash]:
     ]
 
 
-def _finding(data: Path, number: int, file: FileHash) -> Sentence | None:
+def _finding(data: Path, number: int, file: FileHash) -> Message | None:
     """Return what is not right with a file that an entry vouches for."""
     path = data / file.place
     try:
         content = path.read_bytes()
     except FileNotFoundError:
-        return sentence(
-            "archive.vouched-missing",
-            "The file {file} of entry {number} is missing.",
-            file=printable(file.place),
-            number=number,
+        return message(
+            "archive.vouched-missing", file=printable(file.place), number=number
         )
     except OSError as error:
-        return unreadable(path, A_FILE, error).sentence
+        return unreadable(path, A_FILE, error).message
     if sha256(content[: file.n_bytes]).hexdigest() == file.sha256:
         return None
-    return sentence(
-        "archive.vouched-changed",
-        "The file {file} of entry {number} is not as it was entered.",
-        file=printable(file.place),
-        number=number,
-    )
+    return message("archive.vouched-changed", file=printable(file.place), number=number)

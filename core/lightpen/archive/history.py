@@ -9,13 +9,13 @@ from sqlalchemy import Row, select
 
 from lightpen.archive.chains import READ, read_row, sound_entry
 from lightpen.archive.database import Database
-from lightpen.archive.entries import IN_FORCE_BY, Written
+from lightpen.archive.entries import IN_FORCE_BY, StoredEntry
 from lightpen.archive.queries import (
     IN_ORDER,
-    Wanted,
+    EntryFilter,
     condition_of,
     replaced,
-    taken_back,
+    revoked,
 )
 from lightpen.archive.tables import ENTRIES
 
@@ -37,13 +37,13 @@ class Line:
     ----------
     number : int
         In its chain.
-    entry : Written or None
+    entry : StoredEntry or None
         None if it was changed since it was entered.
     """
 
     chain: str
     number: int
-    entry: Written | None
+    entry: StoredEntry | None
     state: TipState = TipState.NONE
 
 
@@ -72,7 +72,7 @@ class KnownNames:
 
 
 def lines(
-    database: Database, wanted: Wanted, first: int, n_lines: int
+    database: Database, wanted: EntryFilter, first: int, n_lines: int
 ) -> tuple[Line, ...]:
     """Return so many of the entries looked for, the newest first.
 
@@ -93,7 +93,7 @@ def lines(
     found = (
         select(
             ENTRIES,
-            taken_back(ENTRIES).label("is_taken_back"),
+            revoked(ENTRIES).label("is_taken_back"),
             replaced(ENTRIES).label("is_replaced"),
         )
         .join(
@@ -106,7 +106,7 @@ def lines(
         return tuple(map(_line, connection.execute(found)))
 
 
-def remarks_on(database: Database, entry: Written) -> tuple[Written, ...]:
+def messages_on(database: Database, entry: StoredEntry) -> tuple[StoredEntry, ...]:
     """Return what concerns an entry: notes, that it was taken back, or restored."""
     found = select(*READ).where(ENTRIES.c.concerns == entry.sha256).order_by(*IN_ORDER)
     with database.reading() as connection:

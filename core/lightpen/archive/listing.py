@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from lightpen.archive.database import Database
-from lightpen.archive.entries import Written
-from lightpen.archive.queries import Wanted, newest
-from lightpen.estimation.verdict import AXES
+from lightpen.archive.entries import StoredEntry
+from lightpen.archive.queries import EntryFilter, newest
+from lightpen.estimation.reports.verdict import AXES
 from lightpen.formats.files import write_whole
 
 COLUMNS = (
@@ -22,7 +22,7 @@ COLUMNS = (
 BATCH = 1000  # entries that are read at one time
 
 
-def save_entries(database: Database, wanted: Wanted, path: Path) -> int:
+def save_entries(database: Database, wanted: EntryFilter, path: Path) -> int:
     """Write the entries looked for, the newest first, and return how many there are.
 
     Parameters
@@ -42,7 +42,7 @@ def save_entries(database: Database, wanted: Wanted, path: Path) -> int:
     return len(entries)
 
 
-def entries_csv(entries: Iterable[Written]) -> str:
+def entries_csv(entries: Iterable[StoredEntry]) -> str:
     """Return entries as a table, one a line."""
     lines = io.StringIO()
     writer = csv.writer(lines, lineterminator="\n")
@@ -51,20 +51,20 @@ def entries_csv(entries: Iterable[Written]) -> str:
     return lines.getvalue()
 
 
-def entries_json(entries: Iterable[Written]) -> str:
+def entries_json(entries: Iterable[StoredEntry]) -> str:
     """Return entries as they are kept, each with its hash."""
     listed = [{"sha256": each.sha256, **json.loads(each.text)} for each in entries]
     return json.dumps(listed, indent=1) + "\n"
 
 
-def _all(database: Database, wanted: Wanted) -> Iterator[Written]:
+def _all(database: Database, wanted: EntryFilter) -> Iterator[StoredEntry]:
     last = None
     while batch := newest(database, wanted, BATCH, last):
         yield from batch
         last = batch[-1].entry
 
 
-def _row(entry: Written) -> list[object]:
+def _row(entry: StoredEntry) -> list[object]:
     event, nothing = entry.entry.event, ("", "", "")
     names = event.names
     return [

@@ -10,6 +10,7 @@ with whatever is entered next, and at every start. So nothing is in force or set
 that the archive does not tell of from the next start on, and no entry is of nothing.
 """
 
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -19,28 +20,28 @@ from threading import Lock
 
 from msgspec import structs
 
-from lightpen.archive.accounts import (
-    Account,
-    account_of_abandoned,
-    account_of_change,
-    account_of_refused,
-    account_of_result,
-    account_of_unreadable,
-)
 from lightpen.archive.chains import (
-    EnteredPlaces,
+    ArchivedFiles,
     append,
     entry_of_result,
     heads,
     own_chain,
     records_of,
 )
-from lightpen.archive.courier import Courier
 from lightpen.archive.database import Database, open_file
-from lightpen.archive.entries import Event, Kind, Written, this_program
-from lightpen.archive.restoring import restored_result, with_change
+from lightpen.archive.entries import Event, Kind, StoredEntry, this_program
+from lightpen.archive.event_extraction import (
+    ExtractedEvent,
+    account_of_abandoned,
+    account_of_change,
+    account_of_refused,
+    account_of_result,
+    account_of_unreadable,
+)
+from lightpen.archive.reinstating import restored_result, with_change
+from lightpen.archive.replication import Replicator
 from lightpen.archive.seal import close_sealed
-from lightpen.archive.station_accounts import (
+from lightpen.archive.station_events import (
     account_of_station,
     is_station_file,
     station_files,
@@ -48,35 +49,37 @@ from lightpen.archive.station_accounts import (
 from lightpen.errors import ArchiveError, FileError
 from lightpen.formats.files import FOLDER, unreadable
 from lightpen.local_time import local_now
-from lightpen.record.acceptance import require_in_use
-from lightpen.record.assessment import Assessment
-from lightpen.record.folder_archive import RECORDS, FolderArchive
-from lightpen.record.journal import JOURNAL, last_verdict
-from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, open_record
-from lightpen.record.results import Result
-from lightpen.record.solving import Solution
-from lightpen.record.tip_library import LIBRARY, library_files
-from lightpen.sentences import Sentence
+from lightpen.messages import Message
+from lightpen.record.library.tip_library import LIBRARY, library_files
+from lightpen.record.results.acceptance import require_in_use
+from lightpen.record.results.assessment import SwingAssessment
+from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.journal import JOURNAL, last_verdict
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import DISCARDED, open_record
+from lightpen.record.swings.solving import Solution
 
 ARCHIVE = "archive.sqlite"
 LONGEST_FAREWELL_S = 1.0  # that a server may hold up the end of the program
 
+_logger = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True)
-class Delivered:
+class ReplicationState:
     """How far a server has what was entered.
 
     Attributes
     ----------
     n_waiting : int or None
         Entries that it does not have; None as long as it did not answer.
-    trouble : Sentence or None
+    trouble : Message or None
         Why the last attempt failed.
     """
 
     n_waiting: int | None
-    trouble: Sentence | None
+    trouble: Message | None
 
 
 class Logbook:
@@ -108,12 +111,14 @@ class Logbook:
         except ArchiveError:
             self.database.close()
             raise
-        self._entered = EnteredPlaces(self.database, self.chain)
-        self._courier = Courier(self.database, self.chain, server) if server else None
+        self._entered = ArchivedFiles(self.database, self.chain)
+        self._replicator = (
+            Replicator(self.database, self.chain, server) if server else None
+        )
 
     def enter_owed(
         self, report: Callable[[float], None] = lambda fraction: None
-    ) -> tuple[Sentence, ...]:
+    ) -> tuple[Message, ...]:
         """Enter what the files tell of and the archive does not yet.
 
         Parameters
@@ -124,7 +129,7 @@ class Logbook:
 
         Returns
         -------
-        tuple of Sentence
+        tuple of Message
             Why some files cannot be entered; they stay owed.
 
         Raises
@@ -134,17 +139,17 @@ class Logbook:
         """
         with self._lock:
             self._entered.read()
-            owed, troubles = tuple(self._owed()), []
+            owed, faults = tuple(self._owed()), []
             for n_done, path in enumerate(owed):
                 report(n_done / len(owed))
                 try:
                     self._enter(self._account_of(path))
                 except FileError as error:
-                    troubles.append(error.sentence)
-        return tuple(troubles)
+                    faults.append(error.message)
+        return tuple(faults)
 
     def enter_refused(
-        self, solution: Solution, assessment: Assessment, at: datetime
+        self, solution: Solution, assessment: SwingAssessment, at: datetime
     ) -> None:
         """Enter that the tip of a swing that is set aside was not accepted.
 
@@ -158,7 +163,7 @@ class Logbook:
         with self._lock:
             self._enter(account_of_refused(self._results, solution, assessment, at))
 
-    def enter_note(self, about: Written, text: str, operator: str) -> None:
+    def enter_note(self, about: StoredEntry, text: str, operator: str) -> None:
         """Enter what somebody has to say of an entry.
 
         Raises
@@ -177,9 +182,9 @@ class Logbook:
             concerns=about.sha256,
         )
         with self._lock:
-            self._enter(Account(event))
+            self._enter(ExtractedEvent(event))
 
-    def restore(self, entry: Written, by: Names, reason: str) -> Result:
+    def restore(self, entry: StoredEntry, by: Names, reason: str) -> Result:
         """Put the tip of an entry in force again, and enter that.
 
         Parameters
@@ -212,7 +217,7 @@ class Logbook:
         self.enter_owed()
         return result
 
-    def delivery(self) -> Delivered | None:
+    def delivery(self) -> ReplicationState | None:
         """Return how far the server has what was entered; None if there is no server.
 
         Raises
@@ -220,13 +225,13 @@ class Logbook:
         ArchiveError
             The archive cannot be read.
         """
-        if self._courier is None:
+        if self._replicator is None:
             return None
-        n_delivered, trouble = self._courier.n_delivered, self._courier.trouble
+        n_delivered, trouble = self._replicator.n_delivered, self._replicator.trouble
         if n_delivered is None:
-            return Delivered(None, trouble)
+            return ReplicationState(None, trouble)
         ends = {head.chain: head.number for head in heads(self.database)}
-        return Delivered(max(0, ends.get(self.chain, 0) - n_delivered), trouble)
+        return ReplicationState(max(0, ends.get(self.chain, 0) - n_delivered), trouble)
 
     def close(self) -> None:
         """Let go of the archive, and seal its file if nobody else has it open.
@@ -237,8 +242,8 @@ class Logbook:
             It cannot be sealed.
         """
         with self._lock:
-            if self._courier is not None:
-                self._courier.close(LONGEST_FAREWELL_S)
+            if self._replicator is not None:
+                self._replicator.close(LONGEST_FAREWELL_S)
             close_sealed(self.database)
 
     def _owed(self) -> Iterator[Path]:
@@ -254,7 +259,7 @@ class Logbook:
     def _is_entered(self, path: Path) -> bool:
         return self._results.place_of(path) in self._entered
 
-    def _account_of(self, path: Path) -> Account:
+    def _account_of(self, path: Path) -> ExtractedEvent:
         if path.parent.name == LIBRARY:
             return account_of_change(self._results, path)
         if is_station_file(path):
@@ -265,20 +270,21 @@ class Logbook:
         try:
             record = open_record(path)
         except FileError as error:
-            return account_of_unreadable(self._results, path, at, error.sentence)
+            return account_of_unreadable(self._results, path, at, error.message)
         return account_of_abandoned(self._results, record, at)
 
-    def _enter(self, account: Account) -> None:
+    def _enter(self, account: ExtractedEvent) -> None:
         event = account.event
         if account.takes_back:
             back = entry_of_result(self.database, self.chain, account.takes_back)
             event = event if back is None else _taking_back(event, back)
         append(self.database, self.chain, event, account.record)
-        if self._courier is not None:
-            self._courier.wake()
+        _logger.info("entered: %s", event.kind)
+        if self._replicator is not None:
+            self._replicator.wake()
 
 
-def _taking_back(event: Event, back: Written) -> Event:
+def _taking_back(event: Event, back: StoredEntry) -> Event:
     """Return the event of a taking back with what is known of the result."""
     of, operator = back.entry.event, event.names.operator
     return structs.replace(

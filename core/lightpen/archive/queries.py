@@ -16,7 +16,7 @@ from sqlalchemy import (
 
 from lightpen.archive.chains import READ, read_row, searchable
 from lightpen.archive.database import Database
-from lightpen.archive.entries import IN_FORCE_BY, Entry, Kind, Written, since_us
+from lightpen.archive.entries import IN_FORCE_BY, Entry, Kind, StoredEntry, since_us
 from lightpen.archive.tables import ENTRIES
 
 IN_ORDER = (ENTRIES.c.since_us, ENTRIES.c.chain, ENTRIES.c.number)
@@ -24,7 +24,7 @@ _KINDS_IN_FORCE = [kind.value for kind in IN_FORCE_BY]
 
 
 @dataclass(frozen=True)
-class Wanted:
+class EntryFilter:
     """Which entries are looked for; what is empty or None leaves all.
 
     Attributes
@@ -44,7 +44,7 @@ class Wanted:
     is_simulated: bool | None = None
 
 
-def n_wanted(database: Database, wanted: Wanted) -> int:
+def n_wanted(database: Database, wanted: EntryFilter) -> int:
     """Return how many entries are looked for."""
     count = select(func.count()).select_from(ENTRIES).where(condition_of(wanted))
     with database.reading() as connection:
@@ -52,8 +52,8 @@ def n_wanted(database: Database, wanted: Wanted) -> int:
 
 
 def newest(
-    database: Database, wanted: Wanted, n_entries: int, before: Entry | None = None
-) -> tuple[Written, ...]:
+    database: Database, wanted: EntryFilter, n_entries: int, before: Entry | None = None
+) -> tuple[StoredEntry, ...]:
     """Return so many of the entries looked for, the newest first.
 
     Parameters
@@ -83,7 +83,7 @@ def last_accepted(
     *,
     is_simulated: bool = False,
     chain: str | None = None,
-) -> Written | None:
+) -> StoredEntry | None:
     """Return the last acceptance of a pen and tip that was not taken back.
 
     Parameters
@@ -97,7 +97,7 @@ def last_accepted(
         & (ENTRIES.c.tip == searchable(tip))
         & (ENTRIES.c.is_simulated == is_simulated)
         & ENTRIES.c.kind.in_(_KINDS_IN_FORCE)
-        & ~taken_back(ENTRIES)
+        & ~revoked(ENTRIES)
     )
     if chain is not None:
         condition &= of_chain(chain)
@@ -107,7 +107,7 @@ def last_accepted(
     return None if row is None else read_row(database, row)
 
 
-def calibrating(database: Database, entry: Written) -> Written:
+def calibrating(database: Database, entry: StoredEntry) -> StoredEntry:
     """Return the entry of the calibration whose tip an entry put in force again.
 
     It is the entry itself if that was the calibration, or if the other is not here.
@@ -130,7 +130,7 @@ def of_chain(chain: str) -> ColumnElement[bool]:
     return func.coalesce(ENTRIES.c.chain, "") == chain
 
 
-def taken_back(entries: FromClause) -> Exists:
+def revoked(entries: FromClause) -> Exists:
     """Return the condition that an entry was taken back since."""
     back = ENTRIES.alias()
     return exists().where(
@@ -148,11 +148,11 @@ def replaced(entries: FromClause) -> Exists:
         later.c.kind.in_(_KINDS_IN_FORCE),
         later.c.since_us > entries.c.since_us,
         later.c.chain == entries.c.chain,
-        ~taken_back(later),
+        ~revoked(later),
     )
 
 
-def condition_of(wanted: Wanted) -> ColumnElement[bool]:
+def condition_of(wanted: EntryFilter) -> ColumnElement[bool]:
     """Return the condition on entries that are looked for."""
     condition: ColumnElement[bool] = true()
     names = {"pen": wanted.pen, "tip": wanted.tip, "station": wanted.station}

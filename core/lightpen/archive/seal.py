@@ -18,18 +18,13 @@ from sqlalchemy import select
 
 from lightpen.archive.chains import heads
 from lightpen.archive.database import Database, is_open
-from lightpen.archive.entries import Chain, Head, text_sha256
+from lightpen.archive.entries import Chain, ChainHead, text_sha256
 from lightpen.archive.tables import ENTRIES
 from lightpen.errors import FileError
 from lightpen.formats.files import MEGABYTE, printable, read_bytes, sha256, write_whole
 from lightpen.formats.json_records import json_bytes
-from lightpen.formats.own_json import (
-    DamagedError,
-    Digest,
-    parse_checked,
-    with_checksum,
-)
-from lightpen.sentences import sentence
+from lightpen.formats.own_json import DamagedError, Digest, parse_checked, with_checksum
+from lightpen.messages import message
 
 
 class SealedHead(Struct, frozen=True):
@@ -94,17 +89,11 @@ def read_seal(archive: Path) -> Seal | None:
     path = seal_of(archive)
     if not path.exists():
         return None
-    data = read_bytes(path, sentence("file.seal", "seal"), MEGABYTE)
+    data = read_bytes(path, message("file.seal"), MEGABYTE)
     try:
         return parse_checked(data, Seal)
     except DamagedError as error:
-        raise FileError(
-            sentence(
-                "archive.seal-damaged",
-                "The seal {file} of the archive was changed or damaged.",
-                file=printable(str(path)),
-            )
-        ) from error
+        raise FileError("archive.seal-damaged", file=printable(str(path))) from error
 
 
 def lost_heads(database: Database, seal: Seal) -> tuple[SealedHead, ...]:
@@ -132,7 +121,7 @@ def lost_heads(database: Database, seal: Seal) -> tuple[SealedHead, ...]:
         )
 
 
-def is_sealed_otherwise(archive: Path, ends: tuple[Head, ...], seal: Seal) -> bool:
+def is_sealed_otherwise(archive: Path, ends: tuple[ChainHead, ...], seal: Seal) -> bool:
     """Return whether a file is not as it was sealed, though nothing was entered.
 
     Raises
@@ -147,7 +136,7 @@ def is_sealed_otherwise(archive: Path, ends: tuple[Head, ...], seal: Seal) -> bo
     return seal.heads == same and seal.sha256 != sha256(archive)
 
 
-def sealed_heads(ends: tuple[Head, ...]) -> tuple[SealedHead, ...]:
+def sealed_heads(ends: tuple[ChainHead, ...]) -> tuple[SealedHead, ...]:
     """Return how far chains have come, as a seal tells it."""
     return tuple(SealedHead(head.chain, head.number, head.sha256) for head in ends)
 

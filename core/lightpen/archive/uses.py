@@ -5,10 +5,9 @@ from contextlib import contextmanager
 from threading import Condition
 
 from lightpen.errors import ArchiveError
-from lightpen.sentences import sentence
 
 
-class Uses:
+class UseCount:
     """Counts those who use an archive, until no more are let in."""
 
     def __init__(self) -> None:
@@ -50,6 +49,4 @@ class Uses:
 
 def closed() -> ArchiveError:
     """Return that an archive is closed."""
-    return ArchiveError(
-        sentence("archive.closed", "The archive is closed: the program ends.")
-    )
+    return ArchiveError("archive.closed")

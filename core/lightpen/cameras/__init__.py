@@ -1,1 +1,1 @@
-"""Live sources of images, and the worker that runs one in a thread of its own."""
+"""Live image sources, and the worker thread that runs one."""

@@ -19,13 +19,13 @@ from lightpen.cameras.aravis_library import (
     load_aravis,
 )
 from lightpen.cameras.clock import Clock
-from lightpen.cameras.device_camera import Delivery, DeviceCamera
+from lightpen.cameras.device_camera import DeliveredFrame, DeviceCamera
 from lightpen.cameras.device_errors import busy, lost, not_found, setting_refused
 from lightpen.cameras.protocol import DeviceNotFound, Range
-from lightpen.cameras.source import FoundDevice, Needs, Source, SourcePlace
-from lightpen.sentences import Sentence, sentence
+from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
+from lightpen.messages import Message, message
 
-N_BUFFERS = 16  # images on their way; each is given back as soon as it is copied
+N_BUFFERS = 16  # images in transit; each buffer is returned once copied
 WAITING = 1 << 24  # bytes of packets that wait to be read, or fewer where so many may
 
 # Where this program may open packet sockets, which lose least on a loaded machine,
@@ -38,7 +38,7 @@ STRAYING_S = 0.03  # some times what a packet waits in a packet socket until it 
 
 
 class AravisFeatures:
-    """The features of a camera that is open.
+    """The features of an open camera.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class AravisFeatures:
         self._device = aravis.camera_get_device(camera)
 
     def has(self, name: str) -> bool:
-        """Return whether the camera has a feature, and it can be used now."""
+        """Return whether the camera has a feature that is available now."""
         found: bool = self._call(
             self._aravis.camera_is_feature_available, name.encode()
         )
@@ -72,7 +72,7 @@ class AravisFeatures:
         return float(self._call(get, name.encode()))
 
     def limits(self, name: str) -> Range:
-        """Return the values that a number takes now."""
+        """Return the present range of a number."""
         aravis, key = self._aravis, name.encode()
         if self._is_integer(name):
             least, most = c_int64(), c_int64()
@@ -92,7 +92,7 @@ class AravisFeatures:
             self._call(aravis.camera_set_float, key, float(value))
 
     def choice(self, name: str) -> str:
-        """Return the entry of an enumeration that is in force."""
+        """Return the current entry of an enumeration."""
         entry: bytes = self._call(self._aravis.camera_get_string, name.encode())
         return entry.decode()
 
@@ -100,7 +100,8 @@ class AravisFeatures:
         """Return the entries of an enumeration that can be chosen now."""
         aravis, n_entries = self._aravis, c_uint()
         entries = self._call(
-            *(aravis.camera_dup_available_enumerations_as_strings, name.encode()),
+            aravis.camera_dup_available_enumerations_as_strings,
+            name.encode(),
             byref(n_entries),
         )
         found = tuple(entries[i].decode() for i in range(n_entries.value))
@@ -159,7 +160,7 @@ class AravisDevice:
         return self._features
 
     def open(self) -> None:
-        """Take hold of the camera."""
+        """Open the camera."""
         self._is_gone = False
         try:
             self._aravis = aravis = load_aravis()
@@ -177,7 +178,7 @@ class AravisDevice:
         self._features = AravisFeatures(aravis, camera, self._told)
 
     def close(self) -> None:
-        """Let go of the camera."""
+        """Close the camera."""
         self._drop_stream()
         camera, self._camera = self._camera, None
         self._features = None
@@ -185,7 +186,7 @@ class AravisDevice:
             self._aravis.unref(camera)
 
     def start(self) -> None:
-        """Let images come."""
+        """Start streaming."""
         aravis, camera = self._open_ones()
         with self._told():
             payload = aravis.camera_get_payload(camera)
@@ -200,15 +201,15 @@ class AravisDevice:
             aravis.camera_start_acquisition(camera)
 
     def stop(self) -> None:
-        """Let no more images come."""
+        """Stop streaming."""
         aravis, camera = self._open_ones()
         if not self._is_gone:  # seconds would go by without an answer
             with suppress(AravisError):
                 aravis.camera_stop_acquisition(camera)
         self._drop_stream()
 
-    def fetch(self, timeout_s: float) -> Delivery | None:
-        """Return the next image, None where none comes in time."""
+    def fetch(self, timeout_s: float) -> DeliveredFrame | None:
+        """Return the next image; None after the timeout."""
         aravis, stream = self._aravis, self._stream
         assert aravis is not None
         buffer = aravis.stream_timeout_pop_buffer(stream, round(timeout_s * 1e6))
@@ -220,7 +221,7 @@ class AravisDevice:
             aravis.stream_push_buffer(stream, buffer)
 
     def probe(self) -> None:
-        """Do nothing if the camera answers."""
+        """Raise an error unless the camera responds."""
         aravis, camera = self._open_ones()
         with self._told():
             aravis.camera_get_integer(camera, b"Width")
@@ -228,7 +229,7 @@ class AravisDevice:
 
     @contextmanager
     def _told(self) -> Iterator[None]:
-        """Tell what goes wrong in a sentence."""
+        """Convert the errors of the library."""
         try:
             yield
         except AravisError as error:
@@ -248,7 +249,7 @@ class AravisDevice:
             self._aravis.unref(stream)
 
     def _gige_stream(self, aravis: Aravis, camera: int) -> int:
-        """Return a stream into which no packet strayed that is not the camera's."""
+        """Return a stream that receives packets of this camera only."""
         with suppress(AravisError):  # as a program that crashed let them come
             aravis.camera_stop_acquisition(camera)
         aravis.camera_gv_set_stream_options(camera, ANY_SOCKET)
@@ -264,12 +265,9 @@ class AravisDevice:
         return stream
 
     def _searched(self, aravis: Aravis) -> str:
-        """Return by what Aravis opens the camera with this serial number."""
+        """Return the device ID of the camera with this serial number."""
         for index in _listed(aravis):
-            known = (
-                aravis.get_device_serial_nbr(index),
-                aravis.get_device_id(index),
-            )
+            known = (aravis.get_device_serial_nbr(index), aravis.get_device_id(index))
             if self._place.encode() in known:
                 name: bytes = known[1]
                 return name.decode()
@@ -278,7 +276,7 @@ class AravisDevice:
     def _require_control(
         self, aravis: Aravis, camera: int, *, is_new: bool = True
     ) -> None:
-        """Refuse a camera that another program controls."""
+        """Raise `DeviceBusy` if another program controls the camera."""
         if not aravis.camera_is_gv_device(camera):
             return
         if aravis.gv_device_is_controller(aravis.camera_get_device(camera)):
@@ -289,15 +287,15 @@ class AravisDevice:
         raise busy(self._place)
 
 
-def _delivery(aravis: Aravis, buffer: int) -> Delivery:
+def _delivery(aravis: Aravis, buffer: int) -> DeliveredFrame:
     number = aravis.buffer_get_frame_id(buffer)
     if aravis.buffer_get_status(buffer) != SUCCESS:
-        return Delivery(np.zeros(0, np.uint8), 0, 0, number, is_complete=False)
+        return DeliveredFrame(np.zeros(0, np.uint8), 0, 0, number, is_complete=False)
     size, x_padding, y_padding = c_size_t(), c_int(), c_int()
     data = aravis.buffer_get_image_data(buffer, byref(size))
     aravis.buffer_get_image_padding(buffer, byref(x_padding), byref(y_padding))
     sent = (ctypes.c_uint8 * size.value).from_address(data)
-    return Delivery(
+    return DeliveredFrame(
         np.ctypeslib.as_array(sent).copy(),
         aravis.buffer_get_image_width(buffer),
         aravis.buffer_get_image_height(buffer),
@@ -316,7 +314,7 @@ def _is_address(place: str) -> bool:
 
 
 def _listed(aravis: Aravis) -> range:
-    """Return the numbers of all cameras that answer now."""
+    """Return the indices of all cameras that respond now."""
     aravis.update_device_list()
     return range(aravis.get_n_devices())
 
@@ -336,14 +334,10 @@ def _find(producer: str) -> tuple[FoundDevice, ...]:
     return tuple(found)
 
 
-_ABSENT = sentence(
-    "aravis.absent",
-    "Aravis is not installed. It drives GigE Vision and USB3 Vision cameras on Linux: "
-    "apt-get install libaravis-0.8-0",
-)
+_ABSENT = message("aravis.absent")
 
 
-def _why_absent() -> Sentence | None:
+def _why_absent() -> Message | None:
     try:
         load_aravis()
     except (OSError, AttributeError):
@@ -356,10 +350,5 @@ def _camera(place: SourcePlace, clock: Clock) -> DeviceCamera:
 
 
 ARAVIS = Source(
-    "aravis",
-    sentence("source.aravis", "GigE and USB3 Vision (Aravis)"),
-    Needs.DEVICE,
-    _camera,
-    _find,
-    _why_absent,
+    "aravis", message("source.aravis"), SourceNeeds.DEVICE, _camera, _find, _why_absent
 )

@@ -1,4 +1,4 @@
-"""The library Aravis through ctypes: what is used of it, with its errors as exceptions.
+"""Bindings of Aravis by ctypes, with errors as exceptions.
 
 Aravis drives GigE Vision and USB3 Vision cameras without a vendor's software. Its
 Python binding needs PyGObject, which no wheel brings; these few functions need nothing.
@@ -49,7 +49,7 @@ class _GError(ctypes.Structure):
 
 
 class Aravis:
-    """The functions of the library by their names there, without ``arv_``.
+    """The functions of the library, named without ``arv_``.
 
     Those of a camera take its pointer first; what fails raises `AravisError`.
     """
@@ -98,8 +98,12 @@ class Aravis:
             "camera_set_integer", None, pointer, text, c_int64
         )
         self.camera_get_integer_bounds = risky(
-            *("camera_get_integer_bounds", None, pointer, text),
-            *(POINTER(c_int64), POINTER(c_int64)),
+            "camera_get_integer_bounds",
+            None,
+            pointer,
+            text,
+            POINTER(c_int64),
+            POINTER(c_int64),
         )
         self.camera_get_integer_increment = risky(
             "camera_get_integer_increment", c_int64, pointer, text
@@ -107,8 +111,12 @@ class Aravis:
         self.camera_get_float = risky("camera_get_float", c_double, pointer, text)
         self.camera_set_float = risky("camera_set_float", None, pointer, text, c_double)
         self.camera_get_float_bounds = risky(
-            *("camera_get_float_bounds", None, pointer, text),
-            *(POINTER(c_double), POINTER(c_double)),
+            "camera_get_float_bounds",
+            None,
+            pointer,
+            text,
+            POINTER(c_double),
+            POINTER(c_double),
         )
         self.camera_get_string = risky("camera_get_string", text, pointer, text)
         self.camera_set_string = risky("camera_set_string", None, pointer, text, text)
@@ -119,8 +127,11 @@ class Aravis:
             "camera_execute_command", None, pointer, text
         )
         self.camera_dup_available_enumerations_as_strings = risky(
-            *("camera_dup_available_enumerations_as_strings", POINTER(text)),
-            *(pointer, text, POINTER(c_uint)),
+            "camera_dup_available_enumerations_as_strings",
+            POINTER(text),
+            pointer,
+            text,
+            POINTER(c_uint),
         )
 
         self.stream_get_info_uint64_by_name = plain(
@@ -140,8 +151,7 @@ class Aravis:
         self.buffer_get_image_width = plain("buffer_get_image_width", c_int, pointer)
         self.buffer_get_image_height = plain("buffer_get_image_height", c_int, pointer)
         self.buffer_get_image_padding = plain(
-            *("buffer_get_image_padding", None, pointer),
-            *(POINTER(c_int), POINTER(c_int)),
+            "buffer_get_image_padding", None, pointer, POINTER(c_int), POINTER(c_int)
         )
 
         self._device_errors = plain("device_error_quark", c_uint32)()
@@ -150,17 +160,17 @@ class Aravis:
         self.unref = _bound(self._gobject.g_object_unref, None, pointer)
         # One property, its value, and the null that ends the list of them.
         self.set_property = _bound(
-            *(self._gobject.g_object_set, None, pointer, text, c_int, pointer)
+            self._gobject.g_object_set, None, pointer, text, c_int, pointer
         )
         self.is_a = _bound(
-            *(self._gobject.g_type_check_instance_is_a, c_bool, pointer, c_size_t)
+            self._gobject.g_type_check_instance_is_a, c_bool, pointer, c_size_t
         )
 
     def _plain(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
         return _bound(getattr(self._library, f"arv_{name}"), result, *arguments)
 
     def _risky(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
-        """Return a function that tells of failure by its last argument."""
+        """Return a function that reports errors by its last argument."""
         call = self._plain(name, result, *arguments, POINTER(POINTER(_GError)))
 
         def checked(*values: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Basler cameras through pypylon, which brings the whole of pylon with it."""
+"""Basler cameras by pypylon, which includes pylon."""
 
 import sys
 from collections.abc import Iterator
@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 
 from lightpen.cameras.clock import Clock
-from lightpen.cameras.device_camera import Delivery, DeviceCamera
+from lightpen.cameras.device_camera import DeliveredFrame, DeviceCamera
 from lightpen.cameras.device_errors import busy, in_sentences, lost, not_found
 from lightpen.cameras.genapi_features import GenapiFeatures, refusals
 from lightpen.cameras.protocol import DeviceNotFound
-from lightpen.cameras.source import FoundDevice, Needs, Source, SourcePlace
-from lightpen.sentences import Sentence, sentence
+from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
+from lightpen.messages import Message, message
 
+NAME = "Basler (pylon)"
 # Kinds of connection, those first that are searched without asking the network.
 LAYERS = ("BaslerCamEmu", "BaslerUsb", "BaslerGigE", "BaslerCxp")
-N_BUFFERS = 16  # images on their way; each is given back as soon as it is copied
+N_BUFFERS = 16  # images in transit; each buffer is returned once copied
 
 
 class BaslerDevice:
@@ -42,7 +43,7 @@ class BaslerDevice:
         return self._features
 
     def open(self) -> None:
-        """Take hold of the camera."""
+        """Open the camera."""
         if (why_absent := _why_absent()) is not None:
             raise DeviceNotFound(why_absent)
         from pypylon import genicam, pylon
@@ -73,7 +74,7 @@ class BaslerDevice:
         )
 
     def close(self) -> None:
-        """Let go of the camera."""
+        """Close the camera."""
         self._features = None
         camera, self._camera = self._camera, None
         if camera is not None:
@@ -85,21 +86,21 @@ class BaslerDevice:
                 camera.DestroyDevice()
 
     def start(self) -> None:
-        """Let images come."""
+        """Start streaming."""
         from pypylon import pylon
 
         with _told(self._serial):
             self._camera.StartGrabbing(pylon.GrabStrategy_OneByOne)
 
     def stop(self) -> None:
-        """Let no more images come."""
+        """Stop streaming."""
         from pypylon import genicam
 
         with suppress(genicam.GenericException):
             self._camera.StopGrabbing()
 
-    def fetch(self, timeout_s: float) -> Delivery | None:
-        """Return the next image, None where none comes in time."""
+    def fetch(self, timeout_s: float) -> DeliveredFrame | None:
+        """Return the next image; None after the timeout."""
         from pypylon import pylon
 
         timeout_ms, returns = round(1000 * timeout_s), pylon.TimeoutHandling_Return
@@ -111,17 +112,17 @@ class BaslerDevice:
                 return _delivery(result)
 
     def probe(self) -> None:
-        """Do nothing if the camera answers."""
+        """Raise an error unless the camera responds."""
         if self._camera.IsCameraDeviceRemoved():
             raise lost(self._serial, "it was removed")
         self.features.number("Width")
 
 
-def _delivery(result: Any) -> Delivery:
+def _delivery(result: Any) -> DeliveredFrame:
     if not result.GrabSucceeded():
         nothing = np.zeros(0, np.uint8)
-        return Delivery(nothing, 0, 0, result.GetBlockID(), is_complete=False)
-    return Delivery(
+        return DeliveredFrame(nothing, 0, 0, result.GetBlockID(), is_complete=False)
+    return DeliveredFrame(
         np.frombuffer(result.GetBuffer(), np.uint8),
         result.GetWidth(),
         result.GetHeight(),
@@ -138,7 +139,7 @@ def _told(serial: str) -> AbstractContextManager[None]:
 
 
 def _infos() -> Iterator[tuple[Any, Any]]:
-    """Return every camera with the layer that it is reached by."""
+    """Yield every camera with its transport layer."""
     from pypylon import pylon
 
     factory = pylon.TlFactory.GetInstance()
@@ -157,21 +158,12 @@ def _find(producer: str) -> tuple[FoundDevice, ...]:
     )
 
 
-def _why_absent() -> Sentence | None:
+def _why_absent() -> Message | None:
     if find_spec("pypylon") is not None:
         return None
     if find_spec("pip") is None:  # as in the program that the Windows installer brings
-        return sentence(
-            "basler.not-part",
-            "pypylon is not part of this program. Basler cameras also work as GenICam "
-            "cameras, with the GenTL producer of pylon.",
-        )
-    return sentence(
-        "basler.absent",
-        "pypylon is not installed. It drives Basler cameras: {python} -m pip install "
-        "pypylon",
-        python=sys.executable,
-    )
+        return message("basler.not-part")
+    return message("basler.absent", python=sys.executable)
 
 
 def _camera(place: SourcePlace, clock: Clock) -> DeviceCamera:
@@ -180,8 +172,8 @@ def _camera(place: SourcePlace, clock: Clock) -> DeviceCamera:
 
 BASLER = Source(
     "basler",
-    sentence("source.basler", "Basler (pylon)"),
-    Needs.DEVICE,
+    message("source.named", name=NAME),
+    SourceNeeds.DEVICE,
     _camera,
     _find,
     _why_absent,

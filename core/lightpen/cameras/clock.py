@@ -1,4 +1,4 @@
-"""Time as a source of images sees it: the machine's, or one that skips every wait."""
+"""Clocks of image sources: the machine's, or one that skips every wait."""
 
 import time
 from threading import Event, Lock
@@ -6,14 +6,14 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """What tells the time and waits."""
+    """A clock that can also wait."""
 
     @property
     def is_real(self) -> bool:
-        """Whether time goes on while nobody waits."""
+        """Whether time passes without waiting."""
 
     def now_ns(self) -> int:
-        """Return a time that never goes back, ns from an arbitrary start."""
+        """Return a monotonic time, ns."""
 
     def wait(self, seconds: float, wake: Event | None = None) -> bool:
         """Wait, or until ``wake`` is set; return whether it is.
@@ -40,7 +40,7 @@ class MachineClock:
 
 
 class SkippingClock:
-    """A clock that goes on only when somebody waits, and then at once.
+    """A clock that advances only by waiting, at once.
 
     With it a simulated hour takes as long as its images take to make, and the same
     calls give the same images.
@@ -64,7 +64,7 @@ class SkippingClock:
         return self._now_ns
 
     def wait(self, seconds: float, wake: Event | None = None) -> bool:
-        """Let ``seconds`` pass unless ``wake`` is set; return whether it is."""
+        """Advance by ``seconds`` unless ``wake`` is set; return whether it is."""
         if wake is not None and wake.wait(max(seconds, 0.0) if self._rests else 0.0):
             return True
         with self._lock:

@@ -1,4 +1,4 @@
-"""A real camera behind the one contract, whichever library drives it.
+"""A real camera behind the common protocol, for any library.
 
 The library is a `Device`: it opens and closes, hands on what arrives, and reaches the
 camera's features. What all cameras share is done here: settings, numbers and times of
@@ -14,7 +14,7 @@ from lightpen.cameras.features import (
     GAINS,
     Features,
     apply_settings,
-    read_caps,
+    read_capabilities,
     read_settings,
     set_nearest,
 )
@@ -22,8 +22,8 @@ from lightpen.cameras.pixel_formats import Bytes, decoded, pixel_format_named
 from lightpen.cameras.protocol import (
     EXPOSURE,
     GAIN,
+    CameraCapabilities,
     CameraSettings,
-    Caps,
     ConfigError,
     Frame,
     FrameIncomplete,
@@ -32,7 +32,7 @@ from lightpen.cameras.protocol import (
     TriggerMode,
     sealed,
 )
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message
 
 SETTLING = 0.4  # s that images with the exposure before may still come
 LOST_TRIGGER = 1.0  # s beyond the exposure without an image; it is given again
@@ -41,8 +41,8 @@ MOST_MISSED = 10_000  # at once; a larger gap is a camera that counts anew
 
 
 @dataclass(frozen=True, eq=False)
-class Delivery:
-    """What a library delivers of one image.
+class DeliveredFrame:
+    """An image as a library delivers it.
 
     Attributes
     ----------
@@ -73,14 +73,14 @@ class Device(Protocol):
 
     @property
     def serial(self) -> str:
-        """Serial number, or what else it is looked for by until it is open."""
+        """Serial number, or the address until it is open."""
 
     @property
     def features(self) -> Features:
         """The features of the open camera."""
 
     def open(self) -> None:
-        """Take hold of the camera.
+        """Open the camera.
 
         Raises
         ------
@@ -88,19 +88,19 @@ class Device(Protocol):
         """
 
     def close(self) -> None:
-        """Let go of everything; also of a dead camera, and twice."""
+        """Release everything; may be called twice and on a dead camera."""
 
     def start(self) -> None:
-        """Let images come."""
+        """Start streaming."""
 
     def stop(self) -> None:
-        """Let no more images come, not even of a dead camera."""
+        """Stop streaming, also of a dead camera."""
 
-    def fetch(self, timeout_s: float) -> Delivery | None:
-        """Return the next image, None where none comes in time."""
+    def fetch(self, timeout_s: float) -> DeliveredFrame | None:
+        """Return the next image; None after the timeout."""
 
     def probe(self) -> None:
-        """Do nothing if the camera answers."""
+        """Raise an error unless the camera responds."""
 
 
 class DeviceCamera:
@@ -109,13 +109,13 @@ class DeviceCamera:
     Parameters
     ----------
     device : Device
-        Not open, and nobody else's.
+        Not open; used by this camera only.
     """
 
     def __init__(self, device: Device, clock: Clock | None = None) -> None:
         self._device = device
         self._clock = clock or MachineClock()
-        self._caps: Caps | None = None
+        self._capabilities: CameraCapabilities | None = None
         self._settings = CameraSettings()
         self._is_streaming = False
         self._stats = Stats()
@@ -127,30 +127,30 @@ class DeviceCamera:
 
     @property
     def serial(self) -> str:
-        """Serial number of the device, or what else it is found by."""
+        """Serial number or address of the device."""
         return self._device.serial
 
     @property
-    def caps(self) -> Caps:
-        """What the camera can do with the settings that are in force."""
-        if self._caps is None:
+    def caps(self) -> CameraCapabilities:
+        """Capabilities with the current settings."""
+        if self._capabilities is None:
             raise ValueError("The camera is not open: call `open` first.")
-        return self._caps
+        return self._capabilities
 
     def open(self) -> None:
-        """Find the camera and take hold of it; nothing if it is open."""
-        if self._caps is None:
+        """Find and open the camera; no-op if it is open."""
+        if self._capabilities is None:
             self._device.open()
             self._refresh()
 
     def close(self) -> None:
-        """Stop and let go of the camera."""
+        """Stop and close the camera."""
         self.stop()
-        self._caps = None
+        self._capabilities = None
         self._device.close()
 
     def configure(self, settings: CameraSettings) -> CameraSettings:
-        """Set up the camera before the start; return what is in force."""
+        """Apply settings before the start; return the actual ones."""
         self._check_open()
         if self._is_streaming:
             raise ValueError("`configure` needs a stopped camera.")
@@ -159,19 +159,19 @@ class DeviceCamera:
         return self._settings
 
     def set_exposure(self, exposure_us: float) -> float:
-        """Set the exposure, also while images come; return what is in force, us."""
+        """Set the exposure, also while streaming; return the actual one, us."""
         applied = self._set(EXPOSURE, EXPOSURES, exposure_us)
         self._settings = replace(self._settings, exposure_us=applied)
         return applied
 
     def set_gain(self, gain_db: float) -> float:
-        """Set the gain, also while images come; return what is in force, dB."""
+        """Set the gain, also while streaming; return the actual one, dB."""
         applied = self._set(GAIN, GAINS, gain_db)
         self._settings = replace(self._settings, gain_db=applied)
         return applied
 
     def start(self) -> None:
-        """Let images come; nothing if they do."""
+        """Start streaming; no-op while streaming."""
         self._check_open()
         if self._is_streaming:
             return
@@ -182,7 +182,7 @@ class DeviceCamera:
         self._next_trigger_ns = self._lost_ns = self._settled_ns = now_ns
 
     def stop(self) -> None:
-        """Let no more images come; nothing if none do."""
+        """Stop streaming; no-op if stopped."""
         if self._is_streaming:
             self._is_streaming = False
             self._device.stop()
@@ -195,64 +195,41 @@ class DeviceCamera:
         delivery = self._fetch(timeout_s)
         if delivery is None:
             self._stats = replace(self._stats, timeouts=self._stats.timeouts + 1)
-            raise FrameTimeout(
-                sentence(
-                    "camera.no-image",
-                    "The camera {serial} sent no image for {waited:.1f} s. Check its "
-                    "cable and its trigger.",
-                    serial=self.serial,
-                    waited=timeout_s,
-                )
-            )
+            raise FrameTimeout("camera.no-image", serial=self.serial, waited=timeout_s)
         seq = self._seq(delivery.number)
         if not self._is_whole(delivery):
             self._stats = replace(self._stats, incomplete=self._stats.incomplete + 1)
-            raise FrameIncomplete(
-                sentence(
-                    "camera.incomplete",
-                    "Image {seq} of the camera {serial} arrived incomplete and was "
-                    "left out. Check the cable and the network.",
-                    seq=seq,
-                    serial=self.serial,
-                )
-            )
+            raise FrameIncomplete("camera.incomplete", seq=seq, serial=self.serial)
         self._stats = replace(self._stats, delivered=self._stats.delivered + 1)
         return self._frame(delivery, seq)
 
     def probe(self) -> None:
-        """Do nothing if the camera answers."""
+        """Raise an error unless the camera responds."""
         self._check_open()
         self._device.probe()
 
     def stats(self) -> Stats:
-        """Return what became of the images so far."""
+        """Return the frame counters."""
         return self._stats
 
     def _check_open(self) -> None:
-        if self._caps is None:
+        if self._capabilities is None:
             raise ValueError("The camera is not open: call `open` first.")
 
     def _refresh(self) -> None:
         features = self._device.features
-        self._caps = replace(read_caps(features), has_link=True)
-        self._settings = read_settings(features, self._caps)
+        self._capabilities = replace(read_capabilities(features), has_link=True)
+        self._settings = read_settings(features, self._capabilities)
 
-    def _set(self, what: Sentence, names: tuple[str, ...], value: float) -> float:
+    def _set(self, what: Message, names: tuple[str, ...], value: float) -> float:
         self._check_open()
         self._settled_ns = self._clock.now_ns() + round(SETTLING * 1e9)
         applied = set_nearest(self._device.features, names, value)
         if applied is None:
-            raise ConfigError(
-                sentence(
-                    "camera.cannot-be-set",
-                    "The {what} of this camera cannot be set. Use the aperture of the "
-                    "lens.",
-                    what=what,
-                )
-            )
+            raise ConfigError("camera.cannot-be-set", what=what)
         return applied
 
-    def _fetch(self, timeout_s: float) -> Delivery | None:
+    def _fetch(self, timeout_s: float) -> DeliveredFrame | None:
         if self._settings.trigger is not TriggerMode.SOFTWARE:
             return self._device.fetch(timeout_s)
         now_ns = self._clock.now_ns()
@@ -282,7 +259,7 @@ class DeviceCamera:
         self._device.features.execute("TriggerSoftware")
 
     def _seq(self, number: int) -> int:
-        """Return the number of an image over the life of the camera."""
+        """Return the sequence number of an image since the camera was made."""
         last, self._last_number = self._last_number, number
         step = 1
         if last is not None:
@@ -296,8 +273,8 @@ class DeviceCamera:
         self._next_seq = seq + 1
         return seq
 
-    def _is_whole(self, delivery: Delivery) -> bool:
-        """Return whether an image is all there, whatever the library says of it."""
+    def _is_whole(self, delivery: DeliveredFrame) -> bool:
+        """Return whether an image is complete, independently of the library."""
         pixel_format = pixel_format_named(self._settings.pixel_format or "")
         caps = self.caps
         return (
@@ -308,7 +285,7 @@ class DeviceCamera:
             >= pixel_format.size(caps.width, caps.height, delivery.padding)
         )
 
-    def _frame(self, delivery: Delivery, seq: int) -> Frame:
+    def _frame(self, delivery: DeliveredFrame, seq: int) -> Frame:
         pixel_format = pixel_format_named(self._settings.pixel_format or "")
         assert pixel_format is not None
         now_ns = self._clock.now_ns()

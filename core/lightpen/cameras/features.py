@@ -1,4 +1,4 @@
-"""Settings of a GenICam camera, whichever library reaches its features.
+"""Settings of a GenICam camera, for any library.
 
 Cameras name their features by the Standard Features Naming Convention (SFNC), older
 ones with endings such as ``Abs``. Of each setting the first name that is there is used,
@@ -10,15 +10,14 @@ from typing import Protocol
 
 from lightpen.cameras.pixel_formats import usable
 from lightpen.cameras.protocol import (
+    CameraCapabilities,
     CameraSettings,
-    Caps,
     ConfigError,
     Range,
     Region,
     RegionLimits,
     TriggerMode,
 )
-from lightpen.sentences import sentence
 
 EXPOSURES = ("ExposureTime", "ExposureTimeAbs")
 GAINS = ("Gain", "GainAbs", "GainRaw")  # the last one in steps of the camera's own
@@ -31,23 +30,23 @@ PACKET_SIZE = "GevSCPSPacketSize"
 class Features(Protocol):
     """The features of an open camera by their names.
 
-    Each method but `has` may raise what is to be raised where a camera is gone.
+    Each method but `has` may raise `DeviceLost`.
     """
 
     def has(self, name: str) -> bool:
-        """Return whether the camera has a feature, and it can be used now."""
+        """Return whether the camera has a feature that is available now."""
 
     def number(self, name: str) -> float:
         """Return the value of a number."""
 
     def limits(self, name: str) -> Range:
-        """Return the values that a number takes now."""
+        """Return the present range of a number."""
 
     def set_number(self, name: str, value: float) -> None:
         """Set a number that is within its limits."""
 
     def choice(self, name: str) -> str:
-        """Return the entry of an enumeration that is in force."""
+        """Return the current entry of an enumeration."""
 
     def choices(self, name: str) -> tuple[str, ...]:
         """Return the entries of an enumeration that can be chosen now."""
@@ -62,11 +61,11 @@ class Features(Protocol):
         """Execute a command."""
 
 
-def read_caps(features: Features) -> Caps:
-    """Return what a camera can do with the settings that are in force."""
+def read_capabilities(features: Features) -> CameraCapabilities:
+    """Return the capabilities of a camera with its current settings."""
     region = read_region(features)
     triggers = (TriggerMode.FREE, TriggerMode.SOFTWARE)
-    return Caps(
+    return CameraCapabilities(
         width=region.width,
         height=region.height,
         pixel_formats=usable(features.choices("PixelFormat")),
@@ -80,8 +79,8 @@ def read_caps(features: Features) -> Caps:
     )
 
 
-def read_settings(features: Features, caps: Caps) -> CameraSettings:
-    """Return the settings that are in force."""
+def read_settings(features: Features, caps: CameraCapabilities) -> CameraSettings:
+    """Return the current settings."""
     packet_size = _number(features, (PACKET_SIZE,))
     return CameraSettings(
         exposure_us=_number(features, EXPOSURES),
@@ -95,7 +94,7 @@ def read_settings(features: Features, caps: Caps) -> CameraSettings:
 
 
 def apply_settings(features: Features, wanted: CameraSettings) -> None:
-    """Set up a camera that sends no images; values are brought into their ranges.
+    """Apply settings to a stopped camera; values are clipped to their ranges.
 
     Pixel format and region come before the frame rate, whose range they change.
 
@@ -126,7 +125,7 @@ def apply_settings(features: Features, wanted: CameraSettings) -> None:
 def set_nearest(
     features: Features, names: Iterable[str], value: float | None
 ) -> float | None:
-    """Set a number as near as the camera can; return what is in force, None without."""
+    """Set a number to the nearest possible; return it, None if it is missing."""
     name = _first(features, names)
     if name is None:
         return None
@@ -136,7 +135,7 @@ def set_nearest(
 
 
 def read_region(features: Features) -> Region:
-    """Return the region that is read out."""
+    """Return the region of interest."""
     x = _number(features, ("OffsetX",)) or 0.0
     y = _number(features, ("OffsetY",)) or 0.0
     width, height = features.number("Width"), features.number("Height")
@@ -174,7 +173,7 @@ def _set_region(features: Features, wanted: Region) -> None:
 
 
 def _choose_pixel_format(features: Features, wanted: str | None) -> None:
-    """Choose a pixel format; where none is wanted, one that can be decoded."""
+    """Choose a pixel format; by default one that can be decoded."""
     offered = features.choices("PixelFormat")
     usable_ones = usable(offered)
     if wanted is None:
@@ -185,20 +184,15 @@ def _choose_pixel_format(features: Features, wanted: str | None) -> None:
             wanted = usable_ones[0]
     if wanted not in usable_ones:
         raise ConfigError(
-            sentence(
-                "camera.pixel-format",
-                "The camera sends no images in the pixel format {wanted} that can be "
-                "used; it offers {offered}. Choose Mono8, or another of Mono8 to "
-                "Mono16.",
-                wanted=wanted,
-                offered=", ".join(usable_ones or offered),
-            )
+            "camera.pixel-format",
+            wanted=wanted,
+            offered=", ".join(usable_ones or offered),
         )
     features.choose("PixelFormat", wanted)
 
 
 def _choose_trigger(features: Features, wanted: TriggerMode | None) -> None:
-    """Choose what makes the camera take an image; a line that may be dead does not."""
+    """Choose the trigger mode; never an external line."""
     if wanted is None:
         wanted = _trigger(features)
     if not features.has("TriggerMode"):

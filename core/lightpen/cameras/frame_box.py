@@ -1,36 +1,35 @@
-"""How frames pass from the thread of a camera to those that use them."""
+"""Containers that pass frames between threads."""
 
 from collections import deque
 from collections.abc import Callable
 from threading import Condition, Lock
 
 from lightpen.cameras.protocol import EndOfImages, Frame, FrameTimeout
-from lightpen.sentences import sentence
 
 
 class FrameBox:
-    """Room for one frame: the newest wins, so a slow reader costs no memory."""
+    """Holds the newest frame only."""
 
     def __init__(self) -> None:
         self._frame: Frame | None = None
         self._lock = Lock()
 
     def put(self, frame: Frame) -> bool:
-        """Leave a frame; return whether the box was empty, so news for its reader."""
+        """Put a frame; return whether the box was empty."""
         with self._lock:
             was_empty = self._frame is None
             self._frame = frame
             return was_empty
 
     def take(self) -> Frame | None:
-        """Return the frame in the box, which is empty then, or None."""
+        """Take the frame out of the box; None if it is empty."""
         with self._lock:
             frame, self._frame = self._frame, None
             return frame
 
 
 class FrameQueue:
-    """Room for ``n_frames`` frames, of which none gets lost inside."""
+    """A queue of at most ``n_frames`` frames."""
 
     def __init__(self, n_frames: int) -> None:
         if n_frames < 1:
@@ -50,7 +49,7 @@ class FrameQueue:
             return True
 
     def hand_over(self, frame: Frame, is_wanted: Callable[[], bool]) -> None:
-        """Append a frame, and return when it was taken.
+        """Append a frame and wait until it is taken.
 
         Nothing is made ahead of its reader, so one who answers an image sees what comes
         of it in the next but one.
@@ -58,7 +57,7 @@ class FrameQueue:
         Parameters
         ----------
         is_wanted : callable
-            Returns whether anybody takes frames; asked again after `clear`.
+            Returns whether frames are wanted; checked again after `clear`.
         """
         with self._changed:
             if self._is_ended:
@@ -75,9 +74,9 @@ class FrameQueue:
         Raises
         ------
         FrameTimeout
-            None came in ``timeout_s``.
+            No frame within ``timeout_s``.
         EndOfImages
-            None will come.
+            The images have ended.
         """
         with self._changed:
             self._changed.wait_for(lambda: self._frames or self._is_ended, timeout_s)
@@ -87,22 +86,16 @@ class FrameQueue:
                 return frame
             if self._is_ended:
                 raise EndOfImages
-            raise FrameTimeout(
-                sentence(
-                    "camera.no-image-came",
-                    "No image came for {waited:.1f} s. Check the camera.",
-                    waited=timeout_s,
-                )
-            )
+            raise FrameTimeout("camera.no-image-came", waited=timeout_s)
 
     def clear(self) -> None:
-        """Forget the frames that nobody took."""
+        """Discard the queued frames."""
         with self._changed:
             self._frames.clear()
             self._changed.notify_all()
 
     def end(self) -> None:
-        """Let no more frames in; those inside can still be taken."""
+        """Accept no more frames; queued ones can still be taken."""
         with self._changed:
             self._is_ended = True
             self._changed.notify_all()

@@ -1,4 +1,4 @@
-"""The features of a camera through GenApi, as Harvesters and pypylon both have it."""
+"""Features of a camera by GenApi, as in Harvesters and pypylon."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -15,13 +15,13 @@ class GenapiFeatures:
     Parameters
     ----------
     find : callable
-        Returns a node by its name, None where there is no such.
+        Returns a node by name, or None.
     spell : callable
         Returns the name of an attribute of a node as this library spells it.
     access : callable
-        Returns how a node can be accessed.
+        Returns the access mode of a node.
     told : callable
-        Returns what tells of refusals in sentences.
+        Returns a context that converts errors.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class GenapiFeatures:
         self._told = told
 
     def has(self, name: str) -> bool:
-        """Return whether the camera has a feature, and it can be used now."""
+        """Return whether the camera has a feature that is available now."""
         with self._told():
             node = self._find(name)
             return node is not None and self._access(node) in (WRITE_ONLY, READ_WRITE)
@@ -47,7 +47,7 @@ class GenapiFeatures:
         return float(self._read(name, "value"))
 
     def limits(self, name: str) -> Range:
-        """Return the values that a number takes now."""
+        """Return the present range of a number."""
         low, high = self._read(name, "min"), self._read(name, "max")
         # What a float is rounded to is seen when it is read back.
         step = self._read(name, "inc") if isinstance(low, int) else 0.0
@@ -59,7 +59,7 @@ class GenapiFeatures:
         self._write(name, round(value) if is_integer else float(value))
 
     def choice(self, name: str) -> str:
-        """Return the entry of an enumeration that is in force."""
+        """Return the current entry of an enumeration."""
         return str(self._read(name, "value"))
 
     def choices(self, name: str) -> tuple[str, ...]:
@@ -89,7 +89,7 @@ class GenapiFeatures:
 
 
 def refusals(genapi: Any) -> tuple[type[Exception], ...]:
-    """Return what GenApi raises where a camera answers, but not as it was asked to."""
+    """Return the exceptions of GenApi for refused requests."""
     return (
         genapi.AccessException,
         genapi.InvalidArgumentException,

@@ -1,4 +1,4 @@
-"""Cameras of any vendor through GenICam, with the vendor's GenTL producer.
+"""GenICam cameras by the GenTL producer of their vendor.
 
 A producer is a file ``.cti`` that comes with the software of a camera. Harvesters runs
 it. Its quirks, each seen: it passes over producers that do not load; its waiting call
@@ -19,17 +19,17 @@ from typing import Any
 import numpy as np
 
 from lightpen.cameras.clock import Clock
-from lightpen.cameras.device_camera import Delivery, DeviceCamera
+from lightpen.cameras.device_camera import DeliveredFrame, DeviceCamera
 from lightpen.cameras.device_errors import busy, in_sentences, not_found
 from lightpen.cameras.genapi_features import GenapiFeatures, refusals
 from lightpen.cameras.protocol import DeviceNotFound
-from lightpen.cameras.source import FoundDevice, Needs, Source, SourcePlace
+from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
 from lightpen.formats.files import printable
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 PRODUCERS = "GENICAM_GENTL64_PATH"  # folders, as the GenTL standard names them
 SUFFIX = ".cti"
-N_BUFFERS = 16  # images on their way; each is given back as soon as it is copied
+N_BUFFERS = 16  # images in transit; each buffer is returned once copied
 POLL = 0.002  # s that a call may keep the other threads waiting
 PAUSE = 0.003  # s between two of them
 
@@ -45,7 +45,7 @@ class GenicamDevice:
 
     @property
     def serial(self) -> str:
-        """Serial number, or what else the producer names the camera by."""
+        """Serial number, or the ID given by the producer."""
         return self._place.name
 
     @property
@@ -55,7 +55,7 @@ class GenicamDevice:
         return self._features
 
     def open(self) -> None:
-        """Take hold of the camera."""
+        """Open the camera."""
         if not _is_installed():
             raise DeviceNotFound(_ABSENT)
         from genicam import gentl
@@ -94,7 +94,7 @@ class GenicamDevice:
         )
 
     def close(self) -> None:
-        """Let go of the camera and the producer."""
+        """Close the camera and the producer."""
         self._features = None
         acquirer, self._acquirer = self._acquirer, None
         harvester, self._harvester = self._harvester, None
@@ -105,16 +105,16 @@ class GenicamDevice:
             _quietly(harvester.reset)
 
     def start(self) -> None:
-        """Let images come."""
+        """Start streaming."""
         with _told(self.serial):
             self._acquirer.start()
 
     def stop(self) -> None:
-        """Let no more images come."""
+        """Stop streaming."""
         _quietly(self._acquirer.stop)
 
-    def fetch(self, timeout_s: float) -> Delivery | None:
-        """Return the next image, None where none comes in time."""
+    def fetch(self, timeout_s: float) -> DeliveredFrame | None:
+        """Return the next image; None after the timeout."""
         end = time.monotonic() + timeout_s
         with _told(self.serial):
             while (buffer := self._acquirer.try_fetch(timeout=POLL)) is None:
@@ -125,11 +125,11 @@ class GenicamDevice:
                 return _delivery(buffer.module)
 
     def probe(self) -> None:
-        """Do nothing if the camera answers."""
+        """Raise an error unless the camera responds."""
         self.features.number("Width")
 
 
-def _delivery(module: Any) -> Delivery:
+def _delivery(module: Any) -> DeliveredFrame:
     from genicam import gentl
 
     try:
@@ -138,7 +138,7 @@ def _delivery(module: Any) -> Delivery:
         device_ts_ns = None
     size = module.size_filled - module.image_offset
     sent = np.frombuffer(module.raw_buffer, np.uint8, size, module.image_offset)
-    return Delivery(
+    return DeliveredFrame(
         sent.copy(),
         module.width,
         module.height,
@@ -157,7 +157,7 @@ def _told(serial: str) -> AbstractContextManager[None]:
 
 
 def _quietly(act: Callable[[], object]) -> None:
-    """Do something with a camera that may be dead."""
+    """Suppress the errors of a camera that may be dead."""
     from genicam import genapi, gentl
 
     with suppress(genapi.GenericException, gentl.GenericException):
@@ -165,7 +165,7 @@ def _quietly(act: Callable[[], object]) -> None:
 
 
 def _harvester(producer: str) -> Any:
-    """Return a harvester that knows the cameras of a producer, or of the system's.
+    """Return a harvester with the given producer, or with those of the system.
 
     Raises
     ------
@@ -176,16 +176,7 @@ def _harvester(producer: str) -> Any:
 
     files = [Path(producer)] if producer else _producers()
     if not files:
-        raise DeviceNotFound(
-            sentence(
-                "genicam.no-producer",
-                "No GenTL producer is installed: {variable} names no folder with a "
-                "file {suffix}. Install the software of the camera, or open its "
-                "file {suffix}.",
-                variable=PRODUCERS,
-                suffix=SUFFIX,
-            )
-        )
+        raise DeviceNotFound("genicam.no-producer", variable=PRODUCERS, suffix=SUFFIX)
     refusals = [_refusal(file) for file in files]
     harvester = Harvester()
     for file, refusal in zip(files, refusals, strict=True):
@@ -193,20 +184,16 @@ def _harvester(producer: str) -> Any:
             harvester.add_file(str(file))
     if not harvester.files:
         raise DeviceNotFound(
-            sentence(
-                "genicam.does-not-load",
-                "The GenTL producer {file} does not load: {why}. Choose the producer "
-                "of this camera, for this system and 64 bit.",
-                file=printable(str(files[0])),
-                why=refusals[0] or "",
-            )
+            "genicam.does-not-load",
+            file=printable(str(files[0])),
+            why=refusals[0] or "",
         )
     harvester.update()
     return harvester
 
 
 def _refusal(producer: Path) -> str | None:
-    """Return why a producer does not load; None where it does."""
+    """Return why a producer does not load; None if it does."""
     from genicam import gentl
 
     library = gentl.GenTLProducer.create_producer()
@@ -219,7 +206,7 @@ def _refusal(producer: Path) -> str | None:
 
 
 def _producers() -> list[Path]:
-    """Return the producers that the system names."""
+    """Return the producers registered in the system."""
     folders = [Path(each) for each in os.environ.get(PRODUCERS, "").split(os.pathsep)]
     return sorted(
         file for folder in folders if folder.name for file in folder.glob(f"*{SUFFIX}")
@@ -239,19 +226,14 @@ def _find(producer: str) -> tuple[FoundDevice, ...]:
     return found
 
 
-_ABSENT = sentence(
-    "genicam.absent",
-    "Harvesters is not installed. With the GenTL producer of its vendor it drives any "
-    "GenICam camera: {python} -m pip install harvesters genicam",
-    python=sys.executable,
-)
+_ABSENT = message("genicam.absent", python=sys.executable)
 
 
 def _is_installed() -> bool:
     return bool(find_spec("harvesters") and find_spec("genicam"))
 
 
-def _why_absent() -> Sentence | None:
+def _why_absent() -> Message | None:
     return None if _is_installed() else _ABSENT
 
 
@@ -261,8 +243,8 @@ def _camera(place: SourcePlace, clock: Clock) -> DeviceCamera:
 
 GENICAM = Source(
     "genicam",
-    sentence("source.genicam", "GenICam with a vendor's GenTL producer"),
-    Needs.DEVICE_AND_PRODUCER,
+    message("source.genicam"),
+    SourceNeeds.DEVICE_AND_PRODUCER,
     _camera,
     _find,
     _why_absent,

@@ -1,4 +1,4 @@
-"""Which frames of two cameras are of the same moment, and how far apart they are.
+"""Pair simultaneous frames of two cameras and estimate their time offset.
 
 Cameras with clocks are paired by these. Where the clocks do not agree, each is set by
 the frame that reached this machine fastest: all others were held up on the way. Nothing
@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpen.cameras.protocol import Frame
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 WAITING = 6  # frames of one camera that wait for the other
 LONGEST_WAITING = 16  # while the clocks are not known
@@ -30,7 +30,7 @@ PEN_SPEED = 100.0  # mm/s
 
 
 class FramePairs:
-    """Pairs the frames of two cameras, each of which come in their order."""
+    """Pairs the frames of two cameras; each delivers in order."""
 
     def __init__(self) -> None:
         self._waiting: tuple[deque[Frame], deque[Frame]] = (deque(), deque())
@@ -47,7 +47,7 @@ class FramePairs:
 
     @property
     def lag_ms(self) -> float | None:
-        """By how much the second camera is later; None until that is known.
+        """Lag of the second camera; None until it is known.
 
         It is half the time between two frames at most: a camera that is later than that
         is early for the next.
@@ -63,7 +63,7 @@ class FramePairs:
         return int(len(first) > len(second))
 
     def note(self, c: int, frame: Frame) -> None:
-        """Learn the times of a frame of camera 0 or 1 that is not to be paired."""
+        """Use the times of a frame of camera 0 or 1 without pairing it."""
         own, other = self._times[c], self._times[1 - c]
         own.note(frame)
         period_ns = self._period_ns
@@ -74,17 +74,17 @@ class FramePairs:
         self._lags_ns.append((apart_ns + period_ns / 2) % period_ns - period_ns / 2)
 
     def add(self, c: int, frame: Frame) -> None:
-        """Take a frame of camera 0 or 1."""
+        """Add a frame of camera 0 or 1."""
         self.note(c, frame)
         self._waiting[c].append(frame)
 
     def take(self, n_images: int | None = None) -> Frame | None:
-        """Return the next moment that is complete; None where none is.
+        """Return the next complete pair; None if there is none.
 
         Parameters
         ----------
         n_images : int, optional
-            Of two recordings that are shown over and over.
+            Length of two recordings that are repeated.
 
         Returns
         -------
@@ -107,7 +107,7 @@ class FramePairs:
         return None
 
     def moved_ms(self) -> float | None:
-        """Return, once, by how much the clocks of the last pairs were mistaken.
+        """Return, once, the error of the clock offset of the last pairs.
 
         Returns
         -------
@@ -118,7 +118,7 @@ class FramePairs:
         return moved_ns * 1e-6 if moved_ns else None
 
     def forget(self) -> None:
-        """Let go of frames that wait; they count for nothing."""
+        """Discard waiting frames without counting them."""
         for each in self._waiting:
             each.clear()
         self._offsets_ns.clear()
@@ -136,7 +136,7 @@ class FramePairs:
 
     @property
     def _offset_ns(self) -> int:
-        """What is to be added to times of the second camera; 0 of one clock."""
+        """Clock offset to add to times of the second camera; 0 for a common clock."""
         one, other = self._times
         if not one.has_clock or not other.has_clock:
             return 0
@@ -144,7 +144,7 @@ class FramePairs:
         return offset_ns if abs(offset_ns) >= SAME_CLOCK_NS else 0
 
     def _check_offset(self) -> None:
-        """Notice that the last pairs were made by another offset than the next."""
+        """Record that the clock offset changed after the last pairs."""
         offset_ns, period_ns = self._offset_ns, self._period_ns
         moved_ns = abs(offset_ns - self._offsets_ns[0]) if self._offsets_ns else 0
         if period_ns is not None and moved_ns > period_ns / 2:
@@ -159,7 +159,7 @@ class FramePairs:
         self._n_unpaired += 1
 
     def _apart(self, first: Frame, second: Frame, n_images: int | None) -> float | None:
-        """Return how much later the second frame is, in times between two frames."""
+        """Return the lag of the second frame, in frame periods."""
         if n_images is not None:
             half = n_images // 2
             return float((second.seq - first.seq + half) % n_images - half)
@@ -173,7 +173,7 @@ class FramePairs:
 
 
 class _Times:
-    """When the frames of one camera were taken and came."""
+    """Exposure and arrival times of the frames of one camera."""
 
     def __init__(self) -> None:
         self._last: Frame | None = None
@@ -188,17 +188,17 @@ class _Times:
 
     @property
     def has_clock(self) -> bool:
-        """Whether frames tell when they were taken."""
+        """Whether frames have device timestamps."""
         return bool(self._offsets_ns)
 
     @property
     def offset_ns(self) -> int:
-        """What the clock of this machine is ahead of the camera's, at most."""
+        """Upper bound of this machine's clock minus the camera's."""
         return min(self._offsets_ns)
 
     @property
     def is_settled(self) -> bool:
-        """Whether the last frames say no more of the clock than those before."""
+        """Whether the estimate of the clock offset has settled."""
         has_no_clock = self._last is not None and self._last.device_ts_ns is None
         return has_no_clock or self._n_no_faster >= SETTLED
 
@@ -208,7 +208,7 @@ class _Times:
         return float(np.median(self._gaps_ns)) if self._gaps_ns else None
 
     def note(self, frame: Frame) -> None:
-        """Take the times of a frame."""
+        """Add the times of a frame."""
         last, self._last = self._last, frame
         if last is not None and _is_set(last, frame):  # as after a power failure
             self._offsets_ns.clear()
@@ -234,7 +234,7 @@ class _Times:
 
 
 def _is_set(last: Frame, frame: Frame) -> bool:
-    """Return whether the clock of a camera was set between two frames."""
+    """Return whether the camera clock was reset between two frames."""
     if last.device_ts_ns is None or frame.device_ts_ns is None:
         return False
     by_camera = frame.device_ts_ns - last.device_ts_ns
@@ -246,20 +246,13 @@ def _time_ns(frame: Frame) -> int:
     return frame.host_ts_ns if frame.device_ts_ns is None else frame.device_ts_ns
 
 
-def held_up(moved_ms: float) -> Sentence:
-    """Return that pairs were made of frames that were not of one moment."""
-    return sentence(
-        "pairing.held-up",
-        "All images of one camera had been held up on their way, so that the last "
-        "pairs are of moments {moved:.0f} ms apart. From now on they are paired "
-        "rightly. Images that do not fit are left out of the result: look at them in "
-        "Review, or begin the swing again.",
-        moved=moved_ms,
-    )
+def held_up(moved_ms: float) -> Message:
+    """Return the message of pairs that were not simultaneous."""
+    return message("pairing.held-up", moved=moved_ms)
 
 
-def not_synchronised(lag_ms: float | None, px_per_mm: float | None) -> Sentence | None:
-    """Return what a lag costs at the pen's speed; None of one that does not matter.
+def not_synchronised(lag_ms: float | None, px_per_mm: float | None) -> Message | None:
+    """Return the message of a lag that matters at the pen's speed, or None.
 
     Parameters
     ----------
@@ -270,20 +263,5 @@ def not_synchronised(lag_ms: float | None, px_per_mm: float | None) -> Sentence 
         return None
     way = abs(lag_ms) * PEN_SPEED / 1000
     if px_per_mm is None:
-        return sentence(
-            "pairing.late",
-            "The cameras are not synchronised: they take their images {lag:.1f} ms "
-            "apart. At 100 mm/s the pen moves {way:.2f} mm meanwhile. Trigger both "
-            "cameras by one signal.",
-            lag=abs(lag_ms),
-            way=way,
-        )
-    return sentence(
-        "pairing.late-in-px",
-        "The cameras are not synchronised: they take their images {lag:.1f} ms apart. "
-        "At 100 mm/s the pen moves {way:.2f} mm meanwhile, {px:.1f} px in the image. "
-        "Trigger both cameras by one signal.",
-        lag=abs(lag_ms),
-        way=way,
-        px=way * px_per_mm,
-    )
+        return message("pairing.late", lag=abs(lag_ms), way=way)
+    return message("pairing.late-in-px", lag=abs(lag_ms), way=way, px=way * px_per_mm)

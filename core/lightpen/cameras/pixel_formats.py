@@ -20,7 +20,7 @@ Bytes = npt.NDArray[np.uint8]
 
 
 class Layout(Enum):
-    """How pixels lie in memory."""
+    """Memory layout of pixels."""
 
     WHOLE = auto()  # in one byte each, or in two if they have more than 8 bits
     PACKED = auto()  # two in three bytes, their low bits in the one between
@@ -52,11 +52,11 @@ class PixelFormat:
 
     @property
     def is_mono(self) -> bool:
-        """Whether each pixel measures the light itself."""
+        """Whether each pixel is a direct measurement (no Bayer pattern)."""
         return self.to_grey is None and self.n_channels == 1
 
     def size(self, width: int, height: int, padding: int = 0) -> int:
-        """Return the bytes of an image whose rows end in so many bytes of padding."""
+        """Return the size of an image with padded rows, bytes."""
         n_values = width * height * self.n_channels
         if self.layout is not Layout.WHOLE:
             bits = 12 if self.layout is Layout.PACKED else self.bits
@@ -91,7 +91,7 @@ _LAYOUTS = {"": Layout.WHOLE, "Packed": Layout.PACKED, "p": Layout.STREAM}
 
 
 def pixel_format_named(name: str) -> PixelFormat | None:
-    """Return a pixel format by its name; None for one that cannot be decoded."""
+    """Return a pixel format by name; None if it cannot be decoded."""
     if name in _LUMINANCES:
         return PixelFormat(name, n_channels=2, luminance=_LUMINANCES[name])
     found = re.fullmatch(
@@ -112,7 +112,7 @@ def pixel_format_named(name: str) -> PixelFormat | None:
 
 
 def usable(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return those of the formats that can be decoded, the better ones first.
+    """Return the formats that can be decoded, best first.
 
     Grey comes before colour, and whole bytes before packed ones.
     """

@@ -1,4 +1,4 @@
-"""What every live source of images offers, and what can go wrong with it.
+"""Protocol of live image sources, and their errors.
 
 `lightpen.model.camera.Camera` holds the intrinsics of a camera; an `ImageCamera` is
 the thing that delivers images. One thread makes all calls of an open one, see
@@ -8,30 +8,34 @@ the thing that delivers images. One thread makes all calls of an open one, see
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from math import isnan
-from typing import Protocol
+from typing import Annotated, Protocol, TypeAlias
+
+from msgspec import Meta
 
 from lightpen.arrays import Image
 from lightpen.errors import LightpenError
-from lightpen.sentences import sentence
+from lightpen.messages import message
 
-EXPOSURE = sentence("camera.exposure", "exposure")
-GAIN = sentence("camera.gain", "gain")
+EXPOSURE = message("camera.exposure")
+GAIN = message("camera.gain")
+
+Count: TypeAlias = Annotated[int, Meta(ge=0, le=10**9)]  # as records hold it
 
 
 class CameraFailure(LightpenError):  # noqa: N818 - its children tell what is wrong
-    """Base of what goes wrong with a source of images."""
+    """Base of the errors of an image source."""
 
 
 class DeviceNotFound(CameraFailure):
-    """The device is not there, or not switched on."""
+    """The device was not found or is switched off."""
 
 
 class DeviceBusy(CameraFailure):
-    """Another program has the device; it may let go of it within seconds."""
+    """The device is in use by another program, perhaps only for seconds."""
 
 
 class ConfigError(CameraFailure):
-    """The device cannot do what the settings ask for."""
+    """The device does not support the settings."""
 
 
 class FrameTimeout(CameraFailure):
@@ -39,19 +43,19 @@ class FrameTimeout(CameraFailure):
 
 
 class FrameIncomplete(CameraFailure):
-    """An image arrived damaged and was thrown away. Not fatal."""
+    """An image arrived damaged and was discarded. Not fatal."""
 
 
 class FramesSkipped(CameraFailure):
-    """Good images were thrown away because nobody took them in time. Not fatal."""
+    """Images were discarded because they were not processed in time. Not fatal."""
 
 
-class FramesHeldUp(CameraFailure):
-    """Frames of two cameras were paired that are of different moments. Not fatal."""
+class FramesDelayed(CameraFailure):
+    """Frames of two cameras were paired that are not simultaneous. Not fatal."""
 
 
 class DeviceLost(CameraFailure):
-    """The device no longer answers; only closing and opening it can help."""
+    """The device no longer responds; close and reopen it."""
 
 
 class EndOfImages(Exception):  # noqa: N818 - not an error
@@ -105,40 +109,40 @@ class Frame:
 
 
 def sealed(image: Image) -> Image:
-    """Return an image that was just made, and is nobody else's, as read-only."""
+    """Return a new image as read-only."""
     image.flags.writeable = False
     return image
 
 
 @dataclass(frozen=True)
 class Stats:
-    """What became of the images since the `ImageCamera` was made.
+    """Frame counters since the `ImageCamera` was made.
 
     Attributes
     ----------
     delivered : int
         Complete images.
     incomplete : int
-        Arrived damaged and thrown away.
+        Arrived damaged and discarded.
     missed : int
-        Never arrived: gaps in the numbers.
+        Never arrived: gaps in the sequence numbers.
     skipped : int
-        Thrown away by this program because it was too slow.
+        Discarded because processing was too slow.
     timeouts : int
-        Waits for an image that ended without one.
+        Reads that timed out.
     unpaired : int
-        Thrown away because another camera of the rig took none at that moment.
+        Discarded without a simultaneous image of the other camera.
     """
 
-    delivered: int = 0
-    incomplete: int = 0
-    missed: int = 0
-    skipped: int = 0
-    timeouts: int = 0
-    unpaired: int = 0
+    delivered: Count = 0
+    incomplete: Count = 0
+    missed: Count = 0
+    skipped: Count = 0
+    timeouts: Count = 0
+    unpaired: Count = 0
 
     def since(self, earlier: "Stats") -> "Stats":
-        """Return what has come to pass since an earlier count."""
+        """Return the difference from earlier counters."""
         names = [item.name for item in fields(self)]
         return Stats(*(getattr(self, name) - getattr(earlier, name) for name in names))
 
@@ -163,7 +167,7 @@ class Range:
     step: float = 0.0
 
     def nearest(self, value: float) -> float:
-        """Return the value that the camera takes instead of this one.
+        """Return the nearest possible value.
 
         Some cameras wrap values out of range round instead of refusing them.
         """
@@ -177,7 +181,7 @@ class Range:
 
 
 class TriggerMode(StrEnum):
-    """What makes a camera take an image."""
+    """Trigger mode of a camera."""
 
     FREE = "free running"  # its own clock
     SOFTWARE = "software"  # this program, whenever it waits for an image
@@ -216,7 +220,7 @@ class RegionLimits:
         return Region(0, 0, int(self.width.high), int(self.height.high))
 
     def nearest(self, wanted: Region) -> Region:
-        """Return the region that the camera reads out instead of this one."""
+        """Return the nearest possible region."""
         width = int(self.width.nearest(wanted.width))
         height = int(self.height.nearest(wanted.height))
         return Region(
@@ -233,8 +237,8 @@ def _place(wanted: int, most: float, step: int) -> int:
 
 
 @dataclass(frozen=True)
-class Caps:
-    """What an open camera can do.
+class CameraCapabilities:
+    """Capabilities of an open camera.
 
     Attributes
     ----------
@@ -245,9 +249,9 @@ class Caps:
     exposure_us, gain_db, frame_rate, packet_size : Range or None
         None if it cannot be set.
     gain_in_db : bool
-        Whether the gain is in dB, not in steps of the camera's own.
+        Whether the gain is in dB and not in device units.
     regions : RegionLimits or None
-        None if there is but the whole image.
+        None if the region cannot be set.
     triggers : tuple of TriggerMode
         That are offered, free running first.
     has_link : bool
@@ -275,14 +279,14 @@ class Caps:
 
 @dataclass(frozen=True)
 class CameraSettings:
-    """How a camera is to take images, or takes them.
+    """Requested or actual settings of a camera.
 
-    In a request None means: leave it. In an answer: the camera has no such thing.
+    In a request None means unchanged; in an answer, not supported.
 
     Attributes
     ----------
     packet_size : int or None
-        Of what a network camera sends at once, bytes.
+        Packet size of a network camera, bytes.
     """
 
     exposure_us: float | None = None
@@ -295,7 +299,7 @@ class CameraSettings:
 
 
 class ImageCamera(Protocol):
-    """A source of images, found by its serial number whenever it is opened.
+    """An image source, found by its serial number when it is opened.
 
     Calls out of order, such as reading before the start, raise `ValueError`. Any call
     on an open camera may raise `DeviceLost` except `stop` and `close`.
@@ -303,14 +307,14 @@ class ImageCamera(Protocol):
 
     @property
     def serial(self) -> str:
-        """Serial number of the device, or what else it is found by."""
+        """Serial number or address of the device."""
 
     @property
-    def caps(self) -> Caps:
-        """What the camera can do, once it is open."""
+    def caps(self) -> CameraCapabilities:
+        """Capabilities of the open camera."""
 
     def open(self) -> None:
-        """Find the device and take hold of it; nothing if it is open.
+        """Find and open the device; no-op if it is open.
 
         Raises
         ------
@@ -318,12 +322,12 @@ class ImageCamera(Protocol):
         """
 
     def close(self) -> None:
-        """Stop and let go of the device; seconds if it is dead, but never an error."""
+        """Stop and close the device; takes seconds if it is dead, never raises."""
 
     def configure(self, settings: CameraSettings) -> CameraSettings:
-        """Set up the camera before the start; return what is in force.
+        """Apply settings before the start; return the actual ones.
 
-        Values out of range are brought into it; what the camera has not is left out.
+        Values are clipped to their ranges; unsupported settings are ignored.
         `caps` may be others after it: the region gives the size of the images.
 
         Raises
@@ -333,7 +337,7 @@ class ImageCamera(Protocol):
         """
 
     def set_exposure(self, exposure_us: float) -> float:
-        """Set the exposure, also while images come; return what is in force, us.
+        """Set the exposure, also while streaming; return the actual one, us.
 
         Raises
         ------
@@ -342,7 +346,7 @@ class ImageCamera(Protocol):
         """
 
     def set_gain(self, gain_db: float) -> float:
-        """Set the gain, also while images come; return what is in force, dB.
+        """Set the gain, also while streaming; return the actual one, dB.
 
         Raises
         ------
@@ -351,10 +355,10 @@ class ImageCamera(Protocol):
         """
 
     def start(self) -> None:
-        """Let images come; nothing if they do."""
+        """Start streaming; no-op while streaming."""
 
     def stop(self) -> None:
-        """Let no more images come; nothing if none do."""
+        """Stop streaming; no-op if stopped."""
 
     def read(self, timeout_s: float) -> Frame:
         """Return the next complete image.
@@ -362,15 +366,15 @@ class ImageCamera(Protocol):
         Raises
         ------
         FrameTimeout
-            None came in ``timeout_s``.
+            No frame within ``timeout_s``.
         FrameIncomplete
-            One came damaged.
+            A frame arrived damaged.
         EndOfImages
             There are no more.
         """
 
     def probe(self) -> None:
-        """Do nothing if the device answers.
+        """Raise an error unless the device responds.
 
         Raises
         ------
@@ -378,4 +382,4 @@ class ImageCamera(Protocol):
         """
 
     def stats(self) -> Stats:
-        """Return what became of the images so far; ``skipped`` is left at 0."""
+        """Return the frame counters; ``skipped`` stays 0."""

@@ -1,4 +1,4 @@
-"""Recorded images as a live camera, at the rate they were taken or as fast as asked."""
+"""Replay recorded images as a live camera."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -11,8 +11,8 @@ from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import (
     EXPOSURE,
     GAIN,
+    CameraCapabilities,
     CameraSettings,
-    Caps,
     ConfigError,
     DeviceLost,
     DeviceNotFound,
@@ -24,12 +24,12 @@ from lightpen.cameras.protocol import (
     Stats,
     sealed,
 )
-from lightpen.cameras.source import Needs, Source, SourcePlace
+from lightpen.cameras.source import Source, SourceNeeds, SourcePlace
 from lightpen.errors import FileError
 from lightpen.formats.decoding import bits_of
 from lightpen.formats.files import printable
 from lightpen.formats.images import ImageSource, find_images
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 FRAME_RATE = Range(0.1, inf)  # inf: as fast as asked
 USUAL_FRAME_RATE = 20.0
@@ -71,7 +71,7 @@ class ReplayCamera:
         self._next_seq = 0
         self._next_due_ns = 0
         self._source: ImageSource | None = None
-        self._caps: Caps | None = None
+        self._capabilities: CameraCapabilities | None = None
         self._loaders: Iterator[Callable[[], Image]] | None = None
         self._n_unread = 0  # images in succession
 
@@ -81,23 +81,23 @@ class ReplayCamera:
         return self._where
 
     @property
-    def caps(self) -> Caps:
-        """What the camera can do."""
-        if self._caps is None:
+    def caps(self) -> CameraCapabilities:
+        """Capabilities of the camera."""
+        if self._capabilities is None:
             raise ValueError("The camera is not open: call `open` first.")
-        return self._caps
+        return self._capabilities
 
     def open(self) -> None:
-        """Find the images; nothing if it is open."""
-        if self._caps is not None:
+        """Find the images; no-op if it is open."""
+        if self._capabilities is not None:
             return
         try:
             source = self._find()
             (height, width), pixel_format = _usual_kind(source, self._where)
         except FileError as error:
-            raise DeviceNotFound(error.sentence) from error
+            raise DeviceNotFound(error.message) from error
         self._source = source
-        self._caps = Caps(
+        self._capabilities = CameraCapabilities(
             width=width,
             height=height,
             pixel_formats=(pixel_format,),
@@ -107,38 +107,33 @@ class ReplayCamera:
         )
 
     def close(self) -> None:
-        """Stop and forget the images."""
+        """Stop and release the images."""
         self.stop()
-        self._caps = self._source = None
+        self._capabilities = self._source = None
 
     def configure(self, settings: CameraSettings) -> CameraSettings:
-        """Set the frame rate before the start; return what is in force."""
+        """Set the frame rate before the start; return the actual settings."""
         (pixel_format,) = self.caps.pixel_formats
         if self._loaders is not None:
             raise ValueError("`configure` needs a stopped camera.")
         if settings.pixel_format not in {None, pixel_format}:
             raise ConfigError(
-                sentence(
-                    "replay.pixel-format",
-                    "The recorded images are {found}, not {wanted}. Choose {found}.",
-                    found=pixel_format,
-                    wanted=settings.pixel_format,
-                )
+                "replay.pixel-format", found=pixel_format, wanted=settings.pixel_format
             )
         if settings.frame_rate is not None:
             self._frame_rate = FRAME_RATE.nearest(settings.frame_rate)
         return CameraSettings(frame_rate=self._frame_rate, pixel_format=pixel_format)
 
     def set_exposure(self, exposure_us: float) -> float:
-        """Refuse: the images are taken."""
+        """Raise `ConfigError`: recorded images cannot be changed."""
         raise _already_taken(EXPOSURE)
 
     def set_gain(self, gain_db: float) -> float:
-        """Refuse: the images are taken."""
+        """Raise `ConfigError`: recorded images cannot be changed."""
         raise _already_taken(GAIN)
 
     def start(self) -> None:
-        """Let images come from the first on; nothing if they do."""
+        """Start with the first image; no-op while streaming."""
         self.probe()
         if self._loaders is None:
             self._loaders = self._open_source()
@@ -146,7 +141,7 @@ class ReplayCamera:
             self._next_due_ns = self._clock.now_ns()
 
     def stop(self) -> None:
-        """Let no more images come; nothing if none do."""
+        """Stop streaming; no-op if stopped."""
         self._loaders = None
 
     def read(self, timeout_s: float) -> Frame:
@@ -167,12 +162,12 @@ class ReplayCamera:
         return frame
 
     def probe(self) -> None:
-        """Do nothing: files are looked at when they are read."""
-        if self._caps is None:
+        """Do nothing: files are checked when they are read."""
+        if self._capabilities is None:
             raise ValueError("The camera is not open: call `open` first.")
 
     def stats(self) -> Stats:
-        """Return what became of the images so far."""
+        """Return the frame counters."""
         return self._stats
 
     def _open_source(self) -> Iterator[Callable[[], Image]]:
@@ -187,13 +182,7 @@ class ReplayCamera:
             self._clock.wait(timeout_s)
             self._stats = replace(self._stats, timeouts=self._stats.timeouts + 1)
             raise FrameTimeout(
-                sentence(
-                    "replay.later",
-                    "The next image of {place} comes {seconds:.1f} s later. Wait, "
-                    "or replay the images faster.",
-                    place=self._where,
-                    seconds=wait_s - timeout_s,
-                )
+                "replay.later", place=self._where, seconds=wait_s - timeout_s
             )
         self._clock.wait(wait_s)
 
@@ -222,15 +211,8 @@ class ReplayCamera:
             self._stats = replace(self._stats, incomplete=self._stats.incomplete + 1)
             self._n_unread += 1
             if self._is_gone():
-                raise DeviceLost(
-                    sentence(
-                        "replay.lost",
-                        "No image of {place} can be read any more. Connect its disk "
-                        "or put the images back, or choose others.",
-                        place=printable(self._where),
-                    )
-                ) from error
-            raise FrameIncomplete(error.sentence) from error
+                raise DeviceLost("replay.lost", place=printable(self._where)) from error
+            raise FrameIncomplete(error.message) from error
         self._n_unread = 0
         return Frame(
             image=sealed(image),
@@ -246,7 +228,7 @@ class ReplayCamera:
         return printable(names[seq % len(names)]) if names else f"Image {seq + 1}"
 
     def _is_gone(self) -> bool:
-        """Return whether no file is there, or none could be read in a whole round."""
+        """Return whether the files are missing or none could be read in a round."""
         if self._source is None:
             return True
         files = self._source.files
@@ -281,46 +263,28 @@ def _usual_kind(source: ImageSource, where: str) -> tuple[tuple[int, ...], str]:
         formats[image.shape] = _pixel_format(image)
     if formats:
         return next(iter(formats.items()))
-    raise unread or FileError(
-        sentence(
-            "replay.no-images",
-            "{place} holds no images. Choose a recording that holds some.",
-            place=where,
-        )
-    )
+    raise unread or FileError("replay.no-images", place=where)
 
 
-def _check_size(image: Image, name: str, caps: Caps) -> None:
+def _check_size(image: Image, name: str, caps: CameraCapabilities) -> None:
     height, width = image.shape
     if (width, height) != (caps.width, caps.height):
         raise FileError(
-            sentence(
-                "replay.other-size",
-                "{name} is {width} x {height} px, the other images are {usual_width} "
-                "x {usual_height} px. Replay only images of one camera together.",
-                name=name,
-                width=width,
-                height=height,
-                usual_width=caps.width,
-                usual_height=caps.height,
-            )
+            "replay.other-size",
+            name=name,
+            width=width,
+            height=height,
+            usual_width=caps.width,
+            usual_height=caps.height,
         )
 
 
-def _already_taken(what: Sentence) -> ConfigError:
-    return ConfigError(
-        sentence(
-            "replay.already-taken",
-            "The {what} of recorded images cannot be changed. Choose a live camera.",
-            what=what,
-        )
-    )
+def _already_taken(what: Message) -> ConfigError:
+    return ConfigError("replay.already-taken", what=what)
 
 
 def _camera(place: SourcePlace, clock: Clock) -> ReplayCamera:
     return ReplayCamera(place.name, loops=True, clock=clock)
 
 
-RECORDED = Source(
-    "recorded", sentence("source.recorded", "Recorded images"), Needs.FILES, _camera
-)
+RECORDED = Source("recorded", message("source.recorded"), SourceNeeds.FILES, _camera)

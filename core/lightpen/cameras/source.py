@@ -1,4 +1,4 @@
-"""What a kind of camera is to those who choose among several."""
+"""Kinds of cameras, for choosing among them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,11 +6,11 @@ from enum import Enum, auto
 
 from lightpen.cameras.clock import Clock
 from lightpen.cameras.protocol import ImageCamera
-from lightpen.sentences import Sentence
+from lightpen.messages import Message
 
 
-class Needs(Enum):
-    """What a source has to be told besides its kind."""
+class SourceNeeds(Enum):
+    """What a source needs to be opened."""
 
     NOTHING = auto()
     FILES = auto()  # a folder, a pattern, a video or a record
@@ -41,7 +41,7 @@ class FoundDevice:
     Attributes
     ----------
     place : str
-        Serial number, or what else it is found by again.
+        Serial number or another identifier.
     label : str
         Vendor, model and serial number.
     """
@@ -57,9 +57,9 @@ class Source:
     Attributes
     ----------
     key : str
-        Names it in settings and records; never changes.
+        Identifies it in settings and records; must not change.
     why_absent : callable
-        Returns what has to be installed first; None where nothing is missing.
+        Returns what must be installed first, or None.
     find : callable
         Returns the cameras that are there, given the file of a producer or nothing.
         Takes seconds; not to be called while one of them streams. Raises
@@ -70,8 +70,8 @@ class Source:
     """
 
     key: str
-    name: Sentence
-    needs: Needs
+    name: Message
+    needs: SourceNeeds
     camera: Callable[[SourcePlace, Clock], ImageCamera] | None = None
     find: Callable[[str], tuple[FoundDevice, ...]] = lambda producer: ()
-    why_absent: Callable[[], Sentence | None] = lambda: None
+    why_absent: Callable[[], Message | None] = lambda: None

@@ -1,4 +1,4 @@
-"""Webcams through OpenCV, to try the program with: they lose images without a word."""
+"""Webcams by OpenCV, for evaluation only: they lose images unnoticed."""
 
 import sys
 from pathlib import Path
@@ -7,18 +7,18 @@ import cv2
 import numpy as np
 
 from lightpen.cameras.clock import Clock
-from lightpen.cameras.device_camera import Delivery, DeviceCamera
+from lightpen.cameras.device_camera import DeliveredFrame, DeviceCamera
 from lightpen.cameras.device_errors import lost, not_found, setting_refused
 from lightpen.cameras.protocol import Range
-from lightpen.cameras.source import FoundDevice, Needs, Source, SourcePlace
-from lightpen.sentences import sentence
+from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
+from lightpen.messages import message
 
 LISTED = Path("/sys/class/video4linux")
 N_TRIED = 4  # where the system lists no cameras
 
 
 class WebcamFeatures:
-    """What is told of a webcam; nothing of it is set in units that mean anything."""
+    """Image size and format of a webcam; nothing can be set."""
 
     def __init__(self, first: cv2.typing.MatLike, place: str) -> None:
         self._numbers = {"Width": first.shape[1], "Height": first.shape[0]}
@@ -46,23 +46,23 @@ class WebcamFeatures:
         return (self._format,)
 
     def set_number(self, name: str, value: float) -> None:
-        """Refuse."""
+        """Raise `ConfigError`."""
         raise setting_refused(self._place, name)
 
     def choose(self, name: str, entry: str) -> None:
         """Take the only pixel format there is."""
 
     def switch_on(self, name: str) -> None:
-        """Refuse."""
+        """Raise `ConfigError`."""
         raise setting_refused(self._place, name)
 
     def execute(self, name: str) -> None:
-        """Refuse."""
+        """Raise `ConfigError`."""
         raise setting_refused(self._place, name)
 
 
 class WebcamDevice:
-    """A webcam by its number, or whatever else OpenCV opens by a name."""
+    """A webcam by its number, or another name that OpenCV opens."""
 
     def __init__(self, place: str) -> None:
         self._place = place
@@ -72,17 +72,17 @@ class WebcamDevice:
 
     @property
     def serial(self) -> str:
-        """Number; what sets two webcams apart is where they are plugged in."""
+        """Number of the webcam, by its connection."""
         return self._place
 
     @property
     def features(self) -> WebcamFeatures:
-        """What is told of the open camera."""
+        """Features of the open camera."""
         assert self._features is not None
         return self._features
 
     def open(self) -> None:
-        """Take hold of the camera."""
+        """Open the camera."""
         place = self._place
         self._capture = capture = (
             cv2.VideoCapture(int(place))
@@ -96,18 +96,18 @@ class WebcamDevice:
         self._features = WebcamFeatures(first, place)
 
     def close(self) -> None:
-        """Let go of the camera."""
+        """Close the camera."""
         capture, self._capture = self._capture, None
         if capture is not None:
             capture.release()
 
     def start(self) -> None:
-        """Do nothing: images come as soon as it is open."""
+        """Do nothing: it streams as soon as it is open."""
 
     def stop(self) -> None:
         """Do nothing."""
 
-    def fetch(self, timeout_s: float) -> Delivery | None:
+    def fetch(self, timeout_s: float) -> DeliveredFrame | None:
         """Return the next image, however long it takes."""
         assert self._capture is not None
         is_read, image = self._capture.read()
@@ -116,7 +116,7 @@ class WebcamDevice:
         self._n_read += 1
         height, width = image.shape[:2]
         data = np.asarray(image, np.uint8).reshape(-1)
-        return Delivery(data, width, height, self._n_read)
+        return DeliveredFrame(data, width, height, self._n_read)
 
     def probe(self) -> None:
         """Do nothing: `fetch` tells."""
@@ -147,10 +147,4 @@ def _camera(place: SourcePlace, clock: Clock) -> DeviceCamera:
     return DeviceCamera(WebcamDevice(place.name), clock)
 
 
-WEBCAM = Source(
-    "webcam",
-    sentence("source.webcam", "Webcam, to try it"),
-    Needs.DEVICE,
-    _camera,
-    _find,
-)
+WEBCAM = Source("webcam", message("source.webcam"), SourceNeeds.DEVICE, _camera, _find)

@@ -1,9 +1,10 @@
-"""The one thread that owns a camera: it reads, watches, and reconnects.
+"""The thread that owns a camera: reads, monitors and reconnects.
 
 Every call of the camera is made in this thread. Frames leave it two ways: through a box
 for the newest one, for showing, and through a queue that loses nothing, for measuring.
 """
 
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from queue import Empty, SimpleQueue
@@ -13,8 +14,8 @@ from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.frame_box import FrameBox, FrameQueue
 from lightpen.cameras.link_watch import LinkWatch
 from lightpen.cameras.protocol import (
+    CameraCapabilities,
     CameraSettings,
-    Caps,
     ConfigError,
     DeviceBusy,
     DeviceLost,
@@ -30,24 +31,23 @@ from lightpen.cameras.protocol import (
 from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
-    Ended,
     Failed,
+    FaultRaised,
     FrameReady,
-    KeepsUp,
+    ProcessingKeepsUp,
     SettingsApplied,
-    Troubled,
     WorkerEvent,
+    WorkerStopped,
 )
 from lightpen.errors import LightpenError
-from lightpen.sentences import sentence
 
-N_QUEUED = 4  # frames of 5 MB; those that are lost when it is full, no swing misses
+N_QUEUED = 4  # frames of 5 MB
 QUIET_PERIODS = 3
-LEAST_QUIET = 1.0  # s without an image after which the camera is asked if it is there
-LONGEST_SILENCE = 6.0  # s after which it is taken for dead, whatever it answers
-LONGEST_READ = 2.0  # s, after which requests are served at the latest
+LEAST_QUIET = 1.0  # s without an image after which the camera is probed
+LONGEST_SILENCE = 6.0  # s without an image after which it counts as lost
+LONGEST_READ = 2.0  # s, longest delay of a request
 BUSY_PAUSE = 0.5  # s
-PROBING = 2.0  # s, after which a camera of which nobody wants images is looked after
+PROBING = 2.0  # s between probes of a paused camera
 # A GigE Vision camera frees itself from a program that crashed after a 3 s heartbeat;
 # that it is not free yet may take 5 s to find out.
 LONGEST_BUSY = 8.0  # s
@@ -59,6 +59,8 @@ LEAST_SKIPPED = 20
 SKIPPED_SHARE = 0.05
 KEEPING_UP = 3.0  # s without a skipped image after which it is over
 
+_logger = logging.getLogger(__name__)
+
 
 class CameraWorker:
     """Runs a camera in a thread of its own.
@@ -66,7 +68,7 @@ class CameraWorker:
     Parameters
     ----------
     camera : ImageCamera
-        Not open yet. Nobody else may call it any more.
+        Not open; used by the worker only from now on.
     settings : CameraSettings
         To be applied, again at each reconnection.
     known : mapping of str to CameraSettings
@@ -75,7 +77,7 @@ class CameraWorker:
         Called in the thread of the worker with what happens; must return at once and
         not call `stop`.
     clock : Clock, optional
-        The one that the camera goes by.
+        The clock of the camera.
     n_queued : int
         Frames of a live camera that wait to be measured at most.
     """
@@ -94,7 +96,7 @@ class CameraWorker:
         self._settings = settings
         self._known = dict(known or {})
         self._applied = settings
-        self._caps: Caps | None = None
+        self._capabilities: CameraCapabilities | None = None
         self._on_event = on_event
         self._clock = clock or MachineClock()
         self._mailbox = FrameBox()
@@ -123,17 +125,17 @@ class CameraWorker:
         return self._camera.serial
 
     @property
-    def caps(self) -> Caps | None:
-        """What the camera can do; None until it was open."""
-        return self._caps
+    def caps(self) -> CameraCapabilities | None:
+        """Capabilities of the camera; None until it was open."""
+        return self._capabilities
 
     @property
     def stats(self) -> Stats:
-        """What became of the images up to the last one."""
+        """Frame counters up to the last image."""
         return self._stats
 
     def start(self) -> None:
-        """Open the camera and let images come; once only."""
+        """Open the camera and start streaming; once only."""
         self._thread.start()
 
     def stop(self, timeout_s: float = LONGEST_STOP) -> None:
@@ -152,21 +154,15 @@ class CameraWorker:
         self._thread.join(timeout_s)
         if self._thread.is_alive():
             raise DeviceLost(
-                sentence(
-                    "camera.did-not-stop",
-                    "The camera {serial} did not stop within {waited:.0f} s. Unplug "
-                    "it, and start the program again before you use it.",
-                    serial=self.serial,
-                    waited=timeout_s,
-                )
+                "camera.did-not-stop", serial=self.serial, waited=timeout_s
             )
 
     def latest(self) -> Frame | None:
-        """Return the newest frame if it was not yet taken, for showing."""
+        """Return the newest frame for display, if it is new."""
         return self._mailbox.take()
 
     def measure(self, measures: bool) -> None:
-        """Begin or stop to queue every frame for `next_frame`; none is left over."""
+        """Start or stop queueing every frame for `next_frame`."""
         if measures and not self._measures.is_set():
             self._queue.clear()
             self._n_offered = self._n_missed = 0
@@ -177,19 +173,19 @@ class CameraWorker:
             self._queue.clear()  # a recording may wait for room in it
 
     def next_frame(self, timeout_s: float) -> Frame:
-        """Return the oldest queued frame, for measuring.
+        """Return the oldest queued frame for processing.
 
         Raises
         ------
         FrameTimeout
-            None came in ``timeout_s``.
+            No frame within ``timeout_s``.
         EndOfImages
-            None will come: the images or the worker ended.
+            The images or the worker have ended.
         """
         return self._queue.take(timeout_s)
 
     def set_rest(self, rest: float | None) -> None:
-        """Leave the camera alone between two images.
+        """Pause between two images.
 
         Parameters
         ----------
@@ -203,17 +199,17 @@ class CameraWorker:
             self._wake.set()
 
     def set_exposure(self, exposure_us: float) -> None:
-        """Ask for another exposure while images come."""
+        """Request another exposure while streaming."""
         self._requests.put(lambda: self._set_exposure(exposure_us))
         self._wake.set()
 
     def set_gain(self, gain_db: float) -> None:
-        """Ask for another gain while images come."""
+        """Request another gain while streaming."""
         self._requests.put(lambda: self._set_gain(gain_db))
         self._wake.set()
 
     def configure(self, settings: CameraSettings) -> None:
-        """Ask for other settings, for which images stop coming for a moment."""
+        """Request other settings; streaming stops briefly."""
         self._requests.put(lambda: self._configure(settings))
         self._wake.set()
 
@@ -223,7 +219,7 @@ class CameraWorker:
             while not self._stopping.is_set():
                 self._serve()
         except EndOfImages:
-            self._on_event(Ended())
+            self._on_event(WorkerStopped())
         except LightpenError as error:
             self._on_event(Failed(error))
         finally:
@@ -239,11 +235,11 @@ class CameraWorker:
             if self._is_wanted():
                 self._read()
         except DeviceLost as error:
-            self._on_event(Troubled(error))
+            self._on_event(FaultRaised(error))
             self._reconnect()
 
     def _is_wanted(self) -> bool:
-        """Return whether an image is wanted, after the rest before it."""
+        """Return whether an image is wanted after the pause."""
         rest = self._rest
         if rest is not None and self._is_stopped:
             self._is_stopped = False
@@ -277,7 +273,7 @@ class CameraWorker:
             self._hear()
             self._count()
             if not self._camera.caps.has_link:  # else it is told of many: see `_count`
-                self._on_event(Troubled(error))
+                self._on_event(FaultRaised(error))
         else:
             self._hear()
             self._change(Connection.STREAMING)
@@ -286,7 +282,7 @@ class CameraWorker:
             self._count()
 
     def _is_due(self) -> bool:
-        """Return whether a camera that is not left alone has rested long enough."""
+        """Return whether the pause is over."""
         now_ns = self._clock.now_ns()
         rest = self._rest if self._camera.caps.has_link else None
         if rest is not None and now_ns - self._delivered_ns < rest * 1e9:
@@ -313,10 +309,10 @@ class CameraWorker:
         is_slow = is_too_slow(self._n_missed, self._n_offered)
         if is_slow and not self._told_of_skipping:  # once is enough until it is over
             self._told_of_skipping = True
-            self._on_event(Troubled(_too_slow(self._n_missed, self._n_offered)))
+            self._on_event(FaultRaised(_too_slow(self._n_missed, self._n_offered)))
 
     def _tell_of_keeping_up(self) -> None:
-        """Tell that it is over with skipping, as when no more images are measured."""
+        """Report that no image is skipped any more."""
         if not self._told_of_skipping:
             return
         is_slow = is_too_slow(self._n_missed, self._n_offered)
@@ -324,38 +320,30 @@ class CameraWorker:
         if not is_slow or since_ns >= KEEPING_UP * 1e9:
             self._told_of_skipping = False
             self._n_offered = self._n_missed = 0
-            self._on_event(KeepsUp())
+            self._on_event(ProcessingKeepsUp())
 
     def _quiet_time(self) -> float:
-        """Return how long no image may come before the camera is probed, s."""
+        """Return the time without images after which the camera is probed, s."""
         rate, exposure_us = self._applied.frame_rate, self._applied.exposure_us
         period = 1 / rate if rate else 0.0
         exposure = (exposure_us or 0.0) * 1e-6
         return max(QUIET_PERIODS * period + exposure, LEAST_QUIET)
 
     def _watch(self) -> None:
-        """Find out whether a camera that sent nothing for long is still there."""
+        """Probe a camera that has been silent."""
         self._count()
         silence = round((self._clock.now_ns() - self._heard_ns) * 1e-9, 3)
         if silence >= self._quiet_time():
             self._change(Connection.SILENT)
         if silence >= max(LONGEST_SILENCE, 2 * self._quiet_time()):
-            raise DeviceLost(
-                sentence(
-                    "camera.silent",
-                    "The camera {serial} sent no image for {silence:.0f} s. Check "
-                    "its cable and its power.",
-                    serial=self.serial,
-                    silence=silence,
-                )
-            )
+            raise DeviceLost("camera.silent", serial=self.serial, silence=silence)
         self._camera.probe()
 
     def _hear(self) -> None:
         self._heard_ns = self._clock.now_ns()
 
     def _count(self) -> None:
-        """Take what became of the images, but of those that nobody wanted."""
+        """Update the frame counters, without frames of a pause."""
         stats = self._camera.stats()
         if self._is_rested:
             self._is_rested = False
@@ -370,10 +358,10 @@ class CameraWorker:
                 self._stats, self._heard_ns * 1e-9, self._applied
             )
             if trouble is not None:
-                self._on_event(Troubled(trouble))
+                self._on_event(FaultRaised(trouble))
 
     def _open_first(self) -> None:
-        """Open the camera, waiting a little for another program to let go of it."""
+        """Open the camera; wait briefly while another program uses it."""
         self._change(Connection.OPENING)
         limit_ns = self._clock.now_ns() + round(LONGEST_BUSY * 1e9)
         is_told = False
@@ -386,12 +374,12 @@ class CameraWorker:
                     raise
                 if not is_told:
                     is_told = True
-                    self._on_event(Troubled(error))
+                    self._on_event(FaultRaised(error))
             if self._clock.wait(BUSY_PAUSE, self._stopping):
                 return
 
     def _reconnect(self) -> None:
-        """Open the camera anew until it succeeds or the worker is stopped."""
+        """Reopen the camera until it succeeds or the worker is stopped."""
         self._change(Connection.LOST)
         n_attempts = 0
         while True:
@@ -418,12 +406,14 @@ class CameraWorker:
         except ConfigError as error:  # it is not what it was when they were kept
             self._settings = CameraSettings()
             self._start(self._settings)
-            self._on_event(Troubled(error))  # when images come, which take back others
+            self._on_event(
+                FaultRaised(error)
+            )  # when images come, which take back others
 
     def _start(self, settings: CameraSettings) -> None:
-        """Set up the open camera and let its images come."""
+        """Configure the open camera and start streaming."""
         self._applied = self._camera.configure(settings)
-        self._caps = self._camera.caps
+        self._capabilities = self._camera.caps
         self._camera.start()
         self._is_stopped = False
         self._hear()
@@ -440,7 +430,7 @@ class CameraWorker:
             try:
                 request()
             except ConfigError as error:
-                self._on_event(Troubled(error))
+                self._on_event(FaultRaised(error))
 
     def _configure(self, settings: CameraSettings) -> None:
         before = self._settings
@@ -472,27 +462,22 @@ class CameraWorker:
     def _change(self, connection: Connection) -> None:
         if connection is not self._connection:
             self._connection = connection
+            is_bad = connection in (Connection.LOST, Connection.SILENT)
+            level = logging.WARNING if is_bad else logging.INFO
+            _logger.log(level, "camera %s: %s", self.serial, connection.name.lower())
             self._on_event(ConnectionChanged(connection))
 
 
 def merged_settings(before: CameraSettings, now: CameraSettings) -> CameraSettings:
-    """Return settings, and of what they leave open those before."""
+    """Return settings, completed by those before."""
     given = {f.name: getattr(now, f.name) for f in fields(now)}
     return replace(before, **{n: v for n, v in given.items() if v is not None})
 
 
 def is_too_slow(n_missed: int, n_offered: int) -> bool:
-    """Return whether so many images were missed that it was not one hold-up."""
+    """Return whether images are skipped persistently."""
     return n_missed >= max(LEAST_SKIPPED, SKIPPED_SHARE * n_offered)
 
 
 def _too_slow(n_missed: int, n_offered: int) -> FramesSkipped:
-    return FramesSkipped(
-        sentence(
-            "camera.too-slow",
-            "This computer is too slow: {n_missed} of {n_offered} images were not "
-            "measured. Close other programs, or the swing takes longer.",
-            n_missed=n_missed,
-            n_offered=n_offered,
-        )
-    )
+    return FramesSkipped("camera.too-slow", n_missed=n_missed, n_offered=n_offered)

@@ -1,4 +1,4 @@
-"""What a camera's worker tells of."""
+"""Events of a camera worker."""
 
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -9,7 +9,7 @@ from lightpen.errors import LightpenError
 
 
 class Connection(Enum):
-    """How a camera and its worker get on."""
+    """State of the connection to a camera."""
 
     OPENING = auto()
     STREAMING = auto()
@@ -20,53 +20,53 @@ class Connection(Enum):
 
 @dataclass(frozen=True)
 class FrameReady:
-    """A frame lies in the box, which was empty before."""
+    """A new frame is in the box, which was empty."""
 
 
 @dataclass(frozen=True)
 class ConnectionChanged:
-    """The camera is in another state."""
+    """The state of the connection changed."""
 
     connection: Connection
 
 
 @dataclass(frozen=True)
 class SettingsApplied:
-    """The camera has these settings in force."""
+    """The camera uses these settings."""
 
     settings: CameraSettings
 
 
 @dataclass(frozen=True)
-class Troubled:
-    """Something went wrong; the worker carries on."""
+class FaultRaised:
+    """A fault occurred; the worker continues."""
 
     error: CameraFailure
 
 
 @dataclass(frozen=True)
-class KeepsUp:
-    """No image is skipped any more, after it was told that they were."""
+class ProcessingKeepsUp:
+    """Images are no longer skipped."""
 
 
 @dataclass(frozen=True)
 class Failed:
-    """Something went wrong that ended the worker."""
+    """An error ended the worker."""
 
     error: LightpenError
 
 
 @dataclass(frozen=True)
-class Ended:
-    """The camera has no more images, which ended the worker."""
+class WorkerStopped:
+    """The worker ended, as the camera has no more images."""
 
 
 WorkerEvent: TypeAlias = (
     FrameReady
     | ConnectionChanged
     | SettingsApplied
-    | Troubled
-    | KeepsUp
+    | FaultRaised
+    | ProcessingKeepsUp
     | Failed
-    | Ended
+    | WorkerStopped
 )

@@ -25,32 +25,36 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
     parser.set_defaults(run=_run)
     actions = parser.add_subparsers(required=True, metavar="ACTION", dest="action")
     check = actions.add_parser(
-        "check", help="look at every entry, record, result and image"
+        "check", help="check every entry, record, result and image"
     )
     listed = actions.add_parser("list", help="print the newest entries")
-    export = actions.add_parser("export", help="write all entries into a file")
-    taken = actions.add_parser("import", help="take up the entries in such a file")
+    export = actions.add_parser("export", help="export all entries to a file")
+    taken = actions.add_parser("import", help="import the entries of an exported file")
     delivered = actions.add_parser(
-        "deliver", help="bring the entries to the server that LIGHTPEN_ARCHIVE names"
+        "deliver", help="deliver the entries to the server set by LIGHTPEN_ARCHIVE"
     )
     for action in (check, listed, export, taken, delivered):
         action.add_argument(
             "--data",
             type=Path,
             metavar="FOLDER",
-            help="data folder; that of the program unless said",
+            help="data folder (default: that of the program)",
         )
         action.set_defaults(data_folder=data_folder)
     for action in (export, taken):
         action.add_argument("file", type=Path, metavar="FILE")
     for name in ("pen", "tip", "station"):
-        listed.add_argument(f"--{name}", default="", help="list its entries only")
-    listed.add_argument("--kind", default="", help="such as refused or verification")
+        listed.add_argument(
+            f"--{name}", default="", help="list entries of this item only"
+        )
     listed.add_argument(
-        "--since", type=parse_date, metavar="YYYY-MM-DD", help="from this day on"
+        "--kind", default="", help="entry type, for example refused or verification"
     )
     listed.add_argument(
-        "--until", type=parse_date, metavar="YYYY-MM-DD", help="to this day"
+        "--since", type=parse_date, metavar="YYYY-MM-DD", help="first day"
+    )
+    listed.add_argument(
+        "--until", type=parse_date, metavar="YYYY-MM-DD", help="last day"
     )
     listed.add_argument(
         "--most",
@@ -60,7 +64,7 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         help=f"entries, the newest first ({USUAL_LENGTH})",
     )
     listed.add_argument(
-        "--csv", action="store_true", help="as a table for other programs"
+        "--csv", action="store_true", help="write a table for other programs"
     )
 
 

@@ -13,16 +13,15 @@ from lightpen.archive.database import Database, look_into, open_file, open_serve
 from lightpen.archive.entries import SHORT, Kind
 from lightpen.archive.exchange import deliver, export_entries, import_entries
 from lightpen.archive.history import Line, lines
-from lightpen.archive.late_logbook import SERVER
+from lightpen.archive.lazy_logbook import SERVER
 from lightpen.archive.listing import entries_csv
 from lightpen.archive.logbook import ARCHIVE
-from lightpen.archive.queries import Wanted, newest
+from lightpen.archive.queries import EntryFilter, newest
 from lightpen.archive.seal import close_sealed
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.errors import UsageError
 from lightpen.formats.files import printable
 from lightpen.local_time import local_time
-from lightpen.sentences import sentence
 
 CHANGED = 1  # exit status of a check that found something
 
@@ -47,7 +46,7 @@ def _check(options: argparse.Namespace) -> int:
 
 @printing
 def _list(options: argparse.Namespace) -> None:
-    wanted = Wanted(
+    wanted = EntryFilter(
         pen=options.pen,
         tip=options.tip,
         station=options.station,
@@ -82,14 +81,7 @@ def _import(options: argparse.Namespace) -> None:
 def _deliver(options: argparse.Namespace) -> None:
     address = os.environ.get(SERVER, "")
     if not address:
-        raise UsageError(
-            sentence(
-                "archive.no-server",
-                "No server is named. Set the variable {variable} to its address, "
-                "postgresql://user:password@host/database.",
-                variable=SERVER,
-            )
-        )
+        raise UsageError("archive.no-server", variable=SERVER)
     with _opened(_data(options)) as database, closing(open_server(address)) as server:
         copied = deliver(database, own_chain(database), server)
     print(f"{copied.n_new} entries are new, {copied.n_known} were there already.")
@@ -131,12 +123,7 @@ def _kinds(name: str) -> tuple[Kind, ...]:
         return (Kind(name),)
     except ValueError as error:
         raise UsageError(
-            sentence(
-                "archive.no-such-kind",
-                "{name} is no kind of entry. There are: {kinds}.",
-                name=printable(name),
-                kinds=", ".join(Kind),
-            )
+            "archive.no-such-kind", name=printable(name), kinds=", ".join(Kind)
         ) from error
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lightpen.formats.pen_content import UNITS
+from lightpen.model.limits import LIMITS
 
 # Of any number, whatever it counts: beyond, its square may be none.
 SMALLEST, LARGEST = 1e-9, 1e6
@@ -68,16 +69,43 @@ def number_from(
 def add_pen_options(parser: argparse.ArgumentParser) -> None:
     """Add what a pen file may leave out."""
     parser.add_argument(
-        "--units", choices=sorted(UNITS), help="of a pen file that does not say"
+        "--units",
+        choices=sorted(UNITS),
+        help="unit of an LED file that does not state one",
     )
     parser.add_argument(
         "--led-diameter",
         type=finite,
         metavar="MM",
-        help="of the LED discs, where the pen file does not say (10)",
+        help="diameter of the LED discs if the LED file does not state it (10)",
     )
+
+
+def add_limits(parser: argparse.ArgumentParser, *names: str) -> None:
+    """Add options for fields of `VerificationLimits`; `chosen_limits` reads them."""
+    for limit in LIMITS:
+        if limit.part == "verification" and limit.name in names:
+            parser.add_argument(
+                f"--limit-{limit.name}",
+                type=above_zero,
+                default=limit.default,
+                metavar=limit.unit.upper(),
+                help=f"{limit.label} ({limit.default:g})",
+            )
+
+
+def chosen_limits(options: argparse.Namespace) -> dict[str, float]:
+    """Return the limits that were added to the options, by their names."""
+    prefix = "limit_"
+    return {
+        name.removeprefix(prefix): value
+        for name, value in vars(options).items()
+        if name.startswith(prefix)
+    }
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
     """Add where the record is written."""
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the record")
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="write the record as JSON"
+    )

@@ -8,32 +8,28 @@ from lightpen.errors import UsageError
 from lightpen.formats.files import printable, write_whole
 from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.page import PAPERS, board_page
-from lightpen.sentences import sentence
 
 
 def add_board(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen board``."""
     parser.set_defaults(run=_board)
     parser.add_argument(
-        "board", metavar="BOARD", help="such as chessboard:11x8:20, as for intrinsics"
+        "board",
+        metavar="BOARD",
+        help="board, for example chessboard:11x8:20, as for intrinsics",
     )
     parser.add_argument("out", type=Path, metavar="OUT.pdf")
     parser.add_argument(
-        "--paper", choices=PAPERS, help="the smallest that holds the board unless given"
+        "--paper",
+        choices=PAPERS,
+        help="paper size (default: the smallest that holds the board)",
     )
 
 
 @printing
 def _board(options: argparse.Namespace) -> None:
     if options.out.suffix.lower() != ".pdf":
-        raise UsageError(
-            sentence(
-                "cli.board-suffix",
-                "A board is written as PDF, but {name} does not end in .pdf. Choose "
-                "such a name.",
-                name=printable(options.out.name),
-            )
-        )
+        raise UsageError("cli.board-suffix", name=printable(options.out.name))
     board = parse_board(options.board)
     write_whole(options.out, board_page(board, options.paper))
     print(

@@ -32,10 +32,11 @@ from lightpen.detection.observations import (
 from lightpen.detection.rig_observations import observe_rig_centers, observe_rig_images
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
-from lightpen.estimation.report import calibration_record
-from lightpen.estimation.second_cone import SecondSwing
-from lightpen.estimation.summary import calibration_text
-from lightpen.estimation.verdict import judge
+from lightpen.estimation.reports.methods import Method
+from lightpen.estimation.reports.report import calibration_record
+from lightpen.estimation.reports.summary import calibration_text
+from lightpen.estimation.reports.verdict import judge
+from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, with_content
 from lightpen.formats.images import find_images
@@ -45,13 +46,15 @@ from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import read_rig
 from lightpen.formats.simulated_files import is_simulated
 from lightpen.local_time import local_now
+from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
-from lightpen.model.camera_validity import doubts_about
+from lightpen.model.camera_validity import unmodelled_effects_of
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.rig import of_camera
-from lightpen.record.reading import (
+from lightpen.record.calibrations.recomputing import recompute
+from lightpen.record.swings.reading import (
     is_record,
     missing_parts,
     open_record,
@@ -59,14 +62,10 @@ from lightpen.record.reading import (
     recorded_limits,
     unacknowledged_images,
 )
-from lightpen.record.recomputing import recompute
-from lightpen.record.solving import record_inputs, solve_record
-from lightpen.sentences import Sentence, sentence
+from lightpen.record.swings.solving import record_inputs, solve_record
 
 MAX_NAMED = 3  # images; of more the first is named
-RIG_NEEDED = sentence(
-    "cli.rig-needed", "Those of several cameras need --rig FILE in place of --camera."
-)
+RIG_NEEDED = message("cli.rig-needed")
 
 
 def add_calibrate(parser: argparse.ArgumentParser) -> None:
@@ -84,19 +83,14 @@ class _Calibrated:
     limits: SwingLimits
     origin: Origin | None
     inputs: Callable[[], Inputs]
-    method: str
+    method: Method
 
 
 @printing
 def _calibrate(options: argparse.Namespace) -> None:
     given = (any(options.images), options.centers, options.from_record)
     if sum(map(bool, given)) != 1:
-        raise UsageError(
-            sentence(
-                "cli.images-or-centers",
-                "Give either IMAGES, --centers FILE.csv or --from-record FILE.",
-            )
-        )
+        raise UsageError("cli.images-or-centers")
     inputs = (options.camera, options.rig, options.pen, *(options.centers or ()))
     require_other_file(options.json, options.from_record, *inputs)
     if options.from_record is not None:
@@ -110,7 +104,10 @@ def _calibrate(options: argparse.Namespace) -> None:
     calibration = calibrated.calibration
     verdict = judge(calibration, calibrated.limits)
     text = calibration_text(
-        *(calibration, calibrated.method, calibrated.nominal_tip, verdict),
+        calibration,
+        calibrated.method,
+        calibrated.nominal_tip,
+        verdict,
         calibrated.origin,
     )
     print(shown(text))
@@ -136,33 +133,20 @@ def _from_json(options: argparse.Namespace) -> _Calibrated:
 
 def _require_none_given(options: argparse.Namespace, record: Path) -> None:
     """Refuse what a record brings itself."""
-    own = {
-        "--camera": options.camera,
-        "--rig": options.rig,
-        "--pen": options.pen,
-        "--units": options.units,
-        "--led-diameter": options.led_diameter,
-        "--nominal-tip": options.nominal_tip,
-        "--camera-sigma": options.camera_sigma,
-        "--scale-sigma": options.scale_sigma,
-        "--temperature": options.temperature,
-        "--temperature-sigma": options.temperature_sigma,
-        "--form-error": options.form_error,
-        "--center-bias": options.center_bias,
-        "--second-cone": options.second_cone,
-        "--distance": options.distance,
-        "--distance-sigma": options.distance_sigma,
-    }
-    given = [name for name, value in own.items() if value is not None]
+    own = (
+        "camera rig pen units led-diameter nominal-tip camera-sigma scale-sigma "
+        "temperature temperature-sigma form-error center-bias second-cone distance "
+        "distance-sigma"
+    )
+    values = vars(options)
+    given = [
+        f"--{name}"
+        for name in own.split()
+        if values[name.replace("-", "_")] is not None
+    ]
     if given:
         raise UsageError(
-            sentence(
-                "cli.record-brings-its-own",
-                "{folder} is the record of a swing, which brings its own. Leave out "
-                "{options}.",
-                folder=str(record),
-                options=", ".join(given),
-            )
+            "cli.record-brings-its-own", folder=str(record), options=", ".join(given)
         )
 
 
@@ -189,37 +173,23 @@ def _note_unacknowledged(names: Sequence[str]) -> None:
     if not names:
         return
     if len(names) == 1:
-        note = sentence(
-            "record.image-unacknowledged",
-            "{image} is in the folder but not in the journal; it was not acknowledged "
-            "and takes no part.",
-            image=names[0],
-        )
+        note = message("record.image-unacknowledged", image=names[0])
     elif len(names) <= MAX_NAMED:
-        note = sentence(
-            "record.images-unacknowledged",
-            "{images} are in the folder but not in the journal; they were not "
-            "acknowledged and take no part.",
-            images=", ".join(names),
-        )
+        note = message("record.images-unacknowledged", images=", ".join(names))
     else:
-        note = sentence(
-            "record.many-images-unacknowledged",
-            "{n_images} images, the first {first}, are in the folder but not in the "
-            "journal; they were not acknowledged and take no part.",
-            n_images=len(names),
-            first=names[0],
+        note = message(
+            "record.many-images-unacknowledged", n_images=len(names), first=names[0]
         )
     _note(note)
 
 
 def _note_doubts(camera: Camera, options: argparse.Namespace, name: str = "") -> None:
     """Tell why the intrinsics of a camera, of a rig if named, may not hold any more."""
-    for doubt in doubts_about(camera, local_now().date(), options.temperature):
+    for doubt in unmodelled_effects_of(camera, local_now().date(), options.temperature):
         _note(of_camera(name, doubt) if name else doubt)
 
 
-def _note(note: Sentence) -> None:
+def _note(note: Message) -> None:
     print(shown(f"lightpen: {note}"), file=sys.stderr)
 
 
@@ -229,15 +199,10 @@ def _lacking(option: str, images: Sequence[str]) -> UsageError:
     if not missing:
         return lacking(option)
     return UsageError(
-        sentence(
-            "cli.part-of-record-missing",
-            "{option} FILE is missing. Only a record needs none, and {folder} is "
-            "not a whole one: it lacks {missing}. Restore what it lacks from a "
-            "copy, or give --camera FILE and --pen FILE.",
-            option=option,
-            folder=images[0],
-            missing=", ".join(missing),
-        )
+        "cli.part-of-record-missing",
+        option=option,
+        folder=images[0],
+        missing=", ".join(missing),
     )
 
 
@@ -295,20 +260,9 @@ def _read_pen(options: argparse.Namespace) -> Pen:
 
 def _from_rig(options: argparse.Namespace) -> _Calibrated:
     if options.camera is not None:
-        raise UsageError(
-            sentence(
-                "cli.rig-and-camera",
-                "The rig file names the files of its cameras. Leave out --camera.",
-            )
-        )
+        raise UsageError("cli.rig-and-camera")
     if options.second_cone is not None:
-        raise UsageError(
-            sentence(
-                "cli.rig-and-second-cone",
-                "A second cone is taken up with a single camera only. Leave out "
-                "--second-cone, --distance and --distance-sigma.",
-            )
-        )
+        raise UsageError("cli.rig-and-second-cone")
     if options.pen is None:
         raise _lacking("--pen", ())
     rig_file = read_rig(options.rig)
@@ -316,12 +270,8 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
     for name, camera in zip(rig.names, rig.cameras, strict=True):
         _note_doubts(camera, options, name)
     pen = _read_pen(options)
-    in_order = sentence(
-        "cli.one-of-each-camera",
-        "The rig has {n_cameras} cameras: give one for each, in the order of its file "
-        "({names}), and a pattern in quotation marks.",
-        n_cameras=rig.n_cameras,
-        names=", ".join(rig.names),
+    in_order = message(
+        "cli.one-of-each-camera", n_cameras=rig.n_cameras, names=", ".join(rig.names)
     )
     if options.centers is not None:
         _require_one_each(options.centers, rig.n_cameras, in_order)
@@ -339,13 +289,7 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
         with progress("Finding LEDs") as report:
             observations = observe_rig_images(sources, pairing, rig, pen, report)
     if pairing.by_order:
-        _note(
-            sentence(
-                "rig.paired-by-order",
-                "The names of the images do not tell which are of the same moment: the "
-                "first of each camera are taken as one moment, and so on.",
-            )
-        )
+        _note(message("rig.paired-by-order"))
     origin = _origin(options.rig, options.pen, *rig_file.camera_files, *files[:1])
     return _Calibrated(
         calibrate_rig(rig, pen, observations, assumptions_of(options)),
@@ -365,23 +309,14 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
 
 
 def _require_one_each(
-    given: Sequence[str | Path], n_cameras: int, why: Sentence
+    given: Sequence[str | Path], n_cameras: int, why: Message
 ) -> None:
     """Refuse another number of places than of cameras, and one that is given twice."""
     if len(given) != n_cameras:
-        raise UsageError(
-            sentence(
-                "cli.other-number",
-                "Folders or files given: {n_given}. {why}",
-                n_given=len(given),
-                why=why,
-            )
-        )
+        raise UsageError("cli.other-number", n_given=len(given), why=why)
     places = [os.path.realpath(place) for place in given]
     if len(set(places)) < len(places):
-        raise UsageError(
-            sentence("cli.place-twice", "A place is given twice. {why}", why=why)
-        )
+        raise UsageError("cli.place-twice", why=why)
 
 
 def _require_other_names(places: Sequence[str], names: Sequence[str]) -> None:
@@ -390,13 +325,9 @@ def _require_other_names(places: Sequence[str], names: Sequence[str]) -> None:
     cameras = [name.casefold() for name in names]
     if folders != cameras and sorted(folders) == sorted(cameras):
         raise UsageError(
-            sentence(
-                "cli.other-order",
-                "The folders {folders} are in another order than the cameras of the "
-                "rig file, {names}. Give them in the order of the file.",
-                folders=", ".join(map(str, places)),
-                names=", ".join(names),
-            )
+            "cli.other-order",
+            folders=", ".join(map(str, places)),
+            names=", ".join(names),
         )
 
 

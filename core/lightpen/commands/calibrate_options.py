@@ -4,10 +4,10 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from lightpen.commands.arguments import add_pen_options, finite, number_from
+from lightpen.commands.arguments import add_json, add_pen_options, finite, number_from
 from lightpen.errors import UsageError
-from lightpen.estimation.methods import METHODS
-from lightpen.estimation.priors import Separation
+from lightpen.estimation.bundle.priors import ConeSeparation
+from lightpen.estimation.reports.methods import METHODS
 from lightpen.model.assumptions import (
     COLDEST,
     USUAL,
@@ -15,7 +15,6 @@ from lightpen.model.assumptions import (
     Assumptions,
     with_focal_length,
 )
-from lightpen.sentences import sentence
 
 SMALLEST_SHARE, LARGEST_SHARE = 1e-9, 0.1
 
@@ -26,7 +25,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         "images",
         nargs="*",
         metavar="IMAGES",
-        help="a folder, a pattern, a video, or the record of a swing",
+        help="image folder, file name pattern, video, or record of a swing",
     )
     parser.add_argument(
         "--centers",
@@ -34,22 +33,26 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         action="extend",
         metavar="FILE.csv",
-        help="LED centres (frame,led,x_px,y_px) in place of IMAGES",
+        help="LED centres (frame,led,x_px,y_px) instead of IMAGES",
     )
     parser.add_argument(
         "--from-record",
         type=Path,
         metavar="FILE.json",
-        help="what --json wrote, or an accepted result, in place of IMAGES: the same "
-        "tip from it alone",
+        help=(
+            "calibration record (from --json) or accepted result instead of IMAGES; "
+            "recomputes the tip from it"
+        ),
     )
     parser.add_argument("--camera", type=Path, metavar="FILE")
     parser.add_argument(
         "--rig",
         type=Path,
         metavar="FILE",
-        help="several cameras and where they stand, in place of --camera; IMAGES (or "
-        "FILE.csv) is then one of each camera, in the order of this file",
+        help=(
+            "rig file with the extrinsics of several cameras, instead of --camera; "
+            "give IMAGES (or FILE.csv) once per camera, in the order of this file"
+        ),
     )
     parser.add_argument("--pen", type=Path, metavar="FILE")
     add_pen_options(parser)
@@ -57,65 +60,72 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         "--camera-sigma",
         type=_share,
         metavar="SHARE",
-        help="standard uncertainty of the focal length, such as 0.5%%, where the "
-        "camera file states none; that of the rest of the camera goes with it",
+        help=(
+            "standard uncertainty of the focal length, for example 0.5%%, if the "
+            "camera file states none; other intrinsics are scaled with it"
+        ),
     )
     parser.add_argument(
         "--scale-sigma",
         type=_share,
         metavar="SHARE",
-        help="standard uncertainty of the pen's scale, such as 20e-6, where the pen "
-        "file states none",
+        help=(
+            "standard uncertainty of the scale of the pen, for example 20e-6, if "
+            "the LED file states none"
+        ),
     )
     parser.add_argument(
         "--temperature",
         type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),
         metavar="CELSIUS",
-        help="of the pen during the swing, which makes it larger than its file says",
+        help="pen temperature during the swing, for thermal expansion",
     )
     parser.add_argument(
         "--temperature-sigma",
         type=number_from(0.001, 50.0, "uncertainty", "K"),
         metavar="K",
-        help="its standard uncertainty (0.5), or without --temperature how much warmer "
-        "than at its measurement the pen may be (1.5)",
+        help=(
+            "standard uncertainty of the temperature (0.5), or without "
+            "--temperature the temperature difference from the LED measurement (1.5)"
+        ),
     )
     parser.add_argument(
         "--form-error",
         type=number_from(1e-7, 1.0, "uncertainty", "mm"),
         metavar="MM",
-        help="standard uncertainty of where the ball sits, as ball and cone are not "
-        "quite round (0.0002)",
+        help="standard uncertainty due to the form error of ball and cone (0.0002)",
     )
     parser.add_argument(
         "--center-bias",
         type=number_from(1e-6, 10.0, "uncertainty", "px"),
         metavar="PX",
-        help="standard uncertainty of LED centres that does not average out (0.003)",
+        help="systematic standard uncertainty of LED centres (0.003)",
     )
     parser.add_argument(
         "--second-cone",
         metavar="IMAGES",
-        help="images of a swing in a second cone, in the form of those of the first; "
-        "the camera must not have moved",
+        help=(
+            "images of a swing in a second cone, given like those of the first; the "
+            "camera must not have moved"
+        ),
     )
     parser.add_argument(
         "--distance",
         type=number_from(0.1, 10_000.0, "distance", "mm"),
         metavar="MM",
-        help="of the two cones",
+        help="distance of the two cones",
     )
     parser.add_argument(
         "--distance-sigma",
         type=number_from(1e-6, 100.0, "uncertainty", "mm"),
         metavar="MM",
-        help="its standard uncertainty",
+        help="standard uncertainty of the distance",
     )
     parser.add_argument("--method", choices=METHODS, default="joint")
     parser.add_argument(
         "--nominal-tip", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the record")
+    add_json(parser)
 
 
 def _share(text: str) -> float:
@@ -133,31 +143,22 @@ def assumptions_of(options: argparse.Namespace) -> Assumptions:
     assumed = USUAL
     if options.camera_sigma is not None:
         assumed = with_focal_length(assumed, options.camera_sigma)
-    if options.scale_sigma is not None:
-        assumed = replace(assumed, scale=options.scale_sigma)
-    if options.temperature is not None:
-        assumed = replace(assumed, temperature_c=options.temperature)
-    if options.temperature_sigma is not None:
-        which = "warmth" if options.temperature is None else "temperature"
-        assumed = replace(assumed, **{which: options.temperature_sigma})
-    if options.form_error is not None:
-        assumed = replace(assumed, form_error=options.form_error)
-    if options.center_bias is not None:
-        assumed = replace(assumed, center_bias=options.center_bias)
-    return assumed
+    temperature = "warmth" if options.temperature is None else "temperature"
+    given = {
+        "scale": options.scale_sigma,
+        "temperature_c": options.temperature,
+        temperature: options.temperature_sigma,
+        "form_error": options.form_error,
+        "center_bias": options.center_bias,
+    }
+    return replace(assumed, **{n: x for n, x in given.items() if x is not None})
 
 
-def separation_of(options: argparse.Namespace) -> Separation | None:
+def separation_of(options: argparse.Namespace) -> ConeSeparation | None:
     """Return the distance of two cones, if there are two."""
     given = (options.second_cone, options.distance, options.distance_sigma)
     if all(each is None for each in given):
         return None
     if any(each is None for each in given):
-        raise UsageError(
-            sentence(
-                "cli.second-cone",
-                "A second cone needs three options: --second-cone IMAGES, --distance "
-                "MM and --distance-sigma MM. Give all or none.",
-            )
-        )
-    return Separation(options.distance, options.distance_sigma)
+        raise UsageError("cli.second-cone")
+    return ConeSeparation(options.distance, options.distance_sigma)

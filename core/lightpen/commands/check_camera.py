@@ -15,15 +15,15 @@ from lightpen.commands.console import (
 )
 from lightpen.detection.observations import observe_images
 from lightpen.errors import CalibrationError
+from lightpen.estimation.bundle.consistency_findings import COEFFICIENTS
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.contradictions import COEFFICIENTS
-from lightpen.estimation.rig_report import adjusted_intrinsics_record
+from lightpen.estimation.reports.report import adjusted_intrinsics
 from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.json_records import plain
 from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
-from lightpen.model.camera_validity import doubts_about
+from lightpen.model.camera_validity import unmodelled_effects_of
 
 COVERAGE_FACTOR = 2.0
 
@@ -32,7 +32,7 @@ def add_check_camera(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen check-camera``."""
     parser.set_defaults(run=_check_camera)
     parser.add_argument(
-        "images", nargs="+", metavar="IMAGES", help="of one swing of the pen"
+        "images", nargs="+", metavar="IMAGES", help="images of one swing of the pen"
     )
     parser.add_argument("--camera", type=Path, required=True, metavar="FILE")
     parser.add_argument("--pen", type=Path, required=True, metavar="FILE")
@@ -41,7 +41,7 @@ def add_check_camera(parser: argparse.ArgumentParser) -> None:
         "--temperature",
         type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),
         metavar="CELSIUS",
-        help="at the station",
+        help="temperature at the station",
     )
     add_json(parser)
 
@@ -55,7 +55,7 @@ def _check_camera(options: argparse.Namespace) -> None:
     with progress("Finding LEDs") as report:
         observations = observe_images(source, camera, pen, report)
     calibration = calibrate(camera, pen, observations)
-    doubts = doubts_about(camera, local_now().date(), options.temperature)
+    doubts = unmodelled_effects_of(camera, local_now().date(), options.temperature)
     denied = [each for each in calibration.contradictions if not each.of_pen]
     print(shown(_text(calibration, camera.intrinsics.tolist())))
     for doubt in doubts:
@@ -64,21 +64,21 @@ def _check_camera(options: argparse.Namespace) -> None:
         record = {
             "kind": "camera check",
             "agrees": not denied,
-            "intrinsics": adjusted_intrinsics_record(calibration, 0),
-            "contradictions": [each.sentence for each in denied],
+            "intrinsics": adjusted_intrinsics(calibration, 0),
+            "contradictions": [each.message for each in denied],
             "doubts": doubts,
         }
         write_record(options.json, plain(record))
     if denied:
         for each in denied[1:]:
-            print(shown(str(each.sentence)))
-        raise CalibrationError(denied[0].sentence)
+            print(shown(str(each.message)))
+        raise CalibrationError(denied[0].message)
     print("\nFile and camera agree.")
 
 
 def _text(calibration: Calibration, stated: list[float]) -> str:
     fitted = calibration.bundle
-    place = fitted.columns.cameras[0]
+    place = fitted.layout.cameras[0]
     camera = fitted.state.rig.cameras[0]
     u = COVERAGE_FACTOR * np.sqrt(np.diag(fitted.covariance)[place])
     before = COVERAGE_FACTOR * np.sqrt(
@@ -91,7 +91,10 @@ def _text(calibration: Calibration, stated: list[float]) -> str:
         f"  {name:<6}{of_file:14.6g}{known:12.2g}{value:16.6g}{now:12.2g}"
         for name, of_file, known, value, now in zip(
             ("fx", "fy", "cx", "cy", *COEFFICIENTS),
-            *(stated, before.tolist(), camera.intrinsics.tolist(), u.tolist()),
+            stated,
+            before.tolist(),
+            camera.intrinsics.tolist(),
+            u.tolist(),
             strict=False,
         )
     ]

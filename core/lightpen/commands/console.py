@@ -9,10 +9,11 @@ from functools import wraps
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from msgspec import Struct
+
 from lightpen.errors import UsageError
 from lightpen.formats.files import A_FILE, printable, unreadable, write_whole
 from lightpen.formats.json_records import record_bytes
-from lightpen.sentences import sentence
 
 DONE, NO_TIP, BAD_INPUT = 0, 1, 2
 BAR_WIDTH = 72  # characters
@@ -63,30 +64,17 @@ def require_other_file(record: Path | None, *inputs: Path | None) -> None:
         return
     for path in inputs:
         if path is not None and are_same(path, record):
-            raise UsageError(
-                sentence(
-                    "cli.json-over-input",
-                    "--json {record} would replace the input file of that name. "
-                    "Give the record another name.",
-                    record=str(record),
-                )
-            )
+            raise UsageError("cli.json-over-input", record=str(record))
 
 
-def write_record(path: Path, record: Mapping[str, Any]) -> None:
+def write_record(path: Path, record: Mapping[str, Any] | Struct) -> None:
     """Write a record as JSON that tells when it was changed."""
     write_whole(path, record_bytes(record))
 
 
 def lacking(option: str) -> UsageError:
     """Return that an option is missing which only a record can do without."""
-    return UsageError(
-        sentence(
-            "cli.option-missing",
-            "{option} FILE is missing. Only a record needs none.",
-            option=option,
-        )
-    )
+    return UsageError("cli.option-missing", option=option)
 
 
 def are_same(one: Path, other: Path) -> bool:

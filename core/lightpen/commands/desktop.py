@@ -7,9 +7,6 @@ from typing import Protocol
 
 from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
-from lightpen.sentences import sentence
-
-LANGUAGES = ("en", "zh_CN")  # of the record on paper
 
 
 class Desktop(Protocol):
@@ -33,6 +30,9 @@ class Desktop(Protocol):
     def data_folder(self) -> Path:
         """Return where records, results and the archive are, as chosen."""
 
+    def languages(self) -> tuple[str, ...]:
+        """Return the languages of the program, English first."""
+
     def write_paper(self, result: Path, out: Path | None, language: str) -> Path:
         """Write the record on paper of a calibration as PDF; return where it is."""
 
@@ -44,21 +44,21 @@ def add_desktop(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
     starts.add_argument(
         "--demo",
         action="store_true",
-        help="play a whole calibration with a simulated operator",
+        help="run a complete calibration with a simulated operator",
     )
     starts.add_argument(
         "--self-test",
         type=Path,
         metavar="REPORT.json",
-        help="try all that the program needs on this computer, and write a report",
+        help="test the installation on this computer and write a report",
     )
     starts.add_argument(
         "--install-desktop-entry",
         action="store_true",
-        help="put the program into the menu of a Linux desktop",
+        help="add the program to the menu of a Linux desktop",
     )
     starts.add_argument(
-        "--remove-desktop-entry", action="store_true", help="take it out again"
+        "--remove-desktop-entry", action="store_true", help="remove it from the menu"
     )
 
 
@@ -69,7 +69,7 @@ def add_open(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
         "swing",
         type=Path,
         metavar="SWING",
-        help="the record of a swing, the file swing.lightpen in it, or a result",
+        help="record of a swing, the file swing.lightpen in it, or a result",
     )
 
 
@@ -80,27 +80,21 @@ def add_report(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
         "result",
         type=Path,
         metavar="RESULT.json",
-        help="an accepted result, or what calibrate --json wrote",
+        help="accepted result, or record written by calibrate --json",
     )
     parser.add_argument(
         "--out",
         type=Path,
         metavar="FILE.pdf",
-        help="here, named by pen, tip and date, unless given",
+        help="output file (default: named by pen, tip and date, in this folder)",
     )
-    parser.add_argument("--language", choices=LANGUAGES, default=LANGUAGES[0])
+    languages = desktop.languages()
+    parser.add_argument("--language", choices=languages, default=languages[0])
 
 
 def _report(desktop: Desktop, options: argparse.Namespace) -> None:
     if options.out is not None and are_same(options.result, options.out):
-        raise UsageError(
-            sentence(
-                "cli.report-over-result",
-                "{out} would replace the result that it is made from. Give the PDF "
-                "another name.",
-                out=str(options.out),
-            )
-        )
+        raise UsageError("cli.report-over-result", out=str(options.out))
     path = desktop.write_paper(options.result, options.out, options.language)
     print(shown(f"The record is in {path}."))
 

@@ -36,7 +36,6 @@ from lightpen.intrinsics.report import (
 )
 from lightpen.intrinsics.views import BoardTolerances
 from lightpen.local_time import local_now
-from lightpen.sentences import sentence
 
 USUAL = BoardTolerances()
 SIDES = ("left", "right")
@@ -49,7 +48,7 @@ def add_intrinsics(parser: argparse.ArgumentParser) -> None:
         "images",
         nargs="+",
         metavar="IMAGES",
-        help="of the board: a folder, a pattern, or a video",
+        help="board images: folder, file name pattern, or video",
     )
     _add_board(parser)
     parser.add_argument(
@@ -57,7 +56,7 @@ def add_intrinsics(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path("camera.yaml"),
         metavar="FILE.yaml",
-        help="the camera file to write (camera.yaml)",
+        help="camera file to write (camera.yaml)",
     )
     parser.add_argument(
         "--serial", default="", metavar="TEXT", help="serial number of the camera"
@@ -69,7 +68,7 @@ def add_intrinsics(parser: argparse.ArgumentParser) -> None:
         action="extend",
         default=[],
         metavar="NAME",
-        help="images that take no part, by their file names",
+        help="file names of images to exclude",
     )
     add_json(parser)
 
@@ -77,39 +76,42 @@ def add_intrinsics(parser: argparse.ArgumentParser) -> None:
 def add_extrinsics(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen extrinsics``."""
     parser.set_defaults(run=_extrinsics)
+    parser.add_argument("left", metavar="LEFT", help="board images of the first camera")
     parser.add_argument(
-        "left", metavar="LEFT", help="images of the board by the first camera"
+        "right",
+        metavar="RIGHT",
+        help="board images of the second camera, paired by name",
     )
-    parser.add_argument("right", metavar="RIGHT", help="by the second, paired by name")
     _add_board(parser)
     parser.add_argument(
         "--cameras",
         type=Path,
         nargs=2,
         metavar=("LEFT.yaml", "RIGHT.yaml"),
-        help="files of the cameras; found from the same images unless given",
+        help="camera files (default: calibrated from the same images)",
     )
     parser.add_argument(
         "--names",
         nargs=2,
         default=SIDES,
         metavar=("LEFT", "RIGHT"),
-        help="by which the program speaks of the cameras (left right)",
+        help="names of the cameras (left right)",
     )
     parser.add_argument(
         "--interval",
         type=above_zero,
         metavar="MS",
-        help="time between two views of a sequence, to tell in ms by how much a camera "
-        "is late",
+        help="time between two views of a sequence, to state the camera lag in ms",
     )
     parser.add_argument(
         "--out",
         type=Path,
         default=Path("rig.json"),
         metavar="FILE.json",
-        help="the rig file to write (rig.json); without --cameras their files are "
-        "written beside it",
+        help=(
+            "rig file to write (rig.json); without --cameras the camera files are "
+            "written next to it"
+        ),
     )
     _add_temperature(parser)
     add_json(parser)
@@ -154,7 +156,7 @@ def _add_temperature(parser: argparse.ArgumentParser) -> None:
         "--temperature",
         type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),
         metavar="CELSIUS",
-        help="at the camera, kept in its file",
+        help="temperature at the camera, stored in its file",
     )
 
 
@@ -174,10 +176,7 @@ def _intrinsics(options: argparse.Namespace) -> None:
         _require_known(options.leave_out, source.names)
         kept = ~np.isin(views.names, options.leave_out)
         calibration = calibrate_camera(
-            views.chosen(kept),
-            tolerances,
-            local_now().date(),
-            _part(report, 0.7, 1.0),
+            views.chosen(kept), tolerances, local_now().date(), _part(report, 0.7, 1.0)
         )
     camera = replace(
         calibration.camera, serial=options.serial, temperature_c=options.temperature
@@ -209,16 +208,12 @@ def _extrinsics(options: argparse.Namespace) -> None:
     ):
         if camera.image_size != size:
             raise UsageError(
-                sentence(
-                    "cli.camera-of-other-size",
-                    "{file} is for images of {width} x {height} px, those given have "
-                    "{seen_width} x {seen_height} px. Give the file of this camera.",
-                    file=printable(str(file)),
-                    width=camera.width,
-                    height=camera.height,
-                    seen_width=size[0],
-                    seen_height=size[1],
-                )
+                "cli.camera-of-other-size",
+                file=printable(str(file)),
+                width=camera.width,
+                height=camera.height,
+                seen_width=size[0],
+                seen_height=size[1],
             )
     calibration = calibrate_pair(
         observed.views, tolerances, names, cameras, options.interval
@@ -257,40 +252,20 @@ def _require_names(names: tuple[str, str]) -> None:
     are_plain = all(re.fullmatch(r"[\w.-]+", name) for name in names)
     if names[0] == names[1] or not are_plain:
         raise UsageError(
-            sentence(
-                "cli.camera-names",
-                "The cameras cannot be called {one} and {other}: two names of letters, "
-                "digits, dots and dashes are needed. Give each such a name of its own.",
-                one=printable(names[0]),
-                other=printable(names[1]),
-            )
+            "cli.camera-names", one=printable(names[0]), other=printable(names[1])
         )
 
 
 def _require_new_file(out: Path, *inputs: Path) -> None:
     """Refuse to write over one of the files that it is made from."""
     if any(are_same(path, out) for path in inputs):
-        raise UsageError(
-            sentence(
-                "cli.cameras-over-input",
-                "--out {out} would replace the input file of that name. Give another "
-                "name.",
-                out=printable(str(out)),
-            )
-        )
+        raise UsageError("cli.cameras-over-input", out=printable(str(out)))
 
 
 def _require_known(left_out: list[str], names: tuple[str, ...]) -> None:
     for name in left_out:
         if name not in names:
-            raise UsageError(
-                sentence(
-                    "cli.no-such-image",
-                    "--leave-out {name} is none of the images. Give a file name "
-                    "without its folder, as in the report.",
-                    name=printable(name),
-                )
-            )
+            raise UsageError("cli.no-such-image", name=printable(name))
 
 
 def _from_there(file: Path, rig_file: Path) -> str:

@@ -7,7 +7,6 @@ from lightpen.commands.arguments import add_pen_options
 from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
 from lightpen.formats.pen_files import read_raw_pen, write_pen
-from lightpen.sentences import sentence
 
 
 def add_pen(parser: argparse.ArgumentParser) -> None:
@@ -21,14 +20,7 @@ def add_pen(parser: argparse.ArgumentParser) -> None:
 @printing
 def _pen(options: argparse.Namespace) -> None:
     if are_same(options.raw, options.out):
-        raise UsageError(
-            sentence(
-                "cli.pen-over-raw",
-                "{out} would replace the measured LEDs that it is made from. Give the "
-                "pen file another name.",
-                out=str(options.out),
-            )
-        )
+        raise UsageError("cli.pen-over-raw", out=str(options.out))
     raw = read_raw_pen(options.raw, options.units, options.led_diameter)
     write_pen(raw, options.out)
     print(shown(f"{raw.n_leds} LEDs in the pen frame are in {options.out}."))

@@ -17,13 +17,15 @@ from lightpen.formats.files import sha256
 from lightpen.formats.hashes import all_hashed
 from lightpen.formats.json_records import file_entry
 from lightpen.formats.pen_files import read_pen, write_pen
-from lightpen.record.calibrations import CalibrationFile, read_calibration
-from lightpen.sentences import sentence
-from lightpen.verification.led_file import improve_pen
-from lightpen.verification.pen_health import GROWN, MOVED, examine_pen
-from lightpen.verification.read_back import read_scale
-from lightpen.verification.records import pen_health_entries, verification_record
-from lightpen.verification.texts import improved_pen_text, pen_health_text
+from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.verification.history.led_file import improve_pen
+from lightpen.verification.history.pen_health import GROWN, MOVED, examine_pen
+from lightpen.verification.history.recorded_tasks import read_scale
+from lightpen.verification.reports.records import (
+    pen_health_entries,
+    verification_record,
+)
+from lightpen.verification.reports.summaries import improved_pen_text, pen_health_text
 
 
 def add_verify_pen(parser: argparse.ArgumentParser) -> None:
@@ -41,10 +43,14 @@ def add_improve_pen(parser: argparse.ArgumentParser) -> None:
         "--length",
         type=Path,
         metavar="FILE.json",
-        help="a certified length verified with this pen, for its scale",
+        help="length verification with this pen, for its scale",
     )
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="NEW.json", help="the new LED file"
+        "--out",
+        type=Path,
+        required=True,
+        metavar="NEW.json",
+        help="new LED file to write",
     )
 
 
@@ -84,14 +90,7 @@ def _verify_pen(options: argparse.Namespace) -> None:
 def _improve_pen(options: argparse.Namespace) -> None:
     for path in (*options.results, options.camera, options.pen, options.length):
         if path is not None and are_same(path, options.out):
-            raise UsageError(
-                sentence(
-                    "cli.out-over-input",
-                    "--out {out} would replace the input file of that name. Give the "
-                    "new LED file another name.",
-                    out=str(options.out),
-                )
-            )
+            raise UsageError("cli.out-over-input", out=str(options.out))
     swings = _swings(options)
     pen = read_pen(options.pen, options.units, options.led_diameter, None)
     camera = read_camera(options.camera)
@@ -109,13 +108,9 @@ def _swings(options: argparse.Namespace) -> list[CalibrationFile]:
     for each in swings:
         if each.pen_sha256 != pen_sha256:
             raise UsageError(
-                sentence(
-                    "cli.swing-of-another-pen",
-                    "{result} was made with the pen file {its_pen}, which --pen {pen} "
-                    "is not. Give that file, and calibrations with it only.",
-                    result=str(each.path),
-                    its_pen=each.pen_file,
-                    pen=str(options.pen),
-                )
+                "cli.swing-of-another-pen",
+                result=str(each.path),
+                its_pen=each.calibration.inputs.pen.file,
+                pen=str(options.pen),
             )
     return swings

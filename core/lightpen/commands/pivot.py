@@ -3,10 +3,11 @@
 import argparse
 from pathlib import Path
 
+from lightpen.commands.arguments import add_json
 from lightpen.commands.console import printing, require_other_file, write_record
 from lightpen.estimation.pivot_calibration import calibrate_pivot
-from lightpen.estimation.pivot_report import pivot_record
-from lightpen.estimation.summary import pivot_text
+from lightpen.estimation.reports.pivot_report import pivot_record
+from lightpen.estimation.reports.summary import pivot_text
 from lightpen.formats.hashes import hashed
 from lightpen.formats.observation_files import read_poses
 
@@ -16,9 +17,9 @@ def add_pivot(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_pivot)
     parser.add_argument("poses", type=Path, metavar="POSES.csv")
     parser.add_argument(
-        "--least-squares", action="store_true", help="take all poses alike"
+        "--least-squares", action="store_true", help="weight all poses equally"
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the record")
+    add_json(parser)
 
 
 @printing

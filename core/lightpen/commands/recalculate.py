@@ -19,16 +19,15 @@ from lightpen.commands.console import (
 )
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.monte_carlo import MIN_TRIALS, MonteCarlo, run_monte_carlo
-from lightpen.estimation.workers import Map, cluster_workers, local_workers
+from lightpen.estimation.statistics.workers import Map, cluster_workers, local_workers
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import printable, sha256
 from lightpen.formats.json_records import plain
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.record.calibrations import CalibrationFile, read_calibration
-from lightpen.sentences import sentence
-from lightpen.verification.led_file import calibrate_again
+from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.verification.history.led_file import calibrate_again
 
 TITLE, COLUMN = 30, 13  # characters
 
@@ -64,18 +63,18 @@ def add_recalculate(parser: argparse.ArgumentParser) -> None:
         "--monte-carlo",
         type=_n_trials,
         metavar="N",
-        help="check the uncertainty of each by so many simulated calibrations",
+        help="number of simulated calibrations to check each uncertainty",
     )
     parser.add_argument(
         "--workers",
         type=whole_number,
         metavar="N",
-        help="processes on this machine; one a core unless said",
+        help="processes on this machine (default: one per core)",
     )
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="compute on a Dask cluster, such as tcp://10.0.0.5:8786",
+        help="compute on a Dask cluster, for example tcp://10.0.0.5:8786",
     )
     add_json(parser)
 
@@ -122,7 +121,7 @@ class _Solve:
         try:
             tip = calibrate_again(file, self.camera, self.pen).joint.tip_pen
         except CalibrationError as error:
-            return Recalculated(name, None, None, str(error.sentence))
+            return Recalculated(name, None, None, str(error.message))
         return Recalculated(name, tip, tip - file.tip_pen)
 
 
@@ -143,14 +142,10 @@ def _require_files(files: list[CalibrationFile], options: argparse.Namespace) ->
     for file in files:
         if (file.camera_sha256, file.pen_sha256) != given:
             raise UsageError(
-                sentence(
-                    "cli.result-of-other-files",
-                    "{result} was made with other files than --camera {camera} and "
-                    "--pen {pen}. Give those that it was made with.",
-                    result=printable(str(file.path)),
-                    camera=str(options.camera),
-                    pen=str(options.pen),
-                )
+                "cli.result-of-other-files",
+                result=printable(str(file.path)),
+                camera=str(options.camera),
+                pen=str(options.pen),
             )
 
 

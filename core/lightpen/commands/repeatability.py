@@ -5,12 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpen.commands.arguments import (
-    above_zero,
-    add_json,
-    add_pen_options,
-    finite,
-)
+from lightpen.commands.arguments import above_zero, add_json, add_pen_options, finite
 from lightpen.commands.console import (
     printing,
     progress,
@@ -21,7 +16,7 @@ from lightpen.commands.console import (
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.methods import result_of
+from lightpen.estimation.reports.methods import result_of
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import printable
 from lightpen.formats.hashes import all_hashed
@@ -29,14 +24,16 @@ from lightpen.formats.json_records import file_entry
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import VerificationLimits
-from lightpen.record.calibrations import read_calibration
-from lightpen.sentences import sentence
-from lightpen.verification.charts import write_chart
-from lightpen.verification.pen_health import require_one_pen
-from lightpen.verification.read_back import read_fixed_point
-from lightpen.verification.records import repeatability_entries, verification_record
-from lightpen.verification.repeatability import TipEstimate, measure_repeatability
-from lightpen.verification.texts import repeatability_text
+from lightpen.record.calibrations.calibrations import read_calibration
+from lightpen.verification.history.pen_health import require_one_pen
+from lightpen.verification.history.recorded_tasks import read_fixed_point
+from lightpen.verification.reports.charts import write_chart
+from lightpen.verification.reports.records import (
+    repeatability_entries,
+    verification_record,
+)
+from lightpen.verification.reports.summaries import repeatability_text
+from lightpen.verification.tasks.repeatability import TipEstimate, measure_repeatability
 
 
 def add_repeatability(parser: argparse.ArgumentParser) -> None:
@@ -47,36 +44,41 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="RESULT",
-        help="calibrations of one tip: RESULT.json, or LED centres as FILE.csv, which "
-        "are calibrated first",
+        help="calibrations of one tip: RESULT.json, or LED centres as FILE.csv",
     )
-    parser.add_argument("--camera", type=Path, metavar="FILE", help="of LED centres")
-    parser.add_argument("--pen", type=Path, metavar="FILE", help="likewise")
+    parser.add_argument(
+        "--camera", type=Path, metavar="FILE", help="camera file for LED centres"
+    )
+    parser.add_argument(
+        "--pen", type=Path, metavar="FILE", help="LED file for LED centres"
+    )
     add_pen_options(parser)
     parser.add_argument(
         "--method",
         choices=("joint", "two-stage"),
         default="joint",
-        help="which estimator gives the tips of LED centres",
+        help="estimator for LED centres",
     )
     parser.add_argument(
         "--fixed-point",
         type=Path,
         metavar="FILE.json",
-        help="a fixed point verified with this tip, to compare its scatter",
+        help=(
+            "fixed-point verification with this tip, to compare its standard deviation"
+        ),
     )
     parser.add_argument(
         "--tolerance",
         type=above_zero,
         metavar="MM",
-        help="width of the tolerance of a coordinate, for Cg and Cgk",
+        help="tolerance width of a coordinate, for Cg and Cgk",
     )
     parser.add_argument(
         "--reference",
         type=finite,
         nargs=3,
         metavar=("X", "Y", "Z"),
-        help="the tip by a better instrument, mm, for Cgk",
+        help="reference tip from a more accurate instrument, mm, for Cgk",
     )
     usual = VerificationLimits().repeatability
     parser.add_argument(
@@ -84,7 +86,7 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
         type=above_zero,
         default=usual,
         metavar="MM",
-        help=f"of the standard deviation of a coordinate; {usual:g} unless said",
+        help=f"limit of the standard deviation of a coordinate ({usual:g})",
     )
     parser.add_argument(
         "--chart", type=Path, metavar="FILE", help="control chart, .csv or .svg"
@@ -129,13 +131,9 @@ def _tips(options: argparse.Namespace) -> list[TipEstimate]:
     tables = [path for path in options.results if path.suffix.lower() == ".csv"]
     if tables and len(tables) < len(options.results):
         raise UsageError(
-            sentence(
-                "cli.results-mixed",
-                "Give either results or files of LED centres: {one} is a result, "
-                "{other} is not.",
-                one=str(next(each for each in options.results if each not in tables)),
-                other=str(tables[0]),
-            )
+            "cli.results-mixed",
+            one=str(next(each for each in options.results if each not in tables)),
+            other=str(tables[0]),
         )
     return _from_centers(options, tables) if tables else _from_results(options)
 
@@ -144,17 +142,13 @@ def _from_results(options: argparse.Namespace) -> list[TipEstimate]:
     calibrations = [read_calibration(path) for path in options.results]
     require_one_pen(calibrations)
     for each in calibrations[1:]:
-        if each.tip != calibrations[0].tip:
+        if each.names.tip != calibrations[0].names.tip:
             raise UsageError(
-                sentence(
-                    "cli.another-tip",
-                    "{other} is of the tip {its}, {first} of the tip {tip}. Give "
-                    "calibrations of one tip.",
-                    other=str(each.path),
-                    its=printable(each.tip),
-                    first=str(calibrations[0].path),
-                    tip=printable(calibrations[0].tip),
-                )
+                "cli.another-tip",
+                other=str(each.path),
+                its=printable(each.names.tip),
+                first=str(calibrations[0].path),
+                tip=printable(calibrations[0].names.tip),
             )
     return [
         TipEstimate(each.path.name, each.tip_pen, each.uncertainty, each.when)
@@ -165,13 +159,7 @@ def _from_results(options: argparse.Namespace) -> list[TipEstimate]:
 def _from_centers(options: argparse.Namespace, tables: list[Path]) -> list[TipEstimate]:
     for option, file in (("--camera", options.camera), ("--pen", options.pen)):
         if file is None:
-            raise UsageError(
-                sentence(
-                    "cli.centers-need",
-                    "{option} FILE is missing: LED centres are calibrated with it.",
-                    option=option,
-                )
-            )
+            raise UsageError("cli.centers-need", option=option)
     camera = read_camera(options.camera)
     pen = read_pen(options.pen, options.units, options.led_diameter, None)
     tips = []

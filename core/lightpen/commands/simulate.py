@@ -23,19 +23,22 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--images", type=_n_images, default=60, metavar="N")
     parser.add_argument("--seed", type=whole_number, default=0, metavar="S")
     parser.add_argument(
-        "--scene", choices=("clean", "hard"), default="clean", help="what goes wrong"
+        "--scene",
+        choices=("clean", "hard"),
+        default="clean",
+        help="disturbance to simulate",
     )
     parser.add_argument(
         "--swing",
         choices=("field", "cone", "operator", "one-axis", "upright"),
         default="field",
-        help="how the pen moves",
+        help="motion of the pen",
     )
     parser.add_argument(
         "--leds",
         choices=("even", "hot-spot", "dome", "ring", "halo", "ghost"),
         default="even",
-        help="how the LEDs look inside and round their rims",
+        help="appearance of the LEDs",
     )
     parser.add_argument(
         "--led-diameter",
@@ -48,7 +51,7 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         type=number_from(*BLURS, "blur", "px"),
         default=0.8,
         metavar="PX",
-        help="standard deviation of the optics' blur",
+        help="standard deviation of the optical blur",
     )
     parser.add_argument("--bits", type=int, choices=(8, 12, 16), default=8)
     parser.add_argument(
@@ -56,34 +59,36 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         type=int,
         choices=(1, 2, 4),
         default=1,
-        help="so many pixels in a row, and in a column, are read out as one",
+        help="binning factor in rows and columns",
     )
     parser.add_argument(
         "--cameras",
         type=int,
         choices=range(1, MAX_RIG + 1),
         default=1,
-        help="in a row, each turned to the pen; of several OUT gets a folder each, and "
-        "rig.json",
+        help=(
+            "number of cameras in a row, each facing the pen; with several, OUT "
+            "gets one folder per camera, and rig.json"
+        ),
     )
     parser.add_argument(
         "--baseline",
         type=number_from(*BASELINES, "baseline", "mm"),
         default=1000.0,
         metavar="MM",
-        help="from the first of several cameras to the last",
+        help="distance from the first to the last camera",
     )
     parser.add_argument(
         "--lamp",
         action="store_true",
-        help="a fixed lamp in view, which tells whether the camera stands still",
+        help="fixed lamp in view, to detect camera motion",
     )
     parser.add_argument(
         "--camera-turn",
         type=number_from(0.0, LARGEST_SHIFT, "shift", "px"),
         default=0.0,
         metavar="PX",
-        help="how far the image shifts during the swing, as the camera turns",
+        help="image shift during the swing due to camera rotation",
     )
     parser.add_argument(
         "--pen",
@@ -105,8 +110,7 @@ def _n_images(text: str) -> int:
 @printing
 def _simulate(options: argparse.Namespace) -> None:
     # Imported here as the simulator is not needed to calibrate.
-    from lightpen.simulator.sample_pens import SAMPLE_PENS
-    from lightpen.simulator.sample_rigs import row_of_cameras
+    from lightpen.simulator.samples import SAMPLE_PENS, row_of_cameras
     from lightpen.simulator.scene_files import write_rig_scene, write_scene
     from lightpen.simulator.scenes import LEDS, SCENES, Scene
     from lightpen.simulator.sensor import Sensor

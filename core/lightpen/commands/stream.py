@@ -19,19 +19,18 @@ from lightpen.cameras.replay import RECORDED, USUAL_FRAME_RATE, ReplayCamera
 from lightpen.cameras.source import SourcePlace
 from lightpen.cameras.sources import SOURCES, source_named
 from lightpen.cameras.worker import CameraWorker
-from lightpen.cameras.worker_events import Failed, Troubled, WorkerEvent
+from lightpen.cameras.worker_events import Failed, FaultRaised, WorkerEvent
 from lightpen.commands.arguments import above_zero, add_pen_options, whole_number
 from lightpen.commands.console import lacking, printing, shown
-from lightpen.detection.aim import Aim
-from lightpen.detection.sighting import Sighting, look
+from lightpen.detection.pen_detection import PenDetection, detect_pen
+from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.errors import LightpenError, UsageError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.camera import Camera
-from lightpen.record.calibrations import read_calibration
-from lightpen.record.names import Names
-from lightpen.record.recordings import FilesBeside, files_beside
-from lightpen.sentences import sentence
+from lightpen.record.calibrations.calibrations import read_calibration
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.recordings import FilesBeside, files_beside
 from lightpen.streaming.messages import StreamedTip
 from lightpen.streaming.server import (
     LOOPBACK,
@@ -40,8 +39,8 @@ from lightpen.streaming.server import (
     StreamPlace,
     StreamStatus,
 )
-from lightpen.verification.places import touch_place, viewers_of_camera
-from lightpen.verification.sources import instrument_of
+from lightpen.verification.probing.image_locations import touch_place, viewers_of_camera
+from lightpen.verification.probing.sources import instrument_of
 
 LONGEST_WAIT = 0.5  # s for an image, before the keyboard is heard
 
@@ -52,8 +51,10 @@ def add_stream(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "place",
         metavar="PLACE",
-        help="a folder, a pattern, a video or the record of a swing; of a camera its "
-        "serial number",
+        help=(
+            "image folder, file name pattern, video or record of a swing; for a "
+            "camera its serial number"
+        ),
     )
     parser.add_argument(
         "--source",
@@ -62,7 +63,7 @@ def add_stream(parser: argparse.ArgumentParser) -> None:
         help=f"what takes the images ({RECORDED.key})",
     )
     parser.add_argument(
-        "--producer", default="", metavar="FILE", help="of a GenTL camera"
+        "--producer", default="", metavar="FILE", help="GenTL producer of a camera"
     )
     parser.add_argument("--camera", type=Path, metavar="FILE")
     parser.add_argument("--pen", type=Path, metavar="FILE")
@@ -71,7 +72,7 @@ def add_stream(parser: argparse.ArgumentParser) -> None:
         "--tip",
         type=Path,
         metavar="RESULT.json",
-        help="the calibration of the tip; without it the pose is streamed alone",
+        help="calibration of the tip; without it only the pose is streamed",
     )
     parser.add_argument(
         "--address",
@@ -96,7 +97,7 @@ def add_stream(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--once",
         action="store_true",
-        help="end after the last recorded image, rather than begin again",
+        help="end after the last recorded image instead of repeating",
     )
 
 
@@ -128,7 +129,7 @@ class _Listened:
     """What is streamed: the images, and what is looked for in them."""
 
     images: ImageCamera
-    aim: Aim
+    region: RegionOfInterest
     tip: StreamedTip | None
 
 
@@ -156,12 +157,16 @@ def _listened(options: argparse.Namespace) -> _Listened:
     camera = read_camera(camera_file)
     pen = read_pen(pen_file, options.units, options.led_diameter, None)
     if options.tip is None:
-        return _Listened(images, Aim(camera, pen, mask), None)
+        return _Listened(images, RegionOfInterest(camera, pen, mask), None)
     calibration = read_calibration(options.tip)
     viewers = viewers_of_camera(camera, camera_file)
     instrument = instrument_of(calibration, viewers, pen, pen_file)
-    tip = StreamedTip(Names(pen=calibration.pen, tip=calibration.tip), instrument)
-    return _Listened(images, Aim(instrument.camera, instrument.pen, mask), tip)
+    tip = StreamedTip(
+        Names(pen=calibration.names.pen, tip=calibration.names.tip), instrument
+    )
+    return _Listened(
+        images, RegionOfInterest(instrument.camera, instrument.pen, mask), tip
+    )
 
 
 def _play(listened: _Listened, stream: PoseStream) -> None:
@@ -171,24 +176,28 @@ def _play(listened: _Listened, stream: PoseStream) -> None:
     def note(event: WorkerEvent) -> None:
         if isinstance(event, Failed):
             failures.append(event.error)
-        elif isinstance(event, Troubled):
+        elif isinstance(event, FaultRaised):
             print(shown(f"lightpen: {event.error}"), file=sys.stderr)
 
-    camera, pen, mask = listened.aim.camera, listened.aim.pen, listened.aim.mask
+    camera, pen, mask = (
+        listened.region.camera,
+        listened.region.pen,
+        listened.region.mask,
+    )
     if camera is None or pen is None:
         raise ValueError("It must be known what is looked for.")
     worker = CameraWorker(listened.images, CameraSettings(), note)
     worker.measure(True)
     worker.start()
-    before: Sighting | None = None
+    before: PenDetection | None = None
     try:
         while True:
             with suppress(FrameTimeout):
                 frame = worker.next_frame(LONGEST_WAIT)
                 if not camera.fits(frame.image):
                     raise _another_size(frame, camera)
-                before = look(
-                    *(frame.image, camera, pen, mask, before, frame.full_scale)
+                before = detect_pen(
+                    frame.image, camera, pen, mask, before, frame.full_scale
                 )
                 stream.take(frame, before)
     except EndOfImages:
@@ -201,13 +210,9 @@ def _play(listened: _Listened, stream: PoseStream) -> None:
 def _another_size(frame: Frame, camera: Camera) -> UsageError:
     height, width = frame.image.shape
     return UsageError(
-        sentence(
-            "stream.another-size",
-            "The images have {width} x {height} px, and the intrinsics are for "
-            "{its_width} x {its_height}. Give the camera file of these images.",
-            width=width,
-            height=height,
-            its_width=camera.width,
-            its_height=camera.height,
-        )
+        "stream.another-size",
+        width=width,
+        height=height,
+        its_width=camera.width,
+        its_height=camera.height,
     )

@@ -20,36 +20,41 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
     """Add ``lightpen tips``."""
     parser.set_defaults(run=_run)
     actions = parser.add_subparsers(required=True, metavar="ACTION", dest="action")
-    listed = actions.add_parser("list", help="print what there is, and how it stands")
+    listed = actions.add_parser("list", help="list items and their calibration status")
     added = actions.add_parser("add", help="add a pen, tip or cone")
-    changed = actions.add_parser("change", help="change what is said of one")
-    retired = actions.add_parser("retire", help="take one out of use; it stays known")
-    returned = actions.add_parser("return", help="bring a retired one back")
+    changed = actions.add_parser("change", help="edit an item")
+    retired = actions.add_parser(
+        "retire", help="retire an item; it stays in the archive"
+    )
+    returned = actions.add_parser("return", help="reactivate a retired item")
     spun = actions.add_parser(
-        "spin", help="find the axis of a stylus by images of its pen spun in the cone"
+        "spin",
+        help=(
+            "determine the axis of a stylus from images of its pen rotated in the cone"
+        ),
     )
     for action in (listed, added, changed, retired, returned, spun):
         action.add_argument(
             "--data",
             type=Path,
             metavar="FOLDER",
-            help="data folder; that of the program unless said",
+            help="data folder (default: that of the program)",
         )
         action.add_argument("--json", action="store_true", help="print JSON")
         action.set_defaults(data_folder=data_folder)
-    listed.add_argument("--all", action="store_true", help="retired ones, too")
+    listed.add_argument("--all", action="store_true", help="include retired items")
     listed.add_argument(
         "--max-days",
         type=whole_number,
         metavar="N",
-        help="days after which a tip is due that has no rule of its own (30)",
+        help="calibration interval in days for tips without their own (30)",
     )
     for action in (added, changed, retired, returned):
         action.add_argument("kind", choices=KINDS)
-        action.add_argument("id", metavar="ID", help="as its label has it")
+        action.add_argument("id", metavar="ID", help="ID as on the label")
     for action in (added, changed):
         _add_entries(action)
-    spun.add_argument("id", metavar="TIP", help="a tip in the library")
+    spun.add_argument("id", metavar="TIP", help="tip in the library")
     spun.add_argument("images", type=Path, nargs="+", metavar="IMAGES")
     spun.add_argument("--camera", type=Path, required=True, metavar="FILE")
     spun.add_argument("--pen", type=Path, required=True, metavar="FILE")
@@ -61,10 +66,7 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
 def _add_entries(action: argparse.ArgumentParser) -> None:
     of_all = action.add_argument_group("pens, tips and cones")
     of_all.add_argument(
-        "--due",
-        type=_or_nothing(parse_date),
-        metavar="YYYY-MM-DD",
-        help="last day on which it may be used before it is looked after",
+        "--due", type=_or_nothing(parse_date), metavar="YYYY-MM-DD", help="expiry date"
     )
     of_all.add_argument("--note", metavar="TEXT")
     of_tips = action.add_argument_group(
@@ -91,14 +93,19 @@ def _add_author(action: argparse.ArgumentParser) -> None:
     who = action.add_argument_group("who changes it, as the archive keeps it")
     who.add_argument("--station", default="", metavar="NAME")
     who.add_argument(
-        "--operator", default=getpass.getuser(), metavar="NAME", help="you unless said"
+        "--operator",
+        default=getpass.getuser(),
+        metavar="NAME",
+        help="operator (default: current user)",
     )
     who.add_argument("--reason", default="", metavar="TEXT")
     who.add_argument(
         "--supervisor",
         metavar="NAME",
-        help="who signs, where a supervisor's password guards the data folder; the "
-        "password is asked for, or read from LIGHTPEN_PASSWORD",
+        help=(
+            "supervisor who signs, if the data folder has a supervisor password; "
+            "the password is requested, or read from LIGHTPEN_PASSWORD"
+        ),
     )
 
 

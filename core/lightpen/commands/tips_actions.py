@@ -15,7 +15,7 @@ from msgspec import structs, to_builtins
 from lightpen.archive.chains import chain_at_home
 from lightpen.archive.database import look_into
 from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.standing import standings
+from lightpen.archive.tip_status import statuses
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.tips import FORGOTTEN
 from lightpen.detection.observations import observe_images
@@ -25,8 +25,9 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
-from lightpen.model.due_rule import DueRule
-from lightpen.record.library_changes import (
+from lightpen.model.limits import DueRule
+from lightpen.record.library.calibration_status import StationStatus
+from lightpen.record.library.library_changes import (
     Author,
     add_item,
     change_item,
@@ -34,9 +35,8 @@ from lightpen.record.library_changes import (
     known_item,
     retire_item,
 )
-from lightpen.record.standing import Standings
-from lightpen.record.supervision import Signature
-from lightpen.record.tip_library import (
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.tip_library import (
     AnyItem,
     AxisOrigin,
     ItemKind,
@@ -46,7 +46,6 @@ from lightpen.record.tip_library import (
     ListedTip,
     read_library,
 )
-from lightpen.sentences import sentence
 
 PASSWORD = "LIGHTPEN_PASSWORD"  # names the variable with the password of a supervisor
 OF_TIPS = {  # options, by what they say of a tip
@@ -65,7 +64,7 @@ POINTS = ("nominal", "axis")
 def _list(options: argparse.Namespace) -> None:
     data = _data(options)
     library = read_library(data)
-    found = _standings(data, library, options.max_days)
+    found = _statuses(data, library, options.max_days)
     records = [
         _record(item, found)
         for kind in ItemKind
@@ -150,7 +149,11 @@ def _spun(options: argparse.Namespace) -> SpinFit:
 def _set_retired(options: argparse.Namespace, *, is_retired: bool) -> None:
     kind = ItemKind(options.kind)
     library = retire_item(
-        *(_data(options), kind, options.id, _author(options), local_now()),
+        _data(options),
+        kind,
+        options.id,
+        _author(options),
+        local_now(),
         is_retired=is_retired,
     )
     _tell(options, known_item(library, kind, options.id), library)
@@ -164,13 +167,7 @@ def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:
         item = structs.replace(item, due=_said(options.due))
     said = dict(_entries_of_tip(options))
     if said and not isinstance(item, ListedTip):
-        raise UsageError(
-            sentence(
-                "library.only-tips",
-                "Only a tip has a ball, an axis, limits and a picture; {id} is none.",
-                id=item.id,
-            )
-        )
+        raise UsageError("library.only-tips", id=item.id)
     return structs.replace(item, **said)
 
 
@@ -196,13 +193,7 @@ def _point(option: str, words: list[Any]) -> Any:
     if words == [FORGOTTEN]:
         return FORGOTTEN
     if len(words) != 3 or FORGOTTEN in words:
-        raise UsageError(
-            sentence(
-                "library.no-point",
-                "--{option} takes three numbers, X Y Z, or none.",
-                option=option,
-            )
-        )
+        raise UsageError("library.no-point", option=option)
     return tuple(words)
 
 
@@ -221,28 +212,28 @@ def _tell(options: argparse.Namespace, item: AnyItem, library: Library) -> None:
     data = _data(options)
     try:
         with closing(Logbook(data)) as logbook:
-            troubles = logbook.enter_owed()
+            faults = logbook.enter_owed()
     except ArchiveError as error:  # it stays owed
-        troubles = (error.sentence,)
-    for trouble in troubles:
+        faults = (error.message,)
+    for trouble in faults:
         print(shown(f"It is not in the archive yet: {trouble}"))
     kept = known_item(library, item.kind, item.id.strip())
-    record = _record(kept, _standings(data, library, None))
+    record = _record(kept, _statuses(data, library, None))
     print(json.dumps(record, indent=1) if options.json else shown(_line(record)))
 
 
-def _standings(data: Path, library: Library, max_days: int | None) -> Standings:
+def _statuses(data: Path, library: Library, max_days: int | None) -> StationStatus:
     rule = DueRule() if not max_days else DueRule(max_days)
     now = local_now()
     try:
         with closing(look_into(data / ARCHIVE)) as database:
             chain = chain_at_home(database) or ""
-            return standings(database, chain, rule, library, now)
+            return statuses(database, chain, rule, library, now)
     except NoArchiveError:
-        return Standings(library, now=now)
+        return StationStatus(library, now=now)
 
 
-def _record(item: AnyItem, found: Standings) -> dict[str, Any]:
+def _record(item: AnyItem, found: StationStatus) -> dict[str, Any]:
     """Return what is said of an item, and how it stands."""
     entries: dict[str, Any] = {"kind": item.kind.value}
     entries |= {n: e for n, e in to_builtins(item).items() if n != "type"}

@@ -1,18 +1,19 @@
-"""``lightpen verify``: prove a tip by touching what is known."""
+"""``lightpen verify``: verify a tip on reference artefacts."""
 
 import argparse
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
 from lightpen.commands.arguments import (
     above_zero,
     add_json,
+    add_limits,
     add_pen_options,
+    chosen_limits,
     finite,
     not_negative,
 )
@@ -25,154 +26,121 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.commands.pen_health import add_verify_pen
-from lightpen.estimation.instrument import Instrument
+from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.hashes import all_hashed, hashed
 from lightpen.formats.json_records import file_entry
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.pen import Pen
-from lightpen.record.calibrations import CalibrationFile, read_calibration
-from lightpen.verification.articulation import (
-    by_posture,
-    measure_articulation,
+from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.verification.history.recorded_tasks import read_drift
+from lightpen.verification.probing.current_tip import cone_before
+from lightpen.verification.probing.drift_reference import (
+    LampDrift,
+    judged_with,
+    lamp_drift_entries,
 )
-from lightpen.verification.assessment import Conformity
-from lightpen.verification.circle import measure_circle
-from lightpen.verification.drift import measure_drift
-from lightpen.verification.fixed_point import measure_fixed_point
-from lightpen.verification.keeping import viewer_entries
-from lightpen.verification.length import measure_length
-from lightpen.verification.places import (
-    TouchPlace,
-    Viewers,
+from lightpen.verification.probing.image_locations import (
+    ImageLocation,
+    PenCameras,
     read_viewers,
     touch_place,
 )
-from lightpen.verification.read_back import read_drift
-from lightpen.verification.records import (
-    articulation_entries,
-    circle_entries,
-    drift_entries,
-    fixed_point_entries,
-    length_entries,
-    rejected_entries,
-    touch_entries,
-    verification_record,
-)
-from lightpen.verification.sources import (
-    TouchRun,
+from lightpen.verification.probing.probing import FAST, PRECISE, SETTLING, ProbingRules
+from lightpen.verification.probing.sources import (
+    ProbingRun,
     instrument_of,
+    lamp_drift_of,
     touch_run,
-    witness_of,
 )
-from lightpen.verification.texts import (
-    articulation_text,
-    circle_text,
-    drift_text,
-    fixed_point_text,
-    length_text,
-    touches_text,
+from lightpen.verification.reports.records import verification_record
+from lightpen.verification.reports.summaries import found_text, touches_text
+from lightpen.verification.storage.verification_files import viewer_entries
+from lightpen.verification.tasks.assessment import VerificationAssessment
+from lightpen.verification.tasks.probed_point import (
+    NO_DRIFT,
+    ProbedPoint,
+    RejectedFrame,
+    on_surface,
+    point_entries,
+    rejected_entries,
 )
-from lightpen.verification.tip_in_force import cone_before
-from lightpen.verification.touch import NO_DRIFT, Touch, on_surface
-from lightpen.verification.touching import FAST, PRECISE, SETTLING, TouchRules
-from lightpen.verification.witness import LampWitness, judged_with, witness_entries
+from lightpen.verification.tasks.registry import TASKS, AnyTask
+from lightpen.verification.tasks.task import (
+    Conditions,
+    NumberOption,
+    SurfaceOption,
+    TaskOptions,
+)
 
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen verify`` and what it verifies."""
     kinds = parser.add_subparsers(required=True, metavar="WHAT")
-    _add_fixed_point(
-        kinds.add_parser("fixed-point", help="the cone again, in new postures")
-    )
-    _add_circle(kinds.add_parser("circle", help="a ring of certified radius"))
-    _add_length(kinds.add_parser("length", help="a certified length"))
-    _add_articulation(
-        kinds.add_parser("articulation", help="one point, in the form of ISO 10360-12")
-    )
-    _add_drift(kinds.add_parser("drift", help="whether the camera moved meanwhile"))
+    for task in TASKS:
+        _add_task(kinds.add_parser(task.command, help=task.summary), task)
     _add_touches(
-        kinds.add_parser(
-            "touches", help="points, each with its uncertainty; no verdict"
+        kinds.add_parser("touches", help="probed points with uncertainty; no verdict")
+    )
+    add_verify_pen(kinds.add_parser("pen", help="LED stability over several swings"))
+
+
+def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
+    parser.set_defaults(run=_verify_task, task=task, ball_diameter=None)
+    _add_runs(parser, task.run_help)
+    for option in task.fields:
+        match option:
+            case NumberOption(argument=str() as argument) if argument:
+                is_needed = option.unknown is not None
+                parser.add_argument(
+                    argument,
+                    dest=option.name,
+                    type=above_zero if is_needed else not_negative,
+                    required=is_needed,
+                    default=0.0,
+                    metavar="MM",
+                    help=option.help,
+                )
+            case SurfaceOption():
+                _add_ball(parser, option.ball_help)
+                parser.add_argument(
+                    option.argument,
+                    dest=option.name,
+                    choices=tuple(option.words),
+                    default=next(iter(option.words)),
+                )
+    if task.compares_nominal_tip:
+        parser.add_argument(
+            "--nominal-tip", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
         )
-    )
-    add_verify_pen(kinds.add_parser("pen", help="the LEDs over several swings"))
+    if task.counts_drift:
+        parser.add_argument(
+            "--drift",
+            type=Path,
+            metavar="DRIFT.json",
+            help="record of verify drift of the same session, included in U",
+        )
+    _add_common(parser, *task.limits)
 
 
-def _add_fixed_point(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(run=_fixed_point)
-    parser.add_argument(
-        "images",
-        nargs="+",
-        metavar="IMAGES",
-        help="a folder, a pattern, a video, or the record of a swing",
-    )
-    parser.add_argument(
-        "--nominal-tip", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
-    )
-    _add_drift_share(parser)
-    _add_common(parser, "across", "along")
-
-
-def _add_circle(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(run=_circle)
-    _add_runs(parser, "once round the ring")
-    _add_certified(parser, "--radius")
-    parser.add_argument(
-        "--ball-diameter",
-        type=above_zero,
-        metavar="MM",
-        help="of the probe, where it touched a bore or a boss and not a groove",
-    )
-    parser.add_argument("--surface", choices=("bore", "boss"), default="bore")
-    _add_drift_share(parser)
-    _add_common(parser, "radius", "form")
-
-
-def _add_length(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(run=_length)
-    _add_runs(parser, "both ends of the length at one place")
-    _add_certified(parser, "--length")
-    parser.add_argument(
-        "--ball-diameter",
-        type=above_zero,
-        metavar="MM",
-        help="of the probe, where it touched faces and not cones",
-    )
-    parser.add_argument("--faces", choices=("inner", "outer"), default="outer")
-    _add_drift_share(parser)
-    _add_common(parser, "length")
-
-
-def _add_articulation(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(run=_articulation)
-    _add_runs(
-        parser, "one posture; a single run holds five postures, one after the other"
-    )
-    _add_common(parser, "location")
-
-
-def _add_drift(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(run=_drift)
-    _add_runs(parser, "one visit of a cone that stands still, in order of time")
-    _add_common(parser, "drift")
+def _add_ball(parser: argparse.ArgumentParser, what: str) -> None:
+    parser.add_argument("--ball-diameter", type=above_zero, metavar="MM", help=what)
 
 
 def _add_touches(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_touches)
     _add_runs(parser, "points that were touched")
-    parser.add_argument(
-        "--ball-diameter",
-        type=above_zero,
-        metavar="MM",
-        help="of the probe, to give the surface that it touched, not its centre",
+    _add_ball(
+        parser, "of the probe, to give the surface that it touched, not its centre"
     )
     parser.add_argument(
         "--along",
         choices=("approach", "axis"),
         default="approach",
-        help="where the surface lies from the centre: the way that the tip came, where "
-        "the images show it and else along the axis of the pen; or always the axis",
+        help=(
+            "direction from the ball centre to the surface: approach direction if "
+            "the images show it, else the pen axis; or always the pen axis"
+        ),
     )
     _add_common(parser)
 
@@ -182,29 +150,7 @@ def _add_runs(parser: argparse.ArgumentParser, what: str) -> None:
         "runs",
         nargs="+",
         metavar="RUN",
-        help=f"a folder, a pattern, a video or a record: {what}",
-    )
-
-
-def _add_certified(parser: argparse.ArgumentParser, option: str) -> None:
-    parser.add_argument(
-        option, type=above_zero, required=True, metavar="MM", help="certified"
-    )
-    parser.add_argument(
-        "--certified-uncertainty",
-        type=not_negative,
-        default=0.0,
-        metavar="MM",
-        help="U (k = 2) of what is certified",
-    )
-
-
-def _add_drift_share(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--drift",
-        type=Path,
-        metavar="DRIFT.json",
-        help="what verify drift wrote of the same session: U counts it",
+        help=f"image folder, file name pattern, video or record: {what}",
     )
 
 
@@ -214,8 +160,11 @@ def _add_common(parser: argparse.ArgumentParser, *limits: str) -> None:
         "--rig",
         type=Path,
         metavar="FILE",
-        help="several cameras and where they stand, in place of --camera; what is "
-        "given is then a folder that holds one for each camera, named as in this file",
+        help=(
+            "rig file with the extrinsics of several cameras, instead of --camera; "
+            "give a folder that contains one folder per camera, named as in this "
+            "file"
+        ),
     )
     parser.add_argument("--pen", type=Path, metavar="FILE")
     add_pen_options(parser)
@@ -224,7 +173,7 @@ def _add_common(parser: argparse.ArgumentParser, *limits: str) -> None:
         type=Path,
         required=True,
         metavar="RESULT.json",
-        help="the calibration to verify",
+        help="calibration to verify",
     )
     parser.add_argument(
         "--frames",
@@ -235,119 +184,67 @@ def _add_common(parser: argparse.ArgumentParser, *limits: str) -> None:
         help="images of a touch, through which the pen is held still, such as "
         f"{FAST} or for a precise one {PRECISE}; 1 unless said: each image is a touch",
     )
-    usual = VerificationLimits()
-    for name in limits:
-        parser.add_argument(
-            f"--limit-{name}",
-            type=above_zero,
-            default=getattr(usual, name),
-            metavar="MM",
-            help=f"{getattr(usual, name):g} unless said",
-        )
+    add_limits(parser, *limits)
     add_json(parser)
 
 
 @dataclass(frozen=True, eq=False)
 class _Measured:
-    """The touches of all runs, and what they were measured with.
+    """The points of all runs, and what they were measured with.
 
     Attributes
     ----------
-    cone_cam : (3,) array or None
-        Of the calibration; None before another camera.
-    drift : (3,) array
-        Standard uncertainty of a point by a camera that moved meanwhile, mm.
-    witness : LampWitness or None
-        What fixed lamps in view tell of the camera.
+    lamp_drift : LampDrift or None
+        The drift of fixed lamps in view.
     """
 
     calibration: CalibrationFile
-    instrument: Instrument
-    runs: tuple[TouchRun, ...]
+    conditions: Conditions
+    runs: tuple[ProbingRun, ...]
     files: tuple[Path, ...]
-    viewers: Viewers
+    viewers: PenCameras
     pen_file: Path
-    nominal_tip: FloatArray | None
-    cone_cam: FloatArray | None
-    drift: FloatArray
-    witness: LampWitness | None
+    lamp_drift: LampDrift | None
 
     @property
-    def touches(self) -> list[tuple[str, Sequence[Touch]]]:
+    def instrument(self) -> Instrument:
+        return self.conditions.instrument
+
+    @property
+    def touches(self) -> list[tuple[str, Sequence[ProbedPoint]]]:
         return [(run.name, run.touches) for run in self.runs]
 
-
-@printing
-def _fixed_point(options: argparse.Namespace) -> None:
-    measured = _measure(options, [tuple(options.images)])
-    found = measure_fixed_point(
-        measured.runs[0].touches,
-        measured.instrument,
-        _limits(options),
-        measured.nominal_tip,
-        measured.cone_cam,
-        measured.drift,
-    )
-    _tell(
-        *(options, measured, fixed_point_text, found, "fixed point"),
-        fixed_point_entries(found, measured.instrument),
-    )
+    @property
+    def rejected(self) -> list[RejectedFrame]:
+        return [each for run in self.runs for each in run.rejected]
 
 
 @printing
-def _circle(options: argparse.Namespace) -> None:
-    measured = _measure(options, [(run,) for run in options.runs])
-    inwards = 1.0 if options.surface == "bore" else -1.0
-    found = measure_circle(
-        measured.touches,
-        measured.instrument,
-        options.radius,
-        _limits(options),
-        certified_uncertainty=options.certified_uncertainty,
-        ball_offset=inwards * (options.ball_diameter or 0.0) / 2,
-        drift=measured.drift,
-    )
-    _tell(
-        *(options, measured, circle_text, found, "circle"),
-        circle_entries(found, measured.instrument),
-    )
+def _verify_task(given: argparse.Namespace) -> None:
+    task: AnyTask = given.task
+    runs = [tuple(given.runs)] if task.is_pooled else [(run,) for run in given.runs]
+    measured = _measure(given, runs)
+    conditions = measured.conditions
+    found = task.measure(measured.touches, conditions, _task_options(task, given))
+    judged = judged_with(found.assessment, measured.lamp_drift)
+    print(shown(found_text(task.tables(found, conditions), judged, measured.rejected)))
+    _print_lamp_drift(measured, judged)
+    if given.json is not None:
+        entries = task.entries(found, measured.instrument)
+        _write(given, measured, task.kind, entries, judged)
 
 
-@printing
-def _length(options: argparse.Namespace) -> None:
-    measured = _measure(options, [(run,) for run in options.runs])
-    outwards = 1.0 if options.faces == "inner" else -1.0
-    found = measure_length(
-        measured.touches,
-        measured.instrument,
-        options.length,
-        _limits(options),
-        certified_uncertainty=options.certified_uncertainty,
-        ball_offset=outwards * (options.ball_diameter or 0.0) / 2,
-        drift=measured.drift,
-    )
-    _tell(
-        *(options, measured, length_text, found, "length"),
-        length_entries(found, measured.instrument),
-    )
-
-
-@printing
-def _articulation(options: argparse.Namespace) -> None:
-    measured = _measure(options, [(run,) for run in options.runs])
-    postures = by_posture(measured.touches)
-    found = measure_articulation(postures, measured.instrument, _limits(options))
-    _tell(
-        *(options, measured, articulation_text, found, "articulation"),
-        articulation_entries(found),
-    )
-
-
-@printing
-def _drift(options: argparse.Namespace) -> None:
-    measured = _measure(options, [(run,) for run in options.runs])
-    found = measure_drift(measured.touches, measured.instrument, _limits(options))
-    _tell(*(options, measured, drift_text, found, "drift"), drift_entries(found))
+def _task_options(task: AnyTask, given: argparse.Namespace) -> TaskOptions:
+    """Return the options of a task; without a ball, its centre runs in a groove."""
+    values = {}
+    for option in task.fields:
+        match option:
+            case NumberOption() if option.argument:
+                values[option.name] = getattr(given, option.name)
+            case SurfaceOption() if given.ball_diameter:
+                values[option.name] = option.words[getattr(given, option.name)]
+    options: TaskOptions = task.options(**values)
+    return options
 
 
 @printing
@@ -359,12 +256,11 @@ def _touches(options: argparse.Namespace) -> None:
             touches = [replace(touch, approach_cam=None) for touch in touches]
         radius = options.ball_diameter / 2
         touches = [on_surface(touch, radius) for touch in touches]
-    rejected = [each for run in measured.runs for each in run.rejected]
-    print(shown(touches_text(touches, measured.instrument, rejected)))
-    _tell_witness(measured)
+    print(shown(touches_text(touches, measured.instrument, measured.rejected)))
+    _print_lamp_drift(measured)
     if options.json is not None:
-        entries = [touch_entries(touch, measured.instrument) for touch in touches]
-        _write(options, measured, "touches", {"touches": entries}, None)
+        entries = {"touches": point_entries(touches, measured.instrument)}
+        _write(options, measured, "touches", entries, None)
 
 
 def _measure(
@@ -385,7 +281,7 @@ def _measure(
         require_other_file(options.json, *place.files)
     instrument = instrument_of(calibration, viewers, pen, pen_file)
     settling = 0 if options.frames == 1 else SETTLING
-    rules = TouchRules(options.frames, settling)
+    rules = ProbingRules(options.frames, settling)
     runs = []
     with progress("Finding LEDs") as report:
         for place in found:
@@ -394,23 +290,28 @@ def _measure(
     nominal = getattr(options, "nominal_tip", None)
     for known in (pen.nominal_tip, calibration.nominal_tip):
         nominal = known if nominal is None else nominal
-    witness = witness_of(runs, instrument, _limits(options))
+    limits = VerificationLimits(**chosen_limits(options))
+    lamp_drift = lamp_drift_of(runs, instrument, limits)
     moved = NO_DRIFT if drift is None else read_drift(drift)
     return _Measured(
         calibration=calibration,
-        instrument=instrument,
+        conditions=Conditions(
+            instrument=instrument,
+            limits=limits,
+            ball_diameter=options.ball_diameter,
+            nominal_tip=None if nominal is None else np.array(nominal, dtype=float),
+            cone_cam=cone_before(calibration, viewers),
+            drift=moved if lamp_drift is None else np.maximum(moved, lamp_drift.share),
+        ),
         runs=tuple(runs),
         files=tuple(file for place in found for file in place.files),
         viewers=viewers,
         pen_file=pen_file,
-        nominal_tip=None if nominal is None else np.array(nominal, dtype=np.float64),
-        cone_cam=cone_before(calibration, viewers),
-        drift=moved if witness is None else np.maximum(moved, witness.share),
-        witness=witness,
+        lamp_drift=lamp_drift,
     )
 
 
-def _pen(options: argparse.Namespace, place: TouchPlace) -> tuple[Pen, Path]:
+def _pen(options: argparse.Namespace, place: ImageLocation) -> tuple[Pen, Path]:
     if options.pen is not None:
         pen = read_pen(options.pen, options.units, options.led_diameter, None)
         return pen, options.pen
@@ -419,40 +320,11 @@ def _pen(options: argparse.Namespace, place: TouchPlace) -> tuple[Pen, Path]:
     return place.pen, place.pen_file
 
 
-def _limits(options: argparse.Namespace) -> VerificationLimits:
-    given = {
-        item.name: getattr(options, f"limit_{item.name}")
-        for item in fields(VerificationLimits)
-        if hasattr(options, f"limit_{item.name}")
-    }
-    return replace(VerificationLimits(), **given)
-
-
-def _tell(
-    options: argparse.Namespace,
-    measured: _Measured,
-    text: Callable[[Any, Any], str],
-    found: Any,
-    kind: str,
-    entries: Mapping[str, Any],
+def _print_lamp_drift(
+    measured: _Measured, judged: VerificationAssessment | None = None
 ) -> None:
-    """Print a verification, and write its record if that is wanted."""
-    rejected = [each for run in measured.runs for each in run.rejected]
-    judged = judged_with(found.assessment, measured.witness)
-    print(shown(text(replace(found, assessment=judged), rejected)))
-    _tell_witness(measured, judged)
-    if not measured.calibration.has_checksum:
-        print(
-            "The calibration was written by a version that kept no checksum: whether "
-            "it was changed since is not known."
-        )
-    if options.json is not None:
-        _write(options, measured, kind, entries, judged)
-
-
-def _tell_witness(measured: _Measured, judged: Conformity | None = None) -> None:
-    """Print what fixed lamps tell, unless it is the verdict."""
-    told = None if measured.witness is None else measured.witness.assessment
+    """Print the drift of fixed lamps, unless it is the verdict."""
+    told = None if measured.lamp_drift is None else measured.lamp_drift.assessment
     if told is not None and told is not judged:
         print(shown(str(told.reason)))
 
@@ -462,30 +334,24 @@ def _write(
     measured: _Measured,
     kind: str,
     entries: Mapping[str, Any],
-    assessment: Conformity | None,
+    assessment: VerificationAssessment | None,
 ) -> None:
-    rejected = [each for run in measured.runs for each in run.rejected]
-    limits = asdict(_limits(options))
+    drift: Path | None = getattr(options, "drift", None)
     record = verification_record(
         kind,
         {
             **entries,
-            "rejected": rejected_entries(rejected),
-            "witness": witness_entries(measured.witness),
+            "rejected": rejected_entries(measured.rejected),
+            "witness": lamp_drift_entries(measured.lamp_drift),
         },
         assessment,
-        {name: limits[name] for name in limits if hasattr(options, f"limit_{name}")},
+        chosen_limits(options),
         {
             "tip": file_entry(hashed(options.tip)),
             **viewer_entries(measured.viewers),
             "pen": file_entry(hashed(measured.pen_file)),
             "images": [file_entry(file) for file in all_hashed(measured.files)],
-            **_drift_entry(options),
+            **({} if drift is None else {"drift": file_entry(hashed(drift))}),
         },
     )
     write_record(options.json, record)
-
-
-def _drift_entry(options: argparse.Namespace) -> dict[str, Any]:
-    drift: Path | None = getattr(options, "drift", None)
-    return {} if drift is None else {"drift": file_entry(hashed(drift))}

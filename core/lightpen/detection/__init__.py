@@ -1,1 +1,1 @@
-"""What one image shows: spots, which LED each is, the pose of the pen."""
+"""Detection in one image: spots, their labels, the pose of the pen."""

@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 
 from lightpen.arrays import IntArray
-from lightpen.cameras.protocol import CameraSettings, Caps, Frame
+from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Frame
 from lightpen.detection.exposure_advice import LONGEST_EXPOSURE_US
 from lightpen.detection.inspection import Inspection
 from lightpen.detection.spots import Spots
@@ -27,8 +27,8 @@ MAX_STEPS = 15
 MAX_BLIND = 40  # images without LEDs in succession: two seconds
 
 
-class Standing(StrEnum):
-    """How an adjustment stands."""
+class ExposureState(StrEnum):
+    """State of an adjustment of the exposure."""
 
     ADJUSTING = "adjusting"
     DONE = "done"
@@ -40,7 +40,7 @@ class Standing(StrEnum):
 
 @dataclass(frozen=True)
 class AutoExposure:
-    """An adjustment under way, image by image.
+    """An adjustment of exposure and gain, image by image.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class AutoExposure:
     """
 
     asked: CameraSettings
-    outcome: Standing = Standing.ADJUSTING
+    outcome: ExposureState = ExposureState.ADJUSTING
     level: float = 0.0
     saturating: float = inf
     n_steps: int = 0
@@ -66,37 +66,41 @@ class AutoExposure:
             CameraSettings(exposure_us=settings.exposure_us, gain_db=settings.gain_db)
         )
 
-    def after(self, frame: Frame, spots: Spots, leds: Inspection, caps: Caps) -> Self:
+    def after(
+        self, frame: Frame, spots: Spots, leds: Inspection, caps: CameraCapabilities
+    ) -> Self:
         """Return the adjustment after another image, which was inspected."""
-        if self.outcome is not Standing.ADJUSTING or not self._is_of_asked(frame):
+        if self.outcome is not ExposureState.ADJUSTING or not self._is_of_asked(frame):
             return self
         if len(leds.chosen) == 0:
             n_blind = self.n_blind + 1
-            outcome = Standing.NO_LEDS if n_blind >= MAX_BLIND else self.outcome
+            outcome = ExposureState.NO_LEDS if n_blind >= MAX_BLIND else self.outcome
             return replace(self, n_blind=n_blind, outcome=outcome)
         level = brightest_level(frame, spots, leds.chosen)
         light = _light(self.asked)
         seen = replace(self, level=level, n_blind=0, n_steps=self.n_steps + 1)
         if leds.exposure.n_saturated:
             seen = replace(seen, saturating=min(self.saturating, light))
-            return seen._ask(light * SATURATED_STEP, caps, Standing.TOO_BRIGHT)
+            return seen._ask(light * SATURATED_STEP, caps, ExposureState.TOO_BRIGHT)
         wanted = min(
             light * min(TARGET / max(level, TARGET / LARGEST_STEP), LARGEST_STEP),
             BELOW_SATURATION * self.saturating,
         )
         if abs(wanted / light - 1) <= TOLERANCE / TARGET:
-            return replace(seen, outcome=Standing.DONE)
+            return replace(seen, outcome=ExposureState.DONE)
         if seen.n_steps >= MAX_STEPS:
-            return replace(seen, outcome=Standing.UNSTEADY)
-        limit = Standing.TOO_DARK if wanted > light else Standing.TOO_BRIGHT
+            return replace(seen, outcome=ExposureState.UNSTEADY)
+        limit = ExposureState.TOO_DARK if wanted > light else ExposureState.TOO_BRIGHT
         return seen._ask(wanted, caps, limit)
 
     def _is_of_asked(self, frame: Frame) -> bool:
         asked = self.asked
         return (frame.exposure_us, frame.gain_db) == (asked.exposure_us, asked.gain_db)
 
-    def _ask(self, light: float, caps: Caps, limit: Standing) -> Self:
-        """Return the adjustment that asks for so much light, or is at its limit."""
+    def _ask(
+        self, light: float, caps: CameraCapabilities, limit: ExposureState
+    ) -> Self:
+        """Return the adjustment with settings for this light, or at its limit."""
         exposures, gains = caps.exposure_us, caps.gain_db
         now = self.asked
         if exposures is None or now.exposure_us is None:

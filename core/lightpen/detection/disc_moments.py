@@ -15,7 +15,7 @@ import numpy as np
 from cv2.typing import MatLike
 
 from lightpen.arrays import Image
-from lightpen.detection.rim import Rim, fit_rim
+from lightpen.detection.edge_fit import EdgeFit, fit_edge
 
 # Narrower than this samples the rim too coarsely: 20 to 80 % doubles the error.
 LOW = 0.1
@@ -63,7 +63,7 @@ SKEWNESS_BY_SAMPLING = 0.1
 SKEWNESS_BY_NOISE = 25.0
 
 
-class Box(NamedTuple):
+class PixelBox(NamedTuple):
     """A rectangle of pixels, ends excluded."""
 
     left: int
@@ -81,34 +81,34 @@ class Box(NamedTuple):
         """How many pixels it holds."""
         return (self.right - self.left) * (self.bottom - self.top)
 
-    def grown(self, margin: int, shape: tuple[int, ...]) -> "Box":
+    def grown(self, margin: int, shape: tuple[int, ...]) -> "PixelBox":
         """Return the box with a margin, kept inside an image of that shape."""
-        return Box(
+        return PixelBox(
             max(self.left - margin, 0),
             max(self.top - margin, 0),
             min(self.right + margin, shape[1]),
             min(self.bottom + margin, shape[0]),
         )
 
-    def moved(self, right: int, down: int) -> "Box":
+    def moved(self, right: int, down: int) -> "PixelBox":
         """Return the box at another place."""
-        return Box(
+        return PixelBox(
             self.left + right, self.top + down, self.right + right, self.bottom + down
         )
 
-    def holds_center_of(self, other: "Box") -> bool:
+    def holds_center_of(self, other: "PixelBox") -> bool:
         """Tell whether the centre of the other box is inside."""
         return (
             2 * self.left <= other.left + other.right <= 2 * self.right
             and 2 * self.top <= other.top + other.bottom <= 2 * self.bottom
         )
 
-    def is_close_to(self, other: "Box") -> bool:
+    def is_close_to(self, other: "PixelBox") -> bool:
         """Tell whether no side differs by more than 2 px and a tenth of the size."""
         tolerance = 2 + other.size // 10
         return all(abs(a - b) <= tolerance for a, b in zip(self, other, strict=True))
 
-    def overlap(self, other: "Box") -> int:
+    def overlap(self, other: "PixelBox") -> int:
         """Return how many pixels both boxes share."""
         width = min(self.right, other.right) - max(self.left, other.left)
         height = min(self.bottom, other.bottom) - max(self.top, other.top)
@@ -128,7 +128,7 @@ class Levels(NamedTuple):
         return self.plateau - self.background
 
 
-class Moments(NamedTuple):
+class DiscMoments(NamedTuple):
     """Area, centroid and central moments of a region, px.
 
     `roundness` is the area over that of the ellipse with the same second moments: 1 for
@@ -175,14 +175,14 @@ class Disc(NamedTuple):
     regions in the box that was asked for.
     """
 
-    moments: Moments
+    moments: DiscMoments
     levels: Levels
     cut_level: float
-    box: Box
+    box: PixelBox
     leaves_image: bool
     leaves_window: bool
     is_whole: bool
-    others: tuple[Box, ...]
+    others: tuple[PixelBox, ...]
 
     @property
     def cut_height(self) -> float:
@@ -191,7 +191,7 @@ class Disc(NamedTuple):
 
 
 def measure_disc(
-    image: Image, box: Box, level: float, noise: float, floor: float = 0.0
+    image: Image, box: PixelBox, level: float, noise: float, floor: float = 0.0
 ) -> Disc | None:
     """Measure the region inside a box as a disc.
 
@@ -199,7 +199,7 @@ def measure_disc(
     ----------
     image : (H, W) array
         The whole image.
-    box : Box
+    box : PixelBox
         Where the region is; a few pixels too small does no harm.
     level : float
         An intensity that the region exceeds and its background does not, digital
@@ -224,7 +224,7 @@ def measure_disc(
 
 
 def _measure_window(
-    image: Image, box: Box, margin: int, level: float, noise: float, floor: float
+    image: Image, box: PixelBox, margin: int, level: float, noise: float, floor: float
 ) -> Disc | None:
     frame = box.grown(margin, image.shape)
     window = image[frame.top : frame.bottom, frame.left : frame.right]
@@ -287,7 +287,9 @@ def _measure_window(
     )
 
 
-def _separate(soft: MatLike, box: Box, frame: Box) -> tuple[list[Box], MatLike]:
+def _separate(
+    soft: MatLike, box: PixelBox, frame: PixelBox
+) -> tuple[list[PixelBox], MatLike]:
     """Return the regions that a box was drawn around, and the first of them alone."""
     contours, _ = cv2.findContours(soft, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     regions = [bounding_box(c).moved(frame.left, frame.top) for c in contours]
@@ -301,7 +303,7 @@ def _separate(soft: MatLike, box: Box, frame: Box) -> tuple[list[Box], MatLike]:
     return [first, *others], cv2.bitwise_and(soft, alone)
 
 
-def _is_ellipse(moments: Moments, relative_noise: float) -> bool:
+def _is_ellipse(moments: DiscMoments, relative_noise: float) -> bool:
     radius = moments.radius
     _, minor = moments.axes
     loss = ROUNDNESS_LOSS + ROUNDNESS_LOSS_BY_BLUR * (moments.edge_width / minor) ** 2
@@ -314,10 +316,10 @@ def _is_ellipse(moments: Moments, relative_noise: float) -> bool:
 
 
 def _is_even(
-    moments: Moments,
+    moments: DiscMoments,
     window: Image,
     soft: MatLike,
-    frame: Box,
+    frame: PixelBox,
     levels: Levels,
     relative_noise: float,
 ) -> bool:
@@ -336,12 +338,12 @@ def _is_even(
     return hypot(x, y) < allowed * moments.radius
 
 
-def _corrects_shading(moments: Moments) -> bool:
+def _corrects_shading(moments: DiscMoments) -> bool:
     """Tell whether the inside of a disc is large enough to measure its shading."""
     return moments.radius >= LEAST_SHADED * moments.rim_width
 
 
-def _rim(image: Image, soft: MatLike, frame: Box) -> Rim | None:
+def _rim(image: Image, soft: MatLike, frame: PixelBox) -> EdgeFit | None:
     """Return the rim of a region, if its outline is somewhat like an ellipse."""
     contours, _ = cv2.findContours(soft, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     m = cv2.moments(contours[0])
@@ -354,27 +356,27 @@ def _rim(image: Image, soft: MatLike, frame: Box) -> Rim | None:
     center = np.array(
         [frame.left + m["m10"] / m["m00"], frame.top + m["m01"] / m["m00"]]
     )
-    return fit_rim(image, center, shape)
+    return fit_edge(image, center, shape)
 
 
-def _moments_of(rim: Rim) -> Moments:
+def _moments_of(rim: EdgeFit) -> DiscMoments:
     (var_x, cov_xy), (_, var_y) = rim.shape.tolist()
     area = 4.0 * pi * sqrt(var_x * var_y - cov_xy**2)
     x, y = rim.center.tolist()
     edge_width = GAUSSIAN_RISE * rim.sigma
-    return Moments(area, x, y, var_x, cov_xy, var_y, 1.0, 0.0, edge_width)
+    return DiscMoments(area, x, y, var_x, cov_xy, var_y, 1.0, 0.0, edge_width)
 
 
-def bounding_box(contour: MatLike, step: int = 1) -> Box:
+def bounding_box(contour: MatLike, step: int = 1) -> PixelBox:
     """Return the box of a contour that was found on every `step`-th pixel."""
     x, y, width, height = cv2.boundingRect(contour)
-    return Box(
+    return PixelBox(
         x * step, y * step, (x + width - 1) * step + 1, (y + height - 1) * step + 1
     )
 
 
 def _window_levels(window: Image, level: float) -> Levels:
-    """Split the intensities in two classes, each known by its median."""
+    """Split the intensities in two classes and return their medians."""
     step = max(1, min(window.shape) // SAMPLES)
     samples = np.sort(window[::step, ::step], axis=None)
     n = samples.size
@@ -389,7 +391,7 @@ def _window_levels(window: Image, level: float) -> Levels:
     return Levels(background, plateau, top)
 
 
-def _moments(soft: MatLike, frame: Box, ramp: float) -> Moments | None:
+def _moments(soft: MatLike, frame: PixelBox, ramp: float) -> DiscMoments | None:
     """Return the moments of a soft-thresholded region, None if it is too small.
 
     So it is, too, if it is too narrow.
@@ -411,7 +413,7 @@ def _moments(soft: MatLike, frame: Box, ramp: float) -> Moments | None:
     area += min(AREA_LOSS * pi * sigma**2, 0.2 * area)
 
     determinant = max(var_x * var_y - cov_xy**2, 1e-9 * var_x * var_y)
-    return Moments(
+    return DiscMoments(
         area,
         frame.left + m["m10"] / m["m00"],
         frame.top + m["m01"] / m["m00"],
@@ -425,8 +427,8 @@ def _moments(soft: MatLike, frame: Box, ramp: float) -> Moments | None:
 
 
 def _unshaded(
-    moments: Moments, window: Image, soft: MatLike, frame: Box, levels: Levels
-) -> Moments:
+    moments: DiscMoments, window: Image, soft: MatLike, frame: PixelBox, levels: Levels
+) -> DiscMoments:
     """Return the moments with the centre that the disc has without shading.
 
     An LED is less bright seen from the side, so one side of a leaning disc is brighter

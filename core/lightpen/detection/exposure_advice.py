@@ -1,8 +1,8 @@
-"""What to do about LEDs that are too dark or too bright."""
+"""Advice on LEDs that are too dark or too bright."""
 
 from enum import StrEnum
 
-from lightpen.cameras.protocol import CameraSettings, Caps, Range
+from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Range
 from lightpen.detection.inspection import Exposure
 
 # The fastest guided swing, 30 degrees a second, then smears an LED by some 1.5 px.
@@ -23,14 +23,16 @@ class Advice(StrEnum):
     EVEN_OUT = "even out"
 
 
-def advise(exposure: Exposure, settings: CameraSettings, caps: Caps | None) -> Advice:
-    """Return what to do about the brightness of the LEDs.
+def advise(
+    exposure: Exposure, settings: CameraSettings, caps: CameraCapabilities | None
+) -> Advice:
+    """Return the advice for the brightness of the LEDs.
 
     Parameters
     ----------
     settings : CameraSettings
         In force.
-    caps : Caps or None
+    caps : CameraCapabilities or None
         Of the camera; without it, nothing of the camera can be set.
     """
     if not exposure.peaks:

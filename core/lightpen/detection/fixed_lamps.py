@@ -1,4 +1,4 @@
-"""Fixed lamps in view, beside the pen: they tell whether the camera stands still.
+"""Fixed lamps in view, by which motion of the camera is detected.
 
 A lamp is the light in a circle that was masked as stray, or a spot that nearly every
 image shows in the same place and that is no LED of the pen. A camera that is bumped has
@@ -14,8 +14,8 @@ from functools import cache
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, Image
-from lightpen.detection.sighting import Sighting
-from lightpen.detection.spots import Flaw, Spots, detect_spots
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 
 NEARLY_ALL = 0.8  # of the images show a lamp
 STAYS = 5.0  # px about its place
@@ -64,14 +64,14 @@ def masked_lights(
     return found
 
 
-def fixed_lamps(masked: FloatArray, sightings: Sequence[Sighting]) -> FloatArray:
+def fixed_lamps(masked: FloatArray, detections: Sequence[PenDetection]) -> FloatArray:
     """Return where images show lamps that stay, (N, K, 2), px.
 
     Parameters
     ----------
     masked : (N, M, 2) array
         Lights in masked circles, px; NaN where an image shows none.
-    sightings : sequence of Sighting
+    detections : sequence of PenDetection
         Of the N images, whose spots that are no LEDs may be lamps, too.
 
     Returns
@@ -79,7 +79,7 @@ def fixed_lamps(masked: FloatArray, sightings: Sequence[Sighting]) -> FloatArray
     (N, K, 2) array
         Of lamps that nearly all images show; NaN where one does not.
     """
-    return lamps_among(masked, list(map(other_lights, sightings)))
+    return lamps_among(masked, list(map(other_lights, detections)))
 
 
 def lamps_among(masked: FloatArray, lights: Sequence[FloatArray]) -> FloatArray:
@@ -175,7 +175,7 @@ def _stay(path: FloatArray) -> _Stay:
 
 
 def _may_jump(one: _Stay, other: _Stay) -> bool:
-    """Tell whether a light may have gone from one place to the other."""
+    """Tell whether a light may have jumped from one place to the other."""
     between = other.first - one.last - 1
     if not 0 <= between <= BETWEEN * len(one.path):
         return False
@@ -189,9 +189,9 @@ def _is_shown(path: FloatArray) -> bool:
     return bool(np.isfinite(path[:, 0]).any())
 
 
-def other_lights(sighting: Sighting) -> FloatArray:
+def other_lights(detection: PenDetection) -> FloatArray:
     """Return the centres of clean spots that are no LEDs, (S, 2), px."""
-    spots, labels = sighting.spots, sighting.labels
+    spots, labels = detection.spots, detection.labels
     if spots is None or labels is None:
         return np.zeros((0, 2))
     clean = _are_clean(spots)
@@ -206,7 +206,7 @@ def _are_same(path: FloatArray, other: FloatArray) -> bool:
 
 
 def _are_clean(spots: Spots) -> BoolArray:
-    return np.asarray((spots.flaws & ~Flaw.SATURATED) == 0)
+    return np.asarray((spots.flaws & ~SpotFlaw.SATURATED) == 0)
 
 
 def _path(padded: FloatArray, place: FloatArray) -> FloatArray:

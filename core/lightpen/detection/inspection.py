@@ -1,4 +1,4 @@
-"""What a live image says of the set-up: exposure, focus and stray light."""
+"""Inspection of live images: exposure, focus and stray light."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.labelling.labels import Labels
-from lightpen.detection.spots import SATURATED_LEVEL, Flaw, Spots
+from lightpen.detection.spots import SATURATED_LEVEL, SpotFlaw, Spots
 
 DARK_PEAK = 0.25  # of the full range; noise then costs more than it need
 SHARP_EDGE = 3.5  # px from dark to bright; a sharp lens and 20 ms of stillness give 2
@@ -102,7 +102,7 @@ def inspect(spots: Spots, labels: Labels | None = None) -> Inspection:
     if labels is not None and are_leds:
         chosen = labels.spot[labels.spot >= 0]
         leds = tuple((np.flatnonzero(labels.spot >= 0) + 1).tolist())
-    clipped = (spots.flaws[chosen] & Flaw.SATURATED) > 0
+    clipped = (spots.flaws[chosen] & SpotFlaw.SATURATED) > 0
     peaks = np.where(clipped, 1.0, spots.contrasts[chosen])
     widths = spots.edge_widths[chosen]
     return Inspection(
@@ -131,7 +131,7 @@ def stray_light(spots: Spots) -> FloatArray:
 
 
 def lasting_light(images: Sequence[Spots]) -> FloatArray:
-    """Return circles that cover what is bright in half of some images or more.
+    """Return circles that cover spots seen in at least half of the images.
 
     Parameters
     ----------
@@ -192,13 +192,11 @@ class StraySearch:
     def after(self, spots: Spots, *, shows_pen: bool) -> Self:
         """Return the search after another image."""
         return replace(
-            self,
-            images=(*self.images, spots),
-            n_with_pen=self.n_with_pen + shows_pen,
+            self, images=(*self.images, spots), n_with_pen=self.n_with_pen + shows_pen
         )
 
     def circles(self) -> FloatArray:
-        """Return what to mask, (M, 3): see `lasting_light`; nothing beside the pen."""
+        """Return circles to mask, (M, 3), see `lasting_light`; none beside a pen."""
         return np.zeros((0, 3)) if self.shows_pen else lasting_light(self.images)
 
 
@@ -207,3 +205,38 @@ def _hull(circles: FloatArray) -> FloatArray:
     center = circles[:, :2].mean(axis=0)
     offsets = np.linalg.norm(circles[:, :2] - center, axis=1)
     return np.append(center, (offsets + circles[:, 2]).max())
+
+
+def with_circle(mask: FloatArray, circle: FloatArray) -> FloatArray:
+    """Return a mask (M, 3) with a circle x, y, radius more, px."""
+    return np.concatenate([mask, np.reshape(circle, (1, 3))])
+
+
+def clicked(mask: FloatArray, spots: Spots, point: FloatArray) -> FloatArray:
+    """Return a mask after a click on the image.
+
+    A click into circles takes them away, one on or beside a spot puts one over it, and
+    one anywhere else changes nothing.
+
+    Parameters
+    ----------
+    mask : (M, 3) array
+        x, y and radius, px.
+    spots : Spots
+        All that is bright in the image and not masked.
+    point : (2,) array
+        Where the click was, px.
+    """
+    is_hit = _distances(mask, point) <= mask[:, 2]
+    if is_hit.any():
+        return mask[~is_hit]
+    circles = stray_light(spots)
+    gaps = _distances(circles, point) - circles[:, 2]
+    if not len(gaps) or gaps.min() > 0:
+        return mask
+    return with_circle(mask, circles[np.argmin(gaps)])
+
+
+def _distances(circles: FloatArray, point: FloatArray) -> FloatArray:
+    distances: FloatArray = np.linalg.norm(circles[:, :2] - point, axis=1)
+    return distances

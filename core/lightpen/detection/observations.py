@@ -1,4 +1,4 @@
-"""From images to observations: the LED centres of every image, and what was dropped."""
+"""From images to observations: LED centres, and reasons for unused images."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -11,22 +11,22 @@ from lightpen.arrays import FloatArray, Image
 from lightpen.detection.fixed_lamps import fixed_lamps, masked_lights
 from lightpen.detection.labelling.diagnosis import diagnose, diagnose_mirror
 from lightpen.detection.labelling.labels import label_images
-from lightpen.detection.pose import MIN_POSE_LEDS, start_poses
-from lightpen.detection.reasons import MISHAPS, Reason, mishap_detail
-from lightpen.detection.sighting import (
-    Sighting,
-    sighting_of_centers,
-    sightings_of,
+from lightpen.detection.pen_detection import (
+    PenDetection,
+    detection_of_centers,
+    detections_of,
     unseen,
 )
+from lightpen.detection.pose import MIN_POSE_LEDS, start_poses
+from lightpen.detection.reasons import MISHAPS, Reason, mishap_detail
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import CalibrationError, FileError
 from lightpen.formats.decoding import bits_of
 from lightpen.formats.images import ImageSource, look_at_all
 from lightpen.formats.observation_files import Centers
+from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.sentences import Sentence, sentence
 
 LABELLED_AT_ONCE = 64  # images; labelling is vectorised over them
 SEARCH_MEMORY_A_PIXEL = 5  # bytes: 16 bits, twice, and what is saturated
@@ -36,7 +36,7 @@ Report = Callable[[float], None]
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """What N images show of the pen.
+    """Detections of the pen in N images.
 
     Attributes
     ----------
@@ -59,9 +59,9 @@ class Observations:
         not the pen.
     reasons : tuple of Reason
         Why an image cannot be used; `Reason.NONE` where it can.
-    details : tuple of Sentence or None
+    details : tuple of Message or None
         More on that, where the reason does not say all.
-    advice : Sentence or None
+    advice : Message or None
         What may be wrong with the set as a whole; None when most images that have
         spots are labelled.
     """
@@ -75,18 +75,18 @@ class Observations:
     edge_widths: FloatArray
     lamps: FloatArray
     reasons: tuple[Reason, ...]
-    details: tuple[Sentence | None, ...]
-    advice: Sentence | None = None
+    details: tuple[Message | None, ...]
+    advice: Message | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class _Searched:
-    """The spots of one image, or why there are none; what a mask leaves out, (M, 2)."""
+    """The spots of one image, or why there are none, and masked lights, (M, 2)."""
 
     spots: Spots = field(default_factory=Spots.none)
     masked: FloatArray | None = None
     reason: Reason = Reason.NONE
-    detail: Sentence | None = None
+    detail: Message | None = None
 
     @classmethod
     def failed(cls, error: Exception) -> Self:
@@ -123,7 +123,7 @@ def observe_images(
         The images are of the mirror image of the pen.
     """
     searched: list[_Searched] = []
-    labelled: list[tuple[_Searched, Sighting]] = []
+    labelled: list[tuple[_Searched, PenDetection]] = []
     n_images = len(source.names)
     search = partial(_search, camera=camera, mask=mask)
     for image in look_at_all(source, search, SEARCH_MEMORY_A_PIXEL, n_threads):
@@ -134,12 +134,14 @@ def observe_images(
             searched = []
         report(n_done / n_images)
     images = [image for image, _ in labelled]
-    sightings = [sighting for _, sighting in labelled]
+    detections = [detection for _, detection in labelled]
     _require_size(images, camera)
     nothing = np.full((0 if mask is None else len(mask), 2), np.nan)
     masked = np.stack([nothing if i.masked is None else i.masked for i in images])
-    seen = _observations(source.names, sightings, _lamps_beside_pen(masked, sightings))
-    spots = [sighting.spots for sighting in sightings if sighting.spots is not None]
+    seen = _observations(
+        source.names, detections, _lamps_beside_pen(masked, detections)
+    )
+    spots = [detection.spots for detection in detections if detection.spots is not None]
     n_lit = sum(len(found) > 0 for found in spots)
     mostly_labelled = 2 * seen.reasons.count(Reason.NONE) > n_lit
     if mostly_labelled and not np.isfinite(seen.seen_pixels[..., 0]).any(axis=0).all():
@@ -167,8 +169,8 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
     rotations[enough], translations[enough] = start_poses(camera, pen, pixels[enough])
     names = tuple(f"frame {frame}" for frame in centers.frames)
     images = zip(pixels, rotations, translations, strict=True)
-    sightings = [sighting_of_centers(*image) for image in images]
-    return _observations(names, sightings, np.zeros((len(names), 0, 2)))
+    detections = [detection_of_centers(*image) for image in images]
+    return _observations(names, detections, np.zeros((len(names), 0, 2)))
 
 
 def leave_out(
@@ -191,12 +193,10 @@ def _search(
     try:
         image = load()
     except FileError as error:
-        return _Searched(reason=Reason.UNREADABLE, detail=error.sentence)
+        return _Searched(reason=Reason.UNREADABLE, detail=error.message)
     if not camera.fits(image):
         height, width = image.shape
-        size = sentence(
-            "image.size", "{width} x {height} px", width=width, height=height
-        )
+        size = message("image.size", width=width, height=height)
         return _Searched(reason=Reason.WRONG_SIZE, detail=size)
     try:
         full_scale = 2 ** bits_of(image) - 1
@@ -210,11 +210,11 @@ def _search(
 
 def _labelled(
     searched: list[_Searched], camera: Camera, pen: Pen
-) -> list[tuple[_Searched, Sighting]]:
-    """Return the images with what they show; one that fails says so from then on."""
+) -> list[tuple[_Searched, PenDetection]]:
+    """Return the images with their detections; one that fails has its reason."""
     spots = [image.spots for image in searched]
     try:
-        sightings = sightings_of(spots, label_images(spots, camera, pen), camera)
+        detections = detections_of(spots, label_images(spots, camera, pen), camera)
     except MISHAPS as error:
         if len(searched) > 1:  # which one it was is seen one by one
             return [
@@ -223,35 +223,35 @@ def _labelled(
         failed = _Searched.failed(error)
         return [(failed, unseen(pen, failed.reason))]
     return [
-        (image, unseen(pen, image.reason) if image.reason else sighting)
-        for image, sighting in zip(searched, sightings, strict=True)
+        (image, unseen(pen, image.reason) if image.reason else detection)
+        for image, detection in zip(searched, detections, strict=True)
     ]
 
 
 def _observations(
-    names: tuple[str, ...], sightings: list[Sighting], lamps: FloatArray
+    names: tuple[str, ...], detections: list[PenDetection], lamps: FloatArray
 ) -> Observations:
     return Observations(
         names=names,
-        pixels=np.array([sighting.pixels for sighting in sightings]),
-        seen_pixels=np.array([sighting.seen_pixels for sighting in sightings]),
-        areas=np.array([sighting.areas for sighting in sightings]),
-        rotations=np.array([sighting.rotation for sighting in sightings]),
-        translations=np.array([sighting.translation for sighting in sightings]),
-        edge_widths=np.array([sighting.edge_width for sighting in sightings]),
+        pixels=np.array([detection.pixels for detection in detections]),
+        seen_pixels=np.array([detection.seen_pixels for detection in detections]),
+        areas=np.array([detection.areas for detection in detections]),
+        rotations=np.array([detection.rotation for detection in detections]),
+        translations=np.array([detection.translation for detection in detections]),
+        edge_widths=np.array([detection.edge_width for detection in detections]),
         lamps=lamps,
-        reasons=tuple(sighting.reason for sighting in sightings),
-        details=(None,) * len(sightings),
+        reasons=tuple(detection.reason for detection in detections),
+        details=(None,) * len(detections),
     )
 
 
-def _lamps_beside_pen(masked: FloatArray, sightings: list[Sighting]) -> FloatArray:
+def _lamps_beside_pen(masked: FloatArray, detections: list[PenDetection]) -> FloatArray:
     """Return the fixed lamps of images that show the pen, (N, K, 2), px; else NaN."""
-    shown = np.flatnonzero([sighting.has_pose for sighting in sightings])
+    shown = np.flatnonzero([detection.has_pose for detection in detections])
     if not len(shown):
-        return np.zeros((len(sightings), 0, 2))
-    found = fixed_lamps(masked[shown], [sightings[i] for i in shown])
-    lamps = np.full((len(sightings), *found.shape[1:]), np.nan)
+        return np.zeros((len(detections), 0, 2))
+    found = fixed_lamps(masked[shown], [detections[i] for i in shown])
+    lamps = np.full((len(detections), *found.shape[1:]), np.nan)
     lamps[shown] = found
     return lamps
 
@@ -260,29 +260,17 @@ def _require_size(searched: list[_Searched], camera: Camera) -> None:
     if all(image.reason is Reason.UNREADABLE for image in searched):
         why = searched[0].detail
         assert why is not None
-        raise FileError(
-            sentence(
-                "images.none-readable",
-                "None of the {n_images} images can be read. {why}",
-                n_images=len(searched),
-                why=why,
-            )
-        )
+        raise FileError("images.none-readable", n_images=len(searched), why=why)
     wrong = [i.detail for i in searched if i.reason is Reason.WRONG_SIZE and i.detail]
     n_readable = sum(image.reason is not Reason.UNREADABLE for image in searched)
     if 2 * len(wrong) > n_readable:
         raise FileError(
-            sentence(
-                "images.other-size",
-                "{n_wrong} of {n_readable} images are {size}, the camera file was "
-                "made for {width} x {height} px. Choose the file for this camera, "
-                "or switch off binning and cropping.",
-                n_wrong=len(wrong),
-                n_readable=n_readable,
-                size=wrong[0],
-                width=camera.width,
-                height=camera.height,
-            )
+            "images.other-size",
+            n_wrong=len(wrong),
+            n_readable=n_readable,
+            size=wrong[0],
+            width=camera.width,
+            height=camera.height,
         )
 
 
@@ -292,28 +280,19 @@ def _require_inside(pixels: FloatArray, camera: Camera) -> None:
     outside = np.any((points < -0.5) | (points > camera.image_size), axis=1)
     if 2 * outside.sum() > len(points):
         raise FileError(
-            sentence(
-                "centers.outside",
-                "The LED centres reach to ({x:.0f}, {y:.0f}) px, the camera file "
-                "was made for {width} x {height} px. Choose the file for this "
-                "camera.",
-                x=far[0],
-                y=far[1],
-                width=camera.width,
-                height=camera.height,
-            )
+            "centers.outside",
+            x=far[0],
+            y=far[1],
+            width=camera.width,
+            height=camera.height,
         )
 
 
 def _advice(
     reasons: tuple[Reason, ...], spots: list[Spots], camera: Camera, pen: Pen
-) -> Sentence | None:
+) -> Message | None:
     if 2 * reasons.count(Reason.AMBIGUOUS) > len(reasons):
-        return sentence(
-            "images.ambiguous",
-            "The LEDs of this pen look the same when it is turned or mirrored, so they "
-            "cannot be told apart. Move an LED, or give the LED centres.",
-        )
+        return message("images.ambiguous")
     return diagnose(spots, camera, pen)
 
 

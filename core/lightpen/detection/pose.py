@@ -37,7 +37,7 @@ ROUGHLY = 1e-4  # likewise; enough to begin to weight LEDs
 MAX_STEP = 0.2  # likewise; keeps an image of wrong LEDs from flying away
 CAUCHY_WIDTH = 4.0  # standard deviations at which a residual counts half
 WORSE = 1.5  # times the common noise; a blurred or dim image has more of it
-MEDIAN_LENGTH = 1.1774  # of a 2-D normal vector, standard deviations
+MEDIAN_LENGTH = math.sqrt(2 * math.log(2))  # of a standard normal vector in 2-D
 MAX_LESSENED = 0.9  # of a weight, by its fall; keeps the normal matrix regular
 RIDGE = 1e-12
 DIAGONAL = np.arange(6)
@@ -142,7 +142,7 @@ def fit_reprojection(
     *,
     is_near: bool = False,
 ) -> Poses:
-    """Fit poses to what any cameras saw, as `fit_poses` does for one."""
+    """Fit poses to the reprojection errors of any cameras, as `fit_poses`."""
     _require_seen(problem.pixels)
     R, t = rotations, translations
     if not is_near:

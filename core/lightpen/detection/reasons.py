@@ -4,7 +4,7 @@ from enum import StrEnum
 
 import cv2
 
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 # What arithmetic ends in on an image that nobody thought of. One such image is left
 # out, and says so; it does not end a swing or a calibration.
@@ -35,7 +35,7 @@ class Reason(StrEnum):
         return self in _OF_THE_PEN
 
     @property
-    def words(self) -> Sentence:
+    def words(self) -> Message:
         """It in a few words; `NONE` has none."""
         return _WORDS[self]
 
@@ -49,38 +49,29 @@ _OF_THE_PEN = {
 }
 
 _WORDS = {
-    Reason.UNREADABLE: sentence("reason.unreadable", "unreadable"),
-    Reason.UNHANDLED: sentence("reason.unhandled", "the program failed on it"),
-    Reason.WRONG_SIZE: sentence("reason.wrong-size", "wrong size"),
-    Reason.EMPTY: sentence("reason.empty", "no LED seen"),
-    Reason.BLURRED: sentence("reason.blurred", "blurred"),
-    Reason.TOO_FEW_LEDS: sentence("reason.too-few-leds", "too few LEDs"),
-    Reason.NOT_THE_PEN: sentence("reason.not-the-pen", "spots do not fit the pen"),
-    Reason.AMBIGUOUS: sentence("reason.ambiguous", "ambiguous"),
-    Reason.MISFIT: sentence("reason.misfit", "LEDs do not fit"),
-    Reason.SLIPPED: sentence("reason.slipped", "tip slipped"),
-    Reason.TAKEN_OUT: sentence("reason.taken-out", "taken out"),
-    Reason.OTHER_MOMENT: sentence("reason.other-moment", "not of the same moment"),
-    Reason.ABSENT: sentence("reason.absent", "no image"),
+    Reason.UNREADABLE: message("reason.unreadable"),
+    Reason.UNHANDLED: message("reason.unhandled"),
+    Reason.WRONG_SIZE: message("reason.wrong-size"),
+    Reason.EMPTY: message("reason.empty"),
+    Reason.BLURRED: message("reason.blurred"),
+    Reason.TOO_FEW_LEDS: message("reason.too-few-leds"),
+    Reason.NOT_THE_PEN: message("reason.not-the-pen"),
+    Reason.AMBIGUOUS: message("reason.ambiguous"),
+    Reason.MISFIT: message("reason.misfit"),
+    Reason.SLIPPED: message("reason.slipped"),
+    Reason.TAKEN_OUT: message("reason.taken-out"),
+    Reason.OTHER_MOMENT: message("reason.other-moment"),
+    Reason.ABSENT: message("reason.absent"),
 }
 
 
-def counted(n_images: int, reason: Reason) -> Sentence:
+def counted(n_images: int, reason: Reason) -> Message:
     """Return how many images do not take part for a reason."""
-    return sentence(
-        "calibrate.images-of-a-reason",
-        "{n_images} {reason}",
-        n_images=n_images,
-        reason=reason.words,
+    return message(
+        "calibrate.images-of-a-reason", n_images=n_images, reason=reason.words
     )
 
 
-def mishap_detail(error: Exception) -> Sentence:
-    """Return what there is to say of an image that ended in one of `MISHAPS`."""
-    return sentence(
-        "image.unhandled",
-        "The program failed on this image ({kind}: {problem}). Keep the image, and "
-        "report it.",
-        kind=type(error).__name__,
-        problem=str(error),
-    )
+def mishap_detail(error: Exception) -> Message:
+    """Return the detail of an image that failed by one of `MISHAPS`."""
+    return message("image.unhandled", kind=type(error).__name__, problem=str(error))

@@ -1,4 +1,4 @@
-"""What several cameras show of the pen at the same moments."""
+"""Observations by several cameras at the same moments."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,9 +17,9 @@ from lightpen.errors import CalibrationError, FileError
 from lightpen.formats.images import ImageSource
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.pairing import NONE, Pairing
+from lightpen.messages import Message, message
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, of_camera
-from lightpen.sentences import Sentence, sentence
 
 
 def observe_rig_images(
@@ -59,9 +59,9 @@ def observe_rig_images(
             mask = None if masks is None else masks[c]
             seen.append(observe_images(source, rig.cameras[c], pen, part, mask=mask))
         except FileError as error:
-            raise FileError(_with_exchange(rig, c, error.sentence)) from error
+            raise FileError(_with_exchange(rig, c, error.message)) from error
         except CalibrationError as error:
-            trouble = of_camera(rig.names[c], error.sentence)
+            trouble = of_camera(rig.names[c], error.message)
             raise CalibrationError(trouble) from error
     return at_moments(seen, pairing)
 
@@ -81,7 +81,7 @@ def observe_rig_centers(
         try:
             seen.append(observe_centers(each, rig.cameras[c], pen))
         except FileError as error:
-            raise FileError(of_camera(rig.names[c], error.sentence)) from error
+            raise FileError(of_camera(rig.names[c], error.message)) from error
     return at_moments(seen, pairing)
 
 
@@ -93,11 +93,11 @@ def at_moments(
     Of a moment that a camera has no image of, the reason is `Reason.ABSENT`.
     """
     return tuple(
-        _rearranged(seen, pairing.images[:, c]) for c, seen in enumerate(observations)
+        _responsive(seen, pairing.images[:, c]) for c, seen in enumerate(observations)
     )
 
 
-def _rearranged(seen: Observations, images: IntArray) -> Observations:
+def _responsive(seen: Observations, images: IntArray) -> Observations:
     absent = images == NONE
 
     def moved(values: FloatArray) -> FloatArray:
@@ -120,11 +120,11 @@ def _rearranged(seen: Observations, images: IntArray) -> Observations:
     )
 
 
-def _with_exchange(rig: Rig, c: int, trouble: Sentence) -> Sentence:
-    """Return what is wrong with a camera's images, and whose size they have."""
+def _with_exchange(rig: Rig, c: int, trouble: Message) -> Message:
+    """Return the error of a camera's images, and whose size they have."""
     told = of_camera(rig.names[c], trouble)
     size = trouble.values.get("size")
-    if not isinstance(size, Sentence):
+    if not isinstance(size, Message):
         return told
     theirs = size.values["width"], size.values["height"]
     others = [
@@ -134,10 +134,4 @@ def _with_exchange(rig: Rig, c: int, trouble: Sentence) -> Sentence:
     ]
     if not others:
         return told
-    return sentence(
-        "rig.size-of-another",
-        "{told} They have the size of {other}: the images may be given in another "
-        "order than the cameras of the rig file.",
-        told=told,
-        other=others[0],
-    )
+    return message("rig.size-of-another", told=told, other=others[0])

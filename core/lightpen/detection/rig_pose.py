@@ -10,13 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.pose import (
-    CameraReprojection,
-    Poses,
-    fit_reprojection,
-)
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.pose import CameraReprojection, Poses, fit_reprojection
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import Sighting
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
 
@@ -70,7 +66,7 @@ def fit_rig_poses(
     rotations: FloatArray,
     translations: FloatArray,
 ) -> Poses:
-    """Fit poses rig_from_pen, each to what all cameras saw.
+    """Fit poses rig_from_pen, each to the LEDs in all cameras.
 
     Parameters
     ----------
@@ -93,15 +89,15 @@ def fit_rig_poses(
     return fit_reprojection(problem, rotations, translations)
 
 
-def see_together(rig: Rig, pen: Pen, sighting: Sighting) -> Sighting:
-    """Return what the cameras of a rig saw at a moment with one pose by all of them.
+def see_together(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:
+    """Return the detections of a moment with one pose by all cameras of a rig.
 
-    A camera that has no pose, or a blurred image, counts for nothing; where none is
-    left, the sighting stays as it is.
+    A camera without a pose, or with a blurred image, is ignored; if none is left, the
+    detection is returned as it is.
 
     Parameters
     ----------
-    sighting : Sighting
+    detection : PenDetection
         By the first camera, with those by the others.
 
     Returns
@@ -109,13 +105,13 @@ def see_together(rig: Rig, pen: Pen, sighting: Sighting) -> Sighting:
     Sighting
         Its pose is rig_from_pen, with its cofactors and its noise.
     """
-    views = (sighting, *sighting.others)
+    views = (detection, *detection.others)
     if len(views) == 1:
-        return sighting
+        return detection
     fit = [view.has_pose and not view.is_blurred for view in views]
     if not any(fit):
-        return sighting
-    nowhere = np.full_like(sighting.pixels, np.nan)
+        return detection
+    nowhere = np.full_like(detection.pixels, np.nan)
     clean = [
         view if is_fit else replace(view, pixels=nowhere)
         for view, is_fit in zip(views, fit, strict=True)
@@ -123,7 +119,9 @@ def see_together(rig: Rig, pen: Pen, sighting: Sighting) -> Sighting:
     start = fit.index(True)
     back = rig.rotations[start].T
     poses = fit_rig_poses(
-        *(rig, pen, np.stack([view.pixels for view in clean])[None]),
+        rig,
+        pen,
+        np.stack([view.pixels for view in clean])[None],
         (back @ views[start].rotation)[None],
         (back @ (views[start].translation - rig.translations[start]))[None],
     )

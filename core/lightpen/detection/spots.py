@@ -1,4 +1,4 @@
-"""Bright spots in an image: centres, shapes and what is wrong with each.
+"""Bright spots in an image: centres, shapes and flaws.
 
 Every fourth pixel of every fourth row tells where something is bright; only windows
 around that are read in full. A region that is no whole disc is looked at again at
@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import IntFlag
-from math import ceil
+from math import ceil, sqrt
 from statistics import median
 from typing import Self
 
@@ -21,13 +21,14 @@ from cv2.typing import MatLike
 from lightpen.arrays import FloatArray, Image, IntArray
 from lightpen.detection.disc_moments import (
     MIN_SIZE,
-    Box,
     Disc,
+    PixelBox,
     bounding_box,
     measure_disc,
 )
 from lightpen.detection.pose import MIN_POSE_LEDS
 from lightpen.formats.decoding import bits_of
+from lightpen.model.quantiles import normal_quantile
 
 MAX_SPOTS = 64
 MAX_BOXES = 128  # the smallest of more are clutter
@@ -38,7 +39,6 @@ MOVED = 0.5  # of a spot's size; a hand that holds still trembles by less
 CHANGED = 0.1  # of the mean area and contrast of all spots
 NOISE_SAMPLES = 48  # per side of the image
 NOISE_QUANTILE = 0.84  # of differences of neighbours; texture may cover the rest
-NOISE_OF_DIFFERENCE = 1.99  # that quantile for normal noise, in standard deviations
 BACKGROUND_QUANTILE = 0.2  # a bright window may fill most of the image
 MIN_NOISE = 0.5  # rounding, digital numbers
 LEVEL_SIGMAS = 8.0
@@ -64,8 +64,8 @@ BLURRED_EDGE = 5.0  # px; a sharp image has 2 to 3
 DIM_SIGMAS = 16.0
 
 
-class Flaw(IntFlag):
-    """What makes a spot less than a clean, whole LED disc."""
+class SpotFlaw(IntFlag):
+    """Flaws of a spot against a clean, whole LED disc."""
 
     NONE = 0
     MERGED = 1  # touches another bright thing
@@ -93,7 +93,7 @@ class Spots:
     edge_widths : (N,) array
         Width of the rim from dark to bright, px; blur widens it.
     flaws : (N,) array
-        `Flaw` of each spot.
+        `SpotFlaw` of each spot.
     has_smears : bool
         Whether there is light, but no spot: discs moved by many times their size during
         the exposure leave streaks, a dark image leaves nothing.
@@ -128,11 +128,11 @@ class Spots:
         """Whether most of the spots are blurred, or all light is smeared to none."""
         if len(self) == 0:
             return self.has_smears
-        return bool(np.mean((self.flaws & Flaw.BLURRED) > 0) > 0.5)
+        return bool(np.mean((self.flaws & SpotFlaw.BLURRED) > 0) > 0.5)
 
 
 def have_moved(before: Spots, now: Spots) -> bool:
-    """Return whether what is seen has moved, or looks otherwise, by more than noise."""
+    """Return whether spots have moved or changed by more than noise."""
     if len(before) != len(now):
         return True
     if not len(now):
@@ -152,7 +152,7 @@ def detect_spots(
     mask: FloatArray | None = None,
     *,
     full_scale: int | None = None,
-    window: Box | None = None,
+    window: PixelBox | None = None,
 ) -> Spots:
     """Find the bright discs of an image.
 
@@ -170,7 +170,7 @@ def detect_spots(
     full_scale : int, optional
         Brightest value a pixel can have. Taken as 255, 4095 or 65535 if not given; see
         `lightpen.formats.decoding.bits_of`.
-    window : Box, optional
+    window : PixelBox, optional
         All of the image that is read; what reaches out of it is cut.
 
     Returns
@@ -226,7 +226,7 @@ def _spots_of(
 
 @dataclass(frozen=True, eq=False)
 class _Survey:
-    """An image, every `stride`-th pixel of it, and what is usual in it."""
+    """An image, every `stride`-th pixel of it, its background and noise."""
 
     image: Image
     thinned: MatLike
@@ -236,7 +236,7 @@ class _Survey:
     peak: float
 
     def higher(self, level: float) -> float:
-        """Return the next level to look at."""
+        """Return the next level to search."""
         step = LEVEL_STEP * (level - self.background)
         longest = LEVEL_STEP_OF_PEAK * (self.peak - self.background)
         return level + max(min(step, longest), 1.0)
@@ -251,7 +251,8 @@ def _survey(image: Image, mask: FloatArray | None, stride: int) -> _Survey:
     beside: MatLike = np.ascontiguousarray(image[:: step * stride, 1 :: step * stride])
     n = min(few.shape[1], beside.shape[1])
     difference = _quantile(cv2.absdiff(few[:, :n], beside[:, :n]), NOISE_QUANTILE)
-    noise = max(difference / NOISE_OF_DIFFERENCE, MIN_NOISE)
+    deviation = sqrt(2) * normal_quantile((1 - NOISE_QUANTILE) / 2)
+    noise = max(difference / deviation, MIN_NOISE)
 
     if mask is not None and len(mask):
         thinned = thinned.copy()
@@ -310,12 +311,12 @@ def _find_discs(scene: _Survey, budget: Iterator[int]) -> list[Disc]:
     rise = scene.peak - scene.background
     level = scene.background + max(LEVEL_SIGMAS * scene.noise, LEVEL_OF_PEAK * rise)
     height, width = scene.image.shape
-    boxes = _regions(scene, Box(0, 0, width, height), level)
+    boxes = _regions(scene, PixelBox(0, 0, width, height), level)
     if len(boxes) > MAX_BOXES:
         boxes = sorted(boxes, key=lambda box: box.size, reverse=True)[:MAX_BOXES]
 
     discs: list[Disc] = []
-    unclear: list[tuple[Box, Disc | None]] = []
+    unclear: list[tuple[PixelBox, Disc | None]] = []
     for box in boxes:
         if _is_too_large(scene, box):
             unclear.append((box, None))
@@ -331,12 +332,16 @@ def _find_discs(scene: _Survey, budget: Iterator[int]) -> list[Disc]:
 
 
 def _parted(
-    scene: _Survey, box: Box, level: float, disc: Disc | None, budget: Iterator[int]
+    scene: _Survey,
+    box: PixelBox,
+    level: float,
+    disc: Disc | None,
+    budget: Iterator[int],
 ) -> list[Disc]:
     """Return the discs that a region parts into at higher levels, or itself."""
     if disc is not None:
         level = max(level, disc.cut_level)
-    parts: list[Box] = []
+    parts: list[PixelBox] = []
     for _ in range(MAX_LEVELS_AT_ONCE):
         if next(budget, None) is None:
             break
@@ -344,24 +349,24 @@ def _parted(
         parts = _regions(scene, box, level)
         if len(parts) != 1 or not parts[0].is_close_to(box):
             break
-    pieces: list[Disc] = []
+    blocks: list[Disc] = []
     for part in parts:
         if _is_too_large(scene, part):
-            pieces += _parted(scene, part, level, None, budget)
+            blocks += _parted(scene, part, level, None, budget)
             continue
-        for piece in _measured(scene, part, level, level, budget):
-            if piece.is_whole:
-                pieces.append(piece)
+        for block in _measured(scene, part, level, level, budget):
+            if block.is_whole:
+                blocks.append(block)
             else:
-                pieces += _parted(scene, piece.box, level, piece, budget)
-    is_parted = len(pieces) > 1 or any(piece.is_whole for piece in pieces)
+                blocks += _parted(scene, block.box, level, block, budget)
+    is_parted = len(blocks) > 1 or any(block.is_whole for block in blocks)
     if disc is None or is_parted or not _resembles_disc(disc):
-        return pieces
+        return blocks
     return [disc]
 
 
 def _unique(discs: list[Disc]) -> list[Disc]:
-    """Drop what was found twice or lies inside a larger disc."""
+    """Drop duplicates and spots inside a larger disc."""
     kept: list[Disc] = []
     for disc in sorted(discs, key=lambda disc: disc.moments.area, reverse=True):
         if not any(larger.box.holds_center_of(disc.box) for larger in kept):
@@ -369,8 +374,8 @@ def _unique(discs: list[Disc]) -> list[Disc]:
     return kept
 
 
-def _regions(scene: _Survey, box: Box, level: float) -> list[Box]:
-    """Return the boxes of what exceeds a level and lies inside a box."""
+def _regions(scene: _Survey, box: PixelBox, level: float) -> list[PixelBox]:
+    """Return the boxes of regions above a level inside a box."""
     if level >= np.iinfo(scene.image.dtype).max:
         return []
     step = 1 if box.size <= FINE_SIZE else scene.stride
@@ -407,13 +412,13 @@ def _is_textured(bright: MatLike) -> bool:
     return bool(changes > TEXTURED * bright.size)
 
 
-def _is_too_large(scene: _Survey, box: Box) -> bool:
+def _is_too_large(scene: _Survey, box: PixelBox) -> bool:
     shorter_side: int = min(scene.image.shape)
     return box.size > max(MAX_DIAMETER * shorter_side, FINE_SIZE)
 
 
 def _measured(
-    scene: _Survey, box: Box, level: float, floor: float, budget: Iterator[int]
+    scene: _Survey, box: PixelBox, level: float, floor: float, budget: Iterator[int]
 ) -> Iterator[Disc]:
     """Measure the region in a box, and others that coarse sampling took for one."""
     boxes = [box]
@@ -455,25 +460,25 @@ def _as_spots(discs: list[Disc], full_scale: float, noise: float) -> Spots:
 
 def _flaws(
     disc: Disc, usual_area: float | None, full_scale: float, noise: float
-) -> Flaw:
-    flaws = Flaw.NONE
+) -> SpotFlaw:
+    flaws = SpotFlaw.NONE
     if disc.cut_height > MERGED_LEVEL:
-        flaws |= Flaw.MERGED
+        flaws |= SpotFlaw.MERGED
     if disc.leaves_image:
-        flaws |= Flaw.CUT
+        flaws |= SpotFlaw.CUT
     elif not disc.is_whole:
         flaws |= _flaw_of_size(disc.moments.area, usual_area)
     if disc.levels.top >= SATURATED_LEVEL * full_scale:
-        flaws |= Flaw.SATURATED
+        flaws |= SpotFlaw.SATURATED
     if disc.moments.edge_width > BLURRED_EDGE:
-        flaws |= Flaw.BLURRED
+        flaws |= SpotFlaw.BLURRED
     if disc.levels.contrast < DIM_SIGMAS * noise:
-        flaws |= Flaw.DIM
+        flaws |= SpotFlaw.DIM
     return flaws
 
 
-def _flaw_of_size(area: float, usual_area: float | None) -> Flaw:
+def _flaw_of_size(area: float, usual_area: float | None) -> SpotFlaw:
     """Tell merged from cut by size, if there is a whole disc to compare with."""
     if usual_area is None:
-        return Flaw.MERGED | Flaw.CUT
-    return Flaw.MERGED if area > usual_area else Flaw.CUT
+        return SpotFlaw.MERGED | SpotFlaw.CUT
+    return SpotFlaw.MERGED if area > usual_area else SpotFlaw.CUT

@@ -1,1 +1,1 @@
-"""The tip from what all images show, its uncertainty, and what it is worth."""
+"""Estimation of the tip and its uncertainty from all images."""

@@ -1,8 +1,20 @@
-"""The calibration of a probe tip: from observations to the tip and what it is worth."""
+"""The calibration of a probe tip, from observations to the tip and its uncertainty.
+
+`calibrate_rig` takes four steps, each a function with a frozen result:
+
+1. `_fit_single_cameras`: poses of single images; images are left out whose LEDs do not
+   fit, or in which the tip was not where the others have it.
+2. `_find_start`: where the images put the cameras of a rig, and the joint fit of tip
+   and cone with all parameters of the files held.
+3. `_adjust_jointly`: the bundle adjustment with priors, equation (2) of method.md.
+4. `_calibration_of`: the uncertainty budget, the paper's method beside it, and the
+   residuals of all images.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,37 +24,51 @@ from lightpen.detection.observations import Observations
 from lightpen.detection.pose import Poses, fit_paper_poses, fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
-from lightpen.estimation.adjustment import adjust
-from lightpen.estimation.bundle import Bundle
-from lightpen.estimation.camera_path import CameraPath, SteadyImages, pose_steadily
-from lightpen.estimation.contradictions import Contradiction
-from lightpen.estimation.disc_diameter import read_diameter
-from lightpen.estimation.instrument import Instrument, adjusted_instrument
-from lightpen.estimation.joint import ContactModel, JointFit, fit_contact, joint_at
-from lightpen.estimation.led_quality import LedQuality, measure_leds
-from lightpen.estimation.linearised import BundleState
-from lightpen.estimation.placing import place_cameras
-from lightpen.estimation.priors import Priors, priors_of, thermal_growth
-from lightpen.estimation.rig_poses import RigPoses, join_poses
-from lightpen.estimation.rig_readings import require_usual_rig
-from lightpen.estimation.second_cone import (
+from lightpen.estimation.bundle.adjustment import Adjustment, adjust
+from lightpen.estimation.bundle.bundle import Bundle
+from lightpen.estimation.bundle.consistency_findings import Contradiction
+from lightpen.estimation.bundle.disc_diameter import read_diameter
+from lightpen.estimation.bundle.linearised import BundleState
+from lightpen.estimation.bundle.priors import Priors, priors_of, thermal_growth
+from lightpen.estimation.contact.camera_motion import (
+    CameraPath,
+    SteadyImages,
+    pose_steadily,
+)
+from lightpen.estimation.contact.joint import (
+    ContactModel,
+    JointFit,
+    fit_contact,
+    joint_at,
+)
+from lightpen.estimation.contact.led_quality import LedQuality, measure_leds
+from lightpen.estimation.contact.single_images import (
+    PosedImages,
+    require_fit,
+    require_images,
+)
+from lightpen.estimation.pivot.two_stage import (
+    TwoStageFit,
+    fit_two_stage,
+    propagated_covariance,
+)
+from lightpen.estimation.rigs.initial_extrinsics import find_initial_extrinsics
+from lightpen.estimation.rigs.rig_conventions import require_usual_rig
+from lightpen.estimation.rigs.rig_poses import RigPoses, join_poses
+from lightpen.estimation.rigs.synchrony import TimeLag
+from lightpen.estimation.uncertainty.budget import (
+    Budget,
+    SplitHalfCheck,
+    combine,
+    compare_halves,
+)
+from lightpen.estimation.uncertainty.instrument import Instrument, adjusted_instrument
+from lightpen.estimation.uncertainty.second_cone import (
     SecondCone,
     SecondSwing,
     second_cone,
     second_images,
 )
-from lightpen.estimation.single_images import (
-    PosedImages,
-    require_fit,
-    require_images,
-)
-from lightpen.estimation.synchrony import Lag
-from lightpen.estimation.two_stage import (
-    TwoStageFit,
-    fit_two_stage,
-    propagated_covariance,
-)
-from lightpen.estimation.uncertainty import Budget, Halves, combine, compare_halves
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import Coverage, measure_coverage
@@ -52,7 +78,7 @@ from lightpen.model.rig import Rig, of_camera, rig_of
 
 @dataclass(frozen=True, eq=False)
 class CameraImages:
-    """The images of one camera in a calibration, one at each of the N moments.
+    """The images of one camera in a calibration, one at each of N moments.
 
     Attributes
     ----------
@@ -62,9 +88,9 @@ class CameraImages:
         Root mean square residual of each image, px; NaN without a pose.
     leds_used : (N, L) array of bool
     total_rms : float
-        Of all LEDs that are used, px.
+        Root mean square residual of all LEDs used, px.
     path : CameraPath or None
-        How the camera moved by its fixed lamps; None without any.
+        Motion of the camera by its fixed lamps; None without any.
     """
 
     observations: Observations
@@ -76,52 +102,51 @@ class CameraImages:
 
     @property
     def used(self) -> BoolArray:
-        """Images that take part, (N,)."""
+        """Which images take part, (N,)."""
         return np.array([reason is Reason.NONE for reason in self.reasons])
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A calibrated tip, with all that is known about it.
+    """A calibrated tip.
 
-    The arrays over images hold all N images of the observations; the fits hold the
-    M images that entered them, in the same order. An image of which the joint fit
-    could use no LED is among these M and not among the used ones. Of a rig, its images
-    of one moment count as one here, and the camera frame is that of the first camera.
+    Arrays over images hold all N images of the observations; the fits hold the M images
+    that entered them, in the same order. An image of which the joint fit uses no LED is
+    among these M and not among the used ones. Of a rig, the images of one moment count
+    as one, and the camera frame is that of the first camera.
 
     Attributes
     ----------
     cameras : tuple of CameraImages
-        What became of the images of each camera.
     reasons : tuple of Reason
         Why an image was left out; `Reason.NONE` for the used ones.
     used : (N,) array of bool
     tips_cam : (N, 3) array
-        Where each image alone puts the tip, camera frame, mm; NaN without a pose.
+        Tip by the pose of each image alone, camera frame, mm; NaN without a pose.
     rms : (N,) array
         Root mean square residual of each image, px: of a used one in the joint fit, of
         another about its own pose; NaN without a pose.
     joint : JointFit
-        Tip, cone and rotations, with all else as the bundle adjustment has it.
+        Tip, cone and rotations, with all parameters as adjusted.
     bundle : Bundle
-        The bundle adjustment: everything that the files may have wrong.
+        The bundle adjustment.
     stated : Priors
-        What the files state, and what is assumed in its place.
+        Of the files, and what is assumed in their place.
     priors : Priors
-        The same without what the images contradict.
+        The same with contradicted numbers released.
     assumptions : Assumptions
-        What stood in for what the files do not state.
+        In place of uncertainties that the files do not state.
     growth : float
-        By which the pen is larger than its file has it, as it is warmer; relative.
+        Thermal expansion of the pen against its file, relative.
     contradictions : tuple of Contradiction
-        What the images say against the files.
+        Numbers of the files that the images contradict.
     two_stage : TwoStageFit
         The paper's method on the same images, of the first camera.
     two_stage_covariance : (6, 6) array
         Of its (tip, cone) by the covariances of the poses, mm^2.
     instrument : Instrument
-        What is left to measure with, of the first camera.
-    lags : tuple of Lag or None
+        Cameras and pen as adjusted, for measurements with this tip.
+    lags : tuple of TimeLag or None
         Of each camera of a rig but the first.
     """
 
@@ -141,28 +166,25 @@ class Calibration:
     two_stage_covariance: FloatArray
     budget: Budget
     instrument: Instrument
-    halves: Halves
+    halves: SplitHalfCheck
     leds: LedQuality
     coverage: Coverage
-    lags: tuple[Lag | None, ...] = ()
+    lags: tuple[TimeLag | None, ...] = ()
     second: SecondCone | None = None
 
     @property
     def observations(self) -> Observations:
-        """What the images of the first camera show."""
+        """Observations of the first camera."""
         return self.cameras[0].observations
 
     @property
     def leds_used(self) -> BoolArray:
-        """Which LEDs of its images take part, (N, L)."""
+        """Which LEDs of the first camera take part, (N, L)."""
         return self.cameras[0].leds_used
 
     @property
     def moved(self) -> float:
-        """How far cone and camera moved against each other for certain, mm.
-
-        As fixed lamps tell, or the pen.
-        """
+        """Significant motion of cone against camera, by fixed lamps or the pen, mm."""
         by_lamps = [
             images.path.moved * float(self.joint.cone_cam[2]) / camera.fx
             for images, camera in zip(
@@ -170,16 +192,16 @@ class Calibration:
             )
             if images.path is not None and images.path.is_followed
         ]
-        is_certain = self.bundle.counted.drift.is_significant
+        is_certain = self.bundle.budget_components.drift.is_significant
         return max([*by_lamps, self.bundle.drift if is_certain else 0.0])
 
     @property
     def led_sigma(self) -> float:
-        """Standard deviation of the LED file's coordinates by the images, mm.
+        """Estimated standard deviation of the LED file's coordinates, mm.
 
-        0 where they show no significant errors, or the file states its uncertainty.
+        0 where it is not significant, or the file states its uncertainty.
         """
-        found = self.bundle.counted.leds
+        found = self.bundle.budget_components.leds
         return found.sigma if found.is_significant else 0.0
 
 
@@ -190,24 +212,7 @@ def calibrate(
     assumptions: Assumptions = USUAL,
     second: SecondSwing | None = None,
 ) -> Calibration:
-    """Calibrate the tip of a pen from the LED centres of a swing.
-
-    Poses of single images come first; images whose LEDs do not fit are left out, then
-    those in which the tip was not where the others have it. The rest goes into the
-    bundle adjustment, and into the paper's method beside it.
-
-    Parameters
-    ----------
-    assumptions : Assumptions
-        What stands in for the uncertainties that the files do not state.
-    second : SecondSwing or None
-        With the same pen before the same camera, which has not moved in between.
-
-    Raises
-    ------
-    CalibrationError
-        The images do not determine the tip; the text says what is missing.
-    """
+    """Calibrate the tip of a pen by a single camera; see `calibrate_rig`."""
     return calibrate_rig(rig_of(camera), pen, (observations,), assumptions, second)
 
 
@@ -218,220 +223,319 @@ def calibrate_rig(
     assumptions: Assumptions = USUAL,
     second: SecondSwing | None = None,
 ) -> Calibration:
-    """Calibrate the tip of a pen that several cameras see at once; see `calibrate`.
-
-    Each camera judges its images by itself. Where they put the cameras, the fit of all
-    begins, whatever the file of the rig says; it enters with its uncertainty.
+    """Calibrate the tip of a pen that one camera or several see swing in a cone.
 
     Parameters
     ----------
+    rig : Rig
+        As its files have it.
+    pen : Pen
+        As its file has it.
     observations : sequence of Observations
         Of each camera, all of the same N moments.
+    assumptions : Assumptions
+        In place of uncertainties that the files do not state.
     second : SecondSwing or None
-        Of a rig of one camera.
+        Of the same pen in another cone, before a single camera that has not moved.
+
+    Raises
+    ------
+    CalibrationError
+        The images do not determine the tip; the text says what is missing.
     """
     growth = thermal_growth(pen, assumptions)
-    pen = grown(pen, growth)
-    steady = [
-        _of_camera(rig, c, partial(pose_steadily, camera, pen, seen))
+    inputs = _Inputs(rig, grown(pen, growth), growth, assumptions)
+    single = _fit_single_cameras(inputs, observations)
+    start = _find_start(inputs, single)
+    adjusted = _adjust_jointly(inputs, single, start, second)
+    return _calibration_of(inputs, single, start, adjusted)
+
+
+class _Inputs(NamedTuple):
+    """The rig of the files, and the pen at the temperature of the swing."""
+
+    rig: Rig
+    pen: Pen
+    growth: float
+    assumptions: Assumptions
+
+
+@dataclass(frozen=True, eq=False)
+class _SingleCameraFits:
+    """Step 1: the images of C cameras at N moments, each by itself.
+
+    Attributes
+    ----------
+    observations : tuple of Observations
+        Of each camera.
+    steady : tuple of SteadyImages
+        The same with the camera's own motion removed.
+    pixels : (N, C, L, 2) array
+        LED centres of these, px.
+    reasons : (N, C) array of Reason
+    """
+
+    observations: tuple[Observations, ...]
+    steady: tuple[SteadyImages, ...]
+    pixels: FloatArray
+    reasons: npt.NDArray[np.object_]
+
+    @property
+    def posed(self) -> list[PosedImages]:
+        """The images of each camera with their poses."""
+        return [each.posed for each in self.steady]
+
+    def rig_poses(self, rig: Rig, poses: Sequence[Poses], used: BoolArray) -> RigPoses:
+        """Join poses of the posed images of each camera to poses rig_from_pen.
+
+        Images that are not ``used`` (N, C) enter only where no image of the moment is.
+        """
+        at_moment = [
+            np.flatnonzero(used[part.posed, c] | ~used[part.posed].any(axis=1))
+            for c, part in enumerate(self.posed)
+        ]
+        moments = [part.posed[i] for part, i in zip(self.posed, at_moment, strict=True)]
+        chosen = [each.of(i) for each, i in zip(poses, at_moment, strict=True)]
+        return join_poses(rig, len(used), moments, chosen)
+
+
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """Step 2: the fit that the adjustment starts from, parameters of the files held.
+
+    Attributes
+    ----------
+    rig : Rig
+        The file's cameras where the images put them.
+    extrinsics : (6 (C - 1),) array or None
+        Their extrinsics less those of the rig file, rad and mm; None of one camera.
+    lags : tuple of TimeLag or None
+    reasons : (N, C) array of Reason
+    moments : (M,) array of int
+        Moments of which an image takes part.
+    pixels : (M, C, L, 2) array
+        Of these, px; NaN of images that do not take part.
+    joint : JointFit
+        Of these.
+    """
+
+    rig: Rig
+    extrinsics: FloatArray | None
+    lags: tuple[TimeLag | None, ...]
+    reasons: npt.NDArray[np.object_]
+    moments: IntArray
+    pixels: FloatArray
+    joint: JointFit
+
+
+@dataclass(frozen=True, eq=False)
+class _Adjusted:
+    """Step 3: the bundle adjustment, and the joint fit at its solution."""
+
+    adjustment: Adjustment
+    joint: JointFit
+    stated: Priors
+
+
+def _fit_single_cameras(
+    inputs: _Inputs, observations: Sequence[Observations]
+) -> _SingleCameraFits:
+    """Fit the poses of each camera's images; a tip slips before all cameras."""
+    rig = inputs.rig
+    steady = tuple(
+        _of_camera(rig, c, partial(pose_steadily, camera, inputs.pen, seen))
         for c, (camera, seen) in enumerate(zip(rig.cameras, observations, strict=True))
-    ]
-    parts = [each.posed for each in steady]
-    reasons = _with_slips(parts)
-    seen_by_all = np.stack([each.observations.pixels for each in steady], axis=1)
-    there, places = rig, None
-    lags: tuple[Lag | None, ...] = ()
+    )
+    reasons = np.stack([each.posed.reasons for each in steady], axis=1)
+    slipped = np.any(reasons == Reason.SLIPPED, axis=1, keepdims=True)
+    reasons[slipped & (reasons == Reason.NONE)] = Reason.SLIPPED
+    pixels = np.stack([each.observations.pixels for each in steady], axis=1)
+    return _SingleCameraFits(tuple(observations), steady, pixels, reasons)
+
+
+def _find_start(inputs: _Inputs, single: _SingleCameraFits) -> _Start:
+    """Find the cameras' extrinsics by the images, whatever the rig file says, and fit.
+
+    A file that contradicts them grossly is refused.
+    """
+    rig, pen, posed = inputs.rig, inputs.pen, single.posed
+    reasons = single.reasons.copy()
+    placed, extrinsics = rig, None
+    lags: tuple[TimeLag | None, ...] = ()
     if rig.n_cameras > 1:
-        placed = place_cameras(rig, parts)
-        require_usual_rig(rig, placed, pen, seen_by_all, parts)
-        there, places, lags = placed.rig, placed.deviations(rig), placed.lags
-        for c, each in enumerate(reasons):
-            each[placed.apart[:, c]] = Reason.OTHER_MOMENT
-    kept = np.stack([each == Reason.NONE for each in reasons], axis=1)
-    chosen, of_first = np.flatnonzero(kept.any(axis=1)), np.flatnonzero(kept[:, 0])
-    require_images(of_first, reasons[0], observations[0].advice)
-    pixels = np.where(kept[..., None, None], seen_by_all, np.nan)[chosen]
-    telling = _telling(parts, kept)
-    posed = [part.posed[some] for part, some in zip(parts, telling, strict=True)]
-
-    def joined(of: Rig, poses: Sequence[Poses]) -> RigPoses:
-        some = [each.of(i) for each, i in zip(poses, telling, strict=True)]
-        return join_poses(of, len(kept), posed, some)
-
-    alone = joined(there, [part.poses for part in parts])
-    start = fit_contact(
-        ContactModel(there, pen, pixels),
-        alone.rotations[chosen],
-        parts[0].pivot.tip_pen,
-        parts[0].pivot.pivot_cam,
+        found = find_initial_extrinsics(rig, posed)
+        require_usual_rig(rig, found, pen, single.pixels, posed)
+        placed, extrinsics, lags = found.rig, found.deviations(rig), found.lags
+        reasons[found.apart] = Reason.OTHER_MOMENT
+    used = reasons == Reason.NONE
+    advice = single.observations[0].advice
+    require_images(np.flatnonzero(used[:, 0]), reasons[:, 0], advice)
+    moments = np.flatnonzero(used.any(axis=1))
+    pixels = np.where(used[..., None, None], single.pixels, np.nan)[moments]
+    poses = single.rig_poses(placed, [part.poses for part in posed], used)
+    joint = fit_contact(
+        ContactModel(placed, pen, pixels),
+        poses.rotations[moments],
+        posed[0].pivot.tip_pen,
+        posed[0].pivot.pivot_cam,
     )
-    require_fit(start.sigma)
-    state = BundleState(rig, pen, start.tip_pen, start.cone_cam, start.rotations)
+    require_fit(joint.sigma)
+    return _Start(placed, extrinsics, lags, reasons, moments, pixels, joint)
+
+
+def _adjust_jointly(
+    inputs: _Inputs,
+    single: _SingleCameraFits,
+    start: _Start,
+    second: SecondSwing | None,
+) -> _Adjusted:
+    """Adjust tip, cone and all parameters of the files, with a second swing if any."""
+    rig, pen = inputs.rig, inputs.pen
+    moments, fitted = start.moments, start.joint
+    state = BundleState(rig, pen, fitted.tip_pen, fitted.cone_cam, fitted.rotations)
     areas, edge_widths = (
-        np.stack([getattr(seen, of) for seen in observations], axis=1)
-        for of in ("areas", "edge_widths")
+        np.stack([getattr(each, name) for each in single.observations], axis=1)
+        for name in ("areas", "edge_widths")
     )
+    used = start.reasons == Reason.NONE
     reading = read_diameter(
-        replace(state, rig=there),
-        np.where(kept[..., None], areas, np.nan)[chosen],
-        edge_widths[chosen],
+        replace(state, rig=start.rig),
+        np.where(used[..., None], areas, np.nan)[moments],
+        edge_widths[moments],
     )
-    priors = replace(priors_of(rig, pen, assumptions), reading=reading)
-    seen, shifts = pixels, _shifts_of(steady, chosen)
+    priors = replace(priors_of(rig, pen, inputs.assumptions), reading=reading)
+    path, pixels = single.steady[0].path, start.pixels
+    # Of several cameras each has lamps of its own, and what they leave is not fitted.
+    is_one = rig.n_cameras == 1 and second is None
+    shifts = path.shifts[moments] if is_one and path is not None else None
     if second is not None:
         others = second_images(rig.cameras[0], pen, second.observations)
-        state, seen = others.joined(state, pixels)
+        state, pixels = others.joined(state, pixels)
         priors = replace(priors, separation=second.separation)
-        shifts = None
-    adjusted = adjust(state, seen, priors, places, shifts)
-    bundle, fitted = adjusted.bundle, adjusted.bundle.state
+    adjustment = adjust(state, pixels, priors, start.extrinsics, shifts)
+    bundle, found = adjustment.bundle, adjustment.bundle.state
+    n = len(moments)
     joint = joint_at(
-        ContactModel(fitted.rig, fitted.pen, pixels),
-        fitted.rotations[: len(chosen)],
-        fitted.tip_pen,
-        fitted.cone_rig,
-        bundle.used[: len(chosen)].reshape(len(chosen), -1),
+        ContactModel(found.rig, found.pen, start.pixels),
+        found.rotations[:n],
+        found.tip_pen,
+        found.cone_rig,
+        bundle.used[:n].reshape(n, -1),
     )
-    poses = parts[0].poses.of(np.searchsorted(parts[0].posed, of_first))
-    paper_poses = fit_paper_poses(
-        rig.cameras[0],
-        pen,
-        seen_by_all[of_first, 0],
-        poses.rotations,
-        poses.translations,
-    )
-    two_stage = fit_two_stage(paper_poses.rotations, paper_poses.translations)
+    return _Adjusted(adjustment, joint, priors)
+
+
+def _calibration_of(
+    inputs: _Inputs, single: _SingleCameraFits, start: _Start, adjusted: _Adjusted
+) -> Calibration:
+    """State the uncertainty, and the residuals of all images as adjusted."""
+    pen = inputs.pen
+    adjustment, joint = adjusted.adjustment, adjusted.joint
+    state = adjustment.bundle.state
     refined = [
         fit_poses(
-            fitted.rig.cameras[c],
-            fitted.pen,
-            seen_by_all[part.posed, c],
+            state.rig.cameras[c],
+            state.pen,
+            single.pixels[part.posed, c],
             part.poses.rotations,
             part.poses.translations,
         )
-        for c, part in enumerate(parts)
+        for c, part in enumerate(single.posed)
     ]
-    single = joined(fitted.rig, refined)
+    poses = single.rig_poses(state.rig, refined, start.reasons == Reason.NONE)
     cameras = tuple(
-        _images_of_camera(
-            observations[c],
-            reasons[c],
-            part,
-            refined[c],
-            joint.of_camera(c, pen.n_leds),
-            chosen,
-            steady[c].path,
-        )
-        for c, part in enumerate(parts)
+        _camera_images(single, start, c, refined[c], joint.of_camera(c, pen.n_leds))
+        for c in range(len(refined))
     )
-    moments = _moments(cameras)
-    budget = combine(adjusted, joint)
+    reasons = _reasons_of_moments(cameras)
+    budget = combine(adjustment, joint)
+    paper_poses = _paper_poses(inputs.rig.cameras[0], pen, single, start)
+    two_stage = fit_two_stage(paper_poses.rotations, paper_poses.translations)
+    has_second = state.at_second is not None
     return Calibration(
         cameras=cameras,
-        reasons=moments,
-        used=np.array([reason is Reason.NONE for reason in moments]),
-        tips_cam=single.rotations @ joint.tip_pen + single.translations,
+        reasons=reasons,
+        used=np.array([reason is Reason.NONE for reason in reasons]),
+        tips_cam=poses.rotations @ joint.tip_pen + poses.translations,
         rms=_rms_of_moments(cameras),
         joint=joint,
-        bundle=bundle,
-        stated=priors,
-        priors=adjusted.priors,
-        assumptions=assumptions,
-        growth=growth,
-        contradictions=adjusted.contradictions,
+        bundle=adjustment.bundle,
+        stated=adjusted.stated,
+        priors=adjustment.priors,
+        assumptions=inputs.assumptions,
+        growth=inputs.growth,
+        contradictions=adjustment.contradictions,
         two_stage=two_stage,
         two_stage_covariance=propagated_covariance(
             paper_poses.rotations, paper_poses.covariances, two_stage.tip_pen
         ),
         budget=budget,
-        instrument=adjusted_instrument(adjusted, budget),
+        instrument=adjusted_instrument(adjustment, budget),
         halves=compare_halves(joint),
-        leds=measure_leds(fitted.rig, pen, pixels, joint),
+        leds=measure_leds(state.rig, pen, start.pixels, joint),
         coverage=measure_coverage(joint.rotations),
-        lags=lags,
-        second=(None if second is None else second_cone(adjusted, budget, len(chosen))),
+        lags=start.lags,
+        second=(
+            second_cone(adjustment, budget, len(start.moments)) if has_second else None
+        ),
     )
 
 
-def _shifts_of(steady: Sequence[SteadyImages], chosen: IntArray) -> FloatArray | None:
-    """Return the ways along which a single camera may have moved, (M, 2), px.
+def _paper_poses(
+    camera: Camera, pen: Pen, single: _SingleCameraFits, start: _Start
+) -> Poses:
+    """Return the poses of the first camera's images by the paper's equations."""
+    part = single.posed[0]
+    used = np.flatnonzero(start.reasons[:, 0] == Reason.NONE)
+    poses = part.poses.of(np.searchsorted(part.posed, used))
+    return fit_paper_poses(
+        camera, pen, single.pixels[used, 0], poses.rotations, poses.translations
+    )
 
-    What lamps show is all that the pen does only where they stand as far away as it.
-    """
-    path = steady[0].path
-    return None if len(steady) > 1 or path is None else path.shifts[chosen]
 
-
-def _images_of_camera(
-    observations: Observations,
-    reasons: npt.NDArray[np.object_],
-    part: PosedImages,
-    refined: Poses,
-    own: JointFit,
-    chosen: IntArray,
-    path: CameraPath | None,
+def _camera_images(
+    single: _SingleCameraFits, start: _Start, c: int, refined: Poses, own: JointFit
 ) -> CameraImages:
-    """Return what became of a camera's images.
+    """Return the images of the c-th camera.
 
-    ``own`` is the joint fit, of the moments ``chosen``, with this camera's residuals;
-    an image that was kept but of which it uses no LED is put down as a misfit.
+    ``own`` is the joint fit with this camera's residuals; an image of which it uses no
+    LED is a misfit.
     """
-    kept = reasons[chosen] == Reason.NONE
-    reasons[chosen[kept & ~own.used.any(axis=1)]] = Reason.MISFIT
+    reasons, moments = start.reasons[:, c].copy(), start.moments
+    used = reasons[moments] == Reason.NONE
+    reasons[moments[used & ~own.used.any(axis=1)]] = Reason.MISFIT
     rms = np.full(len(reasons), np.nan)
-    rms[part.posed] = refined.rms
-    rms[chosen[kept]] = own.image_rms[kept]
-    leds_used = np.zeros(observations.pixels.shape[:2], dtype=bool)
-    leds_used[chosen] = own.used
+    rms[single.posed[c].posed] = refined.rms
+    rms[moments[used]] = own.image_rms[used]
+    leds_used = np.zeros((len(reasons), own.used.shape[1]), dtype=bool)
+    leds_used[moments] = own.used
     return CameraImages(
-        observations=observations,
+        observations=single.observations[c],
         reasons=tuple(reasons),
         rms=rms,
         leds_used=leds_used,
         total_rms=own.rms if own.used.any() else float("nan"),
-        path=path,
+        path=single.steady[c].path,
     )
 
 
-def _telling(parts: Sequence[PosedImages], kept: BoolArray) -> list[IntArray]:
-    """Return which poses of each camera tell that of a moment.
-
-    Those of images that were left out do only where no other image of the moment takes
-    part.
-    """
-    none_kept = np.logical_not(kept.any(axis=1))
-    return [
-        np.flatnonzero(kept[part.posed, c] | none_kept[part.posed])
-        for c, part in enumerate(parts)
-    ]
-
-
 def _of_camera(rig: Rig, c: int, work: Callable[[], SteadyImages]) -> SteadyImages:
-    """Return what the work on one camera's images gives; an error names the camera."""
+    """Return the result of the work on one camera's images; errors name the camera."""
     try:
         return work()
     except CalibrationError as error:
         if rig.n_cameras == 1:
             raise
-        raise CalibrationError(of_camera(rig.names[c], error.sentence)) from error
+        raise CalibrationError(of_camera(rig.names[c], error.message)) from error
 
 
-def _with_slips(parts: Sequence[PosedImages]) -> list[npt.NDArray[np.object_]]:
-    """Return the reasons of each camera's images: a tip slips before all of them."""
-    reasons = [part.reasons.copy() for part in parts]
-    slipped = np.any([each == Reason.SLIPPED for each in reasons], axis=0)
-    for each in reasons:
-        each[slipped & (each == Reason.NONE)] = Reason.SLIPPED
-    return reasons
-
-
-def _moments(cameras: Sequence[CameraImages]) -> tuple[Reason, ...]:
-    """Return why each moment is left out; NONE where a camera's image takes part."""
-    found = []
-    for reasons in zip(*(each.reasons for each in cameras), strict=True):
-        there = [reason for reason in reasons if reason is not Reason.ABSENT]
-        found.append(Reason.NONE if Reason.NONE in there else there[0])
-    return tuple(found)
+def _reasons_of_moments(cameras: Sequence[CameraImages]) -> tuple[Reason, ...]:
+    """Return why each moment is left out; NONE where an image of it takes part."""
+    reasons = []
+    for of_cameras in zip(*(each.reasons for each in cameras), strict=True):
+        present = [reason for reason in of_cameras if reason is not Reason.ABSENT]
+        reasons.append(Reason.NONE if Reason.NONE in present else present[0])
+    return tuple(reasons)
 
 
 def _rms_of_moments(cameras: Sequence[CameraImages]) -> FloatArray:

@@ -22,33 +22,35 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.observations import Observations
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
+from lightpen.estimation.bundle.components import NONE
+from lightpen.estimation.bundle.disc_diameter import modelled_areas
+from lightpen.estimation.bundle.linearised import N_CONE, BundleState
+from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.components import NONE
-from lightpen.estimation.disc_diameter import modelled_areas
-from lightpen.estimation.linearised import N_CONE, BundleState
-from lightpen.estimation.priors import Priors
-from lightpen.estimation.uncertainty import (
+from lightpen.estimation.statistics.workers import Map
+from lightpen.estimation.uncertainty.budget import (
     POSTURES,
-    ShareName,
-    counted_drift,
-    counted_seat,
+    ContributionName,
+    drift_variance,
+    seat_covariance,
 )
-from lightpen.estimation.workers import Map
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
-from lightpen.sentences import sentence
 
 MIN_TRIALS = 20  # fewer tell a standard deviation to worse than a sixth
 COVERED = 0.95
-OF_OTHERS = {ShareName.DISTANCE, ShareName.EXTRINSICS}  # cones, or cameras; not drawn
+OF_OTHERS = {
+    ContributionName.DISTANCE,
+    ContributionName.EXTRINSICS,
+}  # cones, or cameras; not drawn
 
 
 @dataclass(frozen=True, eq=False)
 class Trials:
-    """What is drawn from; the same for all trials.
+    """The distributions that all trials draw from.
 
     Attributes
     ----------
@@ -131,18 +133,18 @@ class MonteCarlo:
 
 
 def trials_of(calibration: Calibration, seed: int = 0) -> Trials:
-    """Return what the trials of a calibration draw from."""
+    """Return the distributions of the trials of a calibration."""
     instrument, joint = calibration.instrument, calibration.joint
     bundle, pen = calibration.bundle, calibration.instrument.pen
     n_images = len(joint.rotations)
     basis, jitter = bundle.unknowns.basis, bundle.components.jitter
-    leds = bundle.counted.leds
+    leds = bundle.budget_components.leds
     led_covariance = max(leds.sigma, pen.led_sigma or 0.0) ** 2 * basis @ basis.T
     if pen.led_covariance is not None and leds is NONE:
         led_covariance = pen.led_covariance
-    seat = counted_seat(bundle)
-    n_seat, n_drift = len(seat), bundle.columns.drift.stop - bundle.columns.drift.start
-    move_covariance = counted_drift(bundle) * np.eye(n_seat + n_drift)
+    seat = seat_covariance(bundle)
+    n_seat, n_drift = len(seat), bundle.layout.drift.stop - bundle.layout.drift.start
+    move_covariance = drift_variance(bundle) * np.eye(n_seat + n_drift)
     move_covariance[:n_seat, :n_seat] = seat
     return Trials(
         camera=instrument.camera,
@@ -156,7 +158,7 @@ def trials_of(calibration: Calibration, seed: int = 0) -> Trials:
         forms=bundle.unknowns.forms[:n_images, : len(move_covariance) // N_CONE],
         move_covariance=move_covariance,
         jitter=(
-            jitter.expected**2 * np.eye(N_CONE)
+            jitter.expected_sigma**2 * np.eye(N_CONE)
             if jitter.covariance is None
             else jitter.covariance
         ),
@@ -178,7 +180,7 @@ def run_monte_carlo(
     Parameters
     ----------
     in_workers : Map
-        See `lightpen.estimation.workers`.
+        See `lightpen.estimation.statistics.workers`.
     report : callable
         Called with the fraction done, 0 to 1; what it raises ends the trials.
 
@@ -194,13 +196,7 @@ def run_monte_carlo(
     errors = [error for error in outcomes if error is not None]
     if 2 * len(errors) < n_trials:
         raise CalibrationError(
-            sentence(
-                "monte-carlo.failed",
-                "{n_failed} of {n_trials} trials gave no tip: the swing is too poor to "
-                "be repeated by simulation. Capture more images in other postures.",
-                n_failed=n_trials - len(errors),
-                n_trials=n_trials,
-            )
+            "monte-carlo.failed", n_failed=n_trials - len(errors), n_trials=n_trials
         )
     return MonteCarlo(
         errors=np.array(errors),
@@ -256,7 +252,7 @@ def _drawn_moves(trials: Trials, rng: np.random.Generator) -> FloatArray:
 
 
 def _biases(trials: Trials, rng: np.random.Generator) -> FloatArray:
-    """Return what centres are off by, the same in images of like posture, px."""
+    """Return errors of centres, the same in images of like posture, px."""
     some = np.linspace(0, len(trials.rotations) - 1, POSTURES).round().astype(int)
     alike = np.einsum("nij,mij->nm", trials.rotations, trials.rotations[some])
     n_leds = trials.pen.n_leds
@@ -265,12 +261,15 @@ def _biases(trials: Trials, rng: np.random.Generator) -> FloatArray:
 
 
 def _drawn_areas(trials: Trials, rng: np.random.Generator) -> FloatArray:
-    """Return the areas of the discs, all off alike, (N, L), px^2; NaN if not known."""
+    """Return areas of discs with a common error, (N, L), px^2; NaN if unknown."""
     reading = trials.priors.reading
     if reading is None:
         return np.full(trials.seen.shape, np.nan)
     state = BundleState(
-        *(rig_of(trials.camera), trials.pen, trials.tip_pen, trials.cone_cam),
+        rig_of(trials.camera),
+        trials.pen,
+        trials.tip_pen,
+        trials.cone_cam,
         trials.rotations,
     )
     wider = 1 + reading.sigma / trials.pen.diameter * rng.standard_normal()

@@ -1,6 +1,6 @@
-"""The tip from poses of another system, with what they leave in doubt.
+"""Pivot calibration from poses of another system, with its warnings.
 
-`lightpen.estimation.pivot.fit_pivot` takes poses at their word. Here they are judged
+`lightpen.estimation.pivot.pivot.fit_pivot` trusts the poses. Here they are judged
 first: by their convention, and by whether they are of one tip in one place. The
 uncertainty is that of residuals which hang together from pose to pose.
 """
@@ -11,40 +11,33 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.correlation import correlated_covariance
-from lightpen.estimation.pivot import (
+from lightpen.estimation.pivot.pivot import (
     PivotFit,
     contact_matrix,
     fit_pivot,
     require_poses,
     tip_covariances,
 )
-from lightpen.estimation.pivot_groups import PoseGroups, find_groups
-from lightpen.estimation.pose_readings import (
+from lightpen.estimation.pivot.pivot_groups import PoseGroups, find_groups
+from lightpen.estimation.pivot.pose_conventions import (
     is_likely_inverted,
     require_usual_reading,
 )
-from lightpen.estimation.uncertainty import COVERAGE_FACTOR
-from lightpen.sentences import Sentence, sentence
+from lightpen.estimation.statistics.correlation import correlated_covariance
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.messages import Message, message
 
 LARGEST_MINORITY = 0.4  # of the poses; with more nobody knows which tip is meant
 MANY_LEFT_OUT = 0.1  # of the poses
 MAX_RUNS = 10  # of neighbouring poses, that a warning names; the record has all
 
-COVERED = sentence(
-    "pivot.covered",
-    "the scatter of the poses, and that it hangs together from pose to pose",
-)
-NOT_COVERED = sentence(
-    "pivot.not-covered",
-    "what stays the same in all poses: the scale of the tracker and of the pen, a tip "
-    "that is worn or does not seat",
-)
+COVERED = message("pivot.covered")
+NOT_COVERED = message("pivot.not-covered")
 
 
 @dataclass(frozen=True, eq=False)
 class PivotCalibration:
-    """Tip and pivot of poses, and what to know about them.
+    """Tip and pivot of poses, with covariance and warnings.
 
     Attributes
     ----------
@@ -54,14 +47,14 @@ class PivotCalibration:
         Of (tip_pen, pivot_cam), with residuals that hang together, mm^2.
     groups : PoseGroups or None
         Where the poses have two tips or pivots; the fit is that of the larger group.
-    warnings : tuple of Sentence
+    warnings : tuple of Message
         What the user should look into.
     """
 
     fit: PivotFit
     covariance: FloatArray
     groups: PoseGroups | None
-    warnings: tuple[Sentence, ...]
+    warnings: tuple[Message, ...]
 
     @property
     def expanded_uncertainty(self) -> FloatArray:
@@ -84,7 +77,7 @@ def calibrate_pivot(
 ) -> PivotCalibration:
     """Find the tip from poses in the order of capture.
 
-    Its parameters are those of `lightpen.estimation.pivot.fit_pivot`.
+    Its parameters are those of `lightpen.estimation.pivot.pivot.fit_pivot`.
 
     Raises
     ------
@@ -144,35 +137,24 @@ def _require_majority(groups: PoseGroups) -> None:
         raise CalibrationError(_parted(groups, _CALIBRATE_EACH, len(groups.group)))
 
 
-_CALIBRATE_EACH = sentence(
-    "pivot.calibrate-each", "Calibrate each of both from a file of its own."
-)
-_MINORITY_LEFT_OUT = sentence(
-    "pivot.minority-left-out", "The tip is that of the first, which are more."
-)
-_BOTH_TAKEN = sentence(
-    "pivot.both-taken", "All of them were taken, so the tip lies between both."
-)
+_CALIBRATE_EACH = message("pivot.calibrate-each")
+_MINORITY_LEFT_OUT = message("pivot.minority-left-out")
+_BOTH_TAKEN = message("pivot.both-taken")
 
 
-def _parted(groups: PoseGroups, consequence: Sentence, max_runs: int) -> Sentence:
-    """Say which poses belong together, and what follows."""
+def _parted(groups: PoseGroups, consequence: Message, max_runs: int) -> Message:
+    """Return which poses belong together, and the consequence."""
     first, second = (_names(groups.group == name, max_runs) for name in (1, 2))
     if groups.has_two_tips:
-        return sentence(
+        return message(
             "pivot.two-tips",
-            "The poses are of two tips, {distance:.2f} mm apart in the pen, as if the "
-            "tip had been exchanged or had slipped in its holder. One: poses {first}. "
-            "The other: poses {second}. {consequence}",
             distance=groups.tip_distance,
             first=first,
             second=second,
             consequence=consequence,
         )
-    return sentence(
+    return message(
         "pivot.two-pivots",
-        "The tip rested on two points, {distance:.2f} mm apart, as if cone or tracker "
-        "had moved. On one: poses {first}. On the other: poses {second}. {consequence}",
         distance=groups.pivot_distance,
         first=first,
         second=second,
@@ -182,7 +164,7 @@ def _parted(groups: PoseGroups, consequence: Sentence, max_runs: int) -> Sentenc
 
 def _warnings(
     fit: PivotFit, groups: PoseGroups | None, left_out: BoolArray
-) -> list[Sentence]:
+) -> list[Message]:
     warnings = []
     if groups is not None:
         told = _MINORITY_LEFT_OUT if left_out.any() else _BOTH_TAKEN
@@ -190,10 +172,8 @@ def _warnings(
     scattered = ~fit.used & ~left_out
     if scattered.mean() > MANY_LEFT_OUT:
         warnings.append(
-            sentence(
+            message(
                 "pivot.many-left-out",
-                "{n_left_out} of {n_poses} poses agree with no common tip and were "
-                "left out: {poses}. Look for what disturbed the tracking.",
                 n_left_out=int(scattered.sum()),
                 n_poses=len(scattered),
                 poses=_names(scattered, MAX_RUNS),
@@ -201,12 +181,8 @@ def _warnings(
         )
     if is_likely_inverted(fit.tip_pen, fit.pivot_cam):
         warnings.append(
-            sentence(
+            message(
                 "poses.likely-inverted",
-                "The tip would be {tip:.0f} mm from the origin of the pen, farther "
-                "than the pivot from that of the camera ({pivot:.0f} mm). Inverted "
-                "poses give this: if they are pen_from_cam, tip and pivot have to "
-                "change places.",
                 tip=float(np.linalg.norm(fit.tip_pen)),
                 pivot=float(np.linalg.norm(fit.pivot_cam)),
             )

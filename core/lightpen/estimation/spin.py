@@ -22,7 +22,6 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.model.posture import UPRIGHT_AXIS
-from lightpen.sentences import sentence
 
 MIN_POSES = 10
 MIN_TURN = np.radians(40.0)  # less, and the tilt of the hand hides the axis
@@ -75,15 +74,7 @@ def fit_spin(rotations: FloatArray, upwards: FloatArray = UPRIGHT_AXIS) -> SpinF
     """
     n = len(rotations)
     if n < MIN_POSES:
-        raise CalibrationError(
-            sentence(
-                "spin.few-poses",
-                "The pen is seen in {n} images of the spin; {needed} are needed. Spin "
-                "it slowly, its LEDs to the camera.",
-                n=n,
-                needed=MIN_POSES,
-            )
-        )
+        raise CalibrationError("spin.few-poses", n=n, needed=MIN_POSES)
     left, _, right = np.linalg.svd(rotations.mean(axis=0))
     sign = 1.0 if right[0] @ upwards >= 0 else -1.0
     axis_pen, axis_cam = sign * right[0], sign * left[:, 0]
@@ -95,27 +86,17 @@ def fit_spin(rotations: FloatArray, upwards: FloatArray = UPRIGHT_AXIS) -> SpinF
     turn = float(np.ptp(np.unwrap(angles)))
     if turn < MIN_TURN:
         raise CalibrationError(
-            sentence(
-                "spin.little-turn",
-                "The pen was turned by {turn:.0f} degrees about its stylus; at least "
-                "{needed:.0f} are needed. Keep the tip in the cone and turn it further "
-                "to both sides.",
-                turn=float(np.degrees(turn)),
-                needed=float(np.degrees(MIN_TURN)),
-            )
+            "spin.little-turn",
+            turn=float(np.degrees(turn)),
+            needed=float(np.degrees(MIN_TURN)),
         )
     tilts = rotations @ axis_pen @ across_cam
     uncertainty = COVERAGE_FACTOR * _axis_deviation(turns, tilts)
     if uncertainty > MAX_UNCERTAINTY:
         raise CalibrationError(
-            sentence(
-                "spin.wobbling",
-                "The axis of the stylus is uncertain by {uncertainty:.1f} degrees, at "
-                "most {needed:.1f} are of use: the pen was tilted while it was spun. "
-                "Hold the stylus upright between two fingers and turn only.",
-                uncertainty=float(np.degrees(uncertainty)),
-                needed=float(np.degrees(MAX_UNCERTAINTY)),
-            )
+            "spin.wobbling",
+            uncertainty=float(np.degrees(uncertainty)),
+            needed=float(np.degrees(MAX_UNCERTAINTY)),
         )
     wobble = float(np.sqrt(np.mean(np.sum(tilts**2, axis=1))))
     return SpinFit(axis_pen, axis_cam, uncertainty, turn, wobble)

@@ -1,1 +1,1 @@
-"""Files of cameras, pens, LED centres and poses, read with care and written whole."""
+"""Read and write files of cameras, pens, LED centres and poses."""

@@ -25,11 +25,11 @@ serial number of the camera, ``camera_serial``; and how warm it was,
 ``calibration_temperature``, in degrees Celsius.
 """
 
+import json
 import re
 from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -42,14 +42,13 @@ from lightpen.formats.camera_checks import (
     checked_distortion,
     checked_size,
 )
-from lightpen.formats.camera_text import opencv_lines, ros_lines
 from lightpen.formats.documents import parse_document
 from lightpen.formats.entries import Entries, counted_numbers, is_covariance
 from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
+from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
-from lightpen.sentences import Sentence, sentence
 
-CAMERA_FILE = sentence("file.camera", "camera file")
+CAMERA_FILE = message("file.camera")
 CAMERA_FILE_LIMIT = 4 * MEGABYTE  # some keep the points they were calibrated from
 LONGEST_SERIAL = 60  # characters
 COLDEST, WARMEST = -50.0, 100.0  # degrees Celsius
@@ -90,7 +89,7 @@ def read_camera(path: Path) -> Camera:
     Camera
         With 5 distortion coefficients, k3 = 0 being added if the file has 4, or with 8,
         further ones being dropped if they are zero. ``calibrated_on`` is None if the
-        file has no date or one that cannot be told, such as 03/04/25.
+        file has no date or an ambiguous one, such as 03/04/25.
 
     Raises
     ------
@@ -114,48 +113,30 @@ def read_camera(path: Path) -> Camera:
     return _from_opencv(entries)
 
 
-def write_camera(
-    camera: Camera, path: Path, layout: Literal["opencv", "ros"] = "opencv"
-) -> None:
-    """Write the intrinsics of a camera as YAML, to be read back to the last digit.
+def write_camera(camera: Camera, path: Path) -> None:
+    """Write the intrinsics of a camera as FileStorage of OpenCV, to the last digit.
 
     Parameters
     ----------
     path : Path
-        Name that ends in .yaml or .yml.
-    layout : {"opencv", "ros"}
-        FileStorage of OpenCV, or camera_info of ROS.
+        Name ending in .yaml or .yml.
 
     Raises
     ------
     UsageError
-        The name ends otherwise.
+        The name has another suffix.
     FileError
         The file cannot be written.
     """
     if path.suffix.lower() not in (".yaml", ".yml"):
-        raise UsageError(
-            sentence(
-                "camera-file.suffix",
-                "A camera file is written as YAML, but {name} does not end in "
-                ".yaml. Choose such a name.",
-                name=printable(path.name),
-            )
-        )
-    lines = opencv_lines(camera) if layout == "opencv" else ros_lines(camera)
-    write_whole(path, "".join(f"{line}\n" for line in lines).encode())
+        raise UsageError("camera-file.suffix", name=printable(path.name))
+    write_whole(path, "".join(f"{line}\n" for line in _opencv_lines(camera)).encode())
 
 
 def _only_camera(entries: Entries, chain: Sequence[str]) -> Entries:
     if len(chain) > 1:
         raise FileError(
-            sentence(
-                "camera-file.several-cameras",
-                "{name} describes {n_cameras} cameras. Keep the one that looks at "
-                "the pen, and remove the others.",
-                name=entries.name,
-                n_cameras=len(chain),
-            )
+            "camera-file.several-cameras", name=entries.name, n_cameras=len(chain)
         )
     return entries.part(chain[0])
 
@@ -175,13 +156,7 @@ def _from_kalibr(entries: Entries) -> Camera:
     model = entries.word("camera_model").casefold()
     if model and model != "pinhole":
         raise FileError(
-            sentence(
-                "camera-file.not-pinhole",
-                "{name} describes a camera of the model {model}; the model pinhole "
-                "is needed. Calibrate the camera again with pinhole-radtan.",
-                name=entries.name,
-                model=quoted(model),
-            )
+            "camera-file.not-pinhole", name=entries.name, model=quoted(model)
         )
     _check_model(entries, "distortion_model")
     pinhole = entries.counted(4, "intrinsics")
@@ -205,13 +180,9 @@ def _from_matlab(entries: Entries) -> Camera:
     radial = entries.numbers("RadialDistortion")
     if len(radial) not in (2, 3):
         raise FileError(
-            sentence(
-                "camera-file.radial-count",
-                "RadialDistortion in {name} has {counted} where 2 or 3 are needed. "
-                "Correct it, or export the file again.",
-                name=entries.name,
-                counted=counted_numbers(len(radial)),
-            )
+            "camera-file.radial-count",
+            name=entries.name,
+            counted=counted_numbers(len(radial)),
         )
     tangential = entries.counted(2, "TangentialDistortion")
     coefficients = np.concatenate([radial[:2], tangential, radial[2:]])
@@ -224,28 +195,12 @@ def _check_model(entries: Entries, key: str) -> None:
         raise _fisheye(entries.name, model)
     if model and model not in _MODELS:
         raise FileError(
-            sentence(
-                "camera-file.distortion-model",
-                "{name} has the distortion model {model}, which is not known here. "
-                "Calibrate the camera again with plumb_bob (radtan) or "
-                "rational_polynomial.",
-                name=entries.name,
-                model=quoted(model),
-            )
+            "camera-file.distortion-model", name=entries.name, model=quoted(model)
         )
 
 
-def _fisheye(name: str | Sentence, model: str) -> FileError:
-    return FileError(
-        sentence(
-            "camera-file.fisheye",
-            "{name} describes a fisheye lens ({model}). A pinhole camera is needed: "
-            "calibrate the camera again with the distortion model plumb_bob "
-            "(radtan) or rational_polynomial.",
-            name=name,
-            model=model,
-        )
-    )
+def _fisheye(name: str | Message, model: str) -> FileError:
+    return FileError("camera-file.fisheye", name=name, model=model)
 
 
 def _size(entries: Entries) -> tuple[float, float]:
@@ -253,28 +208,14 @@ def _size(entries: Entries) -> tuple[float, float]:
         width, height = entries.counted(2, *_SIZE)
         return width, height
     if not entries.has(*_WIDTH) or not entries.has(*_HEIGHT):
-        raise FileError(
-            sentence(
-                "camera-file.no-size",
-                "{name} does not say how large the images are. Add the lines "
-                "image_width and image_height, in pixels.",
-                name=entries.name,
-            )
-        )
+        raise FileError("camera-file.no-size", name=entries.name)
     return entries.counted(1, *_WIDTH)[0], entries.counted(1, *_HEIGHT)[0]
 
 
 def _pinhole(matrix: FloatArray, entries: Entries) -> FloatArray:
     """Return fx fy cx cy of a camera matrix."""
     if not np.array_equal(matrix[2], [0, 0, 1]) or matrix[1, 0] != 0:
-        raise FileError(
-            sentence(
-                "camera-file.matrix-form",
-                "The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 "
-                "0 1; it may be transposed or incomplete. Export the file again.",
-                name=entries.name,
-            )
-        )
+        raise FileError("camera-file.matrix-form", name=entries.name)
     check_skew(matrix[0, 1], entries)
     return np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]])
 
@@ -307,7 +248,7 @@ def _camera(
 
 
 def _covariance(entries: Entries, given: int, kept: int) -> FloatArray | None:
-    """Return the covariance of fx fy cx cy and the coefficients that are kept."""
+    """Return the covariance of fx fy cx cy and the retained coefficients."""
     if entries.has(*_COVARIANCE):
         stated = entries.counted((4 + given) ** 2, *_COVARIANCE)
         stated = stated.reshape(4 + given, 4 + given)
@@ -316,16 +257,11 @@ def _covariance(entries: Entries, given: int, kept: int) -> FloatArray | None:
         deviations = entries.numbers(*_DEVIATIONS)
         if len(deviations) < 4 + given or np.any(deviations < 0):
             raise FileError(
-                sentence(
-                    "camera-file.deviations",
-                    "{entry} in {name} must hold {needed} numbers, none of them "
-                    "negative: of fx fy cx cy and the {n_coefficients} distortion "
-                    "coefficients. Correct or remove it.",
-                    entry=entries.entry(*_DEVIATIONS)[0],
-                    name=entries.name,
-                    needed=4 + given,
-                    n_coefficients=given,
-                )
+                "camera-file.deviations",
+                entry=entries.entry(*_DEVIATIONS)[0],
+                name=entries.name,
+                needed=4 + given,
+                n_coefficients=given,
             )
         stated = np.diag(deviations[: 4 + given] ** 2)
         stated[0, 1] = stated[1, 0] = FOCAL_CORRELATION * deviations[0] * deviations[1]
@@ -337,16 +273,9 @@ def _covariance(entries: Entries, given: int, kept: int) -> FloatArray | None:
     return covariance
 
 
-def _check_covariance(covariance: FloatArray, name: str | Sentence) -> None:
+def _check_covariance(covariance: FloatArray, name: str | Message) -> None:
     if not is_covariance(covariance):
-        raise FileError(
-            sentence(
-                "camera-file.covariance",
-                "The intrinsics_covariance of {name} is not a covariance: it must "
-                "be symmetric, with correlations from -1 to 1. Correct or remove it.",
-                name=name,
-            )
-        )
+        raise FileError("camera-file.covariance", name=name)
 
 
 def _day(entries: Entries) -> date | None:
@@ -381,14 +310,50 @@ def _temperature(entries: Entries) -> float | None:
     celsius = float(entries.counted(1, *_TEMPERATURE)[0])
     if not COLDEST <= celsius <= WARMEST:
         raise FileError(
-            sentence(
-                "camera-file.temperature",
-                "{name} has the calibration_temperature {celsius:g}; degrees Celsius "
-                "from {coldest:g} to {warmest:g} are needed. Correct or remove it.",
-                name=entries.name,
-                celsius=celsius,
-                coldest=COLDEST,
-                warmest=WARMEST,
-            )
+            "camera-file.temperature",
+            name=entries.name,
+            celsius=celsius,
+            coldest=COLDEST,
+            warmest=WARMEST,
         )
     return celsius
+
+
+def _opencv_lines(camera: Camera) -> list[str]:
+    """Return the lines of a FileStorage of OpenCV."""
+    lines = [
+        "%YAML:1.0",
+        "---",
+        f"image_width: {camera.width}",
+        f"image_height: {camera.height}",
+        *_matrix_lines("camera_matrix", camera.matrix),
+        *_matrix_lines("distortion_coefficients", camera.distortion[None]),
+    ]
+    if camera.covariance is not None:
+        lines += _matrix_lines("intrinsics_covariance", camera.covariance)
+    if camera.calibrated_on is not None:
+        lines.append(f'calibration_date: "{camera.calibrated_on.isoformat()}"')
+    if camera.serial:
+        lines.append(f"camera_serial: {json.dumps(camera.serial, ensure_ascii=False)}")
+    if camera.temperature_c is not None:
+        lines.append(f"calibration_temperature: {_decimal(camera.temperature_c)}")
+    return lines
+
+
+def _matrix_lines(name: str, matrix: FloatArray) -> list[str]:
+    rows = ",\n      ".join(", ".join(map(_decimal, row)) for row in matrix)
+    return [
+        f"{name}: !!opencv-matrix",
+        f"   rows: {len(matrix)}",
+        f"   cols: {matrix.shape[1]}",
+        "   dt: d",
+        f"   data: [ {rows} ]",
+    ]
+
+
+def _decimal(value: float) -> str:
+    """Return the shortest text that reads back the same, as YAML 1.1 wants a float."""
+    text = repr(float(value))
+    if "e" in text and "." not in text:
+        return text.replace("e", ".0e")
+    return text

@@ -1,4 +1,4 @@
-"""An image file as grey values: read within limits, checked, decoded."""
+"""Read, check and decode an image file to grey values, within memory limits."""
 
 import ctypes
 import os
@@ -27,9 +27,9 @@ from lightpen.formats.image_headers import (
     damaged_image,
     read_image_header,
 )
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
-IMAGE_FILE = sentence("file.image", "image")
+IMAGE_FILE = message("file.image")
 MAX_FILE_SIZE = 150_000_000  # bytes; the largest image, of 16 bits, not compressed
 MAX_MEMORY = 250_000_000  # bytes that all images take while they are decoded
 PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by the colour type
@@ -45,7 +45,7 @@ MAX_ARENAS = 1  # of threads; what stays free in one is of no use to another
 
 
 def keep_freed_memory() -> None:
-    """Let the next image use the memory of the last one (Linux with glibc).
+    """Reuse the memory of freed images (Linux with glibc).
 
     Blocks as large as an image otherwise go back to the kernel when freed, and come
     anew page by page, zeroed: two fifths of the time that decoding takes. Threads that
@@ -114,7 +114,7 @@ def encode_png(image: Image) -> bytes:
 
 
 class _Memory:
-    """Lets those in who need some of it, as long as there is enough for all."""
+    """Semaphore on decoding memory."""
 
     def __init__(self, n_bytes: int) -> None:
         self._free = n_bytes
@@ -137,22 +137,17 @@ _MEMORY = _Memory(MAX_MEMORY)
 
 
 def _needed(header: ImageHeader, size: int, name: str) -> int:
-    """Return the memory for a file of that size, and what decoding it takes."""
+    """Return the memory needed to read and decode a file of this size, bytes."""
     # OpenCV decodes into memory of its own and then copies the image to numpy's.
     needed = size + header.decoded + max(header.decoded, header.working)
     if needed > MAX_MEMORY:
         raise FileError(
-            sentence(
-                "image.too-much-memory",
-                "{name} is {width} x {height} px and would take {needed:.0f} MB to be "
-                "decoded; at most {most:.0f} MB are given to an image. Save the images "
-                "as grey PNG.",
-                name=name,
-                width=header.width,
-                height=header.height,
-                needed=needed / 1e6,
-                most=MAX_MEMORY / 1e6,
-            )
+            "image.too-much-memory",
+            name=name,
+            width=header.width,
+            height=header.height,
+            needed=needed / 1e6,
+            most=MAX_MEMORY / 1e6,
         )
     return needed
 
@@ -165,20 +160,13 @@ def _decoded(data: bytes, name: str) -> Image:
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
-        raise FileError(
-            sentence(
-                "image.undecodable",
-                "{name} cannot be decoded: {problem}.",
-                name=name,
-                problem=error.err,
-            )
-        ) from error
+        raise FileError("image.undecodable", name=name, problem=error.err) from error
     if image is None:
         raise damaged_image(name)
     return grey_image(np.asarray(image), name)
 
 
-def grey_image(image: npt.NDArray[Any], name: str | Sentence) -> Image:
+def grey_image(image: npt.NDArray[Any], name: str | Message) -> Image:
     """Return a decoded image in grey values of 8 or 16 bit, (H, W).
 
     Raises
@@ -187,15 +175,7 @@ def grey_image(image: npt.NDArray[Any], name: str | Sentence) -> Image:
         Its values are of another type.
     """
     if image.dtype not in (np.uint8, np.uint16):
-        raise FileError(
-            sentence(
-                "image.value-type",
-                "{name} holds values of type {value_type}; grey values of 8 or 16 "
-                "bit are needed. Save the images without conversion.",
-                name=name,
-                value_type=str(image.dtype),
-            )
-        )
+        raise FileError("image.value-type", name=name, value_type=str(image.dtype))
     if image.ndim == 2:
         return image
     conversion = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}.get(image.shape[2])
@@ -206,7 +186,7 @@ def grey_image(image: npt.NDArray[Any], name: str | Sentence) -> Image:
 
 
 def _check_png(data: bytes, name: str) -> None:
-    """Walk over the chunks of a PNG: the decoder would only print what is wrong.
+    """Check the chunks of a PNG, as the decoder only prints errors.
 
     It would also unpack what comes after the image, however much that is.
     """
@@ -222,13 +202,7 @@ def _check_png(data: bytes, name: str) -> None:
         if len(checksum) < 4:
             raise cut_off_image(name)
         if zlib.crc32(body) != int.from_bytes(checksum, "big"):
-            raise FileError(
-                sentence(
-                    "image.wrong-checksum",
-                    "{name} is damaged (wrong checksum). Capture or copy it again.",
-                    name=name,
-                )
-            )
+            raise FileError("image.wrong-checksum", name=name)
         if kind == b"acTL":
             raise animated_image(name)
         if kind == b"IDAT":
@@ -242,7 +216,7 @@ def _check_png(data: bytes, name: str) -> None:
 
 
 def _most_png_data(data: bytes) -> int:
-    """Return the bytes of compressed data that the image of a PNG can come to."""
+    """Return the largest possible size of a PNG's compressed data, bytes."""
     width, height, depth, colour = map(int, struct.unpack_from(">IIBB", data, 16))
     row = 1 + -(-width * depth * PNG_CHANNELS.get(colour, 4) // 8)
     # What cannot be compressed grows by an eighth at most.
@@ -250,18 +224,11 @@ def _most_png_data(data: bytes) -> int:
 
 
 def _check_jpeg(data: bytes, name: str) -> None:
-    """Refuse a JPEG without an end, which the decoder makes up, or without end."""
+    """Refuse a JPEG whose end is missing or which never ends."""
     if data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda"):
         raise cut_off_image(name)
     n_scans = data.count(b"\xff\xda")
     if n_scans > MAX_SCANS:
         raise FileError(
-            sentence(
-                "image.too-many-scans",
-                "{name} is a JPEG of {n_scans} scans; at most {most} are read. Save "
-                "the images as PNG.",
-                name=name,
-                n_scans=n_scans,
-                most=MAX_SCANS,
-            )
+            "image.too-many-scans", name=name, n_scans=n_scans, most=MAX_SCANS
         )

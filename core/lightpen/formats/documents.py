@@ -1,4 +1,4 @@
-"""Trees of plain values out of YAML, XML and JSON files, none of which is trusted.
+"""Parse untrusted YAML, XML and JSON files to trees of plain values.
 
 Everything that is not a mapping or a sequence stays text, so that a number is read to
 its last digit whatever the format. Nothing in a file is executed, expanded or followed:
@@ -17,7 +17,6 @@ import yaml
 
 from lightpen.errors import FileError
 from lightpen.formats.files import quoted
-from lightpen.sentences import sentence
 
 Tree: TypeAlias = "dict[str, Tree] | list[Tree] | str | bool | None"
 
@@ -43,7 +42,7 @@ def parse_document(text: str, name: str) -> dict[str, Tree]:
     text : str
         Content of the file.
     name : str
-        Name of the file, for the sentences.
+        Name of the file, for messages.
 
     Raises
     ------
@@ -58,15 +57,7 @@ def parse_document(text: str, name: str) -> dict[str, Tree]:
     else:
         tree = parse_yaml(text, name)
     if not isinstance(tree, dict):
-        raise FileError(
-            sentence(
-                "document.no-values",
-                "{name} begins with {start}, which names no values. Check that the "
-                "right file is named.",
-                name=name,
-                start=quoted(text.strip()),
-            )
-        )
+        raise FileError("document.no-values", name=name, start=quoted(text.strip()))
     return tree
 
 
@@ -77,14 +68,7 @@ def parse_json(text: str, name: str) -> Tree:
         mapping: dict[str, Tree] = {}
         for key, value in pairs:
             if key in mapping:
-                raise FileError(
-                    sentence(
-                        "document.given-twice",
-                        "{key} is given a second time in {name}. Keep the right one.",
-                        key=quoted(key),
-                        name=name,
-                    )
-                )
+                raise FileError("document.given-twice", key=quoted(key), name=name)
             mapping[key] = value
         return mapping
 
@@ -98,15 +82,11 @@ def parse_json(text: str, name: str) -> Tree:
         )
     except json.JSONDecodeError as error:
         raise FileError(
-            sentence(
-                "json.invalid",
-                "Line {line} of {name} is not valid JSON ({problem}, column "
-                "{column}). The file may be cut short: copy or export it again.",
-                line=error.lineno,
-                name=name,
-                problem=error.msg,
-                column=error.colno,
-            )
+            "json.invalid",
+            line=error.lineno,
+            name=name,
+            problem=error.msg,
+            column=error.colno,
         ) from error
     except RecursionError as error:
         raise _too_deep(name) from error
@@ -128,14 +108,10 @@ def parse_yaml(text: str, name: str) -> Tree:
         if error.problem_mark is None:
             raise _no_yaml(name) from error
         raise FileError(
-            sentence(
-                "yaml.invalid-line",
-                "Line {line} of {name} is not valid YAML ({problem}). The file may be "
-                "cut short: copy or export it again.",
-                line=error.problem_mark.line + 1,
-                name=name,
-                problem=str(error.problem or error.context),
-            )
+            "yaml.invalid-line",
+            line=error.problem_mark.line + 1,
+            name=name,
+            problem=str(error.problem or error.context),
         ) from error
     except yaml.YAMLError as error:
         raise _no_yaml(name) from error
@@ -162,14 +138,10 @@ def parse_xml(text: str, name: str) -> Tree:
         parser.Parse(text, True)
     except expat.ExpatError as error:
         raise FileError(
-            sentence(
-                "xml.invalid",
-                "Line {line} of {name} is not valid XML ({problem}). The file may "
-                "be cut short: copy or export it again.",
-                line=error.lineno,
-                name=name,
-                problem=expat.ErrorString(error.code),
-            )
+            "xml.invalid",
+            line=error.lineno,
+            name=name,
+            problem=expat.ErrorString(error.code),
         ) from error
     return builder.root
 
@@ -186,13 +158,7 @@ def _yaml_document(events: Iterator[Any], name: str) -> Tree:
     for event in events:
         if isinstance(event, yaml.DocumentStartEvent):
             if tree is not None:
-                raise FileError(
-                    sentence(
-                        "yaml.several-documents",
-                        "{name} holds more than one YAML document. Keep one of them.",
-                        name=name,
-                    )
-                )
+                raise FileError("yaml.several-documents", name=name)
             tree = _yaml_node(next(events), events, 0, name)
     return tree
 
@@ -213,15 +179,7 @@ def _yaml_node(event: Any, events: Iterator[Any], depth: int, name: str) -> Tree
         key = _yaml_node(child, events, depth + 1, name)
         line = child.start_mark.line + 1
         if not isinstance(key, str):
-            raise FileError(
-                sentence(
-                    "yaml.list-as-name",
-                    "Line {line} of {name} has a list in place of a name. Check "
-                    "that the right file is named.",
-                    line=line,
-                    name=name,
-                )
-            )
+            raise FileError("yaml.list-as-name", line=line, name=name)
         if key in mapping:
             _refuse_twice(key, line, name)
         mapping[key] = _yaml_node(next(events), events, depth + 1, name)
@@ -232,28 +190,11 @@ def _check_yaml_event(event: Any, name: str) -> None:
     line = event.start_mark.line + 1
     if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
         raise FileError(
-            sentence(
-                "yaml.anchor",
-                "Line {line} of {name} has the YAML anchor or alias {anchor}, which "
-                "can make a small file fill the memory. Write the values out.",
-                line=line,
-                name=name,
-                anchor=quoted(event.anchor),
-            )
+            "yaml.anchor", line=line, name=name, anchor=quoted(event.anchor)
         )
     if event.tag is not None and event.tag not in _YAML_TAGS and event.tag != "!":
         tag = event.tag.replace(_YAML_NAMESPACE, "!!")
-        raise FileError(
-            sentence(
-                "yaml.tag",
-                "Line {line} of {name} has the tag {tag}. Such a tag can ask for "
-                "code to be run, so only plain values and matrices of OpenCV are "
-                "read. Remove the tag, or use a file from a source you trust.",
-                line=line,
-                name=name,
-                tag=quoted(tag),
-            )
-        )
+        raise FileError("yaml.tag", line=line, name=name, tag=quoted(tag))
 
 
 @dataclass(frozen=True)
@@ -306,16 +247,7 @@ class _XmlBuilder:
             self.root = element.tree()
 
     def refuse_definition(self, line: int) -> NoReturn:
-        raise FileError(
-            sentence(
-                "xml.definition",
-                "Line {line} of {name} begins a document type definition, which can "
-                "make a small file fill the memory. Remove it; a camera file of "
-                "OpenCV has none.",
-                line=line,
-                name=self._name,
-            )
-        )
+        raise FileError("xml.definition", line=line, name=self._name)
 
 
 def _xml_scalar(text: str) -> str:
@@ -344,46 +276,18 @@ def _check_size(tree: Tree, name: str) -> None:
 
 
 def _no_yaml(name: str) -> FileError:
-    return FileError(
-        sentence(
-            "yaml.invalid",
-            "{name} is not valid YAML. Check that the right file is named.",
-            name=name,
-        )
-    )
+    return FileError("yaml.invalid", name=name)
 
 
 def _too_many(name: str) -> FileError:
-    return FileError(
-        sentence(
-            "document.too-many-values",
-            "{name} has more than {most:,} values. Check that the right file is named.",
-            name=name,
-            most=MAX_VALUES,
-        )
-    )
+    return FileError("document.too-many-values", name=name, most=MAX_VALUES)
 
 
 def _too_deep(name: str) -> FileError:
-    return FileError(
-        sentence(
-            "document.too-deep",
-            "{name} is nested more than {n_levels} levels deep. Check that the "
-            "right file is named.",
-            name=name,
-            n_levels=MAX_DEPTH,
-        )
-    )
+    return FileError("document.too-deep", name=name, n_levels=MAX_DEPTH)
 
 
 def _refuse_twice(key: str, line: int, name: str) -> NoReturn:
     raise FileError(
-        sentence(
-            "document.given-twice-on-line",
-            "{key} is given a second time on line {line} in {name}. Keep the right "
-            "one.",
-            key=quoted(key),
-            line=line,
-            name=name,
-        )
+        "document.given-twice-on-line", key=quoted(key), line=line, name=name
     )

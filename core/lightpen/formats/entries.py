@@ -1,4 +1,4 @@
-"""Values looked up by name in a file that is a tree, as numbers and words."""
+"""Look up numbers and texts by name in a parsed file."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from lightpen.errors import FileError
 from lightpen.formats.documents import Tree
 from lightpen.formats.files import printable, quoted
 from lightpen.formats.tables import number_flaw, too_large_number
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 MAX_NUMBERS = 10_000  # of one entry; a covariance has 324
 LARGEST_NUMBER = 1e12  # no length, pixel or coefficient comes near it
@@ -18,24 +18,24 @@ SYMMETRY_TOLERANCE = 1e-6  # of a covariance, relative: files with few digits
 
 @dataclass(frozen=True)
 class Entries:
-    """A mapping of a file, its names compared without case and underscores.
+    """A mapping of a file; names are compared without case and underscores.
 
     Every method that takes several names takes them as spellings of one entry, of
     which the file may have one.
 
     Attributes
     ----------
-    name : str or Sentence
-        Name of the file, or of a place in it, for the sentences.
+    name : str or Message
+        Name of the file, or of a place in it, for messages.
     values : dict
         By the name without case and underscores: the name in the file, and the value.
     """
 
-    name: str | Sentence
+    name: str | Message
     values: dict[str, tuple[str, Tree]]
 
     @staticmethod
-    def of(tree: dict[str, Tree], name: str | Sentence) -> "Entries":
+    def of(tree: dict[str, Tree], name: str | Message) -> "Entries":
         """Return the entries of a mapping in the file called `name`."""
         values: dict[str, tuple[str, Tree]] = {}
         for key, value in tree.items():
@@ -59,15 +59,7 @@ class Entries:
         """
         found = [self.values[_plain(n)] for n in names if _plain(n) in self.values]
         if not found:
-            raise FileError(
-                sentence(
-                    "entry.missing",
-                    "{name} has no {entry}. Check that the right file is named and "
-                    "that it is complete.",
-                    name=self.name,
-                    entry=names[0],
-                )
-            )
+            raise FileError("entry.missing", name=self.name, entry=names[0])
         if len(found) > 1:
             raise _same_meaning(self.name, found[0][0], found[1][0])
         return found[0]
@@ -80,15 +72,7 @@ class Entries:
         """Return the entries of a mapping within this one; see `entry`."""
         key, value = self.entry(*names)
         if not isinstance(value, dict):
-            raise FileError(
-                sentence(
-                    "entry.nothing-below",
-                    "{entry} in {name} has no named values below it. The file may "
-                    "be cut short: copy or export it again.",
-                    entry=printable(key),
-                    name=self.name,
-                )
-            )
+            raise FileError("entry.nothing-below", entry=printable(key), name=self.name)
         return Entries.of(value, self.name)
 
     def numbers(self, *names: str) -> FloatArray:
@@ -106,28 +90,17 @@ class Entries:
         cells = _cells(value)
         if len(cells) > MAX_NUMBERS:
             raise FileError(
-                sentence(
-                    "entry.too-many-numbers",
-                    "{entry} in {name} has {counted}; at most {most} are read. "
-                    "Correct it, or export the file again.",
-                    entry=printable(key),
-                    name=self.name,
-                    counted=counted_numbers(len(cells)),
-                    most=MAX_NUMBERS,
-                )
+                "entry.too-many-numbers",
+                entry=printable(key),
+                name=self.name,
+                counted=counted_numbers(len(cells)),
+                most=MAX_NUMBERS,
             )
         for cell in cells:
             flaw = _flaw(cell)
             if flaw:
                 raise FileError(
-                    sentence(
-                        "entry.unreadable",
-                        "{entry} in {name} cannot be read: {flaw} Correct it, or "
-                        "export the file again.",
-                        entry=printable(key),
-                        name=self.name,
-                        flaw=flaw,
-                    )
+                    "entry.unreadable", entry=printable(key), name=self.name, flaw=flaw
                 )
         numbers = np.array([float(str(cell)) for cell in cells])
         if isinstance(value, dict):
@@ -144,15 +117,11 @@ class Entries:
         numbers = self.numbers(*names)
         if len(numbers) != count:
             raise FileError(
-                sentence(
-                    "entry.wrong-count",
-                    "{entry} in {name} has {counted} where {needed} are needed. "
-                    "Correct it, or export the file again.",
-                    entry=printable(self.entry(*names)[0]),
-                    name=self.name,
-                    counted=counted_numbers(len(numbers)),
-                    needed=count,
-                )
+                "entry.wrong-count",
+                entry=printable(self.entry(*names)[0]),
+                name=self.name,
+                counted=counted_numbers(len(numbers)),
+                needed=count,
             )
         return numbers
 
@@ -162,7 +131,7 @@ class Entries:
         return value.strip() if isinstance(value, str) else ""
 
     def refuse_others(self, *names: str) -> None:
-        """Refuse entries of other names: one that is misspelt would not be read.
+        """Refuse unknown entries, which may be misspelt.
 
         Raises
         ------
@@ -173,14 +142,10 @@ class Entries:
         for plain, (key, _) in self.values.items():
             if plain not in known:
                 raise FileError(
-                    sentence(
-                        "entry.unknown",
-                        "{name} has {key}, which means nothing here. Remove it, or "
-                        "correct it to one of {known}.",
-                        name=self.name,
-                        key=quoted(key),
-                        known=", ".join(sorted(names)),
-                    )
+                    "entry.unknown",
+                    name=self.name,
+                    key=quoted(key),
+                    known=", ".join(sorted(names)),
                 )
 
     def _check_shape(self, key: str, matrix: dict[str, Tree], count: int) -> None:
@@ -190,26 +155,21 @@ class Entries:
         rows, cols = (float(shape.counted(1, side)[0]) for side in ("rows", "cols"))
         if rows * cols != count:
             raise FileError(
-                sentence(
-                    "entry.wrong-shape",
-                    "{entry} in {name} has {counted} where its {rows:g} rows of "
-                    "{cols:g} need {needed:g}. The file may be cut short: copy or "
-                    "export it again.",
-                    entry=printable(key),
-                    name=self.name,
-                    counted=counted_numbers(count),
-                    rows=rows,
-                    cols=cols,
-                    needed=rows * cols,
-                )
+                "entry.wrong-shape",
+                entry=printable(key),
+                name=self.name,
+                counted=counted_numbers(count),
+                rows=rows,
+                cols=cols,
+                needed=rows * cols,
             )
 
 
-def counted_numbers(count: int) -> Sentence:
+def counted_numbers(count: int) -> Message:
     """Return how many numbers, such as "2 numbers"."""
     if count == 1:
-        return sentence("count.one-number", "1 number")
-    return sentence("count.numbers", "{count} numbers", count=count)
+        return message("count.one-number")
+    return message("count.numbers", count=count)
 
 
 def is_covariance(matrix: FloatArray) -> bool:
@@ -228,15 +188,9 @@ def _plain(name: str) -> str:
     return name.replace("_", "").casefold()
 
 
-def _same_meaning(name: str | Sentence, first: str, second: str) -> FileError:
+def _same_meaning(name: str | Message, first: str, second: str) -> FileError:
     return FileError(
-        sentence(
-            "entry.same-meaning",
-            "{name} has {first} and {second}, which mean the same. Keep the right one.",
-            name=name,
-            first=quoted(first),
-            second=quoted(second),
-        )
+        "entry.same-meaning", name=name, first=quoted(first), second=quoted(second)
     )
 
 
@@ -250,9 +204,9 @@ def _cells(value: Tree) -> list[Tree]:
     return [value]
 
 
-def _flaw(cell: Tree) -> Sentence | None:
+def _flaw(cell: Tree) -> Message | None:
     if not isinstance(cell, str):
-        return sentence("number.no-list", "it is not a list of numbers.")
+        return message("number.no-list")
     flaw = number_flaw(cell)
     if not flaw and abs(float(cell)) > LARGEST_NUMBER:
         return too_large_number(cell)

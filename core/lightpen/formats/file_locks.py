@@ -1,7 +1,6 @@
 """Locks of the operating system on open files.
 
-Such a lock goes when the file is closed or its process ends, however it ends. It keeps
-out those who ask for it, and nobody else.
+Such a lock is released when the file is closed or its process ends. It is advisory.
 """
 
 import errno
@@ -13,20 +12,20 @@ from contextlib import contextmanager
 from pathlib import Path
 
 PAUSE = 0.01  # s between two attempts
-LOCKED_BYTE = 2**30  # behind any content: Windows lets nobody read what is locked
+LOCKED_BYTE = 2**30  # beyond any content, as Windows blocks reading locked bytes
 TAKEN = (errno.EAGAIN, errno.EACCES, errno.EDEADLK)
 NO_LOCKS = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK)
 
 
 def locked(descriptor: int, *, shared: bool = False, patience_s: float = 0.0) -> bool:
-    """Lock an open file, and return whether nobody else has it locked.
+    """Lock an open file; return whether it succeeded.
 
     Parameters
     ----------
     shared : bool
-        Whether others may have it locked so, too.
+        Whether several processes may hold it.
     patience_s : float
-        To wait for others to let go.
+        Time to wait for the lock.
 
     Raises
     ------
@@ -49,9 +48,9 @@ def locked(descriptor: int, *, shared: bool = False, patience_s: float = 0.0) ->
 
 @contextmanager
 def folder_locked(folder: Path, patience_s: float) -> Iterator[bool]:
-    """Keep others who ask out of a folder, and yield whether nobody else had it.
+    """Hold an advisory lock on a folder; yield whether it was acquired.
 
-    On Windows, and on a disk that knows no locks, it is as if nobody had.
+    On Windows and on file systems without locks it always succeeds.
 
     Raises
     ------
@@ -82,11 +81,11 @@ if sys.platform == "win32":
         _set_locking(descriptor, msvcrt.LK_NBLCK)
 
     def unlock(descriptor: int) -> None:
-        """Let others lock a file."""
+        """Release the lock of a file."""
         _set_locking(descriptor, msvcrt.LK_UNLCK)
 
     def _set_locking(descriptor: int, mode: int) -> None:
-        # What is locked begins where the file is at, and so does what is written next.
+        # The lock begins at the file position, which is restored.
         place = os.lseek(descriptor, 0, os.SEEK_CUR)
         os.lseek(descriptor, LOCKED_BYTE, os.SEEK_SET)
         try:
@@ -97,10 +96,10 @@ else:
     import fcntl
 
     def _lock(descriptor: int, shared: bool) -> None:
-        # Disks of the network let nobody keep others out of a file open for reading.
+        # Network file systems refuse exclusive locks of files open for reading.
         kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
         fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
 
     def unlock(descriptor: int) -> None:
-        """Let others lock a file."""
+        """Release the lock of a file."""
         fcntl.flock(descriptor, fcntl.LOCK_UN)

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import logging
 import os
 import re
 import stat
@@ -14,65 +15,42 @@ from lightpen.errors import FileError, NameTakenError
 from lightpen.formats.file_locks import folder_locked
 from lightpen.formats.part_files import part_of, renamed, sweep_parts
 from lightpen.formats.system_reasons import strerror
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 MEGABYTE = 1_000_000  # bytes
-A_FILE = sentence("file.file", "file")  # of no kind that a user knows
-FOLDER = sentence("file.folder", "folder")
-PATIENCE = 2.0  # s for another program to give a file its name
-EXCERPT_LENGTH = 40  # characters of a file's content quoted in a sentence
+A_FILE = message("file.file")  # of unknown kind
+FOLDER = message("file.folder")
+PATIENCE = 2.0  # s to wait for another program's rename
+EXCERPT_LENGTH = 40  # characters of a file's content quoted in a message
 
 _CONTROL = r"[\x00-\x08\x0b\x0e-\x1f\x7f]"
-_DENIED = sentence(
-    "write.denied", "permission is denied. Choose another folder, or ask for access."
-)
+_DENIED = message("write.denied")
 _REASONS = {
-    errno.ENOSPC: sentence(
-        "write.disk-full",
-        "the disk is full. Free some space, or write to another disk.",
-    ),
-    errno.EDQUOT: sentence(
-        "write.quota-used-up",
-        "your disk quota is used up. Free some space, or write elsewhere.",
-    ),
-    errno.EFBIG: sentence(
-        "write.larger-than-allowed",
-        "the file would be larger than allowed here. Write to another disk.",
-    ),
+    errno.ENOSPC: message("write.disk-full"),
+    errno.EDQUOT: message("write.quota-used-up"),
+    errno.EFBIG: message("write.larger-than-allowed"),
     errno.EACCES: _DENIED,
     errno.EPERM: _DENIED,
-    errno.EROFS: sentence(
-        "write.read-only", "the disk is read-only. Choose another folder."
-    ),
-    errno.ENOENT: sentence(
-        "write.no-folder",
-        "its folder does not exist. Create the folder, or choose another.",
-    ),
-    errno.ENOTDIR: sentence(
-        "write.not-a-folder", "its folder is not a folder. Check the path."
-    ),
-    errno.ENAMETOOLONG: sentence(
-        "write.name-too-long", "the name is too long. Choose a shorter one."
-    ),
-    errno.ELOOP: sentence(
-        "write.link-loop",
-        "the name is a link that leads back to itself. Choose another name.",
-    ),
-    errno.EEXIST: sentence(
-        "write.name-taken", "there is a file of that name already. Try again."
-    ),
+    errno.EROFS: message("write.read-only"),
+    errno.ENOENT: message("write.no-folder"),
+    errno.ENOTDIR: message("write.not-a-folder"),
+    errno.ENAMETOOLONG: message("write.name-too-long"),
+    errno.ELOOP: message("write.link-loop"),
+    errno.EEXIST: message("write.name-taken"),
 }
-# What a disk answers that gives a file one name only: FAT, and some of the network.
+# Errors of file systems without hard links: FAT, some network drives.
 _NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
 
+_logger = logging.getLogger(__name__)
 
-def read_bytes(path: Path, what: Sentence, limit: int) -> bytes:
+
+def read_bytes(path: Path, what: Message, limit: int) -> bytes:
     """Return the content of a file.
 
     Parameters
     ----------
-    what : Sentence
-        What the file is, for the sentences: "camera file".
+    what : Message
+        What the file is, for messages: "camera file".
     limit : int
         Largest size, bytes. It is checked before anything is read.
 
@@ -82,13 +60,13 @@ def read_bytes(path: Path, what: Sentence, limit: int) -> bytes:
         The file is missing, a folder, empty, unreadable or larger than `limit`.
     """
     with opened(path, what, limit) as stream:
-        # Of a longer read, all that it may bring is asked for in advance.
+        # A longer read would allocate the requested size in advance.
         return stream.read(os.fstat(stream.fileno()).st_size)
 
 
 @contextlib.contextmanager
-def opened(path: Path, what: Sentence, limit: int) -> Iterator[BinaryIO]:
-    """Open a file to be read, having looked at what it is.
+def opened(path: Path, what: Message, limit: int) -> Iterator[BinaryIO]:
+    """Check a file and open it for reading.
 
     Parameters
     ----------
@@ -105,21 +83,15 @@ def opened(path: Path, what: Sentence, limit: int) -> Iterator[BinaryIO]:
         _check_readable(_status(path, what), what, shown, limit)
         with path.open("rb") as stream:
             _check_readable(os.fstat(stream.fileno()), what, shown, limit)
+            _logger.debug("read: %s", shown)
             yield stream
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise FileError(
-            sentence(
-                "read.missing",
-                "The {what} {path} does not exist. Check the name and the folder.",
-                what=what,
-                path=shown,
-            )
-        ) from error
+        raise FileError("read.missing", what=what, path=shown) from error
     except OSError as error:
         raise unreadable(path, what, error) from error
 
 
-def read_text(path: Path, what: Sentence, limit: int) -> str:
+def read_text(path: Path, what: Message, limit: int) -> str:
     r"""Return the content of a text file, with ``\n`` at the line ends.
 
     UTF-8 with or without byte order mark, UTF-16 with one, and Windows-1252, which
@@ -127,8 +99,8 @@ def read_text(path: Path, what: Sentence, limit: int) -> str:
 
     Parameters
     ----------
-    what : Sentence
-        What the file is, for the sentences.
+    what : Message
+        What the file is, for messages.
     limit : int
         Largest size, bytes.
 
@@ -143,39 +115,20 @@ def read_text(path: Path, what: Sentence, limit: int) -> str:
         text = _decode(data)
     except UnicodeDecodeError as error:
         raise FileError(
-            sentence(
-                "read.no-known-encoding",
-                "The {what} {path} is not text: byte {byte} fits no known encoding. "
-                "Check that the right file is named, or save it as UTF-8.",
-                what=what,
-                path=shown,
-                byte=error.start + 1,
-            )
+            "read.no-known-encoding", what=what, path=shown, byte=error.start + 1
         ) from error
     control = re.search(_CONTROL, text)
     if control:
         line = text.count("\n", 0, control.start()) + 1
         raise FileError(
-            sentence(
-                "read.control-character",
-                "The {what} {path} is not text: line {line} holds the control "
-                "character {character}. Check that the right file is named, or save "
-                "it as UTF-8.",
-                what=what,
-                path=shown,
-                line=line,
-                character=ord(control[0]),
-            )
+            "read.control-character",
+            what=what,
+            path=shown,
+            line=line,
+            character=ord(control[0]),
         )
     if not text.strip():
-        raise FileError(
-            sentence(
-                "read.blank",
-                "The {what} {path} holds nothing but blanks. Save it again.",
-                what=what,
-                path=shown,
-            )
-        )
+        raise FileError("read.blank", what=what, path=shown)
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -196,20 +149,15 @@ def write_whole(path: Path, data: bytes) -> None:
             path.write_bytes(data)
         else:
             _replace(Path(os.path.realpath(path)), data)
+        _logger.debug("written: %s", path)
     except IsADirectoryError as error:
-        raise FileError(
-            sentence(
-                "write.onto-folder",
-                "{path} cannot be written: it is a folder. Name a file.",
-                path=printable(str(path)),
-            )
-        ) from error
+        raise FileError("write.onto-folder", path=printable(str(path))) from error
     except OSError as error:
         raise _unwritten(path, error) from error
 
 
 def create_whole(path: Path, data: bytes) -> None:
-    """Write a new file whole, or none; a file that has the name stays as it is.
+    """Write a new file whole or not at all; never replace a file.
 
     When this returns, the file is on the disk with its name, whatever happens next.
 
@@ -229,14 +177,15 @@ def create_whole(path: Path, data: bytes) -> None:
         except OSError:
             path.unlink()
             raise
+        _logger.debug("written: %s", path)
     except FileExistsError as error:
-        raise NameTakenError(_unwritten(path, error).sentence) from error
+        raise NameTakenError(_unwritten(path, error).message) from error
     except OSError as error:
         raise _unwritten(path, error) from error
 
 
 def sync_folder(folder: Path) -> None:
-    """Put the names in a folder on the disk, where the system can (not Windows).
+    """Flush the directory entries of a folder to disk (not on Windows).
 
     Raises
     ------
@@ -252,17 +201,10 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def unreadable(path: Path, what: Sentence, error: OSError) -> FileError:
-    """Return the error of a file or folder, ``what`` it is, that cannot be read."""
+def unreadable(path: Path, what: Message, error: OSError) -> FileError:
+    """Return the error of an unreadable file or folder of the kind ``what``."""
     return FileError(
-        sentence(
-            "read.failed",
-            "The {what} {path} cannot be read: {reason}. Check that it is yours to "
-            "read and that its disk is connected.",
-            what=what,
-            path=printable(str(path)),
-            reason=strerror(error),
-        )
+        "read.failed", what=what, path=printable(str(path)), reason=strerror(error)
     )
 
 
@@ -281,18 +223,12 @@ def sha256(path: Path) -> str:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise FileError(
-            sentence(
-                "hash.failed",
-                "The file {path} cannot be read: {reason}. Check the name and that it "
-                "is yours to read.",
-                path=printable(str(path)),
-                reason=strerror(error),
-            )
+            "hash.failed", path=printable(str(path)), reason=strerror(error)
         ) from error
 
 
 def printable(text: str) -> str:
-    """Return a text with every unprintable character written as its code."""
+    """Return a text with unprintable characters escaped."""
     if text.isprintable():
         return text
     return "".join(
@@ -302,80 +238,44 @@ def printable(text: str) -> str:
 
 
 def quoted(text: str) -> str:
-    """Return the start of a file's content in quotes, fit to be shown to the user."""
+    """Return the start of a file's content, quoted and escaped for display."""
     start = text[:EXCERPT_LENGTH]
     return f'"{printable(start)}{"..." if len(text) > len(start) else ""}"'
 
 
-def why_unwritten(error: OSError) -> Sentence:
-    """Return why a file cannot be written, and what to do, as a whole sentence."""
-    other = sentence(
-        "write.other-reason",
-        "{reason}. Choose another folder or name.",
-        reason=strerror(error),
-    )
+def why_unwritten(error: OSError) -> Message:
+    """Return why a file cannot be written and what to do."""
+    other = message("write.other-reason", reason=strerror(error))
     return _REASONS.get(error.errno or 0, other)
 
 
-def _status(path: Path, what: Sentence) -> os.stat_result:
+def _status(path: Path, what: Message) -> os.stat_result:
     try:
         return path.stat()
-    except ValueError as error:  # a null character in it, or half a letter
-        raise FileError(
-            sentence(
-                "read.no-name",
-                "The {what} {path} has a name that no file can have. Check the name.",
-                what=what,
-                path=printable(str(path)),
-            )
-        ) from error
+    except ValueError as error:  # null character or lone surrogate
+        raise FileError("read.no-name", what=what, path=printable(str(path))) from error
 
 
 def _check_readable(
-    status: os.stat_result, what: Sentence, path: str, limit: int
+    status: os.stat_result, what: Message, path: str, limit: int
 ) -> None:
     if stat.S_ISDIR(status.st_mode):
-        raise FileError(
-            sentence(
-                "read.folder",
-                "The {what} {path} is a folder. Name the file itself.",
-                what=what,
-                path=path,
-            )
-        )
+        raise FileError("read.folder", what=what, path=path)
     if not stat.S_ISREG(status.st_mode):
-        raise FileError(
-            sentence(
-                "read.device",
-                "The {what} {path} is a pipe or a device. Name a file on a disk.",
-                what=what,
-                path=path,
-            )
-        )
+        raise FileError("read.device", what=what, path=path)
     if status.st_size == 0:
-        raise FileError(
-            sentence(
-                "read.empty",
-                "The {what} {path} is empty. Check how it was saved or copied.",
-                what=what,
-                path=path,
-            )
-        )
+        raise FileError("read.empty", what=what, path=path)
     if status.st_size > limit:
         raise _too_large(what, path, status.st_size, limit)
 
 
-def _too_large(what: Sentence, path: str, size: int, limit: int) -> FileError:
+def _too_large(what: Message, path: str, size: int, limit: int) -> FileError:
     return FileError(
-        sentence(
-            "read.too-large",
-            "The {what} {path} has {size:.1f} MB, more than the {limit:g} MB such a "
-            "file may have. Check that the right file is named.",
-            what=what,
-            path=path,
-            size=size / MEGABYTE,
-            limit=limit / MEGABYTE,
-        )
+        "read.too-large",
+        what=what,
+        path=path,
+        size=size / MEGABYTE,
+        limit=limit / MEGABYTE,
     )
 
 
@@ -391,7 +291,7 @@ def _decode(data: bytes) -> str:
 
 
 def _replace(target: Path, data: bytes) -> None:
-    if target.is_symlink():  # still, after all that can be followed was
+    if target.is_symlink():  # a loop of links
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
@@ -406,7 +306,7 @@ def _replace(target: Path, data: bytes) -> None:
 
 
 def _name_anew(part: Path, target: Path) -> None:
-    """Give a file its name, unless another has it."""
+    """Rename a file unless the target exists."""
     if os.name != "posix":
         renamed(part.rename, target)  # Windows refuses to replace a file
         return
@@ -419,7 +319,7 @@ def _name_anew(part: Path, target: Path) -> None:
 
 
 def _rename_anew(part: Path, target: Path) -> None:
-    """Do so on a disk that gives a file one name only, and one program at a time."""
+    """Rename a file unless the target exists, on file systems without hard links."""
     with folder_locked(target.parent, PATIENCE):
         if target.exists():
             raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
@@ -428,10 +328,5 @@ def _rename_anew(part: Path, target: Path) -> None:
 
 def _unwritten(path: Path, error: OSError) -> FileError:
     return FileError(
-        sentence(
-            "write.failed",
-            "{path} cannot be written: {reason} What was there before is unchanged.",
-            path=printable(str(path)),
-            reason=why_unwritten(error),
-        )
+        "write.failed", path=printable(str(path)), reason=why_unwritten(error)
     )

@@ -1,4 +1,4 @@
-"""The files that a calibration was made from, with their hashes."""
+"""The input files of a calibration, with their hashes."""
 
 import os
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ LIMIT = 16 * MEGABYTE  # of a file that is kept in the record
 
 @dataclass(frozen=True)
 class InputFile:
-    """A file that went into a calibration.
+    """An input file of a calibration.
 
     Attributes
     ----------
     content : bytes or None
-        Of a file that the record is to hold, so that it is enough to calibrate again.
+        Stored in the record, so that the calibration can be recomputed from it alone.
     """
 
     path: Path
@@ -32,7 +32,7 @@ class InputFile:
 
 @dataclass(frozen=True)
 class RigInputs:
-    """The files of several cameras: that of the rig, and one a camera."""
+    """The rig file and the camera files of several cameras."""
 
     rig: InputFile
     cameras: tuple[InputFile, ...]
@@ -40,7 +40,7 @@ class RigInputs:
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """What a calibration was made from.
+    """The inputs of a calibration.
 
     Attributes
     ----------
@@ -49,13 +49,13 @@ class Inputs:
     observations : tuple of InputFile
         The images, the video or the file of LED centres.
     nominal_tip : (3,) array or None
-        Where the design puts the tip, pen frame, mm.
+        Nominal tip centre, pen frame, mm.
     origin : Origin or None
-        What the images are of; None where a record of an earlier version does not say.
+        Origin of the images; None if unknown.
     units : str or None
-        Of the pen file, where it does not say.
+        Of the pen file, where it states none.
     led_diameter : float or None
-        Of the LED discs, where the pen file does not say, mm.
+        Of the LED discs, mm, where the pen file does not state it.
     """
 
     camera: InputFile
@@ -86,7 +86,7 @@ def with_content(path: Path) -> InputFile:
 
 
 def all_hashed(paths: Sequence[Path]) -> tuple[InputFile, ...]:
-    """Return files with their hashes, read in as many threads as processors."""
+    """Return files with their hashes, computed in parallel."""
     n_threads = os.cpu_count() or 1
     n_each = -(-len(paths) // n_threads) or 1  # taking one by one, threads wait in turn
     shares = [paths[i : i + n_each] for i in range(0, len(paths), n_each)]

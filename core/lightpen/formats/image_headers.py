@@ -1,8 +1,8 @@
-"""How large the image in a file is, and what decoding it takes, by its header alone.
+"""Image size and decoding memory, from the header of an image file alone.
 
-A kilobyte can claim to be an image of gigapixels, and a decoder believes it. So the few
-formats that cameras write are told here by their first bytes, and their headers are
-read as their decoders read them; no other format is decoded.
+A kilobyte can claim to be an image of gigapixels, and a decoder believes it. So the
+formats that cameras write are recognised by their first bytes and their headers are
+read as their decoders read them; other formats are refused.
 """
 
 import re
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import BinaryIO, TypeAlias
 
 from lightpen.errors import FileError
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message
 
-MAX_PIXELS = 70_000_000  # 9344 x 7000 are the most of the usual sensors
+MAX_PIXELS = 70_000_000  # the largest usual sensors have 9344 x 7000
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 _PNM_GAP = rb"(?:\s|#[^\r\n]*[\r\n])"
@@ -29,7 +29,7 @@ _JPEG_SCAN = 0xDA
 _JPEG_WITHOUT_LENGTH = frozenset({0x01, *range(0xD0, 0xD9)})
 _JPEG_MARKERS = 1000  # before the pixels; a colour profile takes 255
 _TIFF_VALUES = {1: "B", 3: "H", 4: "I"}  # by the type of an entry
-_TIFF_TAGS = frozenset({256, 257, 258, 259, 277, 278, 322, 323})  # that are looked at
+_TIFF_TAGS = frozenset({256, 257, 258, 259, 277, 278, 322, 323})  # that are evaluated
 _TIFF_ENTRIES = 500
 _WEBP_ANIMATED = 0x02  # of the flags
 _TIFF_LOSSLESS = frozenset({1, 5, 8, 32773, 32946})  # none, LZW, deflate, PackBits
@@ -37,7 +37,7 @@ _TIFF_LOSSLESS = frozenset({1, 5, 8, 32773, 32946})  # none, LZW, deflate, PackB
 
 @dataclass(frozen=True)
 class ImageHeader:
-    """What the header of an image says.
+    """Size of an image and memory needed to decode it.
 
     Attributes
     ----------
@@ -55,19 +55,19 @@ class ImageHeader:
     working: int = 0
 
 
-_Name: TypeAlias = str | Sentence
+_Name: TypeAlias = str | Message
 _Reader: TypeAlias = Callable[[BinaryIO, _Name], ImageHeader]
 
 
-def read_image_header(stream: BinaryIO, name: str | Sentence) -> ImageHeader:
-    """Read the header of an image, and refuse what is larger than cameras take.
+def read_image_header(stream: BinaryIO, name: str | Message) -> ImageHeader:
+    """Read the header of an image; refuse implausibly large images.
 
     Parameters
     ----------
     stream : BinaryIO
         The file, at its first byte; it is left anywhere.
-    name : str or Sentence
-        Of the image, for the sentences.
+    name : str or Message
+        Of the image, for messages.
 
     Raises
     ------
@@ -84,9 +84,9 @@ def read_image_header(stream: BinaryIO, name: str | Sentence) -> ImageHeader:
 
 
 def check_pixels(
-    width: int, height: int, name: str | Sentence, most: int = MAX_PIXELS
+    width: int, height: int, name: str | Message, most: int = MAX_PIXELS
 ) -> None:
-    """Refuse an image with more pixels than those of cameras.
+    """Refuse an image with too many pixels.
 
     Raises
     ------
@@ -95,50 +95,23 @@ def check_pixels(
     """
     if width * height > most:
         raise FileError(
-            sentence(
-                "image.too-many-pixels",
-                "{name} is {width} x {height} px; at most {most:,} px are read, more "
-                "than usual cameras have. Choose images of the calibrated camera.",
-                name=name,
-                width=width,
-                height=height,
-                most=most,
-            )
+            "image.too-many-pixels", name=name, width=width, height=height, most=most
         )
 
 
-def damaged_image(name: str | Sentence) -> FileError:
-    """Return the error of what is damaged, or no image at all."""
-    return FileError(
-        sentence(
-            "image.damaged",
-            "{name} is damaged or no image that can be read here (PNG, JPEG, BMP, "
-            "TIFF, PGM, WebP). Capture or copy it again.",
-            name=name,
-        )
-    )
+def damaged_image(name: str | Message) -> FileError:
+    """Return the error of a damaged image."""
+    return FileError("image.damaged", name=name)
 
 
-def cut_off_image(name: str | Sentence) -> FileError:
-    """Return the error of an image whose end is missing."""
-    return FileError(
-        sentence(
-            "image.cut-off",
-            "{name} is cut off. Capture or copy it again.",
-            name=name,
-        )
-    )
+def cut_off_image(name: str | Message) -> FileError:
+    """Return the error of a truncated image."""
+    return FileError("image.cut-off", name=name)
 
 
-def animated_image(name: str | Sentence) -> FileError:
-    """Return the error of an image that moves."""
-    return FileError(
-        sentence(
-            "image.animated",
-            "{name} is an animation. Save its images one by one.",
-            name=name,
-        )
-    )
+def animated_image(name: str | Message) -> FileError:
+    """Return the error of an animated image."""
+    return FileError("image.animated", name=name)
 
 
 def _reader(start: bytes, name: _Name) -> _Reader:
@@ -208,7 +181,7 @@ def _jpeg(stream: BinaryIO, name: _Name) -> ImageHeader:
 
 
 def _jpeg_segment(stream: BinaryIO, name: _Name) -> tuple[int, int]:
-    """Return the marker that comes next, and how many bytes follow its length."""
+    """Return the next marker and the length of its segment, bytes."""
     while True:
         if _exactly(stream, 1, name) != b"\xff":
             raise damaged_image(name)
@@ -273,15 +246,7 @@ def _tiff_header(values: dict[int, int], name: _Name) -> ImageHeader:
         values.get(277, 1),
     )
     if compression not in _TIFF_LOSSLESS:
-        raise FileError(
-            sentence(
-                "image.tiff-compression",
-                "{name} is a TIFF with the compression {compression}, which is not "
-                "read here. Save the images as PNG, or without compression.",
-                name=name,
-                compression=compression,
-            )
-        )
+        raise FileError("image.tiff-compression", name=name, compression=compression)
     if not 1 <= channels <= 4 or depth > 64:
         raise damaged_image(name)
     # It is decoded strip by strip or tile by tile, each from a copy.

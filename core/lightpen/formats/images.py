@@ -6,18 +6,63 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from threading import Condition
 from typing import TypeVar
 
 from lightpen.arrays import Image
 from lightpen.errors import FileError
 from lightpen.formats.decoding import keep_freed_memory, read_image
 from lightpen.formats.files import printable, unreadable
-from lightpen.formats.memory_room import MemoryRoom
 from lightpen.formats.video_process import count_frames, frame_loaders
-from lightpen.sentences import sentence
+from lightpen.messages import message
+
+
+class MemoryRoom:
+    """Limits the threads that decode at once by the memory they need.
+
+    One thread is always admitted.
+
+    Parameters
+    ----------
+    budget : int
+        bytes that all of them may take.
+    """
+
+    def __init__(self, budget: int) -> None:
+        self._budget = budget
+        self._changed = Condition()
+        self._n = 0
+        self._largest: int | None = None
+
+    @contextmanager
+    def one(self) -> Iterator[None]:
+        """Wait for memory, and hold it for one image."""
+        with self._changed:
+            self._changed.wait_for(self._has_room)
+            self._n += 1
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._n -= 1
+                self._changed.notify_all()
+
+    def note(self, n_bytes: int) -> None:
+        """Record the memory that an image needed."""
+        with self._changed:
+            self._largest = max(n_bytes, self._largest or 0)
+            self._changed.notify_all()
+
+    def _has_room(self) -> bool:
+        if self._n == 0:
+            return True
+        largest = self._largest
+        return largest is not None and (self._n + 1) * largest <= self._budget
+
 
 SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".jpg", ".jpeg", ".pgm", ".webp")
 VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm")
@@ -54,16 +99,16 @@ def look_at_all(
     memory_a_pixel: int,
     n_threads: int | None = None,
 ) -> Iterator[Seen]:
-    """Look at all images in threads, and yield what each shows in their order.
+    """Process all images in threads; yield the results in order.
 
-    Images leave memory at once; those looked at are a few ahead of who asks.
+    Images are released at once; processing runs a few images ahead.
 
     Parameters
     ----------
     look : callable
-        Takes the loader of an image; what it raises ends the looking.
+        Takes the loader of an image; an exception ends the processing.
     memory_a_pixel : int
-        bytes that looking takes; so many threads look at once as have `WORK_MEMORY`.
+        Memory of processing, bytes per pixel; limits the threads by `WORK_MEMORY`.
     n_threads : int, optional
         At most; by default as many as there are processors.
     """
@@ -104,7 +149,7 @@ def find_images(*places: str) -> ImageSource:
     Raises
     ------
     FileError
-        There is nothing there, or no image, or it may not be looked at.
+        The place is missing, holds no image, or cannot be read.
     """
     if len(places) > 1:
         return image_files(sorted(map(Path, places), key=_by_name))
@@ -112,9 +157,7 @@ def find_images(*places: str) -> ImageSource:
     try:
         return _images_at(path, places[0])
     except OSError as error:
-        raise unreadable(
-            path, sentence("file.image-source", "source of images"), error
-        ) from error
+        raise unreadable(path, message("file.image-source"), error) from error
 
 
 def image_files(files: list[Path]) -> ImageSource:
@@ -128,7 +171,7 @@ def image_files(files: list[Path]) -> ImageSource:
 
 
 def natural_order(name: str) -> list[tuple[int, str]]:
-    """Return what sorts names as people do: 2 before 10."""
+    """Return a sort key with numbers in numeric order: 2 before 10."""
     parts = re.split(r"(?a:(\d+))", name)  # text and digits take turns
     return [(int(part), "") if i % 2 else (-1, part) for i, part in enumerate(parts)]
 
@@ -141,13 +184,9 @@ def _images_at(path: Path, where: str) -> ImageSource:
             files = _image_files_in(inner)
         if not files:
             raise FileError(
-                sentence(
-                    "images.empty-folder",
-                    "The folder {folder} holds no images ({suffixes}). Name the "
-                    "folder that the images are in.",
-                    folder=printable(where),
-                    suffixes=", ".join(SUFFIXES),
-                )
+                "images.empty-folder",
+                folder=printable(where),
+                suffixes=", ".join(SUFFIXES),
             )
     elif path.is_file():
         if path.suffix.lower() in VIDEO_SUFFIXES:
@@ -156,13 +195,7 @@ def _images_at(path: Path, where: str) -> ImageSource:
     else:
         files = [Path(name) for name in glob.glob(where)]  # noqa: PTH207 - any root
         if not files:
-            raise FileError(
-                sentence(
-                    "images.nothing-there",
-                    "There is no folder, video or image at {place}. Check the name.",
-                    place=printable(where),
-                )
-            )
+            raise FileError("images.nothing-there", place=printable(where))
     return image_files(sorted(files, key=_by_name))
 
 

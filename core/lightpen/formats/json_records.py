@@ -1,4 +1,4 @@
-"""Records as JSON: what they begin with, and plain values out of arrays and sentences.
+"""Records as JSON: heading, and plain values of arrays and messages.
 
 `lightpen.formats.own_json` reads what is written here.
 """
@@ -11,31 +11,52 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
+from msgspec import Struct, to_builtins
 
 from lightpen import __version__
 from lightpen.formats.hashes import InputFile
-from lightpen.formats.own_json import with_checksum
-from lightpen.sentences import Sentence
+from lightpen.formats.own_json import Digest, require_path, with_checksum
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.messages import Message
+
+
+class ProgramName(Struct, frozen=True):
+    """The program that wrote a file."""
+
+    name: str
+    version: str
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.version}"
+
+
+class FileRecord(Struct, frozen=True, omit_defaults=True):
+    """A file that was read, with its content where the record needs it."""
+
+    file: str
+    sha256: Digest
+    base64: str = ""
+
+    def __post_init__(self) -> None:
+        require_path(self.file)
+
+
+THIS_PROGRAM = ProgramName("lightpen", __version__)
 
 
 def record_heading(created: datetime) -> dict[str, Any]:
-    """Return what every record begins with: the program, and when it was made."""
-    return {
-        "program": {"name": "lightpen", "version": __version__},
-        "created": created.isoformat(timespec="seconds"),
-    }
+    """Return the common first entries of a record: program and time."""
+    return {"program": THIS_PROGRAM, "created": created.isoformat(timespec="seconds")}
 
 
-def file_entry(file: InputFile) -> dict[str, str]:
+def file_entry(file: InputFile) -> FileRecord:
     """Return a file with its hash, and its content where that is kept."""
-    named = {"file": file.path.name, "sha256": file.sha256}
-    if file.content is not None:
-        named["base64"] = b64encode(file.content).decode()
-    return named
+    content = b64encode(file.content or b"").decode()
+    return FileRecord(file.path.name, file.sha256, content)
 
 
 def plain(value: Any) -> Any:
-    """Return arrays as lists, what is not a number as null, sentences with codes."""
+    """Return plain values: tuples of arrays, None for NaN, stored messages."""
     if value is None or isinstance(value, (str, int)):
         return value
     if isinstance(value, float):
@@ -43,31 +64,30 @@ def plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {name: plain(entry) for name, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
+        return tuple(map(plain, value))
     if isinstance(value, np.ndarray):
-        if value.dtype.kind == "f" and np.isfinite(value).all():
-            return value.tolist()
         return plain(value.tolist())
     if isinstance(value, np.generic):
         return plain(value.item())
-    if isinstance(value, Sentence):
-        return plain({"code": value.code, "text": str(value), "values": value.values})
+    if isinstance(value, Message):
+        return to_builtins(StoredMessage.of(value))
     return value
 
 
-def record_bytes(record: Mapping[str, Any]) -> bytes:
-    """Return a record as JSON that tells when it was changed."""
+def record_bytes(record: Mapping[str, Any] | Struct) -> bytes:
+    """Return a record as JSON with its checksum."""
     return with_checksum(json_bytes(record)) + b"\n"
 
 
-def json_bytes(record: Mapping[str, Any]) -> bytes:
+def json_bytes(record: Mapping[str, Any] | Struct) -> bytes:
     """Return a record as JSON, readable: one line an entry, and one an image.
 
     The bytes of a file name that is no text in this system's encoding become JSON
     escapes.
     """
     lines = []
-    for name, entry in record.items():
+    entries = to_builtins(record) if isinstance(record, Struct) else record
+    for name, entry in entries.items():
         if name == "frames":
             rows = ",\n    ".join(map(_dumps, entry))
             lines.append(f'  "frames": [\n    {rows}\n  ]')
@@ -78,4 +98,4 @@ def json_bytes(record: Mapping[str, Any]) -> bytes:
 
 
 def _dumps(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    return json.dumps(value, ensure_ascii=False, allow_nan=False, default=to_builtins)

@@ -1,4 +1,4 @@
-"""LED centres and poses that were found elsewhere, as tables.
+"""Tables of LED centres and poses measured by other programs.
 
 LED centres have the columns ``frame,led,x_px,y_px``. Poses have the row-major rotation
 ``r11,r12,r13,r21,...,r33`` and the translation ``tx_mm,ty_mm,tz_mm`` of cam_from_pen,
@@ -17,8 +17,8 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
 from lightpen.formats.files import MEGABYTE
 from lightpen.formats.tables import Table, read_table
+from lightpen.messages import message
 from lightpen.model.rigid import nearest_rotation
-from lightpen.sentences import sentence
 
 OBSERVATION_FILE_LIMIT = 16 * MEGABYTE
 MAX_FRAMES = 30_000
@@ -93,10 +93,8 @@ def read_centers(path: Path, n_leds: int) -> Centers:
         The file cannot be read, or has LEDs that the pen does not have, an LED twice
         in a frame, or cells that are not numbers. The text names the line.
     """
-    table = read_table(
-        path, sentence("file.centers", "file of LED centres"), OBSERVATION_FILE_LIMIT
-    )
-    columns = table.columns(_CENTERS, sentence("table.of-centers", "LED centres"))
+    table = read_table(path, message("file.centers"), OBSERVATION_FILE_LIMIT)
+    columns = table.columns(_CENTERS, message("table.of-centers"))
     frame_of_row = table.whole_numbers(columns[0])
     led_of_row = table.whole_numbers(columns[1])
     pixels = table.numbers(columns[2:])
@@ -104,14 +102,10 @@ def read_centers(path: Path, n_leds: int) -> Centers:
     frames, place = np.unique(frame_of_row, return_inverse=True)
     if len(frames) > MAX_FRAMES:
         raise FileError(
-            sentence(
-                "centers.too-many-frames",
-                "{name} has {n_frames} frames; at most {most} are read. Check that "
-                "the right file is named, or divide it.",
-                name=table.name,
-                n_frames=len(frames),
-                most=MAX_FRAMES,
-            )
+            "centers.too-many-frames",
+            name=table.name,
+            n_frames=len(frames),
+            most=MAX_FRAMES,
         )
     _check_no_pair_twice(table, frame_of_row, led_of_row, place * n_leds + led_of_row)
     grid = np.full((len(frames), n_leds, 2), np.nan)
@@ -131,9 +125,7 @@ def read_poses(path: Path) -> PoseTable:
         The file cannot be read, or has matrices that are no rotations or covariances,
         poses given twice, or cells that are not numbers. The text names the line.
     """
-    table = read_table(
-        path, sentence("file.poses", "pose file"), OBSERVATION_FILE_LIMIT
-    )
+    table = read_table(path, message("file.poses"), OBSERVATION_FILE_LIMIT)
     columns, covariance_columns = _pose_columns(table)
     numbers = table.numbers(columns)
     if "pose" in table.header:
@@ -144,13 +136,7 @@ def read_poses(path: Path) -> PoseTable:
     far = np.abs(translations).max(axis=1) > LARGEST_TRANSLATION
     if np.any(far):
         raise table.error(
-            int(np.argmax(far)),
-            sentence(
-                "poses.far",
-                "the translation is more than {most:g} m. Check its units: "
-                "millimetres are needed.",
-                most=LARGEST_TRANSLATION / 1000,
-            ),
+            int(np.argmax(far)), message("poses.far", most=LARGEST_TRANSLATION / 1000)
         )
     covariances = None
     if covariance_columns:
@@ -167,27 +153,13 @@ def _check_centers(
     if np.any(unknown):
         row = int(np.argmax(unknown))
         raise table.error(
-            row,
-            sentence(
-                "centers.unknown-led",
-                "there is no LED {led}; the pen has LEDs 1 to {n_leds}. Check that "
-                "the pen file is of this pen, and that LEDs are numbered from 1.",
-                led=leds[row],
-                n_leds=n_leds,
-            ),
+            row, message("centers.unknown-led", led=leds[row], n_leds=n_leds)
         )
     far = np.abs(pixels).max(axis=1) > LARGEST_PIXEL
     if np.any(far):
         row = int(np.argmax(far))
         raise table.error(
-            row,
-            sentence(
-                "centers.far",
-                "({x:g}, {y:g}) px lies outside every image. Correct or remove the "
-                "line.",
-                x=pixels[row, 0],
-                y=pixels[row, 1],
-            ),
+            row, message("centers.far", x=pixels[row, 0], y=pixels[row, 1])
         )
 
 
@@ -201,10 +173,8 @@ def _check_no_pair_twice(
         first, second = order[twice][pair], order[twice + 1][pair]
         raise table.error(
             int(second),
-            sentence(
+            message(
                 "centers.twice",
-                "LED {led} of frame {frame} stands already on line {line}. Keep the "
-                "right one.",
                 led=leds[second],
                 frame=frames[second],
                 line=table.lines[first],
@@ -214,7 +184,7 @@ def _check_no_pair_twice(
 
 def _pose_columns(table: Table) -> tuple[list[int], list[int]]:
     """Return the columns of the pose and those, if any, of its covariance."""
-    what = sentence("table.of-poses", "poses")
+    what = message("table.of-poses")
     if table.header:
         with_covariance = any(name in table.header for (name,) in _COVARIANCE)
         return (
@@ -223,18 +193,7 @@ def _pose_columns(table: Table) -> tuple[list[int], list[int]]:
         )
     skipped = table.n_columns % 12  # the number of the pose
     if skipped > 1 or table.n_columns - skipped not in (12, 48):
-        raise FileError(
-            sentence(
-                "poses.no-header",
-                "{name} has no header and {n_columns} columns; poses need the 12 "
-                "columns r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm, "
-                "with the number of the pose before them and the covariance c11 to "
-                "c66 behind them if known. Put a header line with these names on "
-                "top.",
-                name=table.name,
-                n_columns=table.n_columns,
-            )
-        )
+        raise FileError("poses.no-header", name=table.name, n_columns=table.n_columns)
     places = list(range(skipped, table.n_columns))
     return places[:12], places[12:]
 
@@ -247,42 +206,23 @@ def _check_repeated(table: Table, poses: FloatArray) -> None:
         row = int(np.argmax(repeated))
         raise table.error(
             row,
-            sentence(
-                "poses.twice",
-                "pose {pose:g} is given on line {line} already. Remove what was "
-                "copied twice.",
-                pose=poses[row],
-                line=table.lines[first[which[row]]],
+            message(
+                "poses.twice", pose=poses[row], line=table.lines[first[which[row]]]
             ),
         )
 
 
 def _checked_rotations(table: Table, matrices: FloatArray) -> FloatArray:
-    """Return rotations; all are kept as they are but those in few digits."""
+    """Return rotations; those given with few digits are orthonormalised."""
     large = np.abs(matrices).max(axis=(1, 2)) > 2
     safe = np.where(large[:, None, None], 0.0, matrices)
     deviations = np.abs(safe @ np.swapaxes(safe, 1, 2) - np.eye(3)).max(axis=(1, 2))
     wrong = deviations > ROTATION_TOLERANCE
     if np.any(wrong):
-        raise table.error(
-            int(np.argmax(wrong)),
-            sentence(
-                "poses.no-rotation",
-                "r11 to r33 are not a rotation: their rows must have the length 1 "
-                "and be at right angles to each other. Check the order of the "
-                "columns.",
-            ),
-        )
+        raise table.error(int(np.argmax(wrong)), message("poses.no-rotation"))
     mirrored = np.linalg.det(matrices) < 0
     if np.any(mirrored):
-        raise table.error(
-            int(np.argmax(mirrored)),
-            sentence(
-                "poses.mirrored",
-                "r11 to r33 are a mirrored rotation (determinant -1). Give the "
-                "poses in right-handed frames.",
-            ),
-        )
+        raise table.error(int(np.argmax(mirrored)), message("poses.mirrored"))
     coarse = deviations > ROUNDING_TOLERANCE
     rotations = matrices.copy()
     rotations[coarse] = nearest_rotation(matrices[coarse])
@@ -303,23 +243,8 @@ def _check_covariances(table: Table, covariances: FloatArray) -> None:
         | np.any(asymmetry > limits * SYMMETRY_TOLERANCE**2, axis=(1, 2))
     )
     if np.any(wrong):
-        raise table.error(
-            int(np.argmax(wrong)),
-            sentence(
-                "poses.no-covariance",
-                "c11 to c66 are not a covariance: they must be symmetric, with "
-                "correlations from -1 to 1. Correct or remove these columns.",
-            ),
-        )
+        raise table.error(int(np.argmax(wrong)), message("poses.no-covariance"))
     values = np.linalg.eigvalsh(covariances)
     singular = values[:, 0] <= SINGULAR * values[:, -1]
     if np.any(singular):
-        raise table.error(
-            int(np.argmax(singular)),
-            sentence(
-                "poses.certain-direction",
-                "the covariance c11 to c66 leaves a direction without any "
-                "uncertainty, which no measurement does. Correct or remove these "
-                "columns.",
-            ),
-        )
+        raise table.error(int(np.argmax(singular)), message("poses.certain-direction"))

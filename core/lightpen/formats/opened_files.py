@@ -1,4 +1,4 @@
-"""The files that a user opened: where each is, and what it holds."""
+"""The files opened at a station: their paths and contents."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,9 +9,9 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import RigFile, read_rig
 from lightpen.formats.simulated_files import is_simulated
+from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.sentences import Sentence
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class PenFile:
     Attributes
     ----------
     units : str or None
-        That were given for a file that does not say.
+        Given for a file that states none.
     is_simulated : bool
         Whether it is of a simulated pen.
     """
@@ -73,18 +73,18 @@ class PenFile:
 
 @dataclass(frozen=True, eq=False)
 class OpenedFiles:
-    """The files of a station, as far as they can be read.
+    """The readable files of a station, and the errors of the others.
 
     Attributes
     ----------
-    troubles : tuple of Sentence
+    faults : tuple of Message
         Why a file must be chosen again.
     """
 
     camera_file: CameraFile | None = None
     pen_file: PenFile | None = None
     rig_file: RigFile | None = None
-    troubles: tuple[Sentence, ...] = ()
+    faults: tuple[Message, ...] = ()
 
 
 def open_files(
@@ -93,26 +93,26 @@ def open_files(
     units: str | None = None,
     rig_path: Path | None = None,
 ) -> OpenedFiles:
-    """Read the files that were in use before, each whether or not the others can be.
+    """Read the files last in use, each independently of the others.
 
     Parameters
     ----------
     camera_path, pen_path, rig_path : Path or None
-        None where there was no such file.
+        None if there was no such file.
     units : str, optional
-        Of a pen file that does not say.
+        Of a pen file that states none.
     """
-    camera_file, pen_file, rig_file, troubles = None, None, None, []
+    camera_file, pen_file, rig_file, faults = None, None, None, []
     try:
         camera_file = None if camera_path is None else CameraFile.read(camera_path)
     except LightpenError as error:
-        troubles.append(error.sentence)
+        faults.append(error.message)
     try:
         pen_file = None if pen_path is None else PenFile.read(pen_path, units)
     except LightpenError as error:
-        troubles.append(error.sentence)
+        faults.append(error.message)
     try:
         rig_file = None if rig_path is None else read_rig(rig_path)
     except LightpenError as error:
-        troubles.append(error.sentence)
-    return OpenedFiles(camera_file, pen_file, rig_file, tuple(troubles))
+        faults.append(error.message)
+    return OpenedFiles(camera_file, pen_file, rig_file, tuple(faults))

@@ -1,4 +1,4 @@
-"""JSON of the program's own files, read back as what it must be, or not at all.
+"""Read back the program's own JSON files with types, ranges and checksum checked.
 
 Records, results and settings all come in here. A text is turned into a declared type:
 what is missing, of another type or out of its range is refused, and so is what JSON as
@@ -19,7 +19,7 @@ from msgspec import Meta, convert
 CHECKSUM = b', "checksum": "'  # no text in JSON holds quotation marks as they are
 FIRST_YEAR, LAST_YEAR = 1970, 9998  # of dates that can be told in any time zone
 
-Moment: TypeAlias = Annotated[datetime, Meta(tz=True)]
+ZonedTime: TypeAlias = Annotated[datetime, Meta(tz=True)]
 Length: TypeAlias = Annotated[float, Meta(ge=-1e7, le=1e7)]  # mm or px
 Vector: TypeAlias = tuple[Length, Length, Length]
 Digest: TypeAlias = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
@@ -32,7 +32,7 @@ _ONE_READER = Lock()
 
 
 class DamagedError(ValueError):
-    """A text is not as the program wrote it; who named the file says so to its user."""
+    """A text is not as the program wrote it; the caller reports the file."""
 
 
 def parse_own_json(data: bytes, shape: type[T]) -> T:
@@ -41,7 +41,7 @@ def parse_own_json(data: bytes, shape: type[T]) -> T:
     Parameters
     ----------
     shape : type
-        As `msgspec` knows them; entries that it does not name are passed over.
+        As for `msgspec`; unknown entries are ignored.
 
     Raises
     ------
@@ -61,12 +61,12 @@ def parse_own_json(data: bytes, shape: type[T]) -> T:
 
 
 def parse_checked(data: bytes, shape: type[T]) -> T:
-    """Return what a text holds that has its checksum; see `parse_own_json`.
+    """Parse a text and verify its checksum; see `parse_own_json`.
 
     Raises
     ------
     DamagedError
-        It does not hold that, or has none.
+        It does not, or has no checksum.
     """
     if not has_checksum(data):
         raise DamagedError("There is no checksum.")
@@ -74,12 +74,12 @@ def parse_checked(data: bytes, shape: type[T]) -> T:
 
 
 def in_shape(tree: Any, shape: type[T], *, strict: bool = True) -> T:
-    """Return a value that was read as what it must be; see `parse_own_json`.
+    """Convert a parsed value to a type; see `parse_own_json`.
 
     Parameters
     ----------
     strict : bool
-        Whether a text is no number, even one that reads as one.
+        Whether texts are refused as numbers.
     """
     try:
         with _ONE_READER:
@@ -95,7 +95,7 @@ def with_checksum(text: bytes) -> bytes:
 
 
 def has_checksum(text: bytes) -> bool:
-    """Return whether the text of an object has a checksum, and is as it says.
+    """Return whether the text of an object has a checksum, and verify it.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def has_checksum(text: bytes) -> bool:
 
 
 def require_usual(moment: datetime) -> None:
-    """Refuse a date that cannot be told in every time zone.
+    """Refuse a date outside the range of all time zones.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def require_usual(moment: datetime) -> None:
 
 
 def require_path(text: str) -> None:
-    """Refuse what can be no file's name, as `require_usual` does a date."""
+    """Refuse an impossible file name, as `require_usual` does a date."""
     if b"\0" in os.fsencode(text):
         raise ValueError("A file's name holds a zero.")
 

@@ -1,4 +1,4 @@
-"""Which images of several cameras are of the same moment, by their names or order."""
+"""Pair simultaneous images of several cameras by their names or their order."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -11,10 +11,9 @@ import numpy as np
 from lightpen.arrays import IntArray
 from lightpen.errors import FileError
 from lightpen.formats.images import natural_order
-from lightpen.sentences import sentence
 
 NONE = -1
-SHARED = 0.5  # of the images of the camera that has fewest, that tell a way of naming
+SHARED = 0.5  # share of images that must match, of the camera with fewest
 
 Key: TypeAlias = str | int
 
@@ -26,9 +25,9 @@ class Pairing:
     Attributes
     ----------
     images : (N, C) array of int
-        Which one of a camera it is, from 0; -1 where the camera has none.
+        Index of the image of each camera, from 0; -1 if it has none.
     by_order : bool
-        Whether the names told nothing.
+        Whether they were paired by order, as the names do not match.
     """
 
     images: IntArray
@@ -48,7 +47,7 @@ def pair_images(names: Sequence[Sequence[str]], cameras: Sequence[str]) -> Pairi
     Raises
     ------
     FileError
-        The names do not tell, and there is another number of images.
+        The names do not match and the numbers of images differ.
     """
     for key_of in (_stem, _last_number):
         paired = _paired(names, key_of)
@@ -58,18 +57,13 @@ def pair_images(names: Sequence[Sequence[str]], cameras: Sequence[str]) -> Pairi
     if min(counts) < max(counts):
         few, many = counts.index(min(counts)), counts.index(max(counts))
         raise FileError(
-            sentence(
-                "rig.names-tell-nothing",
-                "There are {n_few} images of {few} and {n_many} of {many}, and their "
-                "names, such as {example} and {other}, do not tell which are of the "
-                "same moment. Give the images of one moment the same name or number.",
-                n_few=counts[few],
-                few=cameras[few],
-                n_many=counts[many],
-                many=cameras[many],
-                example=names[few][0],
-                other=names[many][0],
-            )
+            "rig.names-tell-nothing",
+            n_few=counts[few],
+            few=cameras[few],
+            n_many=counts[many],
+            many=cameras[many],
+            example=names[few][0],
+            other=names[many][0],
         )
     return Pairing(np.tile(np.arange(counts[0])[:, None], (1, len(names))), True)
 
@@ -77,7 +71,7 @@ def pair_images(names: Sequence[Sequence[str]], cameras: Sequence[str]) -> Pairi
 def _paired(
     names: Sequence[Sequence[str]], key_of: Callable[[str], Key | None]
 ) -> IntArray | None:
-    """Return the images of each key, in its order; None if the keys tell nothing."""
+    """Return the images of each key in order; None if the keys do not match."""
     places: list[dict[Key, int]] = []
     for each in names:
         keys = [key_of(name) for name in each]

@@ -1,4 +1,4 @@
-"""The files that data is written to before it takes its name, and what kills leave.
+"""Temporary files for atomic writes, and their clean-up.
 
 A part is locked as long as it is written, so that one whose lock can be had was left
 behind by a program that was killed. Windows lets no open file be renamed, and some
@@ -15,14 +15,14 @@ from typing import IO
 
 from lightpen.formats.file_locks import PAUSE, locked
 
-PATIENCE = 2.0  # s for one who sweeps to let go
+PATIENCE = 2.0  # s to wait for a clean-up in another process
 LONGEST_WRITE = 60.0  # s, after which a part that cannot be locked is taken as left
 _NAME = re.compile(r"\.[0-9a-f]{16}\.part")
 
 
 @contextlib.contextmanager
 def part_of(target: Path, data: bytes) -> Iterator[Path]:
-    """Put data on the disk beside its target, until it has a name of its own.
+    """Write data to a temporary file beside its target.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def part_of(target: Path, data: bytes) -> Iterator[Path]:
 
 
 def renamed(rename: Callable[[Path], object], target: Path) -> None:
-    """Give a part its name; on Windows, wait for those who look into it meanwhile.
+    """Rename a temporary file; on Windows, retry while it is open elsewhere.
 
     Scanners for viruses open what was just written, others the file that is replaced,
     and both keep Windows from renaming.
@@ -67,7 +67,7 @@ def renamed(rename: Callable[[Path], object], target: Path) -> None:
 
 
 def sweep_parts(folder: Path) -> None:
-    """Remove what writes that were killed have left in a folder, where that can be."""
+    """Remove temporary files of interrupted writes from a folder, if possible."""
     with contextlib.suppress(OSError):  # they do no harm where they are
         for path in list(folder.iterdir()):
             if _NAME.fullmatch(path.name):
@@ -75,7 +75,7 @@ def sweep_parts(folder: Path) -> None:
 
 
 def _own_part(folder: Path) -> tuple[Path, IO[bytes]]:
-    """Make a part that nobody else takes as left."""
+    """Create a temporary file that no clean-up removes."""
     while True:
         part = folder / f".{os.urandom(8).hex()}.part"
         stream = part.open("xb")

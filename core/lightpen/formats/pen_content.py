@@ -1,4 +1,4 @@
-"""What a pen file states, in whatever layout, and what it may."""
+"""The content of a pen file of any layout, and its permitted ranges."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,8 +7,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, UsageError
+from lightpen.messages import Message
 from lightpen.model.pen import Pen
-from lightpen.sentences import Sentence, sentence
 
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4}
 LARGEST_DIAMETER = 100.0  # mm
@@ -35,7 +35,7 @@ RANGES = {
 
 @dataclass(frozen=True, eq=False)
 class PenContent:
-    """What a pen file states, in mm; None is what it leaves out."""
+    """The content of a pen file, mm; None where it states nothing."""
 
     leds: FloatArray
     normals: FloatArray | None
@@ -63,25 +63,11 @@ def agreed_unit(stated: str, given: str | None, name: str) -> str:
     """
     if stated and given and stated != given:
         raise UsageError(
-            sentence(
-                "pen-file.contradicting-units",
-                "{name} states its lengths in {stated}, but the unit {given} is "
-                "given. Leave the unit away, or correct the file.",
-                name=name,
-                stated=stated,
-                given=given,
-            )
+            "pen-file.contradicting-units", name=name, stated=stated, given=given
         )
     unit = stated or given
     if not unit:
-        raise UsageError(
-            sentence(
-                "pen-file.no-units",
-                "{name} does not say which units its coordinates have. Name them, "
-                "or write them into the header: led,x_mm,y_mm,z_mm.",
-                name=name,
-            )
-        )
+        raise UsageError("pen-file.no-units", name=name)
     return unit
 
 
@@ -96,22 +82,18 @@ def checked_number(what: str, number: float, name: str) -> float:
     least, most = RANGES[what]
     if not least < number <= most:
         raise FileError(
-            sentence(
-                "pen-file.number",
-                "{name} has the {what} {number:g}. A number above {least:g} and up to "
-                "{most:g} is needed; leave it away if it is not known.",
-                name=name,
-                what=what,
-                number=number,
-                least=least,
-                most=most,
-            )
+            "pen-file.number",
+            name=name,
+            what=what,
+            number=number,
+            least=least,
+            most=most,
         )
     return number
 
 
 def check_diameter(diameter: float, name: str) -> None:
-    """Refuse discs, mm, that no LED has.
+    """Refuse an implausible disc diameter, mm.
 
     Raises
     ------
@@ -120,18 +102,11 @@ def check_diameter(diameter: float, name: str) -> None:
     """
     if not 0 < diameter <= LARGEST_DIAMETER:
         raise FileError(
-            sentence(
-                "pen-file.diameter",
-                "{name} has LED discs {diameter:g} mm wide. A diameter of up to "
-                "{most:g} mm is needed; check its units.",
-                name=name,
-                diameter=diameter,
-                most=LARGEST_DIAMETER,
-            )
+            "pen-file.diameter", name=name, diameter=diameter, most=LARGEST_DIAMETER
         )
 
 
-def unit_normal(normal: FloatArray, place: str | Sentence) -> FloatArray:
+def unit_normal(normal: FloatArray, place: str | Message) -> FloatArray:
     """Return a normal (3,) of unit length, unchanged if it has it but for rounding.
 
     Raises
@@ -142,19 +117,15 @@ def unit_normal(normal: FloatArray, place: str | Sentence) -> FloatArray:
     squared = float(normal @ normal) if np.abs(normal).max() < 2 else np.inf
     if abs(squared - 1) > 2 * NORMAL_TOLERANCE:
         raise FileError(
-            sentence(
-                "pen-file.normal-length",
-                "{place}: the normal {normal} does not have the length 1. Correct "
-                "it, or leave the normals away if all discs face +z.",
-                place=place,
-                normal=" ".join(f"{c:g}" for c in normal),
-            )
+            "pen-file.normal-length",
+            place=place,
+            normal=" ".join(f"{c:g}" for c in normal),
         )
     return normal if abs(squared - 1) < 1e-9 else normal / np.sqrt(squared)
 
 
 def stated_numbers(pen: Pen) -> dict[str, float]:
-    """Return what is known of a pen under the names of `RANGES`."""
+    """Return the numbers stated for a pen, by the names of `RANGES`."""
     return {
         what: float(number)
         for what in RANGES

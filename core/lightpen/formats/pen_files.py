@@ -46,16 +46,10 @@ from lightpen.formats.pen_content import LARGEST_DIAMETER, UNITS, PenContent
 from lightpen.formats.pen_json import from_json, json_text
 from lightpen.formats.pen_tables import csv_text, from_table
 from lightpen.formats.tables import parse_table
-from lightpen.model.pen import (
-    DISC_DIAMETER,
-    Pen,
-    check_frame,
-    check_leds,
-    in_pen_frame,
-)
-from lightpen.sentences import sentence
+from lightpen.messages import message
+from lightpen.model.pen import DISC_DIAMETER, Pen, check_frame, check_leds, in_pen_frame
 
-PEN_FILE = sentence("file.pen", "pen file")
+PEN_FILE = message("file.pen")
 PEN_FILE_LIMIT = MEGABYTE
 
 
@@ -135,7 +129,7 @@ def read_raw_pen(
 
 
 def read_unchecked_pen(path: Path, units: str | None = None) -> Pen:
-    """Read a pen to be looked at and mended: its LEDs may stand anywhere.
+    """Read a pen for inspection and repair, without checking its LEDs.
 
     Parameters
     ----------
@@ -176,25 +170,10 @@ def write_pen(pen: Pen, path: Path, parent_sha256: str = "") -> None:
     elif suffix == ".csv":
         extras = pen.nominal_tip, pen.led_covariance
         if pen.name or any(each is not None for each in extras):
-            raise UsageError(
-                sentence(
-                    "pen-file.table-has-no-place",
-                    "{name} is a table, which has no place for the name, the nominal "
-                    "tip and the covariance of the pen. Choose a name that ends in "
-                    ".json.",
-                    name=printable(path.name),
-                )
-            )
+            raise UsageError("pen-file.table-has-no-place", name=printable(path.name))
         text = csv_text(pen)
     else:
-        raise UsageError(
-            sentence(
-                "pen-file.suffix",
-                "A pen is written as .csv or .json, but {name} ends in neither. "
-                "Choose such a name.",
-                name=printable(path.name),
-            )
-        )
+        raise UsageError("pen-file.suffix", name=printable(path.name))
     write_whole(path, text.encode())
 
 
@@ -203,13 +182,7 @@ def _pen(
 ) -> Pen:
     if diameter is not None and not 0 < diameter <= LARGEST_DIAMETER:
         raise UsageError(
-            sentence(
-                "pen-file.given-diameter",
-                "The LED discs cannot be {diameter:g} mm wide. Give a diameter of "
-                "up to {most:g} mm.",
-                diameter=diameter,
-                most=LARGEST_DIAMETER,
-            )
+            "pen-file.given-diameter", diameter=diameter, most=LARGEST_DIAMETER
         )
     if nominal_tip is None:
         nominal_tip = content.nominal_tip
@@ -230,14 +203,7 @@ def _pen(
 
 
 def _flawed(path: Path, flaw: FileError) -> FileError:
-    return FileError(
-        sentence(
-            "pen-file.flawed",
-            "{name}: {flaw}",
-            name=printable(path.name),
-            flaw=flaw.sentence,
-        )
-    )
+    return FileError("pen-file.flawed", name=printable(path.name), flaw=flaw.message)
 
 
 def _facing_normals(n_leds: int) -> FloatArray:
@@ -247,12 +213,7 @@ def _facing_normals(n_leds: int) -> FloatArray:
 def _read(path: Path, units: str | None) -> PenContent:
     if units is not None and units not in UNITS:
         raise UsageError(
-            sentence(
-                "pen-file.unknown-unit",
-                "{unit} is not a unit of length known here. Choose one of {known}.",
-                unit=quoted(units),
-                known=", ".join(UNITS),
-            )
+            "pen-file.unknown-unit", unit=quoted(units), known=", ".join(UNITS)
         )
     text = read_text(path, PEN_FILE, PEN_FILE_LIMIT)
     name = printable(path.name)

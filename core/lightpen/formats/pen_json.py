@@ -21,8 +21,8 @@ from lightpen.formats.pen_content import (
     stated_numbers,
     unit_normal,
 )
+from lightpen.messages import message
 from lightpen.model.pen import Pen
-from lightpen.sentences import sentence
 
 _LED_KEYS = {"led", "x", "y", "z", "normal"}
 _FILE_KEYS = {
@@ -52,27 +52,16 @@ def from_json(tree: Tree, units: str | None, name: str) -> PenContent:
         The units are neither stated nor given, or both and different.
     """
     if not isinstance(tree, dict):
-        raise FileError(
-            sentence(
-                "pen-file.list",
-                "{name} is a list; a pen file is a mapping with leds and units. "
-                "Write it so.",
-                name=name,
-            )
-        )
+        raise FileError("pen-file.list", name=name)
     entries = Entries.of(tree, name)
     entries.refuse_others(*_FILE_KEYS)
     stated = entries.word("units").casefold()
     if stated and stated not in UNIT_NAMES:
         raise FileError(
-            sentence(
-                "pen-file.unknown-units-in-file",
-                "{name} has the units {unit}, which are not known here. Use one of "
-                "{known}.",
-                name=name,
-                unit=quoted(stated),
-                known=", ".join(UNITS),
-            )
+            "pen-file.unknown-units-in-file",
+            name=name,
+            unit=quoted(stated),
+            known=", ".join(UNITS),
         )
     unit = UNITS[agreed_unit(UNIT_NAMES.get(stated, ""), units, name)]
     leds = _listed_leds(entries, name)
@@ -113,52 +102,27 @@ def _covariance(
     off = float(np.abs(matrix - matrix.T).max())
     size = float(np.abs(np.diag(matrix)).max())
     if off > ASYMMETRY * size or np.linalg.eigvalsh(matrix)[0] < -ASYMMETRY * size:
-        raise FileError(
-            sentence(
-                "pen-file.no-covariance",
-                "The led_covariance of {name} is none: it must be symmetric, and no "
-                "variance below 0. Leave it away, or give it as it was written.",
-                name=name,
-            )
-        )
+        raise FileError("pen-file.no-covariance", name=name)
     return matrix
 
 
 def _listed_leds(entries: Entries, name: str) -> list[Entries]:
     listed = entries.value("leds")
     if not isinstance(listed, list) or not listed:
-        raise FileError(
-            sentence(
-                "pen-file.no-led-list",
-                "leds in {name} is no list of LEDs. Write it as "
-                '[{{"led": 1, "x": 0, "y": 0, "z": -30}}, ...].',
-                name=name,
-            )
-        )
+        raise FileError("pen-file.no-led-list", name=name)
     leds = []
     for number, tree in enumerate(listed, 1):
-        place = sentence("pen-file.led", "LED {led} of {name}", led=number, name=name)
+        place = message("pen-file.led", led=number, name=name)
         if not isinstance(tree, dict):
-            raise FileError(
-                sentence(
-                    "pen-file.led-no-mapping",
-                    "{place} is no mapping. Write it as "
-                    '{{"led": 1, "x": 0, "y": 0, "z": -30}}.',
-                    place=place,
-                )
-            )
+            raise FileError("pen-file.led-no-mapping", place=place)
         led = Entries.of(tree, place)
         led.refuse_others(*_LED_KEYS)
         if led.counted(1, "led")[0] != number:
             raise FileError(
-                sentence(
-                    "pen-file.entry-out-of-order",
-                    "Entry {number} of leds in {name} is LED {led:g}. List the LEDs "
-                    "from 1 in ascending order, each once.",
-                    number=number,
-                    name=name,
-                    led=led.counted(1, "led")[0],
-                )
+                "pen-file.entry-out-of-order",
+                number=number,
+                name=name,
+                led=led.counted(1, "led")[0],
             )
         leds.append(led)
     return leds
@@ -169,20 +133,12 @@ def _listed_normals(leds: list[Entries], name: str) -> FloatArray | None:
     if not any(given):
         return None
     if not all(given):
-        raise FileError(
-            sentence(
-                "pen-file.some-normals",
-                "LED {led} of {name} has no normal, but others have. Give the "
-                "normals of all LEDs or of none.",
-                led=given.index(False) + 1,
-                name=name,
-            )
-        )
+        raise FileError("pen-file.some-normals", led=given.index(False) + 1, name=name)
     return np.array([unit_normal(led.counted(3, "normal"), led.name) for led in leds])
 
 
 def json_text(pen: Pen, parent_sha256: str) -> str:
-    """Return a pen as JSON, with the hash of the file it was made better from."""
+    """Return a pen as JSON, with the hash of the file it was improved from."""
     leds = [
         {"led": number, "x": led[0], "y": led[1], "z": led[2], "normal": normal}
         for number, (led, normal) in enumerate(

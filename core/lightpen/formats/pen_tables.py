@@ -19,8 +19,8 @@ from lightpen.formats.pen_content import (
     unit_normal,
 )
 from lightpen.formats.tables import Table
+from lightpen.messages import message
 from lightpen.model.pen import Pen
-from lightpen.sentences import sentence
 
 _LED_NAMES = ("led", "no", "no.", "nr", "nr.", "number", "id", "point")
 _COORDINATES = (("x",), ("y",), ("z",))
@@ -50,21 +50,12 @@ def from_table(table: Table, units: str | None) -> PenContent:
     stated = {unit for name, unit in named if unit and name in ("x", "y", "z")}
     if len(stated) > 1:
         one, other = sorted(stated)[:2]
-        raise FileError(
-            sentence(
-                "pen-file.mixed-units",
-                "{name} has coordinates in {one} and in {other}. Give all of them "
-                "in one unit.",
-                name=table.name,
-                one=one,
-                other=other,
-            )
-        )
+        raise FileError("pen-file.mixed-units", name=table.name, one=one, other=other)
     unit = agreed_unit(stated.pop() if stated else "", units, table.name)
     bare = replace(table, header=tuple(name for name, _ in named))
     with_normals = "nx" in bare.header or (not bare.header and bare.n_columns == 7)
     wanted = [_LED_NAMES, *_COORDINATES, *(_NORMALS if with_normals else ())]
-    columns = bare.columns(wanted, sentence("table.of-leds", "the LEDs of a pen"))
+    columns = bare.columns(wanted, message("table.of-leds"))
     _check_numbering(table, columns[0])
     numbers = table.numbers(columns[1:])
     diameter = None
@@ -83,9 +74,7 @@ def from_table(table: Table, units: str | None) -> PenContent:
     if with_normals:
         normals = np.empty((len(numbers), 3))
         for i, line in enumerate(table.lines):
-            where = sentence(
-                "pen-file.line", "Line {line} of {name}", line=line, name=table.name
-            )
+            where = message("pen-file.line", line=line, name=table.name)
             normals[i] = unit_normal(numbers[i, 3:], where)
     return PenContent(numbers[:, :3] * UNITS[unit], normals, diameter, stated=further)
 
@@ -109,29 +98,13 @@ def _check_numbering(table: Table, column: int) -> None:
     found, needed = int(numbers[row]), row + 1
     earlier = np.flatnonzero(numbers[:row] == found)
     if len(earlier):
-        flaw = sentence(
-            "pen-file.listed-twice",
-            "LED {led} is listed already on line {line}.",
-            led=found,
-            line=table.lines[earlier[0]],
-        )
+        flaw = message("pen-file.listed-twice", led=found, line=table.lines[earlier[0]])
     elif needed in numbers:
-        flaw = sentence(
-            "pen-file.out-of-order",
-            "LED {led} stands where LED {needed} is needed. List the LEDs from 1 to "
-            "{n_leds} in ascending order.",
-            led=found,
-            needed=needed,
-            n_leds=len(numbers),
+        flaw = message(
+            "pen-file.out-of-order", led=found, needed=needed, n_leds=len(numbers)
         )
     else:
-        flaw = sentence(
-            "pen-file.gap",
-            "LED {led} stands where LED {needed} is needed, and no line has LED "
-            "{needed}. Number the LEDs from 1 without gaps.",
-            led=found,
-            needed=needed,
-        )
+        flaw = message("pen-file.gap", led=found, needed=needed)
     raise table.error(row, flaw)
 
 
@@ -142,10 +115,8 @@ def _common(table: Table, column: int, bare: Table) -> float:
     if np.any(other):
         raise table.error(
             int(np.argmax(other)),
-            sentence(
+            message(
                 "pen-file.column-differs",
-                "the {what} is {value:g} where the first LED has {first:g}. It must be "
-                "the same for all LEDs of a pen.",
                 what=bare.header[column],
                 value=numbers[other][0],
                 first=numbers[0],

@@ -1,4 +1,4 @@
-"""The cameras of a rig, and where each stands, as JSON (or YAML).
+"""Rig files: the cameras of a rig and their poses, as JSON or YAML.
 
 A rig file has ``cameras``, a list of which the first is the reference, and optionally a
 ``comment``, which is not read. Of each camera it has
@@ -38,12 +38,12 @@ from lightpen.formats.documents import parse_document
 from lightpen.formats.entries import Entries, is_covariance
 from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
 from lightpen.formats.simulated_files import is_simulated
+from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.rig import Rig
-from lightpen.model.rigid import nearest_rotation, rotation_from_quaternion
-from lightpen.sentences import Sentence, sentence
+from lightpen.model.rigid import nearest_rotation
 
-RIG_FILE = sentence("file.rig", "rig file")
+RIG_FILE = message("file.rig")
 RIG_FILE_LIMIT = MEGABYTE
 MAX_CAMERAS = 16
 LONGEST_NAME = 40  # characters
@@ -150,28 +150,12 @@ def write_rig(rig: Rig, path: Path, camera_files: Sequence[str]) -> None:
 def _listed_cameras(entries: Entries, name: str) -> list[Entries]:
     listed = entries.value("cameras")
     if not isinstance(listed, list) or not 2 <= len(listed) <= MAX_CAMERAS:
-        raise FileError(
-            sentence(
-                "rig-file.no-cameras",
-                "cameras in {name} is no list of 2 to {most} cameras. One camera alone "
-                "needs no rig file.",
-                name=name,
-                most=MAX_CAMERAS,
-            )
-        )
+        raise FileError("rig-file.no-cameras", name=name, most=MAX_CAMERAS)
     cameras = []
     for number, tree in enumerate(listed, 1):
-        place = sentence(
-            "rig-file.camera", "camera {number} of {name}", number=number, name=name
-        )
+        place = message("rig-file.camera", number=number, name=name)
         if not isinstance(tree, dict):
-            raise FileError(
-                sentence(
-                    "rig-file.no-mapping",
-                    "{place} is no mapping with name, intrinsics and cam_from_rig.",
-                    place=place,
-                )
-            )
+            raise FileError("rig-file.no-mapping", place=place)
         camera = Entries.of(tree, place)
         camera.refuse_others(*_CAMERA_KEYS)
         cameras.append(camera)
@@ -182,42 +166,20 @@ def _names(listed: list[Entries], name: str) -> tuple[str, ...]:
     names = tuple(printable(_text(each, _NAME))[:LONGEST_NAME] for each in listed)
     for c, each in enumerate(names):
         if each in names[:c]:
-            raise FileError(
-                sentence(
-                    "rig-file.name-twice",
-                    "{name} has two cameras called {camera}. Give each a name of its "
-                    "own.",
-                    name=name,
-                    camera=quoted(each),
-                )
-            )
+            raise FileError("rig-file.name-twice", name=name, camera=quoted(each))
     return names
 
 
 def _text(entries: Entries, key: str) -> str:
     text = entries.word(key)
     if not text:
-        raise FileError(
-            sentence(
-                "rig-file.no-text",
-                "{place} has no {key}, or one that is no text. Add it.",
-                place=entries.name,
-                key=key,
-            )
-        )
+        raise FileError("rig-file.no-text", place=entries.name, key=key)
     return text
 
 
 def _other_number(name: str, n_cameras: int, n_files: int) -> FileError:
     return FileError(
-        sentence(
-            "rig-file.other-number",
-            "{name} is of {n_cameras} cameras, and {n_files} files of cameras are "
-            "beside it. Restore it from a copy.",
-            name=name,
-            n_cameras=n_cameras,
-            n_files=n_files,
-        )
+        "rig-file.other-number", name=name, n_cameras=n_cameras, n_files=n_files
     )
 
 
@@ -228,15 +190,11 @@ def _camera_files(
     for c, file in enumerate(files):
         if file in files[:c]:
             raise FileError(
-                sentence(
-                    "rig-file.file-twice",
-                    "{name} gives {one} and {other} the same camera file {file}. Each "
-                    "camera needs the file of its own calibration.",
-                    name=printable(path.name),
-                    one=names[files.index(file)],
-                    other=names[c],
-                    file=printable(file.name),
-                )
+                "rig-file.file-twice",
+                name=printable(path.name),
+                one=names[files.index(file)],
+                other=names[c],
+                file=printable(file.name),
             )
     return files
 
@@ -246,41 +204,22 @@ def _read_of(rig_name: str, name: str, file: Path) -> Camera:
         return read_camera(file)
     except FileError as error:
         raise FileError(
-            sentence(
-                "rig-file.camera-file",
-                "{name} names the camera file of {camera}: {trouble}",
-                name=rig_name,
-                camera=name,
-                trouble=error.sentence,
-            )
+            "rig-file.camera-file", name=rig_name, camera=name, trouble=error.message
         ) from error
 
 
 def _require_reference(entries: Entries, camera: str, name: str) -> None:
-    """Refuse a first camera that stands elsewhere than in the frame of the rig."""
+    """Refuse a first camera that does not define the rig frame."""
     turned = entries.has(_ROTATION) and not np.allclose(
         _rotation(entries), np.eye(3), rtol=0, atol=ROUNDING_TOLERANCE
     )
     if turned or (entries.has(_TRANSLATION) and np.any(_translation(entries))):
-        raise FileError(
-            sentence(
-                "rig-file.no-reference",
-                "The first camera of {name}, {camera}, is the reference of the rig: "
-                "its cam_from_rig must be the identity. List the reference camera "
-                "first, and give the others from its frame.",
-                name=name,
-                camera=camera,
-            )
-        )
+        raise FileError("rig-file.no-reference", name=name, camera=camera)
     if entries.has(*_UNCERTAINTIES):
         raise FileError(
-            sentence(
-                "rig-file.uncertain-reference",
-                "{place} is the reference of the rig, where it stands is exact. Remove "
-                "its {key}.",
-                place=entries.name,
-                key=entries.entry(*_UNCERTAINTIES)[0],
-            )
+            "rig-file.uncertain-reference",
+            place=entries.name,
+            key=entries.entry(*_UNCERTAINTIES)[0],
         )
 
 
@@ -295,57 +234,32 @@ def _rotation(entries: Entries) -> FloatArray:
     matrix = entries.counted(9, _ROTATION).reshape(3, 3)
     deviation = np.abs(matrix @ matrix.T - np.eye(3)).max()
     if not deviation <= ROTATION_TOLERANCE:
-        raise FileError(
-            sentence(
-                "rig-file.no-rotation",
-                "{key} of {place} is no rotation: its rows must have the length 1 and "
-                "be at right angles to each other. Give the matrix row by row, or a "
-                "unit quaternion w x y z.",
-                key=_ROTATION,
-                place=entries.name,
-            )
-        )
+        raise FileError("rig-file.no-rotation", key=_ROTATION, place=entries.name)
     if np.linalg.det(matrix) < 0:
-        raise FileError(
-            sentence(
-                "rig-file.mirrored",
-                "{key} of {place} is a mirrored rotation (determinant -1). Both "
-                "cameras need right-handed frames: u right, v down, w forward.",
-                key=_ROTATION,
-                place=entries.name,
-            )
-        )
+        raise FileError("rig-file.mirrored", key=_ROTATION, place=entries.name)
     return matrix if deviation <= ROUNDING_TOLERANCE else nearest_rotation(matrix)
 
 
-def _from_quaternion(numbers: FloatArray, place: str | Sentence) -> FloatArray:
+def _from_quaternion(numbers: FloatArray, place: str | Message) -> FloatArray:
     length = float(np.linalg.norm(numbers))
     if not abs(length - 1) <= ROTATION_TOLERANCE:
         raise FileError(
-            sentence(
-                "rig-file.quaternion",
-                "{key} of {place} is a quaternion of length {length:.4g}; 1 is needed. "
-                "Give it as w x y z.",
-                key=_ROTATION,
-                place=place,
-                length=length,
-            )
+            "rig-file.quaternion", key=_ROTATION, place=place, length=length
         )
-    return rotation_from_quaternion(numbers / length)
+    from scipy.spatial.transform import Rotation  # takes 0.2 s
+
+    scalar, *vector = numbers.tolist()
+    return np.asarray(Rotation.from_quat([*vector, scalar]).as_matrix())
 
 
 def _translation(entries: Entries) -> FloatArray:
     translation = entries.counted(3, _TRANSLATION)
     if np.abs(translation).max() > LARGEST_TRANSLATION:
         raise FileError(
-            sentence(
-                "rig-file.far",
-                "{key} of {place} is more than {most:g} m. Check its units: "
-                "millimetres are needed.",
-                key=_TRANSLATION,
-                place=entries.name,
-                most=LARGEST_TRANSLATION / 1000,
-            )
+            "rig-file.far",
+            key=_TRANSLATION,
+            place=entries.name,
+            most=LARGEST_TRANSLATION / 1000,
         )
     return translation
 
@@ -358,14 +272,10 @@ def _covariance(
         return None
     if not all(stated):
         raise FileError(
-            sentence(
-                "rig-file.some-uncertain",
-                "{name} states how well it is known where {one} stands, but not of "
-                "{other}. State it of all cameras but the first, or of none.",
-                name=name,
-                one=names[stated.index(True)],
-                other=names[stated.index(False)],
-            )
+            "rig-file.some-uncertain",
+            name=name,
+            one=names[stated.index(True)],
+            other=names[stated.index(False)],
         )
     covariance = np.zeros((6 * len(listed), 6 * len(listed)))
     for c, each in enumerate(listed):
@@ -384,17 +294,7 @@ def _covariance_of(entries: Entries) -> FloatArray:
         covariance = entries.counted(36, _COVARIANCE).reshape(6, 6)
         is_right = is_covariance(covariance) and _is_positive(covariance)
     if not is_right or np.any(np.diag(covariance) > LARGEST_SIGMAS**2):
-        raise FileError(
-            sentence(
-                "rig-file.covariance",
-                "{key} of {place} must hold what the turn about x y z (rad) and the "
-                "translation (mm) are uncertain by: 6 standard deviations, none of "
-                "them negative, or a covariance, symmetric and positive; up to 1 rad "
-                "and 10 m. Correct or remove it.",
-                key=key,
-                place=entries.name,
-            )
-        )
+        raise FileError("rig-file.covariance", key=key, place=entries.name)
     return covariance
 
 

@@ -1,4 +1,4 @@
-"""The mark of a folder whose files were simulated.
+"""The mark of a folder with simulated files.
 
 A simulated camera file looks like a real one. Whoever writes simulated files leaves
 this mark beside them, so that what is computed from them is known to be simulated.
@@ -26,8 +26,7 @@ def mark_simulated(folder: Path) -> None:
 def is_simulated(path: Path) -> bool:
     """Return whether a file, or a folder of images, was simulated.
 
-    Images may be in a folder of their own beside the mark. What cannot be looked at is
-    taken for real.
+    Images may be in a subfolder beside the mark. Unreadable folders count as real.
     """
     folders = (path, path.parent, path.parent.parent)
     try:

@@ -1,25 +1,25 @@
-"""Why the system refuses a file, a folder or a port, to be told in any language."""
+"""Translatable reasons of operating system errors."""
 
 import errno
 
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 _REASONS = {  # as the C library words them
-    errno.EPERM: sentence("system.not-permitted", "Operation not permitted"),
-    errno.ENOENT: sentence("system.not-there", "No such file or directory"),
-    errno.EIO: sentence("system.input-output", "Input/output error"),
-    errno.EACCES: sentence("system.denied", "Permission denied"),
-    errno.ENOTDIR: sentence("system.no-folder", "Not a directory"),
-    errno.EMFILE: sentence("system.many-open", "Too many open files"),
-    errno.ENOSPC: sentence("system.full", "No space left on device"),
-    errno.EROFS: sentence("system.read-only", "Read-only file system"),
-    errno.ENAMETOOLONG: sentence("system.long-name", "File name too long"),
-    errno.ELOOP: sentence("system.loop", "Too many levels of symbolic links"),
-    errno.ETIMEDOUT: sentence("system.timed-out", "Connection timed out"),
+    errno.EPERM: message("system.not-permitted"),
+    errno.ENOENT: message("system.not-there"),
+    errno.EIO: message("system.input-output"),
+    errno.EACCES: message("system.denied"),
+    errno.ENOTDIR: message("system.no-folder"),
+    errno.EMFILE: message("system.many-open"),
+    errno.ENOSPC: message("system.full"),
+    errno.EROFS: message("system.read-only"),
+    errno.ENAMETOOLONG: message("system.long-name"),
+    errno.ELOOP: message("system.loop"),
+    errno.ETIMEDOUT: message("system.timed-out"),
 }
 
 
-def strerror(error: OSError) -> Sentence | str:
-    """Return why the system refuses; in its own words where these are not known."""
+def strerror(error: OSError) -> Message | str:
+    """Return the reason of an error; the system's own text where it is unknown."""
     known = _REASONS.get(error.errno or 0)
     return known or error.strerror or type(error).__name__

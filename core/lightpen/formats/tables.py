@@ -12,7 +12,7 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
 from lightpen.formats.files import printable, quoted, read_text
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 MAX_LINES = 300_000  # 30 000 frames of ten LEDs, 0.2 GB while they are read
 MAX_LINE_LENGTH = 10_000  # characters
@@ -24,15 +24,12 @@ LARGEST_WHOLE = 2**31 - 1  # of frame and LED numbers
 _NUMBER = r"(?a:[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?)"
 _NUMBER_CHARACTERS = b"0123456789+-.eE\n"
 _NOT_FINITE = r"(?i:[+-]?\.?(nan|inf|infinity|1\.#\w+))"
-_BLANK = sentence("look-alike.blank", "blank inside")
+_BLANK = message("look-alike.blank")
 _LOOK_ALIKES = {
-    **{
-        letter: sentence("look-alike.letter", "letter {letter}", letter=letter)
-        for letter in "OolISB"
-    },
-    "\N{MINUS SIGN}": sentence("look-alike.minus", "a typographic minus sign"),
-    "\N{EN DASH}": sentence("look-alike.dash", "a dash in place of a minus sign"),
-    "_": sentence("look-alike.underscore", "underscore"),
+    **{letter: message("look-alike.letter", letter=letter) for letter in "OolISB"},
+    "\N{MINUS SIGN}": message("look-alike.minus"),
+    "\N{EN DASH}": message("look-alike.dash"),
+    "_": message("look-alike.underscore"),
     " ": _BLANK,
     "\N{NO-BREAK SPACE}": _BLANK,
 }
@@ -46,7 +43,7 @@ class Table:
     Attributes
     ----------
     name : str
-        Name of the file, for the sentences.
+        Name of the file, for messages.
     header : tuple of str
         Column names in lower case; empty if the file has none.
     rows : list of list of str
@@ -65,7 +62,7 @@ class Table:
         """Number of columns."""
         return len(self.rows[0])
 
-    def columns(self, names: Sequence[Sequence[str]], what: Sentence) -> list[int]:
+    def columns(self, names: Sequence[Sequence[str]], what: Message) -> list[int]:
         """Return where columns are.
 
         A table without header has its columns in the order of `names`.
@@ -74,8 +71,8 @@ class Table:
         ----------
         names : sequence of sequences of str
             For each column the names it may have, the preferred one first.
-        what : Sentence
-            What the table holds, for the sentences.
+        what : Message
+            What the table holds, for messages.
 
         Raises
         ------
@@ -87,50 +84,37 @@ class Table:
             if self.n_columns == len(names):
                 return list(range(len(names)))
             n_columns = (
-                sentence("table.one-column", "1 column")
+                message("table.one-column")
                 if self.n_columns == 1
-                else sentence("table.columns", "{count} columns", count=self.n_columns)
+                else message("table.columns", count=self.n_columns)
             )
             raise FileError(
-                sentence(
-                    "table.no-header",
-                    "{name} has no header and {n_columns}; {what} need the {n_needed} "
-                    "columns {wanted}. Put a header line with these names on top, and "
-                    "separate the columns by commas, semicolons or tabs.",
-                    name=self.name,
-                    n_columns=n_columns,
-                    what=what,
-                    n_needed=len(names),
-                    wanted=wanted,
-                )
+                "table.no-header",
+                name=self.name,
+                n_columns=n_columns,
+                what=what,
+                n_needed=len(names),
+                wanted=wanted,
             )
         places = []
         for alternatives in names:
             found = [i for i, name in enumerate(self.header) if name in alternatives]
             if not found:
                 raise FileError(
-                    sentence(
-                        "table.no-column",
-                        "{name} has no column {column}; {what} need the columns "
-                        "{wanted}. Its header is {header}. Name the columns so.",
-                        name=self.name,
-                        column=alternatives[0],
-                        what=what,
-                        wanted=wanted,
-                        header=quoted(",".join(self.header)),
-                    )
+                    "table.no-column",
+                    name=self.name,
+                    column=alternatives[0],
+                    what=what,
+                    wanted=wanted,
+                    header=quoted(",".join(self.header)),
                 )
             if len(found) > 1:
                 raise FileError(
-                    sentence(
-                        "table.two-columns",
-                        "Columns {first} and {second} of {name} both hold {column}. "
-                        "Remove one of them.",
-                        first=found[0] + 1,
-                        second=found[1] + 1,
-                        name=self.name,
-                        column=alternatives[0],
-                    )
+                    "table.two-columns",
+                    first=found[0] + 1,
+                    second=found[1] + 1,
+                    name=self.name,
+                    column=alternatives[0],
                 )
             places.append(found[0])
         return places
@@ -180,29 +164,16 @@ class Table:
         if np.any(wrong):
             row = int(np.argmax(wrong))
             raise self.error(
-                row,
-                sentence(
-                    "table.not-whole",
-                    "{cell} is not a whole number.",
-                    cell=quoted(self.rows[row][column]),
-                ),
+                row, message("table.not-whole", cell=quoted(self.rows[row][column]))
             )
         return values.astype(np.int64)
 
-    def error(self, row: int, flaw: Sentence) -> FileError:
+    def error(self, row: int, flaw: Message) -> FileError:
         """Return the error that names the line of a row."""
-        return FileError(
-            sentence(
-                "table.line",
-                "Line {line} of {name}: {flaw}",
-                line=self.lines[row],
-                name=self.name,
-                flaw=flaw,
-            )
-        )
+        return FileError("table.line", line=self.lines[row], name=self.name, flaw=flaw)
 
     def _refuse_numbers(self, columns: Sequence[int]) -> NoReturn:
-        """Raise the error of the cell that keeps `numbers` from its result."""
+        """Raise the error of the first cell that is not a number."""
         first: dict[str, int] = {}
         for i, row in enumerate(self.rows):
             cells = [row[column] for column in columns]
@@ -217,16 +188,11 @@ class Table:
                     first.setdefault(mark, i)
         raise self.error(
             max(first.values()),
-            sentence(
-                "table.points-and-commas",
-                "the file has decimal points and decimal commas, the other ones on "
-                "line {line}. Use one of them throughout.",
-                line=self.lines[min(first.values())],
-            ),
+            message("table.points-and-commas", line=self.lines[min(first.values())]),
         )
 
 
-def read_table(path: Path, what: Sentence, limit: int) -> Table:
+def read_table(path: Path, what: Message, limit: int) -> Table:
     """Read a table from delimited text.
 
     The separator is found from the lines: semicolon, tab, comma or blanks. Numbers may
@@ -235,8 +201,8 @@ def read_table(path: Path, what: Sentence, limit: int) -> Table:
 
     Parameters
     ----------
-    what : Sentence
-        What the file is, for the sentences.
+    what : Message
+        What the file is, for messages.
     limit : int
         Largest size, bytes.
 
@@ -257,13 +223,7 @@ def parse_table(text: str, name: str) -> Table:
         separator = hint[1]
         del lines[0]
     if not lines:
-        raise FileError(
-            sentence(
-                "table.no-rows",
-                "{name} has no rows. Check that it is complete.",
-                name=name,
-            )
-        )
+        raise FileError("table.no-rows", name=name)
     numbers = [number for number, _ in lines]
     _check_cells(lines, separator, name)
     rows = [_cells(line, separator, number, name) for number, line in lines]
@@ -275,45 +235,30 @@ def parse_table(text: str, name: str) -> Table:
         header = tuple(cell.casefold() for cell in rows.pop(0))
         _check_header(header, numbers.pop(0), name)
     if not rows:
-        raise FileError(
-            sentence(
-                "table.only-header",
-                "{name} has a header but no rows below it.",
-                name=name,
-            )
-        )
+        raise FileError("table.only-header", name=name)
     table = Table(name, header, rows, numbers)
     if not text.endswith("\n"):
         _check_last_number(table)
     return table
 
 
-def number_flaw(text: str) -> Sentence | None:
-    """Return what keeps a text from being a finite number."""
+def number_flaw(text: str) -> Message | None:
+    """Return why a text is not a finite number; None if it is."""
     if re.fullmatch(_NUMBER, text):
         return None if math.isfinite(float(text)) else too_large_number(text)
     if not text:
-        return sentence("number.missing", "a cell is empty where a number is needed.")
+        return message("number.missing")
     if re.fullmatch(_NOT_FINITE, text):
-        return sentence(
-            "number.not-finite", "{cell} is not a finite number.", cell=quoted(text)
-        )
+        return message("number.not-finite", cell=quoted(text))
     for character, meaning in _LOOK_ALIKES.items():
         if character in text and any(map(str.isdigit, text)):
-            return sentence(
-                "number.look-alike",
-                "{cell} is not a number ({meaning}).",
-                cell=quoted(text),
-                meaning=meaning,
-            )
-    return sentence("number.none", "{cell} is not a number.", cell=quoted(text))
+            return message("number.look-alike", cell=quoted(text), meaning=meaning)
+    return message("number.none", cell=quoted(text))
 
 
-def too_large_number(text: str) -> Sentence:
-    """Return the flaw of a number beyond all that is measured."""
-    return sentence(
-        "number.too-large", "{cell} is too large a number.", cell=quoted(text)
-    )
+def too_large_number(text: str) -> Message:
+    """Return the flaw of a number that is too large."""
+    return message("number.too-large", cell=quoted(text))
 
 
 def _clean_numbers(cells: list[str]) -> FloatArray | None:
@@ -335,39 +280,18 @@ def _clean_numbers(cells: list[str]) -> FloatArray | None:
 def _filled_lines(text: str, name: str) -> list[tuple[int, str]]:
     """Return the lines that are neither blank nor comments, with their numbers."""
     if text.count("\n") > MAX_LINES:
-        raise FileError(
-            sentence(
-                "table.too-many-lines",
-                "{name} has more than {most} lines. Check that the right file is "
-                "named, or divide it.",
-                name=name,
-                most=MAX_LINES,
-            )
-        )
+        raise FileError("table.too-many-lines", name=name, most=MAX_LINES)
     lines = [
         (number, line)
         for number, line in enumerate(text.split("\n"), 1)
         if line and not line.isspace() and line.lstrip()[0] != "#"
     ]
     if not lines:
-        raise FileError(
-            sentence(
-                "table.only-comments",
-                "{name} has no lines but comments. Check that it is complete.",
-                name=name,
-            )
-        )
+        raise FileError("table.only-comments", name=name)
     for number, line in lines:
         if len(line) > MAX_LINE_LENGTH:
             raise FileError(
-                sentence(
-                    "table.long-line",
-                    "Line {line} of {name} has {n_characters} characters, which no "
-                    "row of a table has. Check that the right file is named.",
-                    line=number,
-                    name=name,
-                    n_characters=len(line),
-                )
+                "table.long-line", line=number, name=name, n_characters=len(line)
             )
     return lines
 
@@ -394,35 +318,20 @@ def _cells(line: str, separator: str | None, number: int, name: str) -> list[str
             )
         return [cell.strip() for cell in next(reader)]
     except csv.Error as error:
-        raise FileError(
-            sentence(
-                "table.quotation-marks",
-                "Line {line} of {name}: the quotation marks do not pair up. Remove "
-                "or complete them.",
-                line=number,
-                name=name,
-            )
-        ) from error
+        raise FileError("table.quotation-marks", line=number, name=name) from error
 
 
 def _check_cells(
     lines: list[tuple[int, str]], separator: str | None, name: str
 ) -> None:
-    """Refuse more or longer cells than are read, before they take any memory."""
+    """Refuse too many or too long cells before allocating memory."""
     if separator is None:
         n_cells = sum(len(line.split()) for _, line in lines)
     else:
         n_cells = sum(line.count(separator) for _, line in lines) + len(lines)
     if n_cells > MAX_CELLS:
         raise FileError(
-            sentence(
-                "table.too-many-cells",
-                "{name} has {n_cells:,} cells; at most {most:,} are read. Check that "
-                "the right file is named, or divide it.",
-                name=name,
-                n_cells=n_cells,
-                most=MAX_CELLS,
-            )
+            "table.too-many-cells", name=name, n_cells=n_cells, most=MAX_CELLS
         )
     for number, line in lines:
         if len(line) <= MAX_CELL_LENGTH:
@@ -430,15 +339,11 @@ def _check_cells(
         longest = max(len(cell.strip()) for cell in line.split(separator))
         if longest > MAX_CELL_LENGTH:
             raise FileError(
-                sentence(
-                    "table.long-cell",
-                    "Line {line} of {name} has a cell of {n_characters} characters; "
-                    "at most {most} are read. Check that the right file is named.",
-                    line=number,
-                    name=name,
-                    n_characters=longest,
-                    most=MAX_CELL_LENGTH,
-                )
+                "table.long-cell",
+                line=number,
+                name=name,
+                n_characters=longest,
+                most=MAX_CELL_LENGTH,
             )
 
 
@@ -454,29 +359,18 @@ def _check_lengths(
     for number, row in zip(numbers, rows, strict=True):
         if len(row) != expected:
             hint = (
-                sentence(
-                    "table.decimal-commas",
-                    "If numbers have decimal commas, separate the columns by "
-                    "semicolons.",
-                )
+                message("table.decimal-commas")
                 if separator == "," and len(row) > expected
-                else sentence(
-                    "table.short-line",
-                    "Complete the line; if it is the last one, the file is cut short.",
-                )
+                else message("table.short-line")
             )
             raise FileError(
-                sentence(
-                    "table.line-lengths",
-                    "Line {line} of {name} has {n_cells} cells where line "
-                    "{first_line} has {expected}. {hint}",
-                    line=number,
-                    name=name,
-                    n_cells=len(row),
-                    first_line=numbers[0],
-                    expected=expected,
-                    hint=hint,
-                )
+                "table.line-lengths",
+                line=number,
+                name=name,
+                n_cells=len(row),
+                first_line=numbers[0],
+                expected=expected,
+                hint=hint,
             )
 
 
@@ -485,31 +379,21 @@ def _check_header(header: tuple[str, ...], number: int, name: str) -> None:
     for column in header:
         if column in seen:
             raise FileError(
-                sentence(
-                    "table.column-twice",
-                    "Line {line} of {name}: the header names {column} twice. Give "
-                    "each column a name of its own.",
-                    line=number,
-                    name=name,
-                    column=quoted(column),
-                )
+                "table.column-twice", line=number, name=name, column=quoted(column)
             )
         seen.add(column)
 
 
 def _check_last_number(table: Table) -> None:
-    """Refuse a file whose writer was stopped within its last number."""
+    """Refuse a file truncated within its last number."""
     if len(table.rows) < _CUT_SHORT_ROWS:
         return
     decimals = [len(row[-1].partition(".")[2]) for row in table.rows]
     if len(set(decimals[:-1])) == 1 and decimals[-1] < decimals[0]:
         raise table.error(
             len(table.rows) - 1,
-            sentence(
+            message(
                 "table.cut-short",
-                "the file ends within the number {number}, which has {n_decimals} "
-                "decimals where all others have {n_others}. Copy the file again, or "
-                "remove the line.",
                 number=quoted(table.rows[-1][-1]),
                 n_decimals=decimals[-1],
                 n_others=decimals[0],

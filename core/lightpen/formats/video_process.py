@@ -1,10 +1,11 @@
-"""Videos decoded in a process of its own, whose memory has a limit.
+"""Decode videos in a separate process with limited memory.
 
 What a frame of a video takes is known only to its decoder: a stream of H.264 in 3 kB
 may say anywhere that its frames are 16000 x 16000 px from here on, and a gigabyte is
 asked for before anyone can look. A decoder that crashes takes no other process with it.
 """
 
+import ctypes
 import os
 import signal
 import sys
@@ -21,8 +22,90 @@ from lightpen.errors import FileError
 from lightpen.formats import videos
 from lightpen.formats.decoding import keep_freed_memory
 from lightpen.formats.files import printable
-from lightpen.formats.memory_limit import limit_memory
-from lightpen.sentences import sentence
+
+
+def limit_memory(more: int) -> None:
+    """Limit this process to its present memory plus ``more`` bytes.
+
+    It stays as it is where the system knows no such limit.
+
+    Raises
+    ------
+    OSError
+        The system refuses.
+    """
+    if sys.platform == "linux":
+        import resource
+
+        status = Path("/proc/self/status").read_text("ascii")
+        (data,) = (line for line in status.splitlines() if line.startswith("VmData:"))
+        most = int(data.split()[1]) * 1024 + more
+        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+        if hard == resource.RLIM_INFINITY or most < hard:
+            resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+    elif sys.platform == "win32":
+        _limit_committed(more)
+
+
+if sys.platform == "win32":
+    from ctypes import wintypes
+
+    EXTENDED_LIMITS = 9  # JobObjectExtendedLimitInformation
+    LIMIT_PROCESS_MEMORY = 0x100  # JOB_OBJECT_LIMIT_PROCESS_MEMORY
+
+    class _MemoryCounters(ctypes.Structure):
+        """PROCESS_MEMORY_COUNTERS_EX."""
+
+        _fields_ = (
+            ("cb", wintypes.DWORD),
+            ("PageFaultCount", wintypes.DWORD),
+            ("Sizes", ctypes.c_size_t * 8),
+            ("PrivateUsage", ctypes.c_size_t),
+        )
+
+    class _ExtendedLimits(ctypes.Structure):
+        """JOBOBJECT_EXTENDED_LIMIT_INFORMATION."""
+
+        _fields_ = (
+            ("Times", wintypes.LARGE_INTEGER * 2),
+            ("LimitFlags", wintypes.DWORD),
+            ("WorkingSetSizes", ctypes.c_size_t * 2),
+            ("ActiveProcessLimit", wintypes.DWORD),
+            ("Affinity", ctypes.c_size_t),
+            ("PriorityClass", wintypes.DWORD),
+            ("SchedulingClass", wintypes.DWORD),
+            ("IoInfo", ctypes.c_ulonglong * 6),
+            ("ProcessMemoryLimit", ctypes.c_size_t),
+            ("JobMemoryLimit", ctypes.c_size_t),
+            ("PeakProcessMemoryUsed", ctypes.c_size_t),
+            ("PeakJobMemoryUsed", ctypes.c_size_t),
+        )
+
+    def _limit_committed(more: int) -> None:
+        windows = ctypes.WinDLL("kernel32", use_last_error=True)
+        windows.GetCurrentProcess.restype = wintypes.HANDLE
+        windows.CreateJobObjectW.restype = wintypes.HANDLE
+        this = wintypes.HANDLE(windows.GetCurrentProcess())
+        has = _MemoryCounters(cb=ctypes.sizeof(_MemoryCounters))
+        _require(windows.K32GetProcessMemoryInfo(this, ctypes.byref(has), has.cb))
+        limits = _ExtendedLimits(
+            LimitFlags=LIMIT_PROCESS_MEMORY, ProcessMemoryLimit=has.PrivateUsage + more
+        )
+        # Its handle stays open: the job lasts as long as this process.
+        job = wintypes.HANDLE(_require(windows.CreateJobObjectW(None, None)))
+        size = ctypes.sizeof(limits)
+        _require(
+            windows.SetInformationJobObject(
+                job, EXTENDED_LIMITS, ctypes.byref(limits), size
+            )
+        )
+        _require(windows.AssignProcessToJobObject(job, this))
+
+    def _require(answer: int | None) -> int:
+        if not answer:
+            raise ctypes.WinError(ctypes.get_last_error())
+        return answer
+
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -45,7 +128,7 @@ def count_frames(path: Path) -> int:
 
 
 def frame_loaders(path: Path, n_frames: int) -> Iterator[Callable[[], Image]]:
-    """Yield a loader for each frame: it returns it in grey, or raises `FileError`."""
+    """Yield a loader for each frame; it returns a grey image or raises `FileError`."""
     with _decoder(_send_frames, path, n_frames) as receive:
         for _ in range(n_frames):
             try:
@@ -58,7 +141,7 @@ def frame_loaders(path: Path, n_frames: int) -> Iterator[Callable[[], Image]]:
 def _decoder(
     send: Callable[..., None], path: Path, *arguments: int
 ) -> Iterator[Callable[[], Any]]:
-    """Start a process that sends; yield what receives, or raises what it raised."""
+    """Start a decoding process; yield a function that receives from it."""
     from multiprocessing import get_context  # 10 ms of a start
 
     context = get_context("spawn")  # a fork would copy threads that hold locks
@@ -107,7 +190,7 @@ def _serve(
 
 
 def _hush_decoders() -> None:
-    """Keep from the console what FFmpeg writes there, a line for each damaged block."""
+    """Silence the messages of FFmpeg on the console."""
     sys.stderr = os.fdopen(os.dup(STDERR), "w")
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, STDERR)
@@ -134,11 +217,7 @@ def _loaded(frame: Image | FileError) -> Image:
 
 def _too_much(path: Path) -> FileError:
     return FileError(
-        sentence(
-            "video.too-much-memory",
-            "The video {path} cannot be decoded within {most:.0f} MB. Save its frames "
-            "as images.",
-            path=printable(str(path)),
-            most=MAX_DECODER_MEMORY / 1e6,
-        )
+        "video.too-much-memory",
+        path=printable(str(path)),
+        most=MAX_DECODER_MEMORY / 1e6,
     )

@@ -1,4 +1,4 @@
-"""The frames of a video, counted and decoded one after the other, in this process."""
+"""Count and decode the frames of a video in this process."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -12,7 +12,7 @@ from lightpen.errors import FileError
 from lightpen.formats.decoding import grey_image
 from lightpen.formats.files import printable, quoted
 from lightpen.formats.image_headers import check_pixels, read_image_header
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 MAX_VIDEO_FRAMES = 30_000
 MAX_VIDEO_PIXELS = 20_000_000  # of a frame, of which a decoder keeps several
@@ -28,7 +28,7 @@ CODECS = frozenset(
 
 
 def count_frames_in_process(path: Path) -> int:
-    """Return how many frames a video has, which its header need not say truly.
+    """Return the number of frames of a video, not trusting its header.
 
     They are counted as they come, not decoded.
 
@@ -48,13 +48,7 @@ def count_frames_in_process(path: Path) -> int:
         codec = _codec(stream)
         if stream.isOpened() and codec not in CODECS:
             raise FileError(
-                sentence(
-                    "video.codec",
-                    "The video {path} is coded as {codec}, which is not read here. "
-                    "Save it with FFV1 or MJPG, or save its frames as images.",
-                    path=printable(str(path)),
-                    codec=quoted(codec),
-                )
+                "video.codec", path=printable(str(path)), codec=quoted(codec)
             )
         n_frames = 0
         while n_frames <= MAX_VIDEO_FRAMES and stream.grab():
@@ -64,23 +58,10 @@ def count_frames_in_process(path: Path) -> int:
     finally:
         stream.release()
     if n_frames == 0:
-        raise FileError(
-            sentence(
-                "image.video",
-                "The video {path} cannot be opened, or holds no frames. Check that "
-                "it plays, or save its frames as images.",
-                path=printable(str(path)),
-            )
-        )
+        raise FileError("image.video", path=printable(str(path)))
     if n_frames > MAX_VIDEO_FRAMES:
         raise FileError(
-            sentence(
-                "video.too-many-frames",
-                "The video {path} has more than {most} frames. Cut out the swing, or "
-                "save its frames as images.",
-                path=printable(str(path)),
-                most=MAX_VIDEO_FRAMES,
-            )
+            "video.too-many-frames", path=printable(str(path)), most=MAX_VIDEO_FRAMES
         )
     return n_frames
 
@@ -88,7 +69,7 @@ def count_frames_in_process(path: Path) -> int:
 def frame_loaders_in_process(
     path: Path, n_frames: int
 ) -> Iterator[Callable[[], Image]]:
-    """Yield a loader for each frame: it returns it in grey, or raises `FileError`."""
+    """Yield a loader for each frame; it returns a grey image or raises `FileError`."""
     stream = _opened_video(path)
     try:
         for i in range(n_frames):
@@ -104,14 +85,7 @@ def _opened_video(path: Path, *parameters: int) -> cv2.VideoCapture:
         name = str(path)
         name.encode()
     except UnicodeEncodeError as error:  # OpenCV would crash
-        raise FileError(
-            sentence(
-                "video.path",
-                "The path of the video {path} is no valid UTF-8, which the video "
-                "decoder needs. Rename the video or its folder, or copy it elsewhere.",
-                path=printable(str(path)),
-            )
-        ) from error
+        raise FileError("video.path", path=printable(str(path))) from error
     # One thread: each takes the memory of some frames. Other backends than FFmpeg take
     # a name for a pattern, or for a description of a pipeline.
     return cv2.VideoCapture(
@@ -124,18 +98,16 @@ def _codec(stream: cv2.VideoCapture) -> str:
     return code.to_bytes(4, "little").decode("latin-1").upper()
 
 
-def _check_jpeg(data: bytes, name: Sentence) -> None:
+def _check_jpeg(data: bytes, name: Message) -> None:
     header = read_image_header(BytesIO(data), name)
     check_pixels(header.width, header.height, name, MAX_VIDEO_PIXELS)
 
 
-def _name(number: int) -> Sentence:
-    return sentence("image.frame", "Frame {number} of the video", number=number)
+def _name(number: int) -> Message:
+    return message("image.frame", number=number)
 
 
-def _frame(frame: Image | None, name: Sentence) -> Image:
+def _frame(frame: Image | None, name: Message) -> Image:
     if frame is None:
-        raise FileError(
-            sentence("image.frame-undecodable", "{name} cannot be decoded.", name=name)
-        )
+        raise FileError("image.frame-undecodable", name=name)
     return frame

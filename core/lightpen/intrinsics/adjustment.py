@@ -37,8 +37,8 @@ from lightpen.intrinsics.start import BoardPoses
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
+from lightpen.model.information import inverse
 from lightpen.model.rigid import rotation_from_vector, skew
-from lightpen.sentences import sentence
 
 MAX_STEPS = 100
 MAX_DAMPING = 1e12
@@ -46,6 +46,7 @@ FIRST_DAMPING = 1e-3
 CONVERGED = 1e-7  # of the sum of squares; far below what changes a digit that is shown
 FINEST = 1e-4  # px; exact points that weigh more drown the priors in rounding
 NOISE_ROUNDS = 3
+ROUNDING = 1e-9  # of a variance; a standard deviation for 0
 VAGUE = 1e-13  # least eigenvalue of an information matrix scaled to ones
 
 
@@ -130,7 +131,7 @@ def fit_board_poses(views: Views, state: BoardState) -> FloatArray:
 def view_information(
     board: Board, state: BoardState, image_size: tuple[int, int]
 ) -> FloatArray:
-    """Return what views of a single camera would tell of all but their poses.
+    """Return the information of views by one camera, poses eliminated.
 
     Parameters
     ----------
@@ -159,15 +160,7 @@ def _settled(
     state, damping = start, FIRST_DAMPING
     residuals = _residuals(views, state)
     if np.isinf(residuals).any():
-        raise CalibrationError(
-            sentence(
-                "intrinsics.no-start",
-                "No camera sees a flat board {board} as the points have it: it has "
-                "other squares than said, or the images are not of one camera. Count "
-                "and measure its squares again.",
-                board=views.board.name,
-            )
-        )
+        raise CalibrationError("intrinsics.no-start", board=views.board.name)
     system = _system(views, state, residuals)
     cost = _cost_of(system.residuals, state, origin, prior, sigma)
     for _ in range(MAX_STEPS):
@@ -185,16 +178,7 @@ def _settled(
         system = _system(views, state, there)
         if gained <= CONVERGED * (cost + 1e-12):
             return state, system
-    raise CalibrationError(
-        sentence(
-            "intrinsics.not-settled",
-            "The adjustment did not settle in {n_steps} steps: the views are too "
-            "alike, or of another board than was said. Add views with the board tilted "
-            "by 20 to 40 degrees to each side, and reaching into each corner of the "
-            "image; if there are some, count and measure its squares again.",
-            n_steps=MAX_STEPS,
-        )
-    )
+    raise CalibrationError("intrinsics.not-settled", n_steps=MAX_STEPS)
 
 
 def _step(
@@ -383,13 +367,10 @@ def _prior(
 
 
 def stated_information(covariance: FloatArray) -> FloatArray:
-    """Return what a file tells, its covariance given; exact is nearly so."""
-    sigmas = np.sqrt(np.diag(covariance))
-    sigmas = np.where(sigmas > 0, sigmas, 1e-9)
-    correlations = covariance / np.outer(sigmas, sigmas)
-    np.fill_diagonal(correlations, 1.0)
-    correlations += 1e-9 * np.eye(len(sigmas))
-    return np.asarray(np.linalg.inv(correlations) / np.outer(sigmas, sigmas))
+    """Return the information of intrinsics with this covariance, (4 + n, 4 + n)."""
+    variances = np.diag(covariance)
+    floor = np.where(variances > 0, ROUNDING * variances, ROUNDING**2)
+    return inverse(covariance + np.diag(floor))
 
 
 def _inverse(information: FloatArray) -> FloatArray:
@@ -403,14 +384,7 @@ def _inverse(information: FloatArray) -> FloatArray:
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
     if values[0] < VAGUE:
-        raise CalibrationError(
-            sentence(
-                "intrinsics.open",
-                "The views leave the camera open: they are too alike. Add views with "
-                "the board tilted by 20 to 40 degrees to each side, and reaching into "
-                "each corner of the image.",
-            )
-        )
+        raise CalibrationError("intrinsics.open")
     inverse = (vectors / values) @ vectors.T
     return np.asarray(inverse * np.outer(scale, scale))
 

@@ -1,4 +1,4 @@
-"""All that the points of a board in views depend on, and how a fit knows it."""
+"""State of a board adjustment, and its fit."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -15,7 +15,7 @@ N_POSE, N_SHAPE = 6, 5
 
 @dataclass(frozen=True, eq=False)
 class BoardState:
-    """Everything that the points of the views depend on.
+    """All parameters that the points of the views depend on.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class BoardState:
 
 @dataclass(frozen=True, eq=False)
 class BoardFit:
-    """A state that fits the views, and how well it is known.
+    """A fitted state with its covariance.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class BoardFit:
         return np.asarray(np.sqrt(sums / np.where(counts > 0, counts, np.nan)))
 
     def of_intrinsics(self, camera: int) -> slice:
-        """Return where the intrinsics of a camera stand among the unknowns."""
+        """Return the indices of the intrinsics of a camera."""
         return intrinsics_at(self.state.cameras)[camera]
 
     def prior_of(self, camera: int) -> FloatArray:
@@ -113,12 +113,12 @@ class BoardFit:
 
     @property
     def of_places(self) -> slice:
-        """Where the places of all cameras but the first stand."""
+        """Indices of the extrinsics of all cameras but the first."""
         return places_at(self.state.cameras)
 
     @property
     def of_shape(self) -> slice:
-        """Where the errors of the board stand."""
+        """Indices of the errors of the board."""
         at = self.of_places
         return slice(at.stop, at.stop + N_SHAPE)
 
@@ -144,12 +144,12 @@ def deformations_of(board: Board) -> FloatArray:
 
 
 def intrinsics_at(cameras: tuple[Camera, ...]) -> list[slice]:
-    """Return where the intrinsics of each camera stand among the unknowns."""
+    """Return the indices of the intrinsics of each camera."""
     ends = np.cumsum([len(camera.intrinsics) for camera in cameras]).tolist()
     return [slice(b, e) for b, e in zip([0, *ends[:-1]], ends, strict=True)]
 
 
 def places_at(cameras: tuple[Camera, ...]) -> slice:
-    """Return where the places of all cameras but the first stand."""
+    """Return the indices of the extrinsics of all cameras but the first."""
     begin = sum(len(camera.intrinsics) for camera in cameras)
     return slice(begin, begin + N_POSE * (len(cameras) - 1))

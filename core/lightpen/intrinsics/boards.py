@@ -29,7 +29,6 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import UsageError
-from lightpen.sentences import sentence
 
 MIN_SIDE, MAX_SIDE = 2, 100  # points or squares along a side
 MAX_LENGTH = 10_000.0  # mm
@@ -42,7 +41,7 @@ FORMS = (
 
 
 class BoardKind(StrEnum):
-    """What a board shows."""
+    """Kinds of boards."""
 
     CHESSBOARD = "chessboard"
     CHARUCO = "charuco"
@@ -59,11 +58,7 @@ class BoardKind(StrEnum):
     @property
     def has_markers(self) -> bool:
         """Whether each of its points has a number of its own."""
-        return self in (
-            BoardKind.CHARUCO,
-            BoardKind.LEGACY_CHARUCO,
-            BoardKind.MARKERS,
-        )
+        return self in (BoardKind.CHARUCO, BoardKind.LEGACY_CHARUCO, BoardKind.MARKERS)
 
 
 @dataclass(frozen=True)
@@ -93,7 +88,7 @@ class Board:
 
     @property
     def name(self) -> str:
-        """The word that tells the board."""
+        """The description of the board."""
         parts = [self.kind.value, f"{self.columns}x{self.rows}", f"{self.pitch:g}"]
         if self.kind is not BoardKind.CHESSBOARD:
             parts.append(f"{self.detail:g}")
@@ -155,7 +150,7 @@ def marker_dictionary(board: Board) -> cv2.aruco.Dictionary:
 
 
 def parse_board(text: str) -> Board:
-    """Return the board that a word tells; see the module for the forms.
+    """Parse a description of a board; see the module for the forms.
 
     Raises
     ------
@@ -192,20 +187,15 @@ def _length(word: str, text: str) -> float:
 
 
 def _check(board: Board, text: str) -> None:
-    """Refuse what cannot be."""
+    """Refuse impossible numbers."""
     if not all(MIN_SIDE <= n <= MAX_SIDE for n in (board.columns, board.rows)):
         raise UsageError(
-            sentence(
-                "board.size",
-                "The board {text} has {columns} x {rows} points or squares; {least} to "
-                "{most} are needed along each side. Count them again: of a chessboard "
-                "it is the inner corners that count.",
-                text=text,
-                columns=board.columns,
-                rows=board.rows,
-                least=MIN_SIDE,
-                most=MAX_SIDE,
-            )
+            "board.size",
+            text=text,
+            columns=board.columns,
+            rows=board.rows,
+            least=MIN_SIDE,
+            most=MAX_SIDE,
         )
     is_smaller = (
         board.kind is BoardKind.MARKERS
@@ -214,40 +204,21 @@ def _check(board: Board, text: str) -> None:
     )
     has_detail = board.detail > 0 or board.kind is BoardKind.CHESSBOARD
     if not (0 < board.pitch <= MAX_LENGTH and has_detail and is_smaller):
-        raise UsageError(
-            sentence(
-                "board.lengths",
-                "The lengths of the board {text} cannot be: they are in mm, above 0, "
-                "and markers or circles are smaller than what they stand in. Measure "
-                "them again.",
-                text=text,
-            )
-        )
+        raise UsageError("board.lengths", text=text)
     if not board.kind.has_markers:
         return
     if not board.dictionary.startswith("DICT_") or not hasattr(
         cv2.aruco, board.dictionary
     ):
-        raise UsageError(
-            sentence(
-                "board.dictionary",
-                "The board {text} names markers that are not known here. Name the "
-                "dictionary as OpenCV does, such as DICT_5X5_100.",
-                text=text,
-            )
-        )
+        raise UsageError("board.dictionary", text=text)
     known = len(marker_dictionary(board).bytesList)
     if n_markers(board) > known:
         raise UsageError(
-            sentence(
-                "board.markers",
-                "The board {text} needs {needed} markers, {dictionary} has {known}. "
-                "Name the dictionary that it was printed from.",
-                text=text,
-                needed=n_markers(board),
-                dictionary=board.dictionary,
-                known=known,
-            )
+            "board.markers",
+            text=text,
+            needed=n_markers(board),
+            dictionary=board.dictionary,
+            known=known,
         )
 
 
@@ -258,14 +229,7 @@ def n_markers(board: Board) -> int:
 
 
 def _no_board(text: str) -> UsageError:
-    return UsageError(
-        sentence(
-            "board.form",
-            "{text} is no board. Name it in a form such as {forms}; lengths are in mm.",
-            text=text,
-            forms=FORMS,
-        )
-    )
+    return UsageError("board.form", text=text, forms=FORMS)
 
 
 def _lattice(columns: int, rows: int) -> FloatArray:

@@ -26,8 +26,9 @@ from lightpen.intrinsics.distortion import (
 from lightpen.intrinsics.start import start_board_poses, start_camera
 from lightpen.intrinsics.uncertainty_map import error_fields
 from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
-from lightpen.sentences import Sentence, sentence
+from lightpen.model.quantiles import normal_quantile
 
 MIN_VIEWS = 5
 ENOUGH_VIEWS = 15
@@ -42,12 +43,11 @@ LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
 CONTRADICTED = 3.0  # standard deviations
 STRETCHED = 1e-3  # relative: less is no printer's doing
 LET_GO, LET_GO_MM = 0.1, 5.0  # of a board that is not what it was said to be
-MAD = 1.4826
 
 
 @dataclass(frozen=True, eq=False)
 class ViewHalves:
-    """What every second view says, and the views between them.
+    """Split-half check: odd views against even ones.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class CameraCalibration:
         By which the variances of independent noise were multiplied.
     halves : ViewHalves or None
         None where there are too few views.
-    remarks : tuple of Sentence
+    remarks : tuple of Message
         What is not as it should be.
     """
 
@@ -97,7 +97,7 @@ class CameraCalibration:
     held_out: FloatArray
     correlation: float
     halves: ViewHalves | None
-    remarks: tuple[Sentence, ...]
+    remarks: tuple[Message, ...]
 
     @property
     def held_out_rms(self) -> float:
@@ -117,7 +117,7 @@ def calibrate_camera(
     calibrated_on: date | None = None,
     report: Callable[[float], None] = lambda fraction: None,
 ) -> CameraCalibration:
-    """Calibrate a camera by what it saw of a board.
+    """Calibrate a camera by views of a board.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def calibrate_camera(
         fitted = fit_camera(kept, tolerances, fitted.state.cameras[0])
     report(0.2)
     choice, fitted, held_out = choose_distortion(kept, tolerances, fitted, report)
-    remarks = _remarks_on_board(fitted, denied, stated)
+    remarks = _messages_on_board(fitted, denied, stated)
     if choice.remark is not None:
         remarks = (*remarks, choice.remark)
     _require_determined(fitted)
@@ -175,15 +175,10 @@ def require_views(views: Views) -> None:
     """
     if views.n_views < MIN_VIEWS:
         raise CalibrationError(
-            sentence(
-                "intrinsics.few-views",
-                "The board is seen in {n_views} images; at least {least} are needed, "
-                "{enough} are better. Add views with the board tilted by 20 to 40 "
-                "degrees to each side, and in each corner of the image.",
-                n_views=views.n_views,
-                least=MIN_VIEWS,
-                enough=ENOUGH_VIEWS,
-            )
+            "intrinsics.few-views",
+            n_views=views.n_views,
+            least=MIN_VIEWS,
+            enough=ENOUGH_VIEWS,
         )
 
 
@@ -198,7 +193,8 @@ def _without_outliers(views: Views, fitted: BoardFit) -> tuple[Views, tuple[str,
     rms = fitted.view_rms[:, 0]
     kept = rms <= OFF_VIEW * max(float(np.median(rms)), FINEST)
     distances = np.linalg.norm(fitted.residuals, axis=-1)
-    usual = max(MAD * float(np.nanmedian(np.abs(fitted.residuals))), FINEST)
+    middle = float(np.nanmedian(np.abs(fitted.residuals)))
+    usual = max(middle / normal_quantile(0.25), FINEST)
     off = distances > OFF_POINT * usual
     pixels = np.where(off[..., None], np.nan, views.pixels)
     left = replace(views, pixels=pixels).chosen(kept)
@@ -208,14 +204,7 @@ def _without_outliers(views: Views, fitted: BoardFit) -> tuple[Views, tuple[str,
         or usual > WORST_RMS * longer
     ):
         raise CalibrationError(
-            sentence(
-                "intrinsics.misfit",
-                "The points lie {rms:.2f} px from where a flat board {board} has them: "
-                "it has other squares than said, is bent, or the images are not of one "
-                "camera with one focus. Count and measure its squares again.",
-                rms=fitted.rms,
-                board=views.board.name,
-            )
+            "intrinsics.misfit", rms=fitted.rms, board=views.board.name
         )
     require_views(left)
     return left, _parted(views, kept)[1]
@@ -234,28 +223,24 @@ def _n_points_left_out(views: Views, kept: Views) -> int:
 
 
 def _denied(fitted: BoardFit, tolerances: BoardTolerances) -> BoolArray:
-    """Tell which errors of the board are larger than was said of it, (5,)."""
+    """Tell which errors of the board contradict its tolerances, (5,)."""
     sigmas = np.sqrt(np.diag(fitted.covariance)[fitted.of_shape])
     priors = np.repeat([tolerances.squareness, tolerances.flatness], [2, 3])
     learned = np.sqrt(np.maximum(priors**2 - sigmas**2, 1e-30))
     return np.asarray(np.abs(fitted.state.shape) > CONTRADICTED * learned)
 
 
-def _remarks_on_board(
+def _messages_on_board(
     fitted: BoardFit, denied: BoolArray, tolerances: BoardTolerances
-) -> tuple[Sentence, ...]:
-    """Return how the board is, that it is not as was said."""
+) -> tuple[Message, ...]:
+    """Return messages on a board that contradicts its tolerances."""
     values = fitted.state.shape
     remarks = []
     stretch, shear = values[:2].tolist()
     if denied[:2].any() and max(abs(stretch), abs(shear)) > STRETCHED:
         remarks.append(
-            sentence(
+            message(
                 "intrinsics.board-stretched",
-                "The board is not what {board} says: its lengths along the rows are "
-                "{stretch:+.2%} longer than down the columns, and its right angles are "
-                "off by {shear:+.2f} degrees. It may be printed to fit the page, or "
-                "its squares are none. Print it at true scale, or measure it again.",
                 board=fitted.board.name,
                 stretch=stretch,
                 shear=float(np.degrees(shear)),
@@ -263,10 +248,8 @@ def _remarks_on_board(
         )
     if denied[2:].any():
         remarks.append(
-            sentence(
+            message(
                 "intrinsics.board-bent",
-                "The board is bent by {bend:.2f} mm, {stated:.2f} mm was assumed. That "
-                "is taken into account, but mount it on a flat plate.",
                 bend=float(np.abs(values[2:]).max()),
                 stated=tolerances.flatness,
             )
@@ -276,18 +259,11 @@ def _remarks_on_board(
 
 def _require_no_fold(camera: Camera) -> None:
     if folds(camera):
-        raise CalibrationError(
-            sentence(
-                "intrinsics.folds",
-                "The distortion that the views tell turns the image over in its "
-                "corners, where no view shows the board. Add views with the board in "
-                "each corner of the image.",
-            )
-        )
+        raise CalibrationError("intrinsics.folds")
 
 
 def _require_determined(fitted: BoardFit) -> None:
-    """Refuse views that are too alike to tell the focal length."""
+    """Refuse views that are too alike to determine the focal length."""
     at = fitted.of_intrinsics(0).start
     focal = fitted.state.cameras[0].fx
     share = float(np.sqrt(fitted.covariance[at, at])) / focal
@@ -295,20 +271,12 @@ def _require_determined(fitted: BoardFit) -> None:
     apart = np.arccos(np.clip(normals @ normals.T, -1, 1)).max()
     if share > LARGEST_FOCAL_SIGMA or apart < LEAST_TILT:
         raise CalibrationError(
-            sentence(
-                "intrinsics.alike",
-                "The views are too alike: the board is tilted by {apart:.0f} degrees "
-                "from view to view at most, and the focal length is known to "
-                "{share:.1%} only. Add views with the board tilted by 20 to 40 degrees "
-                "to each side, and reaching into each corner of the image.",
-                apart=float(np.degrees(apart)),
-                share=2 * share,
-            )
+            "intrinsics.alike", apart=float(np.degrees(apart)), share=2 * share
         )
 
 
 def _significant(fitted: BoardFit) -> float:
-    """Return how much residuals hang together, 1 where chance explains it."""
+    """Return the factor by correlation of the residuals, 1 if not significant."""
     n_unknowns = fitted.scores.shape[1] - N_SHAPE
     chance = 1 + SIGMAS * float(np.sqrt(2 / n_unknowns))
     found = fitted.correlation

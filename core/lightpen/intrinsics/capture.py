@@ -1,4 +1,4 @@
-"""Views of a board kept by themselves: when it is held still, somewhere new."""
+"""Automatic capture of views: of a board held still, in a new pose."""
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -23,8 +23,8 @@ NEW = 0.05  # of the image's longer side, from each view that was kept, rms
 MAX_VIEWS = 60
 
 
-class Sight(StrEnum):
-    """What the newest image says of the board."""
+class BoardVisibility(StrEnum):
+    """Visibility of the board in the newest image."""
 
     UNSEEN = "unseen"
     MOVING = "moving"
@@ -52,23 +52,25 @@ class Capture:
     kept: tuple[FloatArray, ...] = ()
     points: FloatArray | None = None
     still_since: float = 0.0
-    sight: Sight = Sight.UNSEEN
+    sight: BoardVisibility = BoardVisibility.UNSEEN
 
     def after(self, points: FloatArray | None, time_s: float) -> "Capture":
-        """Return the capture after another image, kept if it is worth it."""
+        """Return the capture after another image, which is kept if still and new."""
         if points is None:
-            return replace(self, points=None, sight=Sight.UNSEEN)
+            return replace(self, points=None, sight=BoardVisibility.UNSEEN)
         longer = max(self.image_size)
         if self.points is None or _apart(self.points, points) > STILL * longer:
             moved = replace(self, points=points, still_since=time_s)
-            return replace(moved, sight=Sight.MOVING)
+            return replace(moved, sight=BoardVisibility.MOVING)
         seen = replace(self, points=points)
         if any(_apart(each, points) < NEW * longer for each in self.kept):
-            is_last = self.sight is Sight.KEPT
-            return replace(seen, sight=Sight.KEPT if is_last else Sight.ALIKE)
+            is_last = self.sight is BoardVisibility.KEPT
+            return replace(
+                seen, sight=BoardVisibility.KEPT if is_last else BoardVisibility.ALIKE
+            )
         if time_s - self.still_since < STILL_TIME or len(self.kept) >= MAX_VIEWS:
-            return replace(seen, sight=Sight.STILL)
-        return replace(seen, kept=(*self.kept, points), sight=Sight.KEPT)
+            return replace(seen, sight=BoardVisibility.STILL)
+        return replace(seen, kept=(*self.kept, points), sight=BoardVisibility.KEPT)
 
     @property
     def views(self) -> Views:

@@ -1,4 +1,4 @@
-"""What the views of a board have shown of the camera yet: places, sizes and tilts."""
+"""Coverage of the image, distances and tilts by views of a board."""
 
 from dataclasses import dataclass
 
@@ -7,29 +7,29 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.intrinsics.start import BoardPoses
 from lightpen.intrinsics.views import Views
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 COLUMNS, ROWS = 8, 6  # of cells that the image is divided into
 TILTED = np.radians(15.0)
 PER_SIDE = 2  # tilted views
 NEAR = 1.3  # times the size of the smallest: the distance varies
 CORNER_NAMES = (
-    sentence("corner.top-left", "top left"),
-    sentence("corner.top-right", "top right"),
-    sentence("corner.bottom-left", "bottom left"),
-    sentence("corner.bottom-right", "bottom right"),
+    message("corner.top-left"),
+    message("corner.top-right"),
+    message("corner.bottom-left"),
+    message("corner.bottom-right"),
 )
 SIDE_NAMES = (
-    sentence("tilt.right", "to the right"),
-    sentence("tilt.down", "downwards"),
-    sentence("tilt.left", "to the left"),
-    sentence("tilt.up", "upwards"),
+    message("tilt.right"),
+    message("tilt.down"),
+    message("tilt.left"),
+    message("tilt.up"),
 )
 
 
 @dataclass(frozen=True, eq=False)
 class BoardCoverage:
-    """What views of a board have in common, and what is missing among them.
+    """Coverage by views of a board.
 
     Attributes
     ----------
@@ -54,8 +54,8 @@ class BoardCoverage:
         return float(np.mean(self.cells > 0))
 
     @property
-    def missing(self) -> tuple[Sentence, ...]:
-        """What is to be shown yet."""
+    def missing(self) -> tuple[Message, ...]:
+        """Messages on what is missing."""
         corners = self.cells[[0, 0, -1, -1], [0, -1, 0, -1]]
         empty = tuple(
             name for name, n in zip(CORNER_NAMES, corners, strict=True) if n == 0
@@ -67,34 +67,16 @@ class BoardCoverage:
         )
         missing = []
         if empty:
-            missing.append(
-                sentence(
-                    "coverage.corners",
-                    "No view reaches these corners of the image: {corners}.",
-                    corners=empty,
-                )
-            )
+            missing.append(message("coverage.corners", corners=empty))
         if sides:
-            missing.append(
-                sentence(
-                    "coverage.tilts",
-                    "The board faces fewer than {least} times {sides}.",
-                    least=PER_SIDE,
-                    sides=sides,
-                )
-            )
+            missing.append(message("coverage.tilts", least=PER_SIDE, sides=sides))
         if len(self.sizes) and self.sizes.max() < NEAR * self.sizes.min():
-            missing.append(
-                sentence(
-                    "coverage.sizes",
-                    "All views are from one distance. Hold the board nearer, too.",
-                )
-            )
+            missing.append(message("coverage.sizes"))
         return tuple(missing)
 
 
 def cover(views: Views, poses: BoardPoses) -> BoardCoverage:
-    """Return what the views of a single camera cover.
+    """Return the coverage by the views of a single camera.
 
     Parameters
     ----------

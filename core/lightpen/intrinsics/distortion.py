@@ -1,8 +1,8 @@
-"""How many distortion coefficients views of a board tell, and the fit with them.
+"""Choice of the number of distortion coefficients by cross-validation.
 
-What more coefficients gain is asked of views that they were not fitted to. Where no
-view reaches the corners of the image the coefficients that are told may fold it there;
-then those that do are drawn towards 0, as little as keeps the image whole.
+The gain by more coefficients is that in views which they were not fitted to. Where no
+view reaches the corners of the image, the coefficients may fold it there; then a prior
+draws those that do towards 0, as weak as keeps the image whole.
 """
 
 from collections.abc import Callable
@@ -18,8 +18,8 @@ from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.uncertainty_map import error_fields
 from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
-from lightpen.sentences import Sentence, sentence
 
 FEW, MANY = 5, 8  # distortion coefficients
 FOLDING = {FEW: [4], MANY: [5, 6, 7]}  # which of them fold: k3, and the denominator's
@@ -52,42 +52,27 @@ class Choice:
     pull: float | None = None
 
     @property
-    def sentence(self) -> Sentence:
+    def message(self) -> Message:
         """It in words."""
         if self.held_out_more is None:
-            return sentence(
-                "intrinsics.five-only",
-                "5 coefficients, as the views do not tell 8 apart. Error in views left "
-                "out: {held_out:.4f} px.",
-                held_out=self.held_out,
-            )
+            return message("intrinsics.five-only", held_out=self.held_out)
         if self.n_coefficients == MANY:
-            return sentence(
+            return message(
                 "intrinsics.eight",
-                "8 coefficients, as they lessen the error in views left out from "
-                "{held_out:.4f} to {held_out_more:.4f} px.",
                 held_out=self.held_out,
                 held_out_more=self.held_out_more,
             )
-        return sentence(
-            "intrinsics.five",
-            "5 coefficients, as 8 do not lessen the error in views left out: "
-            "{held_out:.4f} px with 5, {held_out_more:.4f} px with 8.",
-            held_out=self.held_out,
-            held_out_more=self.held_out_more,
+        return message(
+            "intrinsics.five", held_out=self.held_out, held_out_more=self.held_out_more
         )
 
     @property
-    def remark(self) -> Sentence | None:
-        """That the corners of the image are not known, where they are not."""
+    def remark(self) -> Message | None:
+        """Message if the corners of the image are undetermined."""
         if self.pull is None:
             return None
-        return sentence(
+        return message(
             "intrinsics.drawn-in",
-            "The views do not reach the corners of the image, and the distortion that "
-            "they tell would fold it there. {coefficients} is drawn towards 0, just so "
-            "far that it does not: the corners are a guess. Add views with the board "
-            "in each of them, or keep the pen out of them.",
             coefficients="k3" if self.n_coefficients == FEW else "(k4, k5, k6)",
         )
 
@@ -120,10 +105,7 @@ def choose_distortion(
 
 
 def fit_camera(
-    views: Views,
-    tolerances: BoardTolerances,
-    near: Camera,
-    pull: float | None = None,
+    views: Views, tolerances: BoardTolerances, near: Camera, pull: float | None = None
 ) -> BoardFit:
     """Return the fit of all, from a camera on; see `Choice` for the pull."""
     known = None
@@ -137,13 +119,13 @@ def fit_camera(
         at = 4 + np.array(folding)
         known[at, at] = pull**-2
     state = BoardState(
-        *((near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE))
+        (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE)
     )
     return adjust_board(views, state, tolerances, (known,))
 
 
 def folds(camera: Camera) -> bool:
-    """Tell whether the distortion turns the image over before its corners."""
+    """Tell whether the distortion folds the image before its corners."""
     try:
         error_fields(camera)
     except CalibrationError:
@@ -182,7 +164,7 @@ def _unfolded(views: Views, tolerances: BoardTolerances, near: Camera) -> _Drawn
 
 
 def _richer(views: Views, tolerances: BoardTolerances, few: _Drawn) -> _Drawn | None:
-    """Return the fit with all coefficients, if the views tell so many apart."""
+    """Return the fit with all coefficients, if the views determine them."""
     camera = few.camera
     near = replace(
         camera, distortion=np.append(camera.distortion, np.zeros(MANY - FEW))

@@ -1,4 +1,4 @@
-"""Where the board should be held next: the view that tells most of what is not known.
+"""The next view of the board: that which lessens the uncertainty most.
 
 Each of some hundred views that an operator can hold is asked by how much it would
 lessen the uncertainty of projections over the whole image, were it added to those that
@@ -30,7 +30,7 @@ TURNS = ((0, 0), (TILT, 0), (-TILT, 0), (0, TILT), (0, -TILT), (TILT, TILT))
 
 
 @dataclass(frozen=True, eq=False)
-class WantedView:
+class SuggestedView:
     """How the board is to be held.
 
     Attributes
@@ -45,31 +45,31 @@ class WantedView:
     gain: float
 
 
-def choose_next_view(adjustment: BoardFit, board: Board) -> WantedView:
+def choose_next_view(adjustment: BoardFit, board: Board) -> SuggestedView:
     """Return the view that would lessen the uncertainty of one camera most."""
     camera = adjustment.state.cameras[0]
     poses = _candidates(camera, board)
     state = replace(adjustment.state, poses=poses)
-    told = view_information(board, state, camera.image_size) / adjustment.sigma**2
+    added = view_information(board, state, camera.image_size) / adjustment.sigma**2
     known = np.linalg.inv(adjustment.covariance)
     fields = error_fields(camera).reshape(-1, len(camera.intrinsics))
     weights = np.zeros_like(known)
     at = adjustment.of_intrinsics(0)
     weights[at, at] = fields.T @ fields
-    left = np.einsum("vij,ij->v", np.linalg.inv(known + told), weights)
+    variances = np.einsum("vij,ij->v", np.linalg.inv(known + added), weights)
     before = float(np.sum(adjustment.covariance * weights))
-    best = int(np.argmin(left))
+    best = int(np.argmin(variances))
     outline = board.outline @ poses.rotations[best].T + poses.translations[best]
-    return WantedView(camera.project(outline), 1 - float(np.sqrt(left[best] / before)))
+    return SuggestedView(
+        camera.project(outline), 1 - float(np.sqrt(variances[best] / before))
+    )
 
 
 def first_views(board: Board, image_size: tuple[int, int]) -> list[FloatArray]:
     """Return outlines to begin with: in the middle, then tilted to each side."""
     width, height = image_size
     focal = USUAL_FOCAL_LENGTH * max(image_size)
-    camera = Camera(
-        *(width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1))
-    )
+    camera = Camera(width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1))
     longer = 2 * float(np.abs(board.points[:, :2]).max())
     depth = focal * longer / (FILLED[-1] * min(image_size))
     outlines = []

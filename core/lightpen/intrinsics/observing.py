@@ -15,13 +15,15 @@ from lightpen.formats.pairing import NONE, Pairing
 from lightpen.intrinsics.boards import Board, BoardKind
 from lightpen.intrinsics.sightings import count_corners, find_points, for_search
 from lightpen.intrinsics.views import Views
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 MEMORY_A_PIXEL = 5  # bytes: 16 bits, its 8, and what is made of them
 EXAMINED = 3  # images in which a board is looked for that is another
 # Seen in a mirror they are others; a larger chessboard holds a smaller one either way.
 TELLS_SIDES = (
-    *(BoardKind.CHARUCO, BoardKind.LEGACY_CHARUCO, BoardKind.MARKERS),
+    BoardKind.CHARUCO,
+    BoardKind.LEGACY_CHARUCO,
+    BoardKind.MARKERS,
     BoardKind.ASYMMETRIC_CIRCLES,
 )
 OTHER_LAYOUT = {
@@ -48,7 +50,7 @@ class ObservedBoard:
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What one image shows."""
+    """Size of one image, and its points."""
 
     size: tuple[int, int]
     points: FloatArray | None
@@ -114,8 +116,8 @@ def observe_board_of_rig(
     return ObservedBoard(views.chosen(is_seen), unseen)
 
 
-def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Sentence | None:
-    """Return what images show in place of the board; None if that is not known.
+def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Message | None:
+    """Return why the board is not found in images; None if unknown.
 
     Parameters
     ----------
@@ -124,38 +126,23 @@ def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Sentence 
     """
     mirrored = (image[:, ::-1].copy() for image in images())
     if board.kind in TELLS_SIDES and _is_found(mirrored, board):
-        return sentence(
-            "intrinsics.mirrored",
-            "The images show the board {board} mirrored. Switch off the mirroring of "
-            "the camera, or print the board anew.",
-            board=board.name,
-        )
+        return message("intrinsics.mirrored", board=board.name)
     if board.kind in OTHER_LAYOUT:
         other = replace(board, kind=OTHER_LAYOUT[board.kind])
         if _is_found(images(), other):
-            return sentence(
-                "intrinsics.other-layout",
-                "No image shows the board {board}, but they show {other}: OpenCV laid "
-                "it out otherwise until 4.6. Give that board.",
-                board=board.name,
-                other=other.name,
+            return message(
+                "intrinsics.other-layout", board=board.name, other=other.name
             )
     if board.kind is BoardKind.CHESSBOARD:  # which lies as it likes
         return _other_count(images(), board)
     across = replace(board, columns=board.rows, rows=board.columns)
     if across != board and _is_found(images(), across):
-        return sentence(
-            "intrinsics.across",
-            "No image shows the board {board}, but they show {other}: columns and rows "
-            "are the other way round. Give that board.",
-            board=board.name,
-            other=across.name,
-        )
+        return message("intrinsics.across", board=board.name, other=across.name)
     return None
 
 
-def _other_count(images: Iterable[Image], board: Board) -> Sentence | None:
-    """Return what to say of a chessboard of other corners than were said."""
+def _other_count(images: Iterable[Image], board: Board) -> Message | None:
+    """Return the message on a chessboard with another number of corners."""
     counts = [count for count in map(count_corners, images) if count is not None]
     if not counts:
         return None
@@ -163,10 +150,8 @@ def _other_count(images: Iterable[Image], board: Board) -> Sentence | None:
     rows, columns = sorted((board.rows, board.columns))
     has_more = seen.columns > columns or seen.rows > rows
     if seen.is_whole and (seen.columns, seen.rows) != (columns, rows):
-        return sentence(
+        return message(
             "intrinsics.other-count",
-            "No image shows a chessboard of {columns} x {rows} inner corners, but one "
-            "of {seen_columns} x {seen_rows}. Count its inner corners again.",
             columns=board.columns,
             rows=board.rows,
             seen_columns=seen.columns,
@@ -174,11 +159,8 @@ def _other_count(images: Iterable[Image], board: Board) -> Sentence | None:
         )
     if not has_more:
         return None
-    return sentence(
+    return message(
         "intrinsics.larger-count",
-        "No image shows a chessboard of {columns} x {rows} inner corners, but a part "
-        "of a larger one, of which {seen_columns} x {seen_rows} are seen. Count the "
-        "inner corners of the whole board again.",
         columns=board.columns,
         rows=board.rows,
         seen_columns=seen.columns,
@@ -193,33 +175,24 @@ def _look(load: Callable[[], Image], board: Board) -> _Look:
 
 def _other_size(first_name: str, first: _Look, name: str, other: _Look) -> FileError:
     return FileError(
-        sentence(
-            "intrinsics.other-size",
-            "{name} has {width} x {height} px, {first} has {first_width} x "
-            "{first_height} px. Give images of one camera, with one region and "
-            "binning.",
-            name=printable(name),
-            width=other.size[0],
-            height=other.size[1],
-            first=printable(first_name),
-            first_width=first.size[0],
-            first_height=first.size[1],
-        )
+        "intrinsics.other-size",
+        name=printable(name),
+        width=other.size[0],
+        height=other.size[1],
+        first=printable(first_name),
+        first_width=first.size[0],
+        first_height=first.size[1],
     )
 
 
-def _why_unseen(source: ImageSource, board: Board) -> Sentence:
-    """Return what the images show in place of the board, as far as that is known."""
+def _why_unseen(source: ImageSource, board: Board) -> Message:
+    """Return why the board is not found."""
 
     def images() -> Iterator[Image]:
         return (for_search(load()) for load in islice(source.open(), EXAMINED))
 
-    return why_unseen(images, board) or sentence(
-        "intrinsics.unseen",
-        "None of the {n_images} images shows the board {board}. The whole board must "
-        "be in the image, sharp, with a bright rim round it; check its kind and count.",
-        n_images=len(source.names),
-        board=board.name,
+    return why_unseen(images, board) or message(
+        "intrinsics.unseen", n_images=len(source.names), board=board.name
     )
 
 

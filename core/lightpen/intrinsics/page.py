@@ -14,7 +14,6 @@ import numpy as np
 from lightpen.arrays import BoolArray
 from lightpen.errors import UsageError
 from lightpen.intrinsics.boards import Board, BoardKind, marker_dictionary
-from lightpen.sentences import sentence
 
 POINTS_A_MM = 72 / 25.4
 PAPERS = {  # mm
@@ -33,7 +32,7 @@ QUARTER = 0.5522847498  # of the radius: control points of a quarter of a circle
 
 @dataclass(frozen=True)
 class _Drawing:
-    """A board as it is drawn: its size in mm, and what fills it."""
+    """A drawing of a board: size in mm, and filled areas."""
 
     width: float
     height: float
@@ -82,16 +81,11 @@ def _page_size(
             if needed[0] <= size[0] and needed[1] <= size[1]:
                 return size
     raise UsageError(
-        sentence(
-            "board.no-paper",
-            "The board {board} is {width:.0f} x {height:.0f} mm large and needs "
-            "{foot:g} mm of white round it, more than the paper has. Choose a larger "
-            "paper, or a smaller board.",
-            board=board.name,
-            width=drawing.width,
-            height=drawing.height,
-            foot=MARGIN,
-        )
+        "board.no-paper",
+        board=board.name,
+        width=drawing.width,
+        height=drawing.height,
+        foot=MARGIN,
     )
 
 
@@ -151,7 +145,7 @@ def _marker(board: Board, number: int, x: float, y: float, side: float) -> list[
 
 
 def _runs(black: BoolArray) -> Iterator[tuple[int, int, int]]:
-    """Yield row, begin and end of what is black without a gap."""
+    """Yield row, begin and end of black runs."""
     for row, cells in enumerate(black):
         edges = np.flatnonzero(np.diff(np.concatenate([[0], cells, [0]]).astype(int)))
         for begin, end in edges.reshape(-1, 2).tolist():
@@ -177,7 +171,7 @@ def _circle(x: float, y: float, r: float) -> str:
 
 
 def _foot(board: Board, left: float) -> list[str]:
-    """Return a scale of 100 mm and what the board is, above the lower edge."""
+    """Return a scale of 100 mm and the description, above the lower edge."""
     ticks = [
         f"{left + x:.4f} {MARGIN:.4f} m {left + x:.4f} {MARGIN + 2:.4f} l S"
         for x in np.arange(0.0, RULER + 1, 10.0).tolist()

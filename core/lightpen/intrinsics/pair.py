@@ -16,10 +16,10 @@ from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.rig import Rig, of_camera
 from lightpen.model.rigid import vector_from_rotation
-from lightpen.sentences import Sentence, sentence
 
 MIN_PAIRS = 3
 MAX_VOTED = 60  # views that are compared with all
@@ -53,7 +53,7 @@ class PairLag:
 
     @property
     def is_significant(self) -> bool:
-        """Whether it is more than chance, and worth a word."""
+        """Whether it is significant, and large enough to matter."""
         return abs(self.views) > max(SIGMAS * self.sigma, LEAST_LAG)
 
     @property
@@ -61,25 +61,18 @@ class PairLag:
         """The same in ms, where the time between two views is known."""
         return None if self.interval_ms is None else self.views * self.interval_ms
 
-    def told(self, name: str) -> Sentence:
+    def told(self, name: str) -> Message:
         """Return it in words, of a camera of that name."""
         if self.lag_ms is None:
-            return sentence(
+            return message(
                 "pair.late",
-                "The cameras are not synchronised: {camera} is out of step by "
-                "{lag:.2f} \u00b1 {u:.2f} of the time between two views. Each "
-                "millisecond costs {px:.2f} px at a pen's speed of 100 mm/s. Trigger "
-                "both cameras by one signal.",
                 camera=name,
                 lag=abs(self.views),
                 u=2 * self.sigma,
                 px=self.px_per_ms,
             )
-        return sentence(
+        return message(
             "pair.late-by",
-            "The cameras are not synchronised: {camera} is out of step by {lag:.1f} "
-            "\u00b1 {u:.1f} ms, which costs {px:.2f} px at a pen's speed of 100 mm/s. "
-            "Trigger both cameras by one signal.",
             camera=name,
             lag=abs(self.lag_ms),
             u=2 * self.sigma * (self.interval_ms or 0.0),
@@ -89,7 +82,7 @@ class PairLag:
 
 @dataclass(frozen=True, eq=False)
 class PairCalibration:
-    """Two cameras and where the second one stands.
+    """Extrinsics and intrinsics of two cameras.
 
     Attributes
     ----------
@@ -115,7 +108,7 @@ class PairCalibration:
     left_out: tuple[str, ...]
     correlation: float
     lag: PairLag | None
-    remarks: tuple[Sentence, ...]
+    remarks: tuple[Message, ...]
 
     @property
     def baseline(self) -> float:
@@ -139,7 +132,7 @@ def calibrate_pair(
     cameras: tuple[Camera, ...] = (),
     interval_ms: float | None = None,
 ) -> PairCalibration:
-    """Find where the second of two cameras stands.
+    """Calibrate the extrinsics of the second of two cameras.
 
     Parameters
     ----------
@@ -170,15 +163,7 @@ def calibrate_pair(
         )
     both = np.all(views.found, axis=1)
     if both.sum() < MIN_PAIRS:
-        raise CalibrationError(
-            sentence(
-                "pair.few",
-                "Both cameras see the board in {n_pairs} views; at least {least} are "
-                "needed. Hold the board where both cameras see it whole.",
-                n_pairs=int(both.sum()),
-                least=MIN_PAIRS,
-            )
-        )
+        raise CalibrationError("pair.few", n_pairs=int(both.sum()), least=MIN_PAIRS)
     names_of_all = views.names
     views, place = _ordered(views, cameras, both)
     poses = _poses(views, cameras, place)
@@ -204,7 +189,7 @@ def calibrate_pair(
         left_out=tuple(name for name in names_of_all if name not in views.names),
         correlation=correlation,
         lag=lag,
-        remarks=_remarks(fitted, alone, both, lag, names),
+        remarks=_messages(fitted, alone, both, lag, names),
     )
 
 
@@ -238,7 +223,7 @@ def _between(poses: tuple[BoardPoses, BoardPoses]) -> BoardPoses:
 def _ordered(
     views: Views, cameras: tuple[Camera, ...], both: BoolArray
 ) -> tuple[Views, BoardPoses]:
-    """Return the views with the points numbered alike, and where the camera stands.
+    """Return the views with equal numbering, and the relative pose.
 
     Raises
     ------
@@ -263,14 +248,9 @@ def _ordered(
     order, view = divmod(int(np.argmax(votes)), votes.shape[1])
     if votes[order, view] <= both.sum() / 2:
         raise CalibrationError(
-            sentence(
-                "pair.contradicting",
-                "The views do not agree on where the second camera stands: {n_agree} "
-                "of {n_pairs} do. Either a camera was moved meanwhile, or the images "
-                "that are taken for one moment are not. Check their names and order.",
-                n_agree=int(votes[order, view]),
-                n_pairs=int(both.sum()),
-            )
+            "pair.contradicting",
+            n_agree=int(votes[order, view]),
+            n_pairs=int(both.sum()),
         )
     chosen = some[view]
     found = BoardPoses(
@@ -287,7 +267,7 @@ def _ordered(
 def _alike(
     rotations: FloatArray, translations: FloatArray, some: IntArray
 ) -> BoolArray:
-    """Tell which places (K, V) agree with some (S,) of them: (K, S, K, V)."""
+    """Tell which relative poses (K, V) agree with some (S,): (K, S, K, V)."""
     between = np.einsum("kvij,lwmj->kvlwim", rotations[:, some], rotations)
     turns = np.linalg.norm(vector_from_rotation(between), axis=-1)
     ours = translations[:, some, None, None]
@@ -347,13 +327,13 @@ def _means(pixels: FloatArray) -> FloatArray:
     return np.asarray(np.nansum(pixels, axis=1) / np.where(counts > 0, counts, np.nan))
 
 
-def _remarks(
+def _messages(
     fitted: BoardFit,
     alone: tuple[CameraCalibration, ...],
     both: BoolArray,
     lag: PairLag | None,
     names: tuple[str, str],
-) -> tuple[Sentence, ...]:
+) -> tuple[Message, ...]:
     remarks = [
         of_camera(name, remark)
         for name, each in zip(names, alone, strict=False)
@@ -366,12 +346,8 @@ def _remarks(
     n_apart = int(np.sum(rms > APART * usual))
     if n_apart > 0:
         remarks.append(
-            sentence(
+            message(
                 "pair.moved",
-                "In {n_views} of {n_pairs} views the two cameras do not see the board "
-                "at one place; they differ by up to {rms:.2f} px. It moved between the "
-                "two exposures, or a camera did. Hold it still, or trigger both "
-                "cameras by one signal.",
                 n_views=n_apart,
                 n_pairs=int(both.sum()),
                 rms=float(rms.max()),

@@ -1,36 +1,76 @@
 """The calibration of one camera, or of two, as text and as a record."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import FloatArray, IntArray
 from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.calibration import CameraCalibration
-from lightpen.intrinsics.coverage import BoardCoverage, cover
+from lightpen.intrinsics.coverage import cover
 from lightpen.intrinsics.next_view import choose_next_view
 from lightpen.intrinsics.observing import ObservedBoard
 from lightpen.intrinsics.pair import PairCalibration
-from lightpen.intrinsics.regions import measure_regions
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.intrinsics.views import BoardTolerances
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import vector_from_rotation
 
+COLUMNS, ROWS = 4, 3
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """Residuals of one camera in 3 rows and 4 columns.
+
+    Attributes
+    ----------
+    n_points : (3, 4) array of int
+    rms : (3, 4) array
+        px; NaN without points.
+    means : (3, 4, 2) array
+        px; a lens that the model does not fit pulls its regions to some side.
+    """
+
+    n_points: IntArray
+    rms: FloatArray
+    means: FloatArray
+
+
+def measure_regions(fitted: BoardFit, camera: Camera) -> Regions:
+    """Return the residuals of a single camera by region."""
+    residuals = fitted.residuals[:, 0]
+    seen = np.isfinite(residuals[..., 0])
+    poses = fitted.state.poses
+    board = fitted.board_points
+    points = board @ np.swapaxes(poses.rotations, 1, 2) + poses.translations[:, None]
+    at = camera.project(points[seen]) / np.array(camera.image_size)
+    at = np.floor(at * np.array([COLUMNS, ROWS])).astype(np.int64)
+    column = np.clip(at[:, 0], 0, COLUMNS - 1)
+    row = np.clip(at[:, 1], 0, ROWS - 1)
+    n_points = np.zeros((ROWS, COLUMNS), dtype=np.int64)
+    sums = np.zeros((ROWS, COLUMNS, 2))
+    squares = np.zeros((ROWS, COLUMNS))
+    np.add.at(n_points, (row, column), 1)
+    np.add.at(sums, (row, column), residuals[seen])
+    np.add.at(squares, (row, column), np.square(residuals[seen]).sum(axis=-1))
+    counts = np.where(n_points > 0, n_points, np.nan)
+    return Regions(n_points, np.sqrt(squares / counts), sums / counts[..., None])
+
+
 NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 SHAPE_NAMES = (
-    *("stretch", "shear"),
-    *("bend_along_rows_mm", "bend_across_mm", "bend_along_columns_mm"),
+    "stretch",
+    "shear",
+    "bend_along_rows_mm",
+    "bend_across_mm",
+    "bend_along_columns_mm",
 )
 COVERAGE_FACTOR = 2.0
 N_WORST = 5
 TITLE = 13  # characters
-
-
-def camera_coverage(calibration: CameraCalibration) -> BoardCoverage:
-    """Return what the views of a calibration cover."""
-    return cover(calibration.views, calibration.adjustment.state.poses)
 
 
 def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> str:
@@ -39,7 +79,7 @@ def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> 
     assert camera.covariance is not None
     u = COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))
     uncertain = map_uncertainty(camera, camera.covariance)
-    coverage = camera_coverage(calibration)
+    coverage = cover(calibration.views, fitted.state.poses)
     lines = [f"{'Intrinsics':<{TITLE}}{'':>18}{'U (k = 2)':>14}"]
     lines += [
         f"  {name:<{TITLE - 2}}{value:>18.6g}{of:>14.2g}"
@@ -62,7 +102,7 @@ def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> 
     lines += [
         f"{'Residuals':<{TITLE}}{fitted.rms:.4f} px rms; in views left out "
         f"{calibration.held_out_rms:.4f} px",
-        f"{'Distortion':<{TITLE}}{calibration.choice.sentence}",
+        f"{'Distortion':<{TITLE}}{calibration.choice.message}",
         f"{'Projection':<{TITLE}}standard uncertainty {uncertain.center:.4f} px in the "
         f"middle, {uncertain.typical:.4f} px over the image, {uncertain.worst:.4f} px "
         "at worst",
@@ -94,12 +134,21 @@ def intrinsics_record(
     unseen : sequence of str
         Names of images without the board.
     """
-    camera, fitted = calibration.camera, calibration.adjustment
+    camera, fitted, views = (
+        calibration.camera,
+        calibration.adjustment,
+        calibration.views,
+    )
+    assert camera.covariance is not None
+    uncertain = map_uncertainty(camera, camera.covariance)
+    regions, halves = measure_regions(fitted, camera), calibration.halves
+    coverage = cover(views, fitted.state.poses)
+    next_view = choose_next_view(fitted, views.board)
     return {
         "kind": "intrinsics",
-        "board": calibration.views.board.name,
-        "board_assumed": _printing_record(tolerances),
-        **_camera_record(calibration.camera),
+        "board": views.board.name,
+        "board_assumed": _tolerances_record(tolerances),
+        **_camera_record(camera),
         "rms_px": fitted.rms,
         "noise_px": fitted.sigma,
         "held_out_rms_px": calibration.held_out_rms,
@@ -107,16 +156,47 @@ def intrinsics_record(
             "coefficients": calibration.choice.n_coefficients,
             "held_out_rms_px_5": calibration.choice.held_out,
             "held_out_rms_px_8": calibration.choice.held_out_more,
-            "reason": calibration.choice.sentence,
+            "reason": calibration.choice.message,
         },
         "correlation_factor": calibration.correlation,
-        "projection_uncertainty": _map_record(camera),
-        "residuals_by_region": _regions_record(fitted, camera),
-        "halves": _halves_record(calibration),
+        "projection_uncertainty": {
+            "middle_px": uncertain.center,
+            "rms_px": uncertain.typical,
+            "worst_px": uncertain.worst,
+            "pixels": uncertain.pixels,
+            "standard_uncertainty_px": uncertain.sigmas,
+        },
+        "residuals_by_region": {
+            "points": regions.n_points,
+            "rms_px": regions.rms,
+            "mean_px": regions.means,
+        },
+        "halves": halves
+        and {
+            "difference_px": halves.difference,
+            "expanded_uncertainty_px": halves.expanded_uncertainty,
+            "in_image_px": halves.in_image,
+        },
         "board_found": _board_record(fitted),
-        "coverage": _coverage_record(calibration),
-        "next_view": _next_record(calibration),
-        "views": _views_record(calibration),
+        "coverage": {
+            "points": coverage.cells,
+            "share": coverage.share,
+            "tilted_right_down_left_up": coverage.tilted,
+            "missing": coverage.missing,
+        },
+        "next_view": {"outline_px": next_view.outline, "gain": next_view.gain},
+        "views": [
+            {
+                "name": name,
+                "rms_px": fitted.view_rms[v, 0],
+                "held_out_rms_px": calibration.held_out[v],
+                "tilt_deg": float(np.degrees(coverage.tilts[v])),
+                "size_px": coverage.sizes[v],
+                "points": np.flatnonzero(views.seen[v, 0]),
+                "pixels": views.pixels[v, 0][views.seen[v, 0]],
+            }
+            for v, name in enumerate(views.names)
+        ],
         "views_left_out": calibration.left_out,
         "points_left_out": calibration.n_points_left_out,
         "images_without_board": unseen,
@@ -125,7 +205,7 @@ def intrinsics_record(
 
 
 def pair_text(calibration: PairCalibration, observed: ObservedBoard) -> str:
-    """Return two cameras and where the second one stands as text for the screen."""
+    """Return the calibration of two cameras as text for the screen."""
     rig, fitted = calibration.rig, calibration.adjustment
     assert rig.covariance is not None
     u = COVERAGE_FACTOR * np.sqrt(np.diag(rig.covariance))
@@ -170,12 +250,12 @@ def pair_text(calibration: PairCalibration, observed: ObservedBoard) -> str:
 def pair_record(
     calibration: PairCalibration, observed: ObservedBoard, tolerances: BoardTolerances
 ) -> dict[str, Any]:
-    """Return two cameras and where the second one stands as a record."""
+    """Return the calibration of two cameras as a record."""
     rig, fitted, lag = calibration.rig, calibration.adjustment, calibration.lag
     return {
         "kind": "extrinsics",
         "board": calibration.views.board.name,
-        "board_assumed": _printing_record(tolerances),
+        "board_assumed": _tolerances_record(tolerances),
         "cameras": [
             {"name": name, **_camera_record(camera)}
             for name, camera in zip(rig.names, rig.cameras, strict=True)
@@ -288,43 +368,11 @@ def _camera_record(camera: Camera) -> dict[str, Any]:
     }
 
 
-def _printing_record(tolerances: BoardTolerances) -> dict[str, float]:
+def _tolerances_record(tolerances: BoardTolerances) -> dict[str, float]:
     return {
         "flatness_mm": tolerances.flatness,
         "squareness": tolerances.squareness,
         "scale": tolerances.scale,
-    }
-
-
-def _map_record(camera: Camera) -> dict[str, Any]:
-    assert camera.covariance is not None
-    uncertain = map_uncertainty(camera, camera.covariance)
-    return {
-        "middle_px": uncertain.center,
-        "rms_px": uncertain.typical,
-        "worst_px": uncertain.worst,
-        "pixels": uncertain.pixels,
-        "standard_uncertainty_px": uncertain.sigmas,
-    }
-
-
-def _regions_record(fitted: BoardFit, camera: Camera) -> dict[str, Any]:
-    regions = measure_regions(fitted, camera)
-    return {
-        "points": regions.n_points,
-        "rms_px": regions.rms,
-        "mean_px": regions.means,
-    }
-
-
-def _halves_record(calibration: CameraCalibration) -> dict[str, Any] | None:
-    halves = calibration.halves
-    if halves is None:
-        return None
-    return {
-        "difference_px": halves.difference,
-        "expanded_uncertainty_px": halves.expanded_uncertainty,
-        "in_image_px": halves.in_image,
     }
 
 
@@ -336,34 +384,3 @@ def _board_record(fitted: BoardFit) -> dict[str, dict[str, float]]:
             SHAPE_NAMES, fitted.state.shape.tolist(), sigmas.tolist(), strict=True
         )
     }
-
-
-def _coverage_record(calibration: CameraCalibration) -> dict[str, Any]:
-    coverage = camera_coverage(calibration)
-    return {
-        "points": coverage.cells,
-        "share": coverage.share,
-        "tilted_right_down_left_up": coverage.tilted,
-        "missing": coverage.missing,
-    }
-
-
-def _next_record(calibration: CameraCalibration) -> dict[str, Any]:
-    wanted = choose_next_view(calibration.adjustment, calibration.views.board)
-    return {"outline_px": wanted.outline, "gain": wanted.gain}
-
-
-def _views_record(calibration: CameraCalibration) -> list[dict[str, Any]]:
-    coverage, views = camera_coverage(calibration), calibration.views
-    return [
-        {
-            "name": name,
-            "rms_px": calibration.adjustment.view_rms[v, 0],
-            "held_out_rms_px": calibration.held_out[v],
-            "tilt_deg": float(np.degrees(coverage.tilts[v])),
-            "size_px": coverage.sizes[v],
-            "points": np.flatnonzero(views.seen[v, 0]),
-            "pixels": views.pixels[v, 0][views.seen[v, 0]],
-        }
-        for v, name in enumerate(views.names)
-    ]

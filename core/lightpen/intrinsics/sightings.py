@@ -1,4 +1,4 @@
-"""Where one image shows the points of a board.
+"""Detection of the points of a board in one image.
 
 OpenCV finds the board [1]_, in a smaller image first where there is one; its corners
 are then placed by the gradients round them in the whole image and at its full depth
@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.rim import fit_rim
+from lightpen.detection.edge_fit import fit_edge
 from lightpen.intrinsics.boards import CORNERS, Board, BoardKind, marker_dictionary
 from lightpen.intrinsics.squares import CornerCount, count_from, goes_on, is_chequered
 
@@ -199,7 +199,7 @@ def _is_board(
 
 
 def _is_even(grid: FloatArray) -> bool:
-    """Tell whether rows and columns go on evenly."""
+    """Tell whether rows and columns are evenly spaced."""
     for along in (grid, np.swapaxes(grid, 0, 1)):
         steps = np.diff(along, axis=1)
         bends = np.linalg.norm(np.diff(steps, axis=1), axis=-1)
@@ -346,7 +346,7 @@ def _rim_centers(
     start = (SPOT_SPREAD * board.detail / board.pitch * apart) ** 2 * np.eye(2)
     centers = np.full_like(rough, np.nan)
     for i, center in enumerate(rough):
-        rim = fit_rim(light, center, start)
+        rim = fit_edge(light, center, start)
         if (
             rim is not None
             and rim.is_whole

@@ -1,4 +1,4 @@
-"""How far the squares of a chessboard go on beyond corners that were found.
+"""Extent of a chessboard beyond the corners that were found.
 
 A search finds as many corners as it is asked for, or stops where it loses its way; the
 squares beyond tell whether that was the whole board. From the outermost corners on the
@@ -87,7 +87,7 @@ def is_chequered(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
 
 
 def goes_on(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
-    """Tell whether a chessboard has more corners than were found.
+    """Tell whether a chessboard extends beyond the corners found.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where an adjustment begins: focal length and poses, from the board's homographies.
+"""Start of an adjustment: focal length and poses, from homographies.
 
 A homography ``H = K [r1 r2 t]`` of a plane makes ``h1^T w h2 = 0`` and ``h1^T w h1 =
 h2^T w h2`` with ``w = diag(1, 1, f^2) / f^2`` about the middle of the image, which all
@@ -24,7 +24,7 @@ SHORTEST, LONGEST = 0.2, 50.0  # of the longer side
 
 
 class BoardPoses(NamedTuple):
-    """Where the board stands in views (rig_from_board)."""
+    """Poses of the board in views (rig_from_board)."""
 
     rotations: FloatArray
     translations: FloatArray
@@ -50,8 +50,12 @@ def start_camera(views: Views, n_coefficients: int) -> Camera:
     if LONGEST**-2 < inverse_square < SHORTEST**-2:
         focal = inverse_square**-0.5
     return Camera(
-        *(width, height, focal * longer, focal * longer),
-        *(float(middle[0]), float(middle[1])),
+        width,
+        height,
+        focal * longer,
+        focal * longer,
+        float(middle[0]),
+        float(middle[1]),
         distortion=np.zeros(n_coefficients),
     )
 

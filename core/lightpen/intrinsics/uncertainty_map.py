@@ -1,4 +1,4 @@
-"""How far off in the image the intrinsics put what the camera sees.
+"""Projection uncertainty of intrinsics over the image.
 
 An error of the intrinsics that a turn of the camera explains is none: where a camera
 looks is found again in each use. So the turn that explains most of it is taken out of
@@ -52,7 +52,7 @@ class UncertaintyMap:
 
 
 def map_uncertainty(camera: Camera, covariance: FloatArray) -> UncertaintyMap:
-    """Return what a covariance of the intrinsics comes to over the image."""
+    """Return the projection uncertainty by a covariance of the intrinsics."""
     fields = error_fields(camera)
     by_place = fields @ covariance @ np.swapaxes(fields, -1, -2)
     sigmas = np.sqrt(np.maximum(np.linalg.eigvalsh(by_place)[..., -1], 0.0))

@@ -1,4 +1,4 @@
-"""What the cameras saw of the board, and what is assumed of it."""
+"""Views of a board by cameras, and the tolerances of the board."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from lightpen.intrinsics.boards import Board
 
 @dataclass(frozen=True)
 class BoardTolerances:
-    """How true a board is, as standard uncertainties; what the views tell they correct.
+    """Standard uncertainties of a board's geometry, priors of the adjustment.
 
     Attributes
     ----------
@@ -70,9 +70,11 @@ class Views:
         return Views(self.board, names, self.pixels[which], self.image_sizes)
 
     def of_camera(self, camera: int) -> "Views":
-        """Return what one camera saw, the views in which it saw the board."""
+        """Return the views in which one camera saw the board."""
         own = Views(
-            *(self.board, self.names, self.pixels[:, camera : camera + 1]),
+            self.board,
+            self.names,
+            self.pixels[:, camera : camera + 1],
             (self.image_sizes[camera],),
         )
         return own.chosen(own.found[:, 0])

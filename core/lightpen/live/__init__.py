@@ -1,1 +1,1 @@
-"""The images of a camera as they come, each looked at and handed on."""
+"""The live pipeline: camera images, detections and their receivers."""

@@ -1,7 +1,6 @@
-"""The cameras that stand for the choice of a source."""
+"""The cameras of a chosen source."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -9,18 +8,11 @@ from pathlib import Path
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import ImageCamera
 from lightpen.cameras.source import SourcePlace
-from lightpen.errors import FileError
-from lightpen.formats.opened_files import (
-    CameraFile,
-    OpenedFiles,
-    PenFile,
-    open_files,
-)
+from lightpen.formats.opened_files import CameraFile, OpenedFiles, PenFile
 from lightpen.formats.rig_files import read_rig
-from lightpen.formats.simulated_files import is_simulated, mark_simulated
 from lightpen.local_time import local_now
 from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.sample_rigs import beside
+from lightpen.simulator.samples import beside
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.swing.preparation import SourceChoice
@@ -29,15 +21,15 @@ SECOND_SERIAL = "SIM-2"
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
-    """What sources and the program go by.
+class SourceEnvironment:
+    """Environment of sources: scene and clocks.
 
     Attributes
     ----------
     scene : Scene
         What the simulated camera sees.
     now : callable
-        Returns date and time with the time zone, to tell ages by.
+        Returns date and time with the time zone.
     """
 
     scene: Scene = field(default_factory=Scene)
@@ -45,7 +37,7 @@ class Surroundings:
     now: Callable[[], datetime] = local_now
 
 
-def sample_files(around: Surroundings, folder: Path) -> OpenedFiles:
+def sample_files(around: SourceEnvironment, folder: Path) -> OpenedFiles:
     """Write the files that go with the simulated camera, and return them.
 
     Raises
@@ -59,27 +51,7 @@ def sample_files(around: Surroundings, folder: Path) -> OpenedFiles:
     )
 
 
-def files_of_before(
-    samples: Path,
-    camera_path: Path | None,
-    pen_path: Path | None,
-    units: str | None,
-    rig_path: Path | None = None,
-) -> OpenedFiles:
-    """Read the files that a station had in use.
-
-    Parameters
-    ----------
-    samples : Path
-        Folder of the simulated camera's files, which an earlier version did not mark.
-    """
-    if samples.is_dir() and not is_simulated(samples):
-        with suppress(FileError):  # where nothing can be written, nothing is accepted
-            mark_simulated(samples)
-    return open_files(camera_path, pen_path, units, rig_path)
-
-
-def camera_of(choice: SourceChoice, around: Surroundings) -> ImageCamera:
+def camera_of(choice: SourceChoice, around: SourceEnvironment) -> ImageCamera:
     """Return the camera of a source, not yet opened."""
     camera = choice.source.camera
     if camera is None:
@@ -88,7 +60,7 @@ def camera_of(choice: SourceChoice, around: Surroundings) -> ImageCamera:
 
 
 def cameras_of(
-    choices: Sequence[SourceChoice], around: Surroundings
+    choices: Sequence[SourceChoice], around: SourceEnvironment
 ) -> tuple[ImageCamera, ...]:
     """Return the cameras of one or two sources, not yet opened.
 

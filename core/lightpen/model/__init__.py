@@ -1,1 +1,1 @@
-"""The words of the problem: camera, pen, pose, posture; no files, no threads."""
+"""Basic types: camera, pen, pose, posture, limits; no files, no threads."""

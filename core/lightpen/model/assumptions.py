@@ -1,4 +1,4 @@
-"""What is known of a station, and assumed where its files say nothing of it."""
+"""Default uncertainties where the files of a station state none."""
 
 from dataclasses import dataclass, fields, replace
 from math import isfinite
@@ -8,7 +8,7 @@ COLDEST, WARMEST = -50.0, 100.0  # degrees C, of a pen
 
 @dataclass(frozen=True)
 class Assumptions:
-    """Standard uncertainties that stand in for what a file leaves out.
+    """Default standard uncertainties for what files do not state.
 
     Those of the camera are what a lens that was calibrated once, and mounted and
     focused again since, was seen to be off by. Beside them stands what no file states
@@ -81,7 +81,7 @@ USUAL = Assumptions()
 
 
 def with_focal_length(assumptions: Assumptions, sigma: float) -> Assumptions:
-    """Return other assumptions of the focal length, relative, and all else of a camera.
+    """Return assumptions with another relative uncertainty of the focal length.
 
     A camera that is known better in one respect is so in all, as a rule.
     """

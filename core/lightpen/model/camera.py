@@ -26,7 +26,6 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.errors import CalibrationError
-from lightpen.sentences import sentence
 
 UNDISTORT_STEPS = 20
 # Of a step of Newton's method, in normalised units: what is left is about its square,
@@ -280,14 +279,7 @@ class Camera:
                     if np.any(_is_folded(there.jacobian)):
                         break
                     return PointMap(normalised, inverse)
-        raise CalibrationError(
-            sentence(
-                "camera.distortion-folds",
-                "The lens distortion of the camera file cannot be undone for some "
-                "image points: its coefficients fold the image. Check the "
-                "distortion coefficients, or calibrate the camera again.",
-            )
-        )
+        raise CalibrationError("camera.distortion-folds")
 
 
 def _rational(distortion: FloatArray) -> FloatArray:
@@ -317,7 +309,7 @@ def _radial_slope(
 
 
 def _is_folded(jacobians: FloatArray) -> BoolArray:
-    """Tell where a distortion turns the image over, past the rim of its valid field."""
+    """Return where a distortion is not invertible, beyond its valid field."""
     a, b = jacobians[..., 0, 0], jacobians[..., 0, 1]
     c, d = jacobians[..., 1, 0], jacobians[..., 1, 1]
     return np.asarray((a <= 0) | (d <= 0) | (a * d - b * c <= 0))

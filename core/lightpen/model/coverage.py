@@ -1,4 +1,4 @@
-"""Which postures a swing holds, and whether they fix the tip at all.
+"""Coverage of postures in a swing, and whether they determine the tip.
 
 The direction ``a`` of the pen frame along which the tip can be found must itself turn
 in the camera: the scatter matrix of the rotations, ``mean (R_i - R)^T (R_i - R)``, says
@@ -12,9 +12,9 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
+from lightpen.messages import Message, message
 from lightpen.model.posture import directions_of, tilts_of
 from lightpen.model.rigid import nearest_rotation
-from lightpen.sentences import Sentence, sentence
 
 MIN_SPREAD = np.radians(3.0)  # rms turn of the worst direction; a cone of 3 degrees
 TILT_RINGS = (np.radians(8.0), np.radians(20.0))  # upright, leaning, leaning far
@@ -64,7 +64,7 @@ class Coverage:
 
     @property
     def missing(self) -> list[str]:
-        """Directions in which the pen never leant, in words."""
+        """Names of the directions without a tilted posture."""
         leant = self.counts.sum(axis=0) > 0
         return [
             name for name, seen in zip(DIRECTION_NAMES, leant, strict=True) if not seen
@@ -72,7 +72,7 @@ class Coverage:
 
 
 def measure_coverage(rotations: FloatArray) -> Coverage:
-    """Measure which postures rotations (N, 3, 3) of cam_from_pen hold."""
+    """Return the posture coverage of rotations (N, 3, 3) of cam_from_pen."""
     counts = dial_counts(rotations)
     spread, axes = posture_spread(rotations)
     mean = nearest_rotation(rotations.mean(axis=0))
@@ -91,7 +91,7 @@ def measure_coverage(rotations: FloatArray) -> Coverage:
 
 
 def posture_spread(rotations: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return by how much the directions of the pen turn in the camera.
+    """Return the spread of the pen's orientations in the camera frame.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def posture_spread(rotations: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def require_spread(rotations: FloatArray) -> None:
-    """Refuse rotations (N, 3, 3) that do not fix the tip.
+    """Refuse rotations (N, 3, 3) that do not determine the tip.
 
     Raises
     ------
@@ -124,62 +124,30 @@ def require_spread(rotations: FloatArray) -> None:
         return
     found, needed = float(np.degrees(spread[0])), math.degrees(MIN_SPREAD)
     if spread[1] < MIN_SPREAD:
-        raise CalibrationError(
-            sentence(
-                "coverage.hardly-moved",
-                "The pen hardly moved: its postures differ by {found:.1f} degrees "
-                "(rms), {needed:.0f} degrees are needed. Tilt the pen to all sides, "
-                "by 20 degrees or more, and turn it about its own axis.",
-                found=found,
-                needed=needed,
-            )
-        )
+        raise CalibrationError("coverage.hardly-moved", found=found, needed=needed)
     raise CalibrationError(
-        sentence(
-            "coverage.one-axis",
-            "The pen was swung about one axis only, {axis}: that axis itself turned "
-            "by {found:.1f} degrees (rms), {needed:.0f} degrees are needed, so the "
-            "tip's place along it is not fixed. {advice}",
-            axis=_axis_name(axes[0]),
-            found=found,
-            needed=needed,
-            advice=_advice(axes[0]),
-        )
+        "coverage.one-axis",
+        axis=_axis_name(axes[0]),
+        found=found,
+        needed=needed,
+        advice=_advice(axes[0]),
     )
 
 
-def _axis_name(axis: FloatArray) -> Sentence:
+def _axis_name(axis: FloatArray) -> Message:
     largest = int(np.argmax(np.abs(axis)))
     if abs(axis[largest]) > 0.9:
-        return sentence("pen.axis", "the pen's {axis} axis", axis="xyz"[largest])
+        return message("pen.axis", axis="xyz"[largest])
     x, y, z = axis.tolist()
-    return sentence(
-        "pen.direction",
-        "the direction ({x:.2f}, {y:.2f}, {z:.2f}) of the pen",
-        x=x,
-        y=y,
-        z=z,
-    )
+    return message("pen.direction", x=x, y=y, z=z)
 
 
-def _advice(axis: FloatArray) -> Sentence:
+def _advice(axis: FloatArray) -> Message:
     largest = int(np.argmax(np.abs(axis)))
     return (
-        sentence(
-            "coverage.lean-sideways",
-            "Lean the pen to the left and right as well as towards and away from the "
-            "camera, and turn it about its own axis.",
-        ),
-        sentence(
-            "coverage.tilt",
-            "Tilt the pen to all sides, by 20 degrees or more, not only about its own "
-            "axis.",
-        ),
-        sentence(
-            "coverage.lean-forth",
-            "Lean the pen towards and away from the camera as well as to the left and "
-            "right, and turn it about its own axis.",
-        ),
+        message("coverage.lean-sideways"),
+        message("coverage.tilt"),
+        message("coverage.lean-forth"),
     )[largest]
 
 

@@ -1,4 +1,4 @@
-"""The image of a round LED: an ellipse, its centre not the image of the LED's centre.
+"""The image of a round LED: an ellipse, and the offset of its centre.
 
 A disc of radius r, unit normal n and centre X in the camera frame has the dual conic
 

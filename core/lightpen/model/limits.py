@@ -1,16 +1,63 @@
-"""What a station asks of a swing, and allows a verification to find."""
+"""The limits of a station: for a swing, for verifications, and for the age of a tip.
 
-from dataclasses import dataclass, field, fields
-from math import isfinite
+A limit is a field made by `_limit`, with label, unit and range: the dialog of limits,
+the options of the command line and the stored limits iterate over `LIMITS`.
+"""
 
-import numpy as np
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from datetime import datetime, timedelta
+from math import isfinite, radians
+from typing import Any
 
-from lightpen.model.due_rule import DueRule
+from lightpen.messages import Message, message
+
+IMAGES = LEAST_IMAGES, MOST_IMAGES = 10, 2000
+MOST_DAYS, MOST_SWINGS = 3650, 10_000
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A limit that a supervisor sets.
+
+    Attributes
+    ----------
+    part : str
+        Field of `StationLimits`.
+    name : str
+        Field of that part.
+    unit : str
+        Empty of a count.
+    range : (least, greatest)
+    """
+
+    part: str
+    name: str
+    default: float
+    label: Message
+    unit: str
+    range: tuple[float, float]
+
+    @property
+    def key(self) -> str:
+        """Name among stored entries."""
+        prefix = {"swing": "", "verification": "max_", "due": "due_"}[self.part]
+        return prefix + self.name + (f"_{self.unit}" if self.unit else "")
+
+
+def _limit(
+    default: float,
+    label: Message,
+    unit: str = "mm",
+    between: tuple[float, float] = (0.0001, 10.0),
+) -> Any:
+    described = {"default": default, "label": label, "unit": unit, "range": between}
+    return field(default=default, metadata=described)
 
 
 @dataclass(frozen=True)
 class SwingLimits:
-    """What a swing needs, and when it ends.
+    """When a swing ends, and which tip passes.
 
     Attributes
     ----------
@@ -25,11 +72,11 @@ class SwingLimits:
         Angle by which a kept posture differs from all others, rad.
     """
 
-    max_uncertainty: float = 0.012
-    min_images: int = 60
-    max_images: int = 300
+    max_uncertainty: float = _limit(0.012, message("limit.max-uncertainty"))
+    min_images: int = _limit(60, message("limit.min-images"), "", IMAGES)
+    max_images: int = _limit(300, message("limit.max-images"), "", IMAGES)
     min_per_field: int = 2
-    spacing: float = float(np.radians(2.5))
+    spacing: float = radians(2.5)
 
     def __post_init__(self) -> None:
         counts = self.min_images, self.min_per_field, self.max_images - 1
@@ -39,35 +86,35 @@ class SwingLimits:
 
 @dataclass(frozen=True)
 class VerificationLimits:
-    """What a verification may find at most, mm.
+    """Maximum deviations of a verification, mm.
 
     Attributes
     ----------
     across, along : float
-        Standard deviation of a fixed point across and along the view: along u and v,
-        and along w, where one camera sees some ten times less.
+        Standard deviation of a fixed point perpendicular to the line of sight (u, v)
+        and along it (w), where one camera resolves some ten times less.
     radius : float
         Error of the mean radius of a circle.
     form : float
-        Roundness of a circle, and its deviation from a plane.
+        Roundness of a circle and its deviation from a plane; excess of a flatness.
     length : float
         Error of a length.
     location : float
-        Diameter of the sphere about one point touched in several postures.
+        Diameter of the sphere about one point probed in several postures.
     repeatability : float
         Standard deviation of a coordinate of the tip over calibrations.
     drift : float
-        How far a witness may move during a session.
+        How far a drift reference may move during a session.
     """
 
-    across: float = 0.01
-    along: float = 0.03
-    radius: float = 0.02
-    form: float = 0.1
-    length: float = 0.03
-    location: float = 0.1
-    repeatability: float = 0.01
-    drift: float = 0.02
+    across: float = _limit(0.01, message("limit.across"))
+    along: float = _limit(0.03, message("limit.along"))
+    radius: float = _limit(0.02, message("limit.radius"))
+    form: float = _limit(0.1, message("limit.form"))
+    length: float = _limit(0.03, message("limit.length"))
+    location: float = _limit(0.1, message("limit.location"))
+    repeatability: float = _limit(0.01, message("limit.repeatability"))
+    drift: float = _limit(0.02, message("limit.drift"))
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -77,9 +124,57 @@ class VerificationLimits:
 
 
 @dataclass(frozen=True)
+class DueRule:
+    """How long a tip may be used before it is calibrated again.
+
+    Attributes
+    ----------
+    max_days : int
+        Days since it was calibrated.
+    max_swings : int
+        Swings of its pen since, with any tip, as each change of tips wears the seat.
+        0 for no limit.
+    """
+
+    max_days: int = _limit(30, message("limit.max-days"), "", (1, MOST_DAYS))
+    max_swings: int = _limit(0, message("limit.max-swings"), "", (0, MOST_SWINGS))
+
+    def __post_init__(self) -> None:
+        if self.max_days < 1 or self.max_swings < 0:
+            raise ValueError(f"No tip can be due by {self}.")
+
+    def due(self, accepted: datetime) -> datetime:
+        """Return when a tip is due by its age."""
+        return accepted + timedelta(days=self.max_days)
+
+
+@dataclass(frozen=True)
 class StationLimits:
-    """All limits of a station, and when its tips are due."""
+    """All limits of a station."""
 
     swing: SwingLimits = field(default_factory=SwingLimits)
     verification: VerificationLimits = field(default_factory=VerificationLimits)
     due: DueRule = field(default_factory=DueRule)
+
+    def value(self, limit: Limit) -> float:
+        """Return the value of a limit."""
+        value: float = getattr(getattr(self, limit.part), limit.name)
+        return value
+
+    def with_values(self, values: Mapping[str, float]) -> "StationLimits":
+        """Return these limits with other values, by `Limit.key`; counts are rounded."""
+        parts = {name: dict[str, float]() for name in PARTS}
+        for limit in LIMITS:
+            value = values.get(limit.key, self.value(limit))
+            parts[limit.part][limit.name] = value if limit.unit else round(value)
+        changed = {n: replace(getattr(self, n), **new) for n, new in parts.items()}
+        return replace(self, **changed)
+
+
+PARTS = {"swing": SwingLimits, "verification": VerificationLimits, "due": DueRule}
+LIMITS = tuple(
+    Limit(part, each.name, **each.metadata)
+    for part, kind in PARTS.items()
+    for each in fields(kind)
+    if each.metadata
+)

@@ -1,4 +1,4 @@
-"""The light pen: where its LEDs are, and the frame they are given in.
+"""The light pen: LED positions and the pen frame.
 
 The paper [1]_ defines the pen frame of its ten-LED pen from the LEDs themselves. LEDs
 1 to 4 stand in a line on the back plane; LEDs 5 to 10 lie on the front plane, in two
@@ -25,7 +25,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 
 DISC_DIAMETER = 10.0  # mm, of each LED of the paper's pen
 FRAME_TOLERANCE = 1.0  # mm; LEDs deviate by up to 0.4 mm from line and plane
@@ -40,17 +40,9 @@ MIN_OFF_LINE = 0.02  # of the pen's extent, of the LED farthest from the best li
 
 _BACK, _LEFT, _RIGHT = slice(0, 4), slice(4, 7), slice(7, 10)
 _HANDEDNESS = (
-    sentence(
-        "pen.sign-of-x",
-        "LEDs 5 to 7 must have negative x and 8 to 10 positive x. Change the sign of "
-        "all x, or exchange the columns if they are numbered the wrong way.",
-    ),
-    sentence(
-        "pen.sign-of-y", "y must grow from LED 1 to LED 4. Change the sign of all y."
-    ),
-    sentence(
-        "pen.sign-of-z", "LEDs 1 to 4 must have negative z. Change the sign of all z."
-    ),
+    message("pen.sign-of-x"),
+    message("pen.sign-of-y"),
+    message("pen.sign-of-z"),
 )
 
 
@@ -109,7 +101,7 @@ class Pen:
 
 
 def grown(pen: Pen, growth: float) -> Pen:
-    """Return a pen whose LEDs lie further apart about their middle.
+    """Return a pen scaled about the centroid of its LEDs.
 
     Parameters
     ----------
@@ -125,7 +117,7 @@ def grown(pen: Pen, growth: float) -> Pen:
 
 
 def check_leds(leds: FloatArray, diameter: float) -> None:
-    """Refuse LEDs that cannot be those of a pen whose pose they fix.
+    """Refuse LEDs that do not determine a pose.
 
     Parameters
     ----------
@@ -141,49 +133,20 @@ def check_leds(leds: FloatArray, diameter: float) -> None:
     """
     if not MIN_LEDS <= len(leds) <= MAX_LEDS:
         raise FileError(
-            sentence(
-                "pen.number-of-leds",
-                "A pen needs {least} to {most} LEDs; the file has {n_leds}. Check "
-                "that it is the complete file of a pen.",
-                least=MIN_LEDS,
-                most=MAX_LEDS,
-                n_leds=len(leds),
-            )
+            "pen.number-of-leds", least=MIN_LEDS, most=MAX_LEDS, n_leds=len(leds)
         )
     farthest = np.abs(leds).max(axis=1)
     if farthest.max() > MAX_COORDINATE:
         raise FileError(
-            sentence(
-                "pen.far-led",
-                "LED {led} is {distance:.6g} m from the origin, which no pen is. "
-                "Check the numbers and their units.",
-                led=int(np.argmax(farthest)) + 1,
-                distance=float(farthest.max()) / 1000,
-            )
+            "pen.far-led",
+            led=int(np.argmax(farthest)) + 1,
+            distance=float(farthest.max()) / 1000,
         )
     extent = float(np.ptp(leds, axis=0).max())
     if extent > MAX_EXTENT:
-        raise FileError(
-            sentence(
-                "pen.too-large",
-                "The LEDs span {extent:.6g} m; a pen spans at most {most:g} m. "
-                "Check that the coordinates are in millimetres, in the header too, "
-                "or name their units.",
-                extent=extent / 1000,
-                most=MAX_EXTENT / 1000,
-            )
-        )
+        raise FileError("pen.too-large", extent=extent / 1000, most=MAX_EXTENT / 1000)
     if extent < diameter:
-        raise FileError(
-            sentence(
-                "pen.too-small",
-                "The LEDs span only {extent:.4g} mm, less than one disc of "
-                "{diameter:g} mm. Are the coordinates in metres? Then name the "
-                "units, such as in the header: x_m, y_m, z_m.",
-                extent=extent,
-                diameter=diameter,
-            )
-        )
+        raise FileError("pen.too-small", extent=extent, diameter=diameter)
     _check_separation(leds, diameter)
     _check_not_in_line(leds, extent)
 
@@ -209,26 +172,14 @@ def check_frame(pen: Pen) -> None:
     worst = int(np.argmax(deviations))
     if deviations[worst] > FRAME_TOLERANCE:
         raise FileError(
-            sentence(
-                "pen.not-in-frame",
-                "The LEDs are not in the pen frame: LED {led} is {distance:.2f} mm "
-                "from where the frame puts it (origin in front of LED 1, y along "
-                "LEDs 1 to 4, LEDs 5 to 10 at z = 0). If these are a measuring "
-                "machine's coordinates, put them into the pen frame.",
-                led=worst + 1,
-                distance=float(deviations[worst]),
-            )
+            "pen.not-in-frame", led=worst + 1, distance=float(deviations[worst])
         )
     backwards = np.flatnonzero(pen.normals[:, 2] <= 0)
     if len(backwards):
         raise FileError(
-            sentence(
-                "pen.normal-backwards",
-                "The normal of LED {led} points away from the viewer (nz = "
-                "{nz:.3f}); nz must be positive in the pen frame. Change its sign.",
-                led=int(backwards[0]) + 1,
-                nz=float(pen.normals[backwards[0], 2]),
-            )
+            "pen.normal-backwards",
+            led=int(backwards[0]) + 1,
+            nz=float(pen.normals[backwards[0], 2]),
         )
 
 
@@ -259,27 +210,10 @@ def pen_frame_from_raw(raw_leds: FloatArray) -> tuple[FloatArray, FloatArray]:
     slots = _layout(raw_leds)
     if slots is None:
         raise FileError(
-            sentence(
-                "pen.no-frame",
-                "The LEDs do not stand as the pen frame needs it: ten LEDs, 1 to 4 "
-                "in a line behind the plane of 5 to 10, and these in two columns of "
-                "three parallel to the line, all within {tolerance:g} mm. {misfit} "
-                "Measure the LEDs again, or give a pen of another layout in a frame "
-                "of its own.",
-                tolerance=FRAME_TOLERANCE,
-                misfit=_misfit(raw_leds),
-            )
+            "pen.no-frame", tolerance=FRAME_TOLERANCE, misfit=_misfit(raw_leds)
         )
     if not _check_order(raw_leds, slots):
-        raise FileError(
-            sentence(
-                "pen.mirror-image",
-                "The LEDs are a mirror image of the pen: seen from the front with "
-                "LED 4 above LED 1, LEDs 5 to 7 must be on the left and 8 to 10 on "
-                "the right. If the machine's axes are left-handed, change the sign "
-                "of one coordinate; if the columns are exchanged, number them anew.",
-            )
-        )
+        raise FileError("pen.mirror-image")
     return _frame(raw_leds)
 
 
@@ -307,16 +241,11 @@ def _check_separation(leds: FloatArray, diameter: float) -> None:
     nearest = distances[first, second]
     if nearest < MIN_SEPARATION * diameter:
         raise FileError(
-            sentence(
-                "pen.leds-too-close",
-                "LEDs {first} and {second} are {distance:.2f} mm apart, too close "
-                "for discs of {diameter:g} mm. Check their coordinates and the "
-                "diameter.",
-                first=int(first) + 1,
-                second=int(second) + 1,
-                distance=float(nearest),
-                diameter=diameter,
-            )
+            "pen.leds-too-close",
+            first=int(first) + 1,
+            second=int(second) + 1,
+            distance=float(nearest),
+            diameter=diameter,
         )
 
 
@@ -324,15 +253,10 @@ def _check_not_in_line(leds: FloatArray, extent: float) -> None:
     off_line = _off_line(leds).max()
     if off_line < MIN_OFF_LINE * extent:
         raise FileError(
-            sentence(
-                "pen.leds-in-line",
-                "The LEDs stand in a line within {off_line:.2f} mm over "
-                "{extent:.0f} mm, so a turn about it could not be seen. At least "
-                "one LED must stand {needed:.1f} mm off the line.",
-                off_line=off_line,
-                extent=extent,
-                needed=MIN_OFF_LINE * extent,
-            )
+            "pen.leds-in-line",
+            off_line=off_line,
+            extent=extent,
+            needed=MIN_OFF_LINE * extent,
         )
 
 
@@ -346,7 +270,7 @@ def _off_line(points: FloatArray) -> FloatArray:
 
 
 def _layout(leds: FloatArray) -> IntArray | None:
-    """Return which LED stands where in the paper's layout, or None if it is not that.
+    """Return the order of the LEDs in the paper's layout; None for other layouts.
 
     The places are the back line, one column and the other, each from one end to the
     other; which end and which column comes first is not decided.
@@ -388,7 +312,7 @@ def _layout_behind(leds: FloatArray, back: IntArray) -> IntArray | None:
 
 
 def _check_order(leds: FloatArray, slots: IntArray) -> bool:
-    """Refuse LEDs with exchanged numbers; tell whether the others are right-handed."""
+    """Refuse LEDs with swapped numbers; return whether they are right-handed."""
     back, left, right = slots[_BACK], slots[_LEFT], slots[_RIGHT]
     orders = [
         np.concatenate([back[::step], first[::step], second[::step]])
@@ -415,36 +339,15 @@ def _out_of_order(order: IntArray) -> FileError:
     wrong = np.flatnonzero(order != np.arange(10))
     if len(wrong) == 2:
         return FileError(
-            sentence(
-                "pen.leds-exchanged",
-                "LEDs {first} and {second} are exchanged: each stands where the "
-                "other belongs. LEDs 1 to 4 must follow each other along the back "
-                "line, and 5 to 7 and 8 to 10 along the columns in the same "
-                "direction. Exchange their coordinates.",
-                first=int(wrong[0]) + 1,
-                second=int(wrong[1]) + 1,
-            )
+            "pen.leds-exchanged", first=int(wrong[0]) + 1, second=int(wrong[1]) + 1
         )
     places = _listing(
         [
-            sentence(
-                "pen.led-in-place-of",
-                "{led} where {other} belongs",
-                led=int(order[j]) + 1,
-                other=int(j) + 1,
-            )
+            message("pen.led-in-place-of", led=int(order[j]) + 1, other=int(j) + 1)
             for j in wrong
         ]
     )
-    return FileError(
-        sentence(
-            "pen.out-of-order",
-            "The LEDs are out of order: LED {places}. LEDs 1 to 4 must follow each "
-            "other along the back line, and 5 to 7 and 8 to 10 along the columns in "
-            "the same direction. Number them so.",
-            places=places,
-        )
-    )
+    return FileError("pen.out-of-order", places=places)
 
 
 def _mirrored(leds: FloatArray) -> FileError:
@@ -455,56 +358,38 @@ def _mirrored(leds: FloatArray) -> FileError:
         if np.abs(_in_frame(mirrored) - mirrored).max() <= FRAME_TOLERANCE:
             break
     else:
-        return FileError(
-            sentence(
-                "pen.neither-framed-nor-handed",
-                "The LEDs are neither in the pen frame nor right-handed: they are a "
-                "mirror image of the pen. Change the sign of one coordinate, then "
-                "put them into the pen frame.",
-            )
-        )
+        return FileError("pen.neither-framed-nor-handed")
     worst = int(np.argmax(np.abs(leds[:, axis])))
     return FileError(
-        sentence(
-            "pen.mirrored-axis",
-            "The LEDs are mirrored in {axis}, a left-handed frame: LED {led} has "
-            "{axis} = {found:.2f} mm in place of {needed:.2f} mm. {rule}",
-            axis="xyz"[axis],
-            led=worst + 1,
-            found=float(leds[worst, axis]),
-            needed=-float(leds[worst, axis]),
-            rule=_HANDEDNESS[axis],
-        )
+        "pen.mirrored-axis",
+        axis="xyz"[axis],
+        led=worst + 1,
+        found=float(leds[worst, axis]),
+        needed=-float(leds[worst, axis]),
+        rule=_HANDEDNESS[axis],
     )
 
 
-def _misfit(leds: FloatArray) -> Sentence:
-    """Return a sentence about what keeps LEDs from being the paper's layout."""
+def _misfit(leds: FloatArray) -> Message:
+    """Return why LEDs are not of the paper's layout."""
     if len(leds) != 10:
-        return sentence(
-            "pen.led-count", "The file has {n_leds} LEDs.", n_leds=len(leds)
-        )
+        return message("pen.led-count", n_leds=len(leds))
     off_line = _off_line(leds[_BACK])
     front = leds[4:] - leds[4:].mean(axis=0)
     off_plane = np.abs(front @ np.linalg.svd(front)[2][2])
     if off_line.max() > FRAME_TOLERANCE:
-        return sentence(
+        return message(
             "pen.off-line",
-            "LED {led} is {distance:.2f} mm off the line of LEDs 1 to 4.",
             led=int(np.argmax(off_line)) + 1,
             distance=float(off_line.max()),
         )
     if off_plane.max() > FRAME_TOLERANCE:
-        return sentence(
+        return message(
             "pen.off-plane",
-            "LED {led} is {distance:.2f} mm off the plane of LEDs 5 to 10.",
             led=int(np.argmax(off_plane)) + 5,
             distance=float(off_plane.max()),
         )
-    return sentence(
-        "pen.not-parallel",
-        "The line, the plane and the columns are not parallel, or too close.",
-    )
+    return message("pen.not-parallel")
 
 
 def _in_frame(leds: FloatArray) -> FloatArray:
@@ -525,6 +410,6 @@ def _frame(leds: FloatArray) -> tuple[FloatArray, FloatArray]:
     return R, -R @ origin
 
 
-def _listing(items: Sequence[Sentence]) -> Sentence:
+def _listing(items: Sequence[Message]) -> Message:
     *others, last = items
-    return sentence("list.and", "{others} and {last}", others=tuple(others), last=last)
+    return message("list.and", others=tuple(others), last=last)

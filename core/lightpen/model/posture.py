@@ -1,4 +1,4 @@
-"""How the pen is held, in the three numbers that its holder can change.
+"""Posture of the pen: tilt, direction and rotation.
 
 The pen leans by a tilt from upright to a direction, and is turned about its own axis:
 

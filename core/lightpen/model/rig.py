@@ -1,4 +1,4 @@
-"""Cameras that stand fast beside each other and see the same pen.
+"""A rig: cameras fixed to each other that see the same pen.
 
 The first camera is the reference: its frame is the frame of the rig. One camera alone
 is a rig of one.
@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
-from lightpen.sentences import Sentence, sentence
 
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """Cameras and where they stand (cam_from_rig, as COLMAP [1]_ names it).
+    """Cameras and their poses (cam_from_rig, as in COLMAP [1]_).
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ def rig_of(camera: Camera) -> Rig:
 
 
 def from_first(rig: Rig) -> Rig:
-    """Return a rig that is given from elsewhere in the frame of its first camera.
+    """Return a rig expressed in the frame of its first camera.
 
     Parameters
     ----------
@@ -67,8 +67,6 @@ def from_first(rig: Rig) -> Rig:
     return replace(rig, rotations=rotations, translations=translations)
 
 
-def of_camera(name: str, trouble: Sentence) -> Sentence:
-    """Return what is wrong with a camera of a rig, its name before it."""
-    return sentence(
-        "rig.of-camera", "Camera {camera}: {trouble}", camera=name, trouble=trouble
-    )
+def of_camera(name: str, trouble: Message) -> Message:
+    """Return an error of a camera of a rig, with the camera's name."""
+    return message("rig.of-camera", camera=name, trouble=trouble)

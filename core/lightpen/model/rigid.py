@@ -90,13 +90,6 @@ def vector_from_rotation(rotations: FloatArray) -> FloatArray:
     return vectors
 
 
-def rotation_from_quaternion(quaternion: FloatArray) -> FloatArray:
-    """Return the rotation matrix (3, 3) of a unit quaternion ``w x y z``."""
-    w, x, y, z = quaternion
-    K = skew(np.array([x, y, z]))
-    return np.asarray(np.eye(3) + 2 * w * K + 2 * K @ K)
-
-
 def skew(vectors: FloatArray) -> FloatArray:
     """Return the matrices K with ``K @ p = v x p``, shape (..., 3, 3)."""
     return np.asarray((vectors @ GENERATORS).reshape(*vectors.shape, 3))

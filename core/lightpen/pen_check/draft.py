@@ -1,17 +1,22 @@
-"""The LEDs of a pen as they are typed, before they are a pen."""
+"""The draft of a pen: its LEDs as typed, files opened to be edited, corrections."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from pathlib import Path
+from typing import Self, cast
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.errors import FileError
+from lightpen.errors import FileError, LightpenError, UsageError
+from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_content import LARGEST_DIAMETER, NORMAL_TOLERANCE
+from lightpen.formats.pen_files import read_unchecked_pen, write_pen
 from lightpen.formats.tables import number_flaw
+from lightpen.messages import Message, message
 from lightpen.model.pen import Pen
 from lightpen.pen_check.frame import FrameCheck, examine_frame, moved_into_frame
-from lightpen.sentences import Sentence, sentence
+from lightpen.pen_check.match import Finding, MatchFinding
 
 COLUMNS = ("x", "y", "z", "nx", "ny", "nz")
 DECIMALS = 6  # of coordinates in mm, as they are shown
@@ -19,30 +24,26 @@ FACING = ("0", "0", "1")
 
 
 @dataclass(frozen=True)
-class CellFlaw:
+class CellError:
     """A cell that holds no number.
 
     Attributes
     ----------
     row, column : int
         From 0; the columns are those of `COLUMNS`.
-    flaw : Sentence
+    flaw : Message
         What is wrong with it.
     """
 
     row: int
     column: int
-    flaw: Sentence
+    flaw: Message
 
     @property
-    def sentence(self) -> Sentence:
-        """What is wrong, and where."""
-        return sentence(
-            "draft.cell",
-            "LED {led}, {column}: {flaw}",
-            led=self.row + 1,
-            column=COLUMNS[self.column],
-            flaw=self.flaw,
+    def message(self) -> Message:
+        """The message to the user."""
+        return message(
+            "draft.cell", led=self.row + 1, column=COLUMNS[self.column], flaw=self.flaw
         )
 
 
@@ -103,10 +104,10 @@ class PenDraft:
         """Return the draft without an LED; later ones get lower numbers."""
         return replace(self, rows=(*self.rows[:row], *self.rows[row + 1 :]))
 
-    def flaws(self) -> tuple[CellFlaw, ...]:
+    def flaws(self) -> tuple[CellError, ...]:
         """Return the cells that hold no number."""
         return tuple(
-            CellFlaw(row, column, flaw)
+            CellError(row, column, flaw)
             for row, cells in enumerate(self.rows)
             for column, cell in enumerate(cells)
             if number_flaw(_pointed(cell)) and (flaw := number_flaw(cell))
@@ -121,7 +122,7 @@ class PenDraft:
             A cell holds no number, or a normal or the diameter cannot be one.
         """
         for flaw in self.flaws():
-            raise FileError(flaw.sentence)
+            raise FileError(flaw.message)
         cells = np.array([[float(_pointed(c)) for c in row] for row in self.rows])
         cells = cells.reshape(-1, len(COLUMNS))
         normals = _unit_normals(cells[:, 3:])
@@ -130,23 +131,11 @@ class PenDraft:
     def _diameter(self) -> float:
         flaw = number_flaw(_pointed(self.diameter))
         if flaw:
-            raise FileError(
-                sentence(
-                    "draft.diameter",
-                    "Diameter of the discs: {flaw}",
-                    flaw=flaw,
-                )
-            )
+            raise FileError("draft.diameter", flaw=flaw)
         diameter = float(_pointed(self.diameter))
         if not 0 < diameter <= LARGEST_DIAMETER:
             raise FileError(
-                sentence(
-                    "draft.disc-diameter",
-                    "The LED discs cannot be {diameter:g} mm wide. Give a diameter "
-                    "of up to {most:g} mm.",
-                    diameter=diameter,
-                    most=LARGEST_DIAMETER,
-                )
+                "draft.disc-diameter", diameter=diameter, most=LARGEST_DIAMETER
             )
         return diameter
 
@@ -156,24 +145,17 @@ class PenDraft:
         for axis, cell in zip("xyz", self.tip, strict=True):
             flaw = number_flaw(_pointed(cell))
             if flaw:
-                raise FileError(
-                    sentence(
-                        "draft.nominal-tip",
-                        "Nominal tip, {axis}: {flaw}",
-                        axis=axis,
-                        flaw=flaw,
-                    )
-                )
+                raise FileError("draft.nominal-tip", axis=axis, flaw=flaw)
         return np.array([float(_pointed(cell)) for cell in self.tip])
 
 
 @dataclass(frozen=True, eq=False)
 class DraftCheck:
-    """What a draft is worth.
+    """Result of checking a draft.
 
     Attributes
     ----------
-    flaw : Sentence or None
+    flaw : Message or None
         Why it is no pen: the cell and what is wrong with it.
     pen : Pen or None
         The pen as it is typed.
@@ -183,7 +165,7 @@ class DraftCheck:
         The pen to look for in images: in the pen frame if it can be put there.
     """
 
-    flaw: Sentence | None = None
+    flaw: Message | None = None
     pen: Pen | None = None
     frame: FrameCheck | None = None
     sought: Pen | None = None
@@ -207,7 +189,7 @@ def check_draft(draft: PenDraft, pen: Pen | None = None) -> DraftCheck:
     try:
         pen = pen or draft.pen()
     except FileError as error:
-        return DraftCheck(error.sentence)
+        return DraftCheck(error.message)
     frame = examine_frame(pen)
     sought = pen if frame.is_a_pen else None
     if frame.can_be_moved:
@@ -229,12 +211,116 @@ def _unit_normals(normals: FloatArray) -> FloatArray:
     wrong = np.flatnonzero(np.abs(lengths - 1) > NORMAL_TOLERANCE)
     if len(wrong):
         raise FileError(
-            sentence(
-                "draft.normal-length",
-                "LED {led}: the normal {normal} does not have the length 1. Correct "
-                "it; a disc that faces +z has the normal 0 0 1.",
-                led=int(wrong[0]) + 1,
-                normal=" ".join(f"{c:g}" for c in normals[wrong[0]]),
-            )
+            "draft.normal-length",
+            led=int(wrong[0]) + 1,
+            normal=" ".join(f"{c:g}" for c in normals[wrong[0]]),
         )
     return np.asarray(normals / lengths[:, None])
+
+
+MEASURED_DECIMALS = 3  # mm; live images do not tell an LED's place any finer
+
+
+def leds_to_exchange(frame: FrameCheck | None) -> tuple[int, int] | None:
+    """Return the numbers of two LEDs that are swapped in the file."""
+    error = None if frame is None else frame.error
+    if error is None or error.code != "pen.leds-exchanged":
+        return None
+    return cast(int, error.values["first"]), cast(int, error.values["second"])
+
+
+def exchanged(
+    draft: PenDraft, leds: Sequence[int], columns: Sequence[str] = COLUMNS
+) -> PenDraft:
+    """Return a draft in which two LEDs, by number, swap these columns."""
+    one, other = (led - 1 for led in leds)
+    result = draft
+    for column in map(COLUMNS.index, columns):
+        result = result.with_cell(one, column, draft.rows[other][column])
+        result = result.with_cell(other, column, draft.rows[one][column])
+    return result
+
+
+def mended(draft: PenDraft, finding: Finding) -> PenDraft:
+    """Return a draft with a finding of live images corrected.
+
+    Coordinates that two LEDs have of each other are exchanged, and an LED off its place
+    is put where the images show it. Where either of two coordinates can be exchanged,
+    that is chosen which leaves the LEDs in the pen frame.
+
+    Parameters
+    ----------
+    draft : PenDraft
+        Of the pen that was compared, in the same frame.
+    finding : Finding
+        One that `can_be_mended`.
+    """
+    if finding.what is not MatchFinding.EXCHANGED:
+        return _put_in_place(draft, finding)
+    drafts = [
+        exchanged(draft, finding.leds, either.split(", "))
+        for either in finding.axes.split("/")
+    ]
+    fit = (each for each in drafts if check_draft(each).usable is not None)
+    return next(fit, drafts[0])
+
+
+def _put_in_place(draft: PenDraft, finding: Finding) -> PenDraft:
+    row = finding.leds[0] - 1
+    place = draft.pen().leds[row] + finding.by
+    for column, value in enumerate(place.tolist()):
+        if round(finding.by[column], MEASURED_DECIMALS):
+            draft = draft.with_cell(row, column, f"{value:.{MEASURED_DECIMALS}f}")
+    return draft
+
+
+@dataclass(frozen=True, eq=False)
+class OpenedPen:
+    """Result of opening a pen file.
+
+    Attributes
+    ----------
+    file : PenFile or None
+        The pen, fit for use.
+    draft : PenDraft or None
+        Else its LEDs to be mended, if they can be shown.
+    needs_units : bool
+        Whether the file has to be read again with the units that it does not say.
+    problem : Message or None
+        Why it cannot be used.
+    """
+
+    path: Path
+    file: PenFile | None = None
+    draft: PenDraft | None = None
+    needs_units: bool = False
+    problem: Message | None = None
+
+
+def open_pen(path: Path, units: str | None = None) -> OpenedPen:
+    """Open a pen file; errors are in the result."""
+    try:
+        return OpenedPen(path, PenFile.read(path, units))
+    except UsageError as error:
+        if units is None:
+            return OpenedPen(path, needs_units=True)
+        return OpenedPen(path, problem=error.message)
+    except FileError as error:
+        problem = error.message
+    try:
+        draft = PenDraft.of(read_unchecked_pen(path, units))
+    except LightpenError:
+        return OpenedPen(path, problem=problem)
+    return OpenedPen(path, draft=draft, problem=problem)
+
+
+def save_pen(pen: Pen, path: Path) -> PenFile:
+    """Write a pen and return it as the file that is now in use.
+
+    Raises
+    ------
+    FileError
+        It cannot be written; what was there before is unchanged.
+    """
+    write_pen(pen, path)
+    return PenFile.read(path)

@@ -1,4 +1,4 @@
-"""The definition of the pen frame, rule by rule, for a pen as it stands."""
+"""Check of a pen against the definition of the pen frame, rule by rule."""
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -7,6 +7,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
+from lightpen.messages import Message
 from lightpen.model.pen import (
     FRAME_TOLERANCE,
     Pen,
@@ -15,11 +16,10 @@ from lightpen.model.pen import (
     in_pen_frame,
     pen_frame_from_raw,
 )
-from lightpen.sentences import Sentence
 
 
 class Rule(StrEnum):
-    """What the pen frame asks for."""
+    """Rules of the pen frame."""
 
     LEDS = "LEDs"  # enough of them, apart, not in a line, in millimetres
     NUMBERS = "numbers"  # LEDs 1 to 4 follow each other, 5 to 7 and 8 to 10 too
@@ -32,7 +32,7 @@ class Rule(StrEnum):
 
 
 class RuleStatus(StrEnum):
-    """How a rule fares."""
+    """Result of checking a rule."""
 
     MET = "met"
     BROKEN = "broken"
@@ -41,7 +41,7 @@ class RuleStatus(StrEnum):
 
 @dataclass(frozen=True)
 class RuleCheck:
-    """One rule and how it fares.
+    """A rule and its result.
 
     Attributes
     ----------
@@ -56,23 +56,23 @@ class RuleCheck:
 
 @dataclass(frozen=True)
 class FrameCheck:
-    """How a pen fares with the pen frame.
+    """Result of checking a pen against the pen frame.
 
     Attributes
     ----------
     checks : tuple of RuleCheck
         In the order of `Rule`.
-    error : Sentence or None
+    error : Message or None
         Why the pen cannot be used, with LED and amount.
-    remark : Sentence or None
+    remark : Message or None
         Why it is no pen of the paper's layout, though it is not in error.
     can_be_moved : bool
         Whether its coordinates can be put into the pen frame.
     """
 
     checks: tuple[RuleCheck, ...]
-    error: Sentence | None = None
-    remark: Sentence | None = None
+    error: Message | None = None
+    remark: Message | None = None
     can_be_moved: bool = False
 
     @property
@@ -89,7 +89,7 @@ def examine_frame(pen: Pen) -> FrameCheck:
     try:
         check_leds(pen.leds, pen.diameter)
     except FileError as error:
-        return FrameCheck(_all_open(Rule.LEDS), error.sentence)
+        return FrameCheck(_all_open(Rule.LEDS), error.message)
     off_layout, off_frame = _layout_error(pen.leds), _frame_error(pen)
     if off_layout and not off_frame:
         return FrameCheck(_all_open(), remark=off_layout)
@@ -118,24 +118,24 @@ def moved_into_frame(pen: Pen) -> Pen:
     return moved
 
 
-def _layout_error(leds: FloatArray) -> Sentence | None:
+def _layout_error(leds: FloatArray) -> Message | None:
     try:
         pen_frame_from_raw(leds)
     except FileError as error:
-        return error.sentence
+        return error.message
     return None
 
 
-def _frame_error(pen: Pen) -> Sentence | None:
+def _frame_error(pen: Pen) -> Message | None:
     try:
         check_frame(pen)
     except FileError as error:
-        return error.sentence
+        return error.message
     return None
 
 
 def _all_open(broken: Rule | None = None) -> tuple[RuleCheck, ...]:
-    """Return checks of which at most one is told, as the others build on it."""
+    """Return checks of which at most one is decided, as the others build on it."""
     outcomes = dict.fromkeys(Rule, RuleStatus.OPEN)
     if broken is not Rule.LEDS:
         outcomes[Rule.LEDS] = RuleStatus.MET

@@ -1,4 +1,4 @@
-"""Whether the pen file fits the pen before the camera, and if not, which LED is wrong.
+"""Comparison of a pen file with the pen before the camera.
 
 LEDs are alike, so an image shows where they are, not which is which: two LEDs that are
 exchanged in the file as a whole fit the images, and only the definition of the pen
@@ -10,7 +10,7 @@ it is instead.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from itertools import combinations, product
+from itertools import combinations
 from math import sqrt
 
 import numpy as np
@@ -31,13 +31,13 @@ from lightpen.detection.pose import (
     robust_sigma,
 )
 from lightpen.detection.spots import Spots
-from lightpen.estimation.single_images import USUAL_SIGMA
+from lightpen.estimation.contact.single_images import USUAL_SIGMA
+from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen
 from lightpen.pen_check.shifts import Shift, find_shifts, triple
 from lightpen.pen_check.unknown_leds import find_unknown_leds
-from lightpen.sentences import Sentence
 
 MAX_VIEWS = 30
 MOVED = 0.006  # of the extent of the spots, by which views differ
@@ -49,8 +49,8 @@ SURE = 0.05  # mm, standard deviation of a shift that is told with its direction
 SURE_SHARE = 0.1  # of its length, likewise
 
 
-class What(StrEnum):
-    """What is wrong; what `Finding` holds is given beside."""
+class MatchFinding(StrEnum):
+    """Kinds of findings, with the fields of `Finding` that they use."""
 
     ADVICE = "advice"
     EXCHANGED = "exchanged"  # two LEDs, axes
@@ -63,7 +63,7 @@ class What(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong.
+    """A finding.
 
     Attributes
     ----------
@@ -75,22 +75,22 @@ class Finding:
         Whether the views differ enough to tell `by`.
     axes : str
         Coordinates that two LEDs have of each other: "y", or "x/y" for either.
-    advice : Sentence or None
+    advice : Message or None
         What is likely wrong with the files as a whole, and what to do.
     """
 
-    what: What
+    what: MatchFinding
     leds: tuple[int, ...] = ()
     by: tuple[float, float, float] = (0.0, 0.0, 0.0)
     is_sure: bool = True
     axes: str = ""
-    advice: Sentence | None = None
+    advice: Message | None = None
 
     @property
     def can_be_mended(self) -> bool:
-        """Whether it tells what to write into the table of the LEDs instead."""
-        is_measured = self.what is What.SHIFTED and self.is_sure
-        return self.what is What.EXCHANGED or is_measured
+        """Whether it gives the correct coordinates."""
+        is_measured = self.what is MatchFinding.SHIFTED and self.is_sure
+        return self.what is MatchFinding.EXCHANGED or is_measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class PenMatch:
 
     @property
     def fits(self) -> bool:
-        """Whether the pen was found in views enough to say so, and nothing is wrong."""
+        """Whether the pen was found in enough views, without findings."""
         enough = self.n_labelled > 0 and self.n_views >= ENOUGH_VIEWS
         return enough and not self.findings
 
@@ -166,7 +166,7 @@ def match_pen(camera: Camera, pen: Pen, views: Sequence[Spots]) -> PenMatch:
     sigma = robust_sigma(residuals, 6)
     findings = _findings(pen, located)
     if not findings and sigma > USUAL_SIGMA:
-        findings = (Finding(What.MISFIT),)
+        findings = (Finding(MatchFinding.MISFIT),)
     return PenMatch(
         n_views=len(views),
         n_labelled=len(found),
@@ -261,14 +261,14 @@ def _located(camera: Camera, pen: Pen, seen: _Seen) -> _Located:
     )
 
 
-def _without_pen(pen: Pen, n_views: int, advice: Sentence | None) -> PenMatch:
+def _without_pen(pen: Pen, n_views: int, advice: Message | None) -> PenMatch:
     return PenMatch(
         n_views=n_views,
         n_labelled=0,
         n_seen=np.zeros(pen.n_leds, dtype=np.int64),
         rms=np.full(pen.n_leds, np.nan),
         sigma=float("nan"),
-        findings=(Finding(What.ADVICE, advice=advice),) if advice else (),
+        findings=(Finding(MatchFinding.ADVICE, advice=advice),) if advice else (),
     )
 
 
@@ -322,34 +322,16 @@ def _owners(leds: FloatArray, points: FloatArray) -> list[int]:
 
     As few coordinates as possible of the file are wrong then; of equals, the nearest.
     """
-    n_leds, n_points = len(leds), len(points)
-    if not n_leds or not n_points:
-        return [-1] * n_leds
+    if not len(leds) or not len(points):
+        return [-1] * len(leds)
+    from scipy.optimize import linear_sum_assignment  # takes 0.3 s
+
     gaps = np.abs(leds[:, None] - points)
     costs = (gaps > SAME).sum(axis=2) + 1e-6 * gaps.sum(axis=2)
-    if n_leds <= n_points:
-        return _cheapest_columns(costs)
-    owners = [-1] * n_leds
-    for point, led in enumerate(_cheapest_columns(costs.T)):
-        owners[led] = point
-    return owners
-
-
-def _cheapest_columns(costs: FloatArray) -> list[int]:
-    """Return a column for each row, none twice, that cost least together.
-
-    Of its n cheapest columns, a row always finds one that the other n - 1 rows leave
-    free. All these choices are tried, as unknown LEDs, and with them rows, are few.
-    """
-    rows = costs.tolist()
-    cheapest = np.argsort(costs, axis=1)[:, : len(rows)].tolist()
-    choices = (each for each in product(*cheapest) if len(set(each)) == len(each))
-    return list(
-        min(
-            choices,
-            key=lambda each: sum(row[k] for row, k in zip(rows, each, strict=True)),
-        )
-    )
+    owners = np.full(len(leds), -1)
+    missing, found = linear_sum_assignment(costs)
+    owners[missing] = found
+    return owners.tolist()
 
 
 def _residuals(camera: Camera, pen: Pen, located: _Located, start: Poses) -> FloatArray:
@@ -383,16 +365,16 @@ def _findings(pen: Pen, located: _Located) -> tuple[Finding, ...]:
     for one, other in combinations(sorted(shifts), 2):
         axes = _exchanged(pen.leds, shifts[one], shifts[other])
         if axes and one in left and other in left:
-            findings.append(Finding(What.EXCHANGED, (one, other), axes=axes))
+            findings.append(Finding(MatchFinding.EXCHANGED, (one, other), axes=axes))
             del left[one], left[other]
     for shift in left.values():
         is_sure = shift.sigma < max(SURE, SURE_SHARE * shift.length)
         leds = (shift.led, shift.rival) if shift.rival else (shift.led,)
-        what = What.SHIFTED_EITHER if shift.rival else What.SHIFTED
+        what = MatchFinding.SHIFTED_EITHER if shift.rival else MatchFinding.SHIFTED
         findings.append(Finding(what, leds, shift.by, is_sure))
-    findings += [Finding(What.UNSEEN, (led,)) for led in located.unseen]
+    findings += [Finding(MatchFinding.UNSEEN, (led,)) for led in located.unseen]
     findings += [
-        Finding(What.UNKNOWN_LED, by=triple(point)) for point in located.unknown
+        Finding(MatchFinding.UNKNOWN_LED, by=triple(point)) for point in located.unknown
     ]
     return tuple(findings)
 

@@ -1,4 +1,4 @@
-"""Which LEDs sit off their places in the pen file, told from a few free poses.
+"""LEDs that are displaced from their coordinates in the pen file.
 
 In image i the residual of LED j is, to first order in the change x_i of the pose and
 the shift d_j of the LED,

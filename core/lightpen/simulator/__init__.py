@@ -1,1 +1,1 @@
-"""The pen, its scene and its images, simulated: demo input and the tests' data."""
+"""Simulation of pen, scene and images, for the demo and the tests."""

@@ -14,23 +14,17 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import (
+    CameraCapabilities,
     CameraSettings,
-    Caps,
     ConfigError,
-    DeviceBusy,
-    DeviceLost,
-    DeviceNotFound,
     Frame,
-    FrameIncomplete,
     FrameTimeout,
     Range,
     Stats,
     sealed,
 )
 from lightpen.model.rig import Rig
-from lightpen.sentences import sentence
-from lightpen.simulator.faults import Faults
-from lightpen.simulator.hand import Held, Operator
+from lightpen.simulator.hand import HandPose, Operator
 from lightpen.simulator.image_plans import (
     ImagePlan,
     camera_turn,
@@ -96,7 +90,6 @@ class SimulatedCamera:
         self.operator = operator or Operator(
             self._clock, self.scene.seed, n_leds=n_leds
         )
-        self.faults = Faults(self._clock)
         self._lamps = lamps
         self._serial = serial
         self._gains = led_gains(self.scene)
@@ -105,7 +98,6 @@ class SimulatedCamera:
         self._stats = Stats()
         self._next_seq = 0
         self._is_open = self._is_streaming = False
-        self._n_unplugged = 0
         self._next_end = 0.0  # of the exposure of the next image
 
     @property
@@ -114,12 +106,12 @@ class SimulatedCamera:
         return self._serial
 
     @property
-    def caps(self) -> Caps:
-        """What the camera can do."""
+    def caps(self) -> CameraCapabilities:
+        """Capabilities of the camera."""
         self._check_open()
         usual = f"Mono{self.scene.sensor.bits}"
         others = tuple(name for name in BITS if name != usual)
-        return Caps(
+        return CameraCapabilities(
             width=self.scene.camera.width,
             height=self.scene.camera.height,
             pixel_formats=(usual, *others),
@@ -130,39 +122,16 @@ class SimulatedCamera:
         )
 
     def open(self) -> None:
-        """Take hold of the camera; nothing if it is open."""
-        if self._is_open:
-            return
-        broken = self.faults.now()
-        if broken.is_unplugged:
-            raise DeviceNotFound(
-                sentence(
-                    "simulated-camera.unplugged",
-                    "The simulated camera {serial} is not plugged in. Plug it in.",
-                    serial=self._serial,
-                )
-            )
-        if self._now < broken.busy_until:
-            raise DeviceBusy(
-                sentence(
-                    "simulated-camera.busy",
-                    "Another program uses the simulated camera {serial}. Close that "
-                    "program, or wait a few seconds.",
-                    serial=self._serial,
-                )
-            )
-        if self._n_unplugged != broken.n_unplugged:
-            self._n_unplugged = broken.n_unplugged
-            self._settings = self._usual_settings  # it was without power
+        """Open the camera; no-op if it is open."""
         self._is_open = True
 
     def close(self) -> None:
-        """Stop and let go of the camera."""
+        """Stop and close the camera."""
         self.stop()
         self._is_open = False
 
     def configure(self, settings: CameraSettings) -> CameraSettings:
-        """Set up the camera before the start; return what is in force."""
+        """Apply settings before the start; return the actual ones."""
         self.probe()
         if self._is_streaming:
             raise ValueError("`configure` needs a stopped camera.")
@@ -170,13 +139,7 @@ class SimulatedCamera:
         pixel_format = settings.pixel_format or now.pixel_format
         if pixel_format not in BITS:
             raise ConfigError(
-                sentence(
-                    "simulated-camera.pixel-format",
-                    "The simulated camera has no pixel format {wanted}; it has "
-                    "{offered}. Choose one of these.",
-                    wanted=str(pixel_format),
-                    offered=", ".join(BITS),
-                )
+                "camera.pixel-format", wanted=str(pixel_format), offered=", ".join(BITS)
             )
         self._settings = CameraSettings(
             exposure_us=_applied(EXPOSURE_US, settings.exposure_us, now.exposure_us),
@@ -187,21 +150,21 @@ class SimulatedCamera:
         return self._settings
 
     def set_exposure(self, exposure_us: float) -> float:
-        """Set the exposure of the next images; return what is in force, us."""
+        """Set the exposure of the next images; return the actual one, us."""
         self.probe()
         applied = EXPOSURE_US.nearest(exposure_us)
         self._settings = replace(self._settings, exposure_us=applied)
         return applied
 
     def set_gain(self, gain_db: float) -> float:
-        """Set the gain of the next images; return what is in force, dB."""
+        """Set the gain of the next images; return the actual one, dB."""
         self.probe()
         applied = GAIN_DB.nearest(gain_db)
         self._settings = replace(self._settings, gain_db=applied)
         return applied
 
     def start(self) -> None:
-        """Let images come; nothing if they do."""
+        """Start streaming; no-op while streaming."""
         self.probe()
         if not self._is_streaming:
             self._is_streaming = True
@@ -209,7 +172,7 @@ class SimulatedCamera:
             self._next_end = (floor(self._now / self._period) + 1) * self._period
 
     def stop(self) -> None:
-        """Let no more images come; nothing if none do."""
+        """Stop streaming; no-op if stopped."""
         self._is_streaming = False
 
     def read(self, timeout_s: float) -> Frame:
@@ -221,20 +184,11 @@ class SimulatedCamera:
         return frame
 
     def probe(self) -> None:
-        """Do nothing if the camera answers."""
+        """Raise an error unless the camera responds."""
         self._check_open()
-        if self._is_cut_off:
-            raise DeviceLost(
-                sentence(
-                    "simulated-camera.lost",
-                    "The simulated camera {serial} no longer answers. Check its "
-                    "cable and its power.",
-                    serial=self._serial,
-                )
-            )
 
     def stats(self) -> Stats:
-        """Return what became of the images so far."""
+        """Return the frame counters."""
         return self._stats
 
     @property
@@ -258,11 +212,6 @@ class SimulatedCamera:
     def _period(self) -> float:
         return max(1 / (self._settings.frame_rate or USUAL_FRAME_RATE), self._exposure)
 
-    @property
-    def _is_cut_off(self) -> bool:
-        broken = self.faults.now()
-        return broken.is_unplugged or broken.n_unplugged != self._n_unplugged
-
     def _check_open(self) -> None:
         if not self._is_open:
             raise ValueError("The camera is not open: call `open` first.")
@@ -276,27 +225,14 @@ class SimulatedCamera:
         """Wait until the exposure of the next image has ended."""
         limit = self._now + timeout_s
         end = self._schedule_next()
-        if end is None or end > limit:
+        if end > limit:
             self._clock.wait(limit - self._now)
             self._stats = replace(self._stats, timeouts=self._stats.timeouts + 1)
-            raise FrameTimeout(
-                sentence(
-                    "simulated-camera.silent",
-                    "The simulated camera {serial} sent no image for {waited:.1f} s. "
-                    "Check its cable.",
-                    serial=self._serial,
-                    waited=timeout_s,
-                )
-            )
+            raise FrameTimeout("camera.no-image", serial=self._serial, waited=timeout_s)
         self._clock.wait(end - self._now)
 
-    def _schedule_next(self) -> float | None:
-        """Settle and return when the exposure of the next image ends, if one comes."""
-        if self._is_cut_off:
-            return None
-        stalled_until = self.faults.now().stalled_until
-        if self._next_end < stalled_until:
-            self._next_end = stalled_until + self._period
+    def _schedule_next(self) -> float:
+        """Return the end of the exposure of the next image, s."""
         n_late = ceil((self._now - self._next_end) / self._period - N_BUFFERED)
         if n_late > 0:
             self._lose(n_late)
@@ -308,22 +244,10 @@ class SimulatedCamera:
         self._stats = replace(self._stats, missed=self._stats.missed + n_frames)
 
     def _take_image(self) -> Frame:
-        self._lose(self.faults.take_lost())
         end = self._next_end
         self._next_end += self._period
         seq = self._next_seq
         self._next_seq += 1
-        if self.faults.take_spoilt():
-            self._stats = replace(self._stats, incomplete=self._stats.incomplete + 1)
-            raise FrameIncomplete(
-                sentence(
-                    "simulated-camera.incomplete",
-                    "Image {seq} of the simulated camera {serial} arrived "
-                    "incomplete. Check the cable and the network.",
-                    seq=seq,
-                    serial=self._serial,
-                )
-            )
         return self._expose(seq, end)
 
     def _expose(self, seq: int, end: float) -> Frame:
@@ -344,7 +268,7 @@ class SimulatedCamera:
         )
 
     def _image_plan(self, scene: Scene, seq: int, times: FloatArray) -> ImagePlan:
-        """Return what is seen in the exposure between the first and the last time."""
+        """Return the plan of the image exposed between the first and the last time."""
         held = self.operator.held(times)
         rotations, translations = self._poses(scene, held)
         moved = _pixels_moved(scene, rotations, translations)
@@ -365,8 +289,8 @@ class SimulatedCamera:
         view = View(*shown, gains, lamps, faces=self._faces)
         return ImagePlan(seq, view, scene.optics, rotations[1], translations[1])
 
-    def _poses(self, scene: Scene, held: Held) -> tuple[FloatArray, FloatArray]:
-        """Return cam_from_pen of a pen that is held so."""
+    def _poses(self, scene: Scene, held: HandPose) -> tuple[FloatArray, FloatArray]:
+        """Return cam_from_pen of a hand pose."""
         R, t = self._place
         rotations = held.postures.rotations
         translations = scene.cone_cam + held.offsets - rotations @ scene.tip_pen
@@ -380,7 +304,7 @@ def _applied(
 
 
 def _with_gain(scene: Scene, settings: CameraSettings) -> Scene:
-    """Return the scene as it looks with these settings."""
+    """Return the scene with exposure and gain applied."""
     gain = 10 ** ((settings.gain_db or 0.0) / 20)
     exposure = (settings.exposure_us or USUAL_EXPOSURE_US) / USUAL_EXPOSURE_US
     optics = replace(scene.optics, exposure=scene.optics.exposure * exposure * gain)

@@ -1,4 +1,4 @@
-"""Random foreign lights and fingers round a pen in the image."""
+"""Random stray lights and fingers near the pen in the image."""
 
 from collections.abc import Callable
 
@@ -20,7 +20,7 @@ BLOB_CORNERS = 9
 def random_lamps(
     camera: Camera, discs: Ellipses, rng: np.random.Generator
 ) -> tuple[Lamp, ...]:
-    """Return one to four foreign lamps clear of the LEDs, often one between them.
+    """Return one to four stray lamps clear of the LEDs, often one between them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What real LEDs look like inside their rims, and their images.
+"""Luminance patterns of real LEDs, and their images.
 
 The face of an LED gives each point of its disc a brightness of 0 to 1. It is drawn
 point by point: sub-pixels are traced back to the disc, and those that the rim passes
@@ -29,7 +29,7 @@ def _single(values: npt.ArrayLike) -> LightArray:
 
 @dataclass(frozen=True)
 class HotSpot:
-    """A diffuser with the chip behind it shining through.
+    """A diffuser with a visible chip behind it.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class HotSpot:
 
 @dataclass(frozen=True)
 class Dome:
-    """A cap of a sphere on the disc, less bright where it is seen at a slant.
+    """A spherical cap on the disc with limb darkening.
 
     It hides nothing and stays within its rim, as a cap does that is seen by less than
     90 degrees minus the slope at its rim.
@@ -217,7 +217,7 @@ def _between(fine: FloatArray, coarse: FloatArray) -> FloatArray:
 
 
 def _blur(fine: FloatArray, sigma: float) -> LightArray:
-    """Return what pixels take of the light of their sub-pixels, blurred, (n, fine)."""
+    """Return the blur weights of sub-pixels in pixels, (n, fine)."""
     z = (fine[:, None] - fine) / sigma
     weights = np.exp(-0.5 * z * z) / (np.sqrt(2 * np.pi) * sigma * SAMPLES)
     return _single(weights.reshape(-1, SAMPLES, len(fine)).mean(axis=1))

@@ -1,11 +1,11 @@
-"""A simulated operator who does what the program asks for."""
+"""A simulated operator who follows the guidance of a swing."""
 
 from math import pi
 
-from lightpen.messages import SWING_TO_SEAT
 from lightpen.model.posture import Posture
 from lightpen.simulator.hand import Operator
 from lightpen.swing.state import Phase, SwingState
+from lightpen.swing_messages import SWING_TO_SEAT
 
 FIRST_LEAN = Posture(tilt=0.35, direction=0.0, turn=0.0)
 UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
@@ -13,8 +13,8 @@ GENTLE_LEANS = tuple(Posture(0.2, i * 2 * pi / 3, 0.0) for i in range(3))
 LEAN_TIME = 0.6  # s until the next one
 
 
-class Follower:
-    """Leads the hand of a simulated operator by the states of a swing.
+class GuidedOperator:
+    """Moves the hand of a simulated operator by the states of a swing.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Follower:
         self._wish: Posture | None = None
 
     def follow(self, state: SwingState) -> None:
-        """Do what a state of the swing asks for."""
+        """React to a state of the swing."""
         swings = state.phase is Phase.SEEN and state.message == SWING_TO_SEAT
         if swings:
             step = int((state.time - state.since) / LEAN_TIME)

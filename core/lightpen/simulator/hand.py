@@ -1,4 +1,4 @@
-"""A simulated operator's hand: it brings the pen to the cone, leans it and lets go.
+"""The hand of a simulated operator: seats, tilts and lifts the pen.
 
 Time goes in equal small steps, so the movement does not depend on when it is looked at.
 """
@@ -18,7 +18,7 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import Clock
 from lightpen.simulator.motion import (
     STEP,
-    Pursuit,
+    TrackingMotion,
     Tremor,
     lean_vectors,
     postures_of,
@@ -42,14 +42,14 @@ FREE_TREMOR = 0.3  # mm, standard deviation of a tip in the air
 FREE_AT = 5.0  # mm from the cone where that tremor is whole
 SLIP_TIME = 0.05  # s that a slip takes
 
-GUIDED = Pursuit(gain=3.0, lag=0.13, top_speed=np.radians(30))
-SWUNG = Pursuit(gain=5.0, lag=0.078, top_speed=np.radians(60))
-MOUSE = Pursuit(gain=12.0, lag=0.0325, top_speed=np.radians(360))
-ARM = Pursuit(gain=4.0, lag=0.0975, top_speed=300.0)
+GUIDED = TrackingMotion(gain=3.0, lag=0.13, top_speed=np.radians(30))
+SWUNG = TrackingMotion(gain=5.0, lag=0.078, top_speed=np.radians(60))
+MOUSE = TrackingMotion(gain=12.0, lag=0.0325, top_speed=np.radians(360))
+ARM = TrackingMotion(gain=4.0, lag=0.0975, top_speed=300.0)
 
 
-class Doing(Enum):
-    """What the operator does, as the last image shows it."""
+class HandActivity(Enum):
+    """Activity of the operator in the last image."""
 
     ABSENT = auto()
     APPROACHING = auto()
@@ -60,8 +60,8 @@ class Doing(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """How the pen is held at some times.
+class HandPose:
+    """Poses of the pen at given times.
 
     Attributes
     ----------
@@ -145,25 +145,29 @@ class Operator:
         self._moments = deque([first], maxlen=N_REMEMBERED)
 
     @property
-    def doing(self) -> Doing:
-        """What the operator did when the last image was taken."""
+    def doing(self) -> HandActivity:
+        """Activity when the last image was taken."""
         with self._lock:
             if self._route:
                 leaves = self._place is not self._seat
-                return Doing.LEAVING if leaves else Doing.APPROACHING
+                return HandActivity.LEAVING if leaves else HandActivity.APPROACHING
             if self._place is not self._seat:
-                return Doing.ABSENT if self._place is AWAY else Doing.LIFTED
-            return Doing.SEATED if self._goal is not None else Doing.SWINGING
+                return (
+                    HandActivity.ABSENT if self._place is AWAY else HandActivity.LIFTED
+                )
+            return (
+                HandActivity.SEATED if self._goal is not None else HandActivity.SWINGING
+            )
 
     @property
     def is_free(self) -> bool:
-        """Whether the pen is away and nobody asked for it."""
+        """Whether the pen is away and no activity is requested."""
         with self._lock:
             is_wanted = any(wish.moves for wish in self._wishes)
             return self._place is AWAY and not self._route and not is_wanted
 
     def seat(self) -> None:
-        """Bring the pen to the cone, put its tip in and hold it still."""
+        """Seat the tip in the cone and hold the pen still."""
         self.touch(SEAT)
 
     def touch(self, place: FloatArray) -> None:
@@ -178,16 +182,16 @@ class Operator:
         self.hold()
 
     def lift(self) -> None:
-        """Take the tip out of the cone and stay above it."""
+        """Lift the tip and stay above the cone."""
         self._wish(partial(self._go, HOVER))
 
     def leave(self) -> None:
-        """Take the pen out of the image."""
+        """Move the pen out of the image."""
         self._wish(partial(self._go, AWAY))
         self._wish(partial(self._aim, UPRIGHT, GUIDED))
 
     def swing(self) -> None:
-        """Swing the pen round the cone until told otherwise, seating it first."""
+        """Seat the pen and swing it until another request."""
         self._wish(partial(self._put, SEAT))
         self._wish(partial(self._aim, None, SWUNG))
 
@@ -196,7 +200,7 @@ class Operator:
         self._wish(self._aim_here)
 
     def lean_towards(self, tilt: float, direction: float, turn: float) -> None:
-        """Bring the pen to a posture as a person does who is told to.
+        """Tilt the pen to a posture with human dynamics.
 
         Parameters
         ----------
@@ -207,7 +211,7 @@ class Operator:
         self._wish(partial(self._aim, goal, GUIDED), delay=REACTION)
 
     def lean(self, tilt: float, direction: float, turn: float) -> None:
-        """Let the pen follow the mouse.
+        """Follow the mouse.
 
         Parameters
         ----------
@@ -229,7 +233,7 @@ class Operator:
         self._wish(partial(self._slip, distance, seconds))
 
     def cover(self, seconds: float = inf, leds: Collection[int] | None = None) -> None:
-        """Put a hand before LEDs.
+        """Cover LEDs by a hand.
 
         Parameters
         ----------
@@ -246,11 +250,11 @@ class Operator:
         self._wish(partial(self._cover, seconds, hidden), moves=False)
 
     def uncover(self) -> None:
-        """Take the hand away from the LEDs."""
+        """Uncover all LEDs."""
         self._wish(self._uncover, moves=False)
 
-    def held(self, times: FloatArray) -> Held:
-        """Return how the pen is held; later calls must not ask for earlier times.
+    def held(self, times: FloatArray) -> HandPose:
+        """Return the pose of the pen; times must not decrease between calls.
 
         Parameters
         ----------
@@ -270,7 +274,7 @@ class Operator:
             offsets = offsets + freedom[:, None] * tremor
             for slip in self._slips:
                 offsets = offsets + _slipped(slip, times)
-            return Held(
+            return HandPose(
                 postures_of(leans),
                 offsets,
                 self._covered(float(times.mean())),
@@ -336,7 +340,7 @@ class Operator:
         above = self._seat + HOVER
         self._route = [above] if place is HOVER else [above, place]
 
-    def _aim(self, goal: FloatArray | None, pursuit: Pursuit) -> None:
+    def _aim(self, goal: FloatArray | None, pursuit: TrackingMotion) -> None:
         self._goal, self._pursuit = goal, pursuit
 
     def _aim_here(self) -> None:

@@ -1,4 +1,4 @@
-"""The images of a scene: everything random about them drawn, then rendered.
+"""The images of a scene: draw everything random, then render.
 
 The seed of a scene fixes all of it. Each image draws from a generator of its own, so
 that it does not depend on which others are rendered, nor in which order.
@@ -13,10 +13,9 @@ from lightpen.model.camera import Camera
 from lightpen.model.ellipse import Ellipses, disc_images
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
-from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
+from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.clutter import random_finger, random_glares, random_lamps
 from lightpen.simulator.faces import Dome, Face, HotSpot, Ring
-from lightpen.simulator.postures import operator_postures
 from lightpen.simulator.render import render_view
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.sensor import expose
@@ -27,7 +26,6 @@ from lightpen.simulator.swings import (
     seen_from,
     shows_all,
     slip_tip,
-    swing_from_postures,
     swing_poses,
 )
 from lightpen.simulator.view import Lamp, Optics, View, moving_poses
@@ -176,42 +174,19 @@ def plan_rig(scene: Scene, rig: Rig) -> tuple[ScenePlan, ...]:
 
 
 def render_plan(scene: Scene, image_plan: ImagePlan) -> Image:
-    """Return the image that is planned, the same every time."""
+    """Render a planned image; deterministic."""
     light = render_view(scene.camera, scene.pen, image_plan.view, image_plan.optics)
     return expose(light, scene.sensor, _image_stream(scene, _NOISE, image_plan.index))
 
 
-def live_plan(
-    scene: Scene, index: int, time: float, exposure_time: float = 0.004
-) -> ImagePlan:
-    """Return what a camera sees of an operator's endless swing.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its disturbances are left out.
-    index : int
-        Number of the image, which chooses its noise.
-    time : float
-        Of mid-exposure, seconds.
-    exposure_time : float
-        Seconds; the pen moves meanwhile.
-    """
-    ends = time + exposure_time * np.array([-0.5, 0.0, 0.5])
-    first, middle, last = _operator_swing(scene, ends).rotations
-    turn = vector_from_rotation(last @ first.T)
-    translation = scene.cone_cam - middle @ scene.tip_pen
-    return _plan_in_motion(scene, index, middle, translation, turn)
-
-
 def led_gains(scene: Scene) -> FloatArray:
-    """Return how bright each LED of the scene's pen is, 1 at most."""
+    """Return the relative brightness of each LED of the scene's pen."""
     rng = _stream(scene, _GAINS)
     return rng.uniform(MIN_GAIN, 1, scene.pen.n_leds)
 
 
 def led_faces(scene: Scene) -> tuple[Face, ...]:
-    """Return how each LED of the scene's pen looks, nothing if all are evenly lit."""
+    """Return the luminance pattern of each LED; empty if all are uniform."""
     rng = _stream(scene, _FACES)
     match scene.faces:
         case "even":
@@ -231,7 +206,7 @@ def _random_hot_spot(rng: np.random.Generator) -> HotSpot:
 
 
 def _turned(swing: Swing, scene: Scene) -> Swing:
-    """Return a swing as a camera sees it that turns from image to image."""
+    """Return a swing as seen by a camera that turns between images."""
     turns = np.array([_turn(scene, index) for index in range(len(swing))])
     return replace(
         swing,
@@ -242,17 +217,17 @@ def _turned(swing: Swing, scene: Scene) -> Swing:
 
 
 def _turn(scene: Scene, index: int) -> FloatArray:
-    """Return by how much the camera has turned in an image, (3, 3)."""
+    """Return the rotation of the camera in an image, (3, 3)."""
     return camera_turn(scene, _share(scene, index))
 
 
 def _share(scene: Scene, index: int) -> float:
-    """Return how far the swing is in an image, from -0.5 to 0.5."""
+    """Return the progress of the swing in an image, -0.5 to 0.5."""
     return index / max(scene.n_images - 1, 1) - 0.5
 
 
 def camera_turn(scene: Scene, share: float) -> FloatArray:
-    """Return by how much the camera of a scene has turned, (3, 3).
+    """Return the rotation of the camera of a scene, (3, 3).
 
     Parameters
     ----------
@@ -268,7 +243,7 @@ def _lamps(scene: Scene, index: int) -> tuple[Lamp, ...]:
 
 
 def lamps_beside(scene: Scene, share: float) -> tuple[Lamp, ...]:
-    """Return the lamps beside the cone, as a camera sees them that turns so far."""
+    """Return the lamps beside the cone as seen by a rotated camera."""
     if not scene.has_lamp:
         return ()
     camera = scene.camera
@@ -288,7 +263,7 @@ def _image_stream(scene: Scene, what: int, index: int) -> np.random.Generator:
 
 
 def _draw_hits(scene: Scene, rng: np.random.Generator) -> dict[str, BoolArray]:
-    """Return which images each disturbance hits.
+    """Return the images affected by each disturbance.
 
     Spoilt images suffer nothing else; none is both saturated and dim.
     """
@@ -326,7 +301,7 @@ def _plan_image(
         optics = replace(optics, psf_sigma=AWAY_SIGMA)
     still = replace(scene, optics=_disturbed_optics(optics, flags, rng))
     turn = _turn_that_moves(still, rotation, translation, moved, rng)
-    image_plan = _plan_in_motion(still, index, rotation, translation, turn)
+    image_plan = plan_in_motion(still, index, rotation, translation, turn)
     view = _disturbed_view(
         replace(image_plan.view, gains=gains),
         _discs(scene, image_plan),
@@ -382,11 +357,6 @@ def _discs(scene: Scene, image_plan: ImagePlan) -> Ellipses:
     return disc_images(scene.camera, leds, normals, scene.pen.diameter / 2)
 
 
-def _operator_swing(scene: Scene, times: FloatArray) -> Swing:
-    postures = operator_postures(times, scene.seed)
-    return swing_from_postures(postures, scene.tip_pen, scene.cone_cam)
-
-
 def _turn_that_moves(
     scene: Scene,
     rotation: FloatArray,
@@ -394,7 +364,7 @@ def _turn_that_moves(
     moved: float,
     rng: np.random.Generator,
 ) -> FloatArray:
-    """Return a turn about the tip, in a random direction, that moves LEDs so far."""
+    """Return a random rotation about the tip that moves LEDs by a distance."""
     turn = rng.standard_normal(3)
     per_radian = _pixels_moved(scene, rotation, translation, turn)
     return np.asarray(turn * moved / per_radian)
@@ -412,7 +382,7 @@ def _pixels_moved(
     return float(np.linalg.norm(pixels, axis=-1).max())
 
 
-def _plan_in_motion(
+def plan_in_motion(
     scene: Scene,
     index: int,
     rotation: FloatArray,

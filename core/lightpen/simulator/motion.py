@@ -1,4 +1,4 @@
-"""How a hand moves: after a goal, with tremor, or in an endless swing.
+"""Hand motion: tracking a goal, tremor, endless swing.
 
 A hand goes after a goal x* with a limited speed and a lag,
 
@@ -20,8 +20,8 @@ STEPS_PER_PIECE = 100  # of a swing, computed at once
 
 
 @dataclass(frozen=True)
-class Pursuit:
-    """How a goal is gone after.
+class TrackingMotion:
+    """Dynamics of tracking a goal.
 
     Attributes
     ----------
@@ -56,9 +56,9 @@ def pursue(
     rate: FloatArray,
     goal: FloatArray,
     goal_rate: FloatArray,
-    pursuit: Pursuit,
+    pursuit: TrackingMotion,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return place and rate of a hand one `STEP` on.
+    """Return position and rate of a hand after one `STEP`.
 
     Parameters
     ----------
@@ -85,14 +85,14 @@ def swing_at(seed: int, step: int) -> tuple[FloatArray, FloatArray]:
     step : int
         `STEP` s each, from the start of the clock.
     """
-    piece, i = divmod(step, STEPS_PER_PIECE)
-    leans = _swing_piece(seed, piece)
+    block, i = divmod(step, STEPS_PER_PIECE)
+    leans = _swing_block(seed, block)
     return leans[i], (leans[i + 1] - leans[i]) / STEP
 
 
 @lru_cache(maxsize=4)
-def _swing_piece(seed: int, piece: int) -> FloatArray:
-    steps = piece * STEPS_PER_PIECE + np.arange(STEPS_PER_PIECE + 1.0)
+def _swing_block(seed: int, block: int) -> FloatArray:
+    steps = block * STEPS_PER_PIECE + np.arange(STEPS_PER_PIECE + 1.0)
     postures = operator_postures(steps * STEP, seed)
     return lean_vectors(postures.tilts, postures.directions, postures.rolls)
 

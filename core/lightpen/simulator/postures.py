@@ -1,4 +1,4 @@
-"""How an operator holds the pen: postures and patterns of them.
+"""Postures of the pen, and swing patterns.
 
 A posture is the tilt of the pen, the direction it tilts to and its roll. Upright, the
 pen's y axis points up in the image and its discs face the camera:
@@ -32,7 +32,7 @@ TREMOR_BAND = (7.0, 12.0)  # Hz, of a human hand
 
 @dataclass(frozen=True, eq=False)
 class Postures:
-    """How a pen is held, one entry per frame.
+    """Postures of a pen, one per frame.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The light that LEDs, lamps, reflections and fingers put on the sensor."""
+"""Irradiance on the sensor by LEDs, lamps, reflections and fingers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -160,14 +160,14 @@ def _lamp_patches(lamp: Lamp, optics: Optics) -> list[Patch]:
 
 
 def _margin(optics: Optics) -> int:
-    """Return how far light strays from a blurred disc, px."""
+    """Return the reach of scattered light around a disc, px."""
     halo = HALO_REACH * HALO_SIGMA if optics.halo > 0 else 0.0
     ghost = max(GHOST_OFFSET) if optics.ghost > 0 else 0
     return int(np.ceil(optics.defocus_radius + max(halo, ghost)))
 
 
 def _shining(patches: list[Patch], levels: FloatArray, optics: Optics) -> list[Patch]:
-    """Return patches at their levels, defocused."""
+    """Return scaled and defocused patches."""
     radius = optics.defocus_radius
     for patch, level in zip(patches, levels, strict=True):
         patch.levels[:] *= np.float32(level)
@@ -180,7 +180,7 @@ def _shining(patches: list[Patch], levels: FloatArray, optics: Optics) -> list[P
 
 
 def _scattered(patches: list[Patch], optics: Optics) -> list[Patch]:
-    """Return patches with their halo and their ghost."""
+    """Return patches with halo and ghost image."""
     if optics.halo == 0 and optics.ghost == 0:
         return patches
     across, down = GHOST_OFFSET

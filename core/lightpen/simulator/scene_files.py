@@ -1,4 +1,4 @@
-"""A simulated set on disk: camera, pen, images and the truth about them."""
+"""Write a simulated set: camera, pen, images and ground truth."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -21,7 +21,6 @@ from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import pen_frame_from_raw
 from lightpen.model.rig import Rig, from_first
 from lightpen.model.rigid import fit_rigid, vector_from_rotation
-from lightpen.sentences import sentence
 from lightpen.simulator.image_plans import (
     ImagePlan,
     ScenePlan,
@@ -31,7 +30,7 @@ from lightpen.simulator.image_plans import (
 )
 from lightpen.simulator.render import hidden_fraction, led_levels
 from lightpen.simulator.rims import disc_rims, measure_insides
-from lightpen.simulator.sample_rigs import beside
+from lightpen.simulator.samples import beside
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import leds_in_camera, rim_gaps
 
@@ -51,7 +50,7 @@ NOTES = (
 
 @dataclass(frozen=True)
 class SampleFiles:
-    """The files that go with simulated cameras: of the first, of both, of the pen."""
+    """The files of simulated cameras: camera file, rig file, pen file."""
 
     camera: Path
     rig: Path
@@ -86,7 +85,7 @@ def write_scene(
     _make_folders(folder, images)
     mark_simulated(folder)
     plan = plan_scene(scene)
-    write_camera(scene.camera, folder / "camera.yaml", "opencv")
+    write_camera(scene.camera, folder / "camera.yaml")
     _write_measured_pen(plan, folder)
     _write_images(plan, images, names, report or _silent)
     truth = {"set": folder.name, **scene_truth(plan)}
@@ -95,10 +94,7 @@ def write_scene(
 
 
 def write_rig_scene(
-    scene: Scene,
-    rig: Rig,
-    folder: Path,
-    report: Callable[[float], None] | None = None,
+    scene: Scene, rig: Rig, folder: Path, report: Callable[[float], None] | None = None
 ) -> FloatArray:
     """Write what several cameras see of a swing: a folder of images for each.
 
@@ -130,7 +126,7 @@ def write_rig_scene(
     there = from_first(rig)
     camera_files = [f"{name}.yaml" for name in rig.names]
     for camera, file in zip(rig.cameras, camera_files, strict=True):
-        write_camera(camera, folder / file, "opencv")
+        write_camera(camera, folder / file)
     write_rig(there, folder / "rig.json", camera_files)
     _write_measured_pen(plans[0], folder)
     views = []
@@ -177,11 +173,11 @@ def _write_images(
 
 
 def _silent(fraction: float) -> None:
-    """Report to nobody."""
+    """Ignore the progress."""
 
 
 def write_sample_files(scene: Scene, folder: Path) -> SampleFiles:
-    """Write the intrinsics and the pen of a scene, as its owner would have them.
+    """Write the camera, rig and pen files of a scene.
 
     Raises
     ------
@@ -198,8 +194,8 @@ def write_sample_files(scene: Scene, folder: Path) -> SampleFiles:
     )
     rig = beside(scene.camera, scene.cone_cam)
     second = folder / "camera-2.yaml"
-    write_camera(scene.camera, files.camera, "opencv")
-    write_camera(rig.cameras[1], second, "opencv")
+    write_camera(scene.camera, files.camera)
+    write_camera(rig.cameras[1], second)
     write_rig(rig, files.rig, [files.camera.name, second.name])
     write_pen(scene.pen, files.pen)
     return files
@@ -211,7 +207,7 @@ def _tip_in_file_frame(plan: ScenePlan) -> FloatArray:
 
 
 def scene_truth(plan: ScenePlan, folder: str = "images/") -> Json:
-    """Return what a test needs to know about a set, as JSON.
+    """Return the ground truth of a set, as JSON.
 
     Lengths in mm, pixels in px, angles in degrees; see `NOTES`.
 
@@ -264,7 +260,7 @@ def scene_truth(plan: ScenePlan, folder: str = "images/") -> Json:
 
 
 def _make_folders(folder: Path, *below: Path) -> None:
-    """Make a folder and those in it, or refuse one that holds something."""
+    """Create a folder and its subfolders; refuse one that is not empty."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         others = [path.name for path in folder.iterdir()]
@@ -274,26 +270,11 @@ def _make_folders(folder: Path, *below: Path) -> None:
     except OSError as error:
         raise _no_folder(folder, error) from error
     if others:
-        raise FileError(
-            sentence(
-                "scene.not-empty",
-                "The folder {folder} is not empty: it holds {example}. Choose another, "
-                "or empty it; nothing is overwritten.",
-                folder=str(folder),
-                example=min(others),
-            )
-        )
+        raise FileError("scene.not-empty", folder=str(folder), example=min(others))
 
 
 def _no_folder(folder: Path, error: OSError) -> FileError:
-    return FileError(
-        sentence(
-            "scene.no-folder",
-            "The folder {folder} cannot be made or read: {reason}",
-            folder=str(folder),
-            reason=why_unwritten(error),
-        )
-    )
+    return FileError("scene.no-folder", folder=str(folder), reason=why_unwritten(error))
 
 
 def _in_order(

@@ -1,4 +1,4 @@
-"""Scenes: what a simulated set of images shows, and how much goes wrong in it."""
+"""Scenes: content and disturbances of a simulated set of images."""
 
 from dataclasses import dataclass, field, fields
 from typing import Literal, TypeAlias
@@ -77,7 +77,7 @@ FaceKind: TypeAlias = Literal["even", "hot-spot", "dome", "ring"]
 
 @dataclass(frozen=True)
 class Leds:
-    """How LEDs look inside their rims, and how the optics scatters their light."""
+    """Luminance pattern of LEDs, and scattering of the optics."""
 
     faces: FaceKind = "even"
     optics: Optics = field(default_factory=Optics)
@@ -95,7 +95,7 @@ LEDS = {
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a simulated set of images shows.
+    """Content of a simulated set of images.
 
     Attributes
     ----------

@@ -14,7 +14,6 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_images, ellipse_centers
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig
 from lightpen.simulator.postures import Postures, SwingKind, draw_postures
 
 PAPER_TIP = np.array([-1.3182, -90.4095, -23.8548])  # mm, the paper's result
@@ -87,7 +86,7 @@ def paper_camera(binning: int = 1) -> Camera:
 
 
 def _board_covariance(binning: int) -> FloatArray:
-    """Return what 24 views of a chessboard leave open of the paper's camera, (9, 9)."""
+    """Return the covariance of the paper's camera by 24 board views, (9, 9)."""
     deviations = np.array([0.52, 0.51, 0.66, 0.58, 3.7e-4, 3.9e-3, 3.3e-5, 3.9e-5, 0.0])
     deviations[:4] /= binning
     correlations = np.eye(9)
@@ -201,7 +200,7 @@ def swing_from_postures(
     cone_cam: FloatArray = PAPER_CONE,
     tips_cam: FloatArray | None = None,
 ) -> Swing:
-    """Return the swing that holds the pen so, with the tip where it should be.
+    """Return the swing of given postures, with the tip in the cone.
 
     Parameters
     ----------
@@ -260,23 +259,6 @@ def slip_tip(
     )
 
 
-def correlated_noise(
-    n_frames: int, correlation: float, rng: np.random.Generator
-) -> FloatArray:
-    """Return noise (F, 3) of unit variance that hangs together from frame to frame.
-
-    Parameters
-    ----------
-    correlation : float
-        Of neighbouring frames; that of others falls off by its powers.
-    """
-    noise = rng.standard_normal((n_frames, 3))
-    fresh = np.sqrt(1 - correlation**2)
-    for i in range(1, n_frames):
-        noise[i] = correlation * noise[i - 1] + fresh * noise[i]
-    return noise
-
-
 def simulate_centers(
     camera: Camera,
     pen: Pen,
@@ -311,90 +293,6 @@ def simulate_centers(
     return np.where(seen[..., None], centers + noise, np.nan)
 
 
-def simulate_rig_centers(
-    rig: Rig, pen: Pen, swing: Swing, sigma: float, rng: np.random.Generator
-) -> FloatArray:
-    """Return measured centres of the LEDs in the images of several cameras.
-
-    Parameters
-    ----------
-    swing : Swing
-        In the frame that the rig is given from, F frames.
-    sigma : float
-        As for `simulate_centers`.
-
-    Returns
-    -------
-    (F, C, L, 2) array
-        px; NaN where missing.
-    """
-    views = []
-    stands = zip(rig.cameras, rig.rotations, rig.translations, strict=True)
-    for camera, R, t in stands:
-        there = seen_from(swing, R, t)
-        poses = there.rotations, there.translations
-        views.append(simulate_centers(camera, pen, *poses, sigma, rng))
-    return np.stack(views, axis=1)
-
-
-def drop_centers(
-    centers: FloatArray, n_missing: int, rng: np.random.Generator
-) -> FloatArray:
-    """Return centres with ``n_missing`` random LEDs missing (NaN) in every frame.
-
-    Parameters
-    ----------
-    centers : (F, L, 2) array
-        px.
-    """
-    order = np.argsort(rng.random(centers.shape[:-1]), axis=-1)
-    return np.where((order < n_missing)[..., None], np.nan, centers)
-
-
-def displace_centers(
-    centers: FloatArray, fraction: float, distance: float, rng: np.random.Generator
-) -> FloatArray:
-    """Return centres with one LED displaced in a fraction of the frames.
-
-    Parameters
-    ----------
-    centers : (F, L, 2) array
-        px.
-    fraction : float
-        Of the frames, 0 to 1.
-    distance : float
-        Of the displaced LED from where it was, px, in a random direction.
-    """
-    n_frames, n_leds, _ = centers.shape
-    hit = rng.permutation(n_frames)[: round(fraction * n_frames)]
-    angles = rng.uniform(0, 2 * np.pi, len(hit))
-    displaced = centers.copy()
-    displaced[hit, rng.integers(n_leds, size=len(hit))] += distance * np.stack(
-        [np.cos(angles), np.sin(angles)], axis=-1
-    )
-    return displaced
-
-
-def swap_centers(
-    centers: FloatArray, fraction: float, rng: np.random.Generator
-) -> FloatArray:
-    """Return centres with two LEDs exchanged in a fraction of the frames.
-
-    Parameters
-    ----------
-    centers : (F, L, 2) array
-        px.
-    fraction : float
-        Of the frames, 0 to 1.
-    """
-    n_frames, n_leds, _ = centers.shape
-    swapped = centers.copy()
-    for frame in rng.permutation(n_frames)[: round(fraction * n_frames)]:
-        pair = rng.permutation(n_leds)[:2]
-        swapped[frame, pair] = centers[frame, pair[::-1]]
-    return swapped
-
-
 def leds_in_camera(
     pen: Pen, rotations: FloatArray, translations: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -404,7 +302,7 @@ def leds_in_camera(
 
 
 def faces_camera(leds_cam: FloatArray, normals_cam: FloatArray) -> BoolArray:
-    """Return which discs show their bright side to the camera, shape (..., L)."""
+    """Return which discs face the camera, shape (..., L)."""
     faces: BoolArray = np.einsum("...i,...i->...", leds_cam, normals_cam) < 0
     return faces
 

@@ -1,103 +1,54 @@
-"""A simulated operator who touches what a verification asks for."""
+"""A simulated operator who follows the guidance of a verification."""
 
-from dataclasses import dataclass, field
-from math import pi
+from dataclasses import dataclass
 
-import numpy as np
-
-from lightpen.arrays import FloatArray
-from lightpen.simulator.hand import Doing, Operator
-from lightpen.verification.choices import TaskKind
-from lightpen.verification.session_state import SessionSetup, SessionState
-from lightpen.verification.touching import TouchPhase
-
-LEANT, LEANT_FAR = 0.2, 0.4  # rad
-RING_STEPS = 12
-BAR_STEP = 15.0  # mm, from one place of the bar to the next
-DOWNWARDS = np.array([0.0, 1.0, 0.0])
+from lightpen.simulator.hand import HandActivity, Operator
+from lightpen.verification.probing.probing import ProbingPhase
+from lightpen.verification.session.session_state import SessionSetup, SessionState
+from lightpen.verification.tasks.registry import AnyTask
 
 
 @dataclass(frozen=True)
 class _TouchGoal:
-    """A touch that the operator was led to."""
+    """A point that the operator was sent to."""
 
-    task: TaskKind | None
+    task: AnyTask | None
     run: int
     step: int
 
 
-@dataclass(frozen=True, eq=False)
-class Artefacts:
-    """Where a ring and a bar stand, from the bottom of the cone, camera frame, mm.
+class ProbingOperator:
+    """Moves the hand of a simulated operator by the states of a verification."""
 
-    Attributes
-    ----------
-    ring_center : (3,) array
-    ring_axes : (2, 3) array
-        Unit vectors in the plane of the ring.
-    bar_start, bar_end : (3,) array
-    """
-
-    ring_center: FloatArray = field(default_factory=lambda: np.array([0.0, -40.0, 0.0]))
-    ring_radius: float = 31.751
-    ring_axes: FloatArray = field(
-        default_factory=lambda: np.array([[1.0, 0.0, 0.0], [0.0, 0.9, -(0.19**0.5)]])
-    )
-    bar_start: FloatArray = field(default_factory=lambda: np.array([-75.0, -20.0, 0.0]))
-    bar_end: FloatArray = field(default_factory=lambda: np.array([75.0, -20.0, 0.0]))
-
-    @property
-    def length(self) -> float:
-        """Of the bar, mm."""
-        return float(np.linalg.norm(self.bar_end - self.bar_start))
-
-    def on_ring(self, step: int) -> FloatArray:
-        """Return a point of the ring."""
-        angle = 2 * pi * step / RING_STEPS
-        spoke = np.array([np.cos(angle), np.sin(angle)]) @ self.ring_axes
-        return np.asarray(self.ring_center + self.ring_radius * spoke)
-
-
-class Toucher:
-    """Leads the hand of a simulated operator by the states of a verification."""
-
-    def __init__(self, operator: Operator, artefacts: Artefacts | None = None) -> None:
+    def __init__(self, operator: Operator) -> None:
         self._operator = operator
-        self._artefacts = artefacts or Artefacts()
         self._wanted: _TouchGoal | None = None
 
     def follow(self, setup: SessionSetup, state: SessionState) -> None:
-        """Do what a state of the verification asks for; a lifted tip is put back."""
+        """React to a state of the verification; reseat a lifted tip."""
+        task, operator = state.task(setup), self._operator
         n_runs = len(state.runs) + len(state.visits)
-        wanted = _TouchGoal(state.task(setup), n_runs, len(state.touches))
-        is_lifted = self._operator.doing in (Doing.LIFTED, Doing.ABSENT)
-        if wanted == self._wanted and not (is_lifted and wanted.task is not None):
+        wanted = _TouchGoal(task, n_runs, len(state.touches))
+        is_lifted = operator.doing in (HandActivity.LIFTED, HandActivity.ABSENT)
+        if wanted == self._wanted and not (is_lifted and task is not None):
             return
-        is_taken = state.touching.phase is TouchPhase.TAKEN
-        again = wanted.task in (TaskKind.ARTICULATION, TaskKind.DRIFT)
-        if is_lifted and is_taken and again:
-            return  # it has to move on first
+        if task is None:
+            self._wanted = wanted
+            operator.leave()
+            return
+        options = setup.choices.options_of(task)
+        is_same_again = not any(task.newness(options))
+        must_move_on = is_same_again and state.touching.phase is ProbingPhase.RECORDED
+        if must_move_on and is_lifted:
+            return
         before, self._wanted = self._wanted, wanted
-        step, artefacts = wanted.step, self._artefacts
-        if wanted.task is TaskKind.FIXED_POINT:
-            if is_lifted or before is None or before.task is not wanted.task:
-                self._operator.seat()
-            tilt = (LEANT, LEANT_FAR)[step % 2]
-            direction = 2 * pi * step / setup.choices.n_touches
-            self._operator.lean_towards(tilt, direction, 0.0)
-        elif again:
-            if is_taken:
-                self._operator.lift()
-            else:
-                self._operator.seat()
-                n_postures = len(state.runs)
-                tilt = LEANT_FAR if n_postures else 0.0
-                self._operator.lean_towards(tilt, pi / 2 * n_postures, 0.0)
-        elif wanted.task is TaskKind.CIRCLE:
-            self._operator.touch(artefacts.on_ring(step))
-        elif wanted.task is TaskKind.LENGTH:
-            ends = artefacts.bar_start, artefacts.bar_end
-            lower = BAR_STEP * len(state.runs) * DOWNWARDS
-            self._operator.touch(ends[step % 2] + lower)
+        goal = task.hand(options, len(state.runs), wanted.step)
+        if must_move_on:
+            operator.lift()
+        elif goal.point is not None:
+            operator.touch(goal.point)
         else:
-            self._operator.leave()
+            is_other = before is None or before.task is not task
+            if is_lifted or is_same_again or is_other:
+                operator.seat()
+            operator.lean_towards(goal.tilt, goal.direction, 0.0)

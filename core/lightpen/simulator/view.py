@@ -1,4 +1,4 @@
-"""What stands before the camera: optics, pose, foreign lights, fingers."""
+"""The scene before the camera: optics, pose, stray lights, fingers."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ CAP_STEPS = 16  # corners of a round finger end
 
 @dataclass(frozen=True)
 class Optics:
-    """How bright and how sharp the image is.
+    """Brightness and sharpness of the image.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Optics:
 
 @dataclass(frozen=True, eq=False)
 class Lamp:
-    """A foreign round light: an ellipse in the image.
+    """A stray round light: an ellipse in the image.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Glare:
 
 @dataclass(frozen=True, eq=False)
 class Finger:
-    """A dark, straight, round-ended thing before the pen.
+    """A dark, straight, round-ended object before the pen.
 
     Attributes
     ----------

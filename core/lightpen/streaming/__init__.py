@@ -1,1 +1,1 @@
-"""Pose and tip of the pen, streamed live to programs that listen."""
+"""Live streaming of pose and tip to other programs."""

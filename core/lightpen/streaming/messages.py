@@ -15,10 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.sighting import Sighting
-from lightpen.estimation.instrument import Instrument
-from lightpen.record.names import Names
-from lightpen.verification.touch import StillFrames, TouchFrame, measure_touches
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.record.swings.names import Names
+from lightpen.verification.tasks.probed_point import (
+    ProbingFrame,
+    StillFrames,
+    measure_touches,
+)
 
 PEN, TIP = "PenToCamera", "TipToCamera"  # names of devices, at most 20 letters
 WITH_METADATA = 2  # version of the header
@@ -26,12 +30,12 @@ WITH_METADATA = 2  # version of the header
 
 @dataclass(frozen=True, eq=False)
 class StreamedTip:
-    """The tip whose place is streamed.
+    """The tip whose position is streamed.
 
     Attributes
     ----------
     instrument : Instrument
-        Camera and pen with the tip, and how well all of them are known.
+        Camera, pen and tip, with their covariance.
     """
 
     names: Names
@@ -39,54 +43,57 @@ class StreamedTip:
 
 
 def pose_messages(
-    sighting: Sighting, tip: StreamedTip | None, number: int, at: float
+    detection: PenDetection, tip: StreamedTip | None, number: int, at: float
 ) -> bytes:
-    """Return the pose of a pen that was seen, and the place of its tip, as sent.
+    """Return the messages of a detected pose and its tip position.
 
     Parameters
     ----------
     tip : StreamedTip or None
-        None where no tip is in force: then there is the pose alone.
+        None without a current tip: only the pose is sent.
     number : int
         Of the image.
     at : float
-        When it was taken, s since 1970 in UTC.
+        Time of exposure, s since 1970 (UTC).
     """
     told = {"Image": str(number), "Units": "mm rad"}
-    sigma = sighting.sigma if tip is None else _sigma(sighting, tip.instrument)
-    covariance = sighting.cofactors * sigma**2
-    R = sighting.rotation
+    sigma = detection.sigma if tip is None else _sigma(detection, tip.instrument)
+    covariance = detection.cofactors * sigma**2
+    R = detection.rotation
     sent = _transform(
-        *(PEN, R, sighting.translation, at),
+        PEN,
+        R,
+        detection.translation,
+        at,
         {**told, **_covariance(covariance, "rx ry rz x y z")},
     )
     if tip is None:
         return sent
-    place, spread = _place_of_tip(sighting, tip.instrument)
+    place, spread = _place_of_tip(detection, tip.instrument)
     named = {"Pen": tip.names.pen, "Tip": tip.names.tip}
     return sent + _transform(
         TIP, R, place, at, {**told, **named, **_covariance(spread, "x y z")}
     )
 
 
-def _sigma(sighting: Sighting, instrument: Instrument) -> float:
-    """Return the noise of one image coordinate, px: one image tells little of it."""
-    return float(np.fmax(sighting.sigma, instrument.sigma))
+def _sigma(detection: PenDetection, instrument: Instrument) -> float:
+    """Return the noise of an image coordinate, px, partly from prior knowledge."""
+    return float(np.fmax(detection.sigma, instrument.sigma))
 
 
 def _place_of_tip(
-    sighting: Sighting, instrument: Instrument
+    detection: PenDetection, instrument: Instrument
 ) -> tuple[FloatArray, FloatArray]:
     """Return the tip in the camera, mm, and its covariance, not of noise alone."""
-    pixels = np.full((instrument.rig.n_cameras, *sighting.pixels.shape), np.nan)
-    pixels[0] = sighting.pixels  # of the first camera, whose images are streamed
-    frame = TouchFrame("", pixels, sighting.rotation, sighting.translation)
+    pixels = np.full((instrument.rig.n_cameras, *detection.pixels.shape), np.nan)
+    pixels[0] = detection.pixels  # of the first camera, whose images are streamed
+    frame = ProbingFrame("", pixels, detection.rotation, detection.translation)
     (touch,) = measure_touches(instrument, [StillFrames((frame,))])
     return touch.point_cam, touch.covariance(instrument)
 
 
 def _covariance(covariance: FloatArray, order: str) -> dict[str, str]:
-    """Return a covariance row by row; nothing of one that is not known."""
+    """Return the entries of a covariance; none if it is unknown."""
     if not np.isfinite(covariance).all():
         return {}
     numbers = " ".join(f"{value:.9g}" for value in covariance.ravel().tolist())
@@ -96,7 +103,7 @@ def _covariance(covariance: FloatArray, order: str) -> dict[str, str]:
 def _transform(
     name: str, R: FloatArray, t: FloatArray, at: float, told: Mapping[str, str]
 ) -> bytes:
-    # Not there without the extra "stream", and not needed before somebody listens.
+    # Not there without the extra "stream", and not needed before a client connects.
     from pyigtl import TransformMessage
 
     matrix = np.eye(4)

@@ -1,12 +1,12 @@
-"""A server of OpenIGTLink that holds up nobody.
+"""A non-blocking OpenIGTLink server.
 
-pyigtl's own server takes one client at a time, and over the signals of the process; so
-of pyigtl only the messages are used. One thread serves all clients here. A client that
-reads slowly, or not at all, misses poses: each is sent the newest one whenever it has
-taken the last, and nothing is kept for it besides.
+pyigtl's own server serves one client at a time and replaces the signal handlers of the
+process, so only its messages are used. One thread serves all clients. A slow client
+misses poses: each client is sent the newest pose once it has received the last one.
 """
 
 import errno
+import logging
 import selectors
 import socket
 import time
@@ -19,25 +19,27 @@ from threading import Lock, Thread
 
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import Frame
-from lightpen.detection.sighting import Sighting
+from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import StreamError
 from lightpen.formats.files import printable
 from lightpen.formats.system_reasons import strerror
-from lightpen.sentences import Sentence, sentence
+from lightpen.messages import Message, message
 from lightpen.streaming.messages import StreamedTip, pose_messages
 
-LOOPBACK = "127.0.0.1"  # reached by programs of this computer only
-PORT = 18944  # that clients of OpenIGTLink look for
-NO_PORT = sentence("stream.no-port", "there is no such port")
+LOOPBACK = "127.0.0.1"  # for programs of this computer only
+PORT = 18944  # the default port of OpenIGTLink
+NO_PORT = message("stream.no-port")
 LAST_PORT = 65535
 MOST_CLIENTS = 16
-ON_THE_WAY = 16_384  # bytes to a slow client, lest what it reads at last is old
-ROOM = 4096  # bytes that are read of what a client says, which is passed over
+ON_THE_WAY = 16_384  # bytes; a slow client misses poses rather than get old ones
+ROOM = 4096  # bytes; what clients send is ignored
+
+_logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class StreamPlace:
-    """Where a stream can be listened to.
+    """Address and port of a stream.
 
     Attributes
     ----------
@@ -52,7 +54,7 @@ class StreamPlace:
 
     @property
     def is_local(self) -> bool:
-        """Whether only programs of this computer can listen."""
+        """Whether only programs of this computer can connect."""
         try:
             return ip_address(self.address).is_loopback
         except ValueError:  # a name
@@ -65,12 +67,12 @@ class StreamPlace:
 
 @dataclass(frozen=True)
 class StreamStatus:
-    """How a stream is.
+    """State of a stream.
 
     Attributes
     ----------
     place : StreamPlace or None
-        None while nothing is streamed.
+        None while the stream is closed.
     """
 
     place: StreamPlace | None = None
@@ -79,7 +81,7 @@ class StreamStatus:
 
 @dataclass(eq=False)
 class _Client:
-    """Somebody who listens: what is being sent, and what comes after it."""
+    """A connected client with its pending data."""
 
     connection: socket.socket
     rest: bytes = b""
@@ -87,7 +89,7 @@ class _Client:
 
     @property
     def awaited(self) -> int:
-        """What the selector is to tell of: also room, while something is to be sent."""
+        """Selector events: also writing while data is pending."""
         has_more = self.rest or self.newest
         return selectors.EVENT_READ | (selectors.EVENT_WRITE if has_more else 0)
 
@@ -96,18 +98,18 @@ class _Client:
 class _Seen:
     """A pose that waits to be sent."""
 
-    sighting: Sighting
+    detection: PenDetection
     number: int
     at: float  # s since 1970
 
 
 class PoseStream:
-    """Streams the poses that it is handed, as long as it is open.
+    """Streams poses while it is open.
 
     Parameters
     ----------
     clock : Clock, optional
-        The one that the camera goes by.
+        The clock of the camera.
     on_change : callable
         Called with the new status by whatever thread changes it; must return at once.
     """
@@ -128,31 +130,25 @@ class PoseStream:
 
     @property
     def status(self) -> StreamStatus:
-        """Where it can be listened to, and by how many it is."""
+        """Address of the stream and number of clients."""
         return self._status
 
     @property
     def is_heard(self) -> bool:
-        """Whether anybody listens."""
+        """Whether clients are connected."""
         return self._status.n_clients > 0
 
     def open(self, place: StreamPlace) -> None:
-        """Let others listen, at this place only.
+        """Start listening at this address only.
 
         Raises
         ------
         StreamError
-            Nobody can listen there.
+            The address or port cannot be used.
         """
         self.close()
         if find_spec("pyigtl") is None:
-            raise StreamError(
-                sentence(
-                    "stream.no-package",
-                    "Streaming needs the package pyigtl, which is not installed. "
-                    'Install it with: pip install "lightpen[stream]".',
-                )
-            )
+            raise StreamError("stream.no-package")
         if not 0 <= place.port <= LAST_PORT:
             raise StreamError(_not_open(place, NO_PORT))
         try:
@@ -171,7 +167,7 @@ class PoseStream:
         self._thread.start()
 
     def close(self) -> None:
-        """Let nobody listen any more; nothing if nobody could."""
+        """Stop listening; no-op if closed."""
         waker, self._waker = self._waker, None
         thread, self._thread = self._thread, None
         if waker is not None and thread is not None:
@@ -179,19 +175,19 @@ class PoseStream:
             thread.join()
 
     def set_tip(self, tip: StreamedTip | None) -> None:
-        """Stream the place of another tip from the next image on."""
+        """Stream the position of another tip from the next image on."""
         self._tip = tip
 
-    def take(self, frame: Frame, sighting: Sighting | None) -> None:
-        """Stream what an image shows, if it shows the pen; returns at once."""
+    def take(self, frame: Frame, detection: PenDetection | None) -> None:
+        """Stream a detection if it shows the pen; returns at once."""
         waker = self._waker
         if waker is None or not self.is_heard:
             return
-        if sighting is None or not sighting.has_pose:
+        if detection is None or not detection.has_pose:
             return
         age_s = (self._clock.now_ns() - frame.host_ts_ns) * 1e-9
         with self._lock:
-            self._newest = _Seen(sighting, frame.seq, time.time() - age_s)
+            self._newest = _Seen(detection, frame.seq, time.time() - age_s)
         with suppress(OSError):  # it is awake, or being closed
             waker.send(b"\0")
 
@@ -219,23 +215,24 @@ class PoseStream:
                     selector.modify(client.connection, client.awaited, client)
 
     def _hand_out(self, selector: selectors.BaseSelector) -> None:
-        """Give every client the newest pose to be sent."""
+        """Queue the newest pose for every client."""
         with self._lock:
             seen, self._newest = self._newest, None
         clients = _clients(selector)
         if seen is None or not clients:
             return
-        sent = pose_messages(seen.sighting, self._tip, seen.number, seen.at)
+        sent = pose_messages(seen.detection, self._tip, seen.number, seen.at)
         for client in clients:
             client.newest = sent
 
     def _tell(self, status: StreamStatus) -> None:
         self._status = status
+        _logger.info("stream at %s, %d clients", status.place, status.n_clients)
         self._on_change(status)
 
 
 def _listener(place: StreamPlace) -> socket.socket:
-    """Return a socket that is bound to this address and no other."""
+    """Return a socket bound to this address only."""
     (family, _, _, _, address), *_ = socket.getaddrinfo(
         place.address, place.port, type=socket.SOCK_STREAM
     )
@@ -274,7 +271,7 @@ def _dismiss_all(selector: selectors.BaseSelector) -> None:
 
 
 def _served(client: _Client, ready: int) -> bool:
-    """Send a client what it has room for, and return whether it is still there."""
+    """Send pending data to a client; return whether it is still connected."""
     try:
         if ready & selectors.EVENT_READ and not client.connection.recv(ROOM):
             return False
@@ -289,30 +286,15 @@ def _served(client: _Client, ready: int) -> bool:
     return True
 
 
-def _why_not(place: StreamPlace, error: OSError) -> Sentence:
+def _why_not(place: StreamPlace, error: OSError) -> Message:
     if error.errno == errno.EADDRINUSE:
-        return sentence(
-            "stream.port-taken",
-            "Port {port} is in use already, by another window or another program. "
-            "Choose another port, or close that one.",
-            port=place.port,
-        )
+        return message("stream.port-taken", port=place.port)
     if error.errno == errno.EADDRNOTAVAIL or isinstance(error, socket.gaierror):
-        return sentence(
-            "stream.no-address",
-            "{address} is no address of this computer. Give one that it has in the "
-            "network that may listen, or {loopback} for this computer alone.",
-            address=printable(place.address),
-            loopback=LOOPBACK,
+        return message(
+            "stream.no-address", address=printable(place.address), loopback=LOOPBACK
         )
     return _not_open(place, strerror(error))
 
 
-def _not_open(place: StreamPlace, reason: Sentence | str) -> Sentence:
-    return sentence(
-        "stream.not-open",
-        "Nobody can listen at {place}: {reason}. Choose a port from 1024 to 65535 "
-        "that is free.",
-        place=printable(str(place)),
-        reason=reason,
-    )
+def _not_open(place: StreamPlace, reason: Message | str) -> Message:
+    return message("stream.not-open", place=printable(str(place)), reason=reason)

@@ -1,1 +1,1 @@
-"""A swing as it happens: its states and rules, and where to lean the pen next."""
+"""The capture of a swing: states, rules, guidance and workflow."""

@@ -1,4 +1,4 @@
-"""Where to lean the pen next: the posture that would shrink the tip's uncertainty most.
+"""The next posture: that which would lessen the tip's uncertainty most.
 
 What an image of a posture would say of tip and cone follows from the contact model
 before it is taken [1]_. Images are taken on the way to a posture as well, so a posture
@@ -16,7 +16,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.labelling.constellation import certain_leds
-from lightpen.estimation.joint import ContactModel, reduce
+from lightpen.estimation.contact.joint import ContactModel, reduce
 from lightpen.model.coverage import N_DIRECTIONS
 from lightpen.model.pen import Pen
 from lightpen.model.posture import Posture, angles_between, rotations_of
@@ -31,8 +31,8 @@ MIN_GAP = 4.0  # px between the rims of two LEDs; blur joins closer ones
 
 
 @dataclass(frozen=True, eq=False)
-class Outlook:
-    """What is known of tip and cone, for the choice of the next posture.
+class GuidanceInput:
+    """Inputs for the choice of the next posture.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Outlook:
 
 
 def next_posture(
-    outlook: Outlook, present: FloatArray, wanted: BoolArray | None = None
+    outlook: GuidanceInput, present: FloatArray, wanted: BoolArray | None = None
 ) -> Posture | None:
     """Return the posture to lean the pen to.
 
@@ -89,7 +89,7 @@ def next_posture(
     return postures[int(chosen[np.argmax(worth)])]
 
 
-def visible_fields(outlook: Outlook) -> BoolArray:
+def visible_fields(outlook: GuidanceInput) -> BoolArray:
     """Return in which fields of the dial the pen shows enough LEDs, (3, 8)."""
     _, rotations, fields = _candidates(outlook.pen)
     row, column = fields[_is_seen(outlook, rotations)].T
@@ -98,8 +98,8 @@ def visible_fields(outlook: Outlook) -> BoolArray:
     return visible
 
 
-def image_information(outlook: Outlook, rotations: FloatArray) -> FloatArray:
-    """Return what images of postures would say of (tip, cone), (N, 6, 6), 1/mm^2.
+def image_information(outlook: GuidanceInput, rotations: FloatArray) -> FloatArray:
+    """Predict the information of images about (tip, cone), (N, 6, 6), 1/mm^2.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def image_information(outlook: Outlook, rotations: FloatArray) -> FloatArray:
     return np.asarray(reduce(state, seen).S / outlook.sigma**2)
 
 
-def usable_leds(outlook: Outlook, rotations: FloatArray) -> BoolArray:
+def usable_leds(outlook: GuidanceInput, rotations: FloatArray) -> BoolArray:
     """Return which LEDs would show whole, apart and face on enough, (N, C L).
 
     The LEDs in one camera after those in the other.
@@ -124,7 +124,7 @@ def usable_leds(outlook: Outlook, rotations: FloatArray) -> BoolArray:
     return np.concatenate(each, axis=1)
 
 
-def _usable_leds(outlook: Outlook, rotations: FloatArray, c: int) -> BoolArray:
+def _usable_leds(outlook: GuidanceInput, rotations: FloatArray, c: int) -> BoolArray:
     """Return which LEDs the c-th camera would show so, (N, L)."""
     camera, pen = outlook.rig.cameras[c], outlook.pen
     R, t = outlook.rig.rotations[c], outlook.rig.translations[c]
@@ -160,7 +160,7 @@ def _candidates(pen: Pen) -> tuple[list[Posture], FloatArray, IntArray]:
     return postures, rotations, np.array([place[:2] for place in places])
 
 
-def _is_seen(outlook: Outlook, rotations: FloatArray) -> BoolArray:
+def _is_seen(outlook: GuidanceInput, rotations: FloatArray) -> BoolArray:
     """Return in which postures a camera shows enough LEDs."""
     least = certain_leds(outlook.pen)
     each = [
@@ -170,7 +170,9 @@ def _is_seen(outlook: Outlook, rotations: FloatArray) -> BoolArray:
     return np.asarray(np.any(each, axis=0))
 
 
-def _worth(outlook: Outlook, present: FloatArray, rotations: FloatArray) -> FloatArray:
+def _worth(
+    outlook: GuidanceInput, present: FloatArray, rotations: FloatArray
+) -> FloatArray:
     """Return by how much the way to postures would shrink the tip's variance, mm^2.
 
     Per image; ``rotations`` (C, 3, 3) gives (C,).

@@ -1,31 +1,37 @@
-"""The images that a swing has kept, and what they say of the tip so far."""
+"""The accepted images of a swing, and the running fit to them."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen.detection.sighting import Sighting
+from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import CalibrationError
-from lightpen.estimation.joint import ContactModel, JointFit, fit_contact
-from lightpen.estimation.pivot import GATE, MEDIAN_CHI
-from lightpen.estimation.reach import NOT_REACHED, Reach, Reached, reach_of
+from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_contact
+from lightpen.estimation.pivot.pivot import median_distance, outlier_distance
+from lightpen.estimation.uncertainty.prediction import (
+    UNKNOWN_UNCERTAINTY,
+    PredictedUncertainty,
+    UncertaintyPrediction,
+    predict_uncertainty,
+)
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
 from lightpen.model.pen import Pen
+from lightpen.model.quantiles import chi_quantile
 from lightpen.model.rig import Rig
-from lightpen.swing.moment import fit_moments
+from lightpen.swing.rig_sighting import fit_moments
 from lightpen.swing.seat import Seat, fit_seat, tip_distances
 
 MIN_JOINT = 8  # images of the first joint fit
-NEAR_GATE = 3.4  # square root of chi-square, 3 degrees of freedom, at 0.01
+LEAVING = 0.01  # chance that an image is left out though the tip rests
 MAX_PASSES = 3  # of looking for slipped images
 NO_NOISE = 1e-4  # px, less than any camera has
 
 
 @dataclass(frozen=True, eq=False)
-class KeptImages:
-    """N kept images and the fit to them.
+class AcceptedImages:
+    """N accepted images and the fit to them.
 
     Attributes
     ----------
@@ -47,10 +53,10 @@ class KeptImages:
         The joint fit, as soon as the postures allow one.
     assumed : Assumptions
         What stands in for what the files do not state.
-    reach : Reach or None
-        What the images say beside the files, with the joint fit.
-    reached : Reached
-        How certain the tip is, by all shares that the verdict counts.
+    prediction : UncertaintyPrediction or None
+        Normal equations for the prediction of U, with the joint fit.
+    predicted : PredictedUncertainty
+        U of the tip by the whole budget, and with endless images.
     """
 
     numbers: IntArray
@@ -63,8 +69,8 @@ class KeptImages:
     assumed: Assumptions = USUAL
     seat: Seat | None = None
     joint: JointFit | None = None
-    reach: Reach | None = None
-    reached: Reached = NOT_REACHED
+    prediction: UncertaintyPrediction | None = None
+    predicted: PredictedUncertainty = UNKNOWN_UNCERTAINTY
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -72,7 +78,7 @@ class KeptImages:
     @property
     def uncertainty(self) -> float:
         """U (k = 2) of the tip along its weakest direction, mm; infinite at first."""
-        return self.reached.uncertainty
+        return self.predicted.uncertainty
 
     @property
     def sigma(self) -> float:
@@ -97,9 +103,11 @@ class KeptImages:
         return np.asarray(np.sqrt(total / np.maximum(counted.sum(axis=1), 1)))
 
 
-def none_kept(n_cameras: int, n_leds: int, assumed: Assumptions = USUAL) -> KeptImages:
+def none_kept(
+    n_cameras: int, n_leds: int, assumed: Assumptions = USUAL
+) -> AcceptedImages:
     """Return no images of a pen with this number of LEDs."""
-    return KeptImages(
+    return AcceptedImages(
         numbers=np.zeros(0, dtype=np.int64),
         times=np.zeros(0),
         pixels=np.zeros((0, n_cameras, n_leds, 2)),
@@ -119,7 +127,7 @@ def kept_before(
     rotations: FloatArray,
     translations: FloatArray,
     assumed: Assumptions = USUAL,
-) -> KeptImages:
+) -> AcceptedImages:
     """Return images that were kept before an interruption, with their fit.
 
     Parameters
@@ -134,7 +142,7 @@ def kept_before(
     if not len(numbers):
         return none_kept(rig.n_cameras, pen.n_leds, assumed)
     poses = fit_moments(rig, pen, pixels, rotations, translations)
-    kept = KeptImages(
+    kept = AcceptedImages(
         numbers=numbers,
         times=np.full(len(numbers), -np.inf),
         pixels=pixels,
@@ -150,38 +158,40 @@ def kept_before(
 def keep(
     rig: Rig,
     pen: Pen,
-    kept: KeptImages,
-    sighting: Sighting,
+    kept: AcceptedImages,
+    detection: PenDetection,
     number: int,
     time: float,
-) -> KeptImages:
+) -> AcceptedImages:
     """Return the images with one more, and the fit to all of them."""
-    longer = KeptImages(
+    longer = AcceptedImages(
         numbers=np.append(kept.numbers, number),
         times=np.append(kept.times, time),
-        pixels=np.concatenate([kept.pixels, sighting.rig_pixels[None]]),
-        rotations=np.concatenate([kept.rotations, sighting.rotation[None]]),
-        translations=np.concatenate([kept.translations, sighting.translation[None]]),
-        cofactors=np.concatenate([kept.cofactors, sighting.cofactors[None]]),
-        sigmas=np.append(kept.sigmas, sighting.sigma),
+        pixels=np.concatenate([kept.pixels, detection.rig_pixels[None]]),
+        rotations=np.concatenate([kept.rotations, detection.rotation[None]]),
+        translations=np.concatenate([kept.translations, detection.translation[None]]),
+        cofactors=np.concatenate([kept.cofactors, detection.cofactors[None]]),
+        sigmas=np.append(kept.sigmas, detection.sigma),
         assumed=kept.assumed,
     )
     if kept.joint is None:
         return _refit(rig, pen, longer, longer.rotations)
-    starts = np.concatenate([kept.joint.rotations, sighting.rotation[None]])
-    longer = replace(longer, seat=kept.seat, reach=kept.reach)
+    starts = np.concatenate([kept.joint.rotations, detection.rotation[None]])
+    longer = replace(longer, seat=kept.seat, prediction=kept.prediction)
     return _refit(rig, pen, longer, starts, is_near=True)
 
 
-def first_images(rig: Rig, pen: Pen, kept: KeptImages, n_images: int) -> KeptImages:
+def first_images(
+    rig: Rig, pen: Pen, kept: AcceptedImages, n_images: int
+) -> AcceptedImages:
     """Return the first of the images, and the fit to them."""
     out = np.arange(len(kept)) >= n_images
     return _leave_out(rig, pen, kept, out, is_near=kept.joint is not None)
 
 
 def _leave_out(
-    rig: Rig, pen: Pen, kept: KeptImages, out: BoolArray, *, is_near: bool = False
-) -> KeptImages:
+    rig: Rig, pen: Pen, kept: AcceptedImages, out: BoolArray, *, is_near: bool = False
+) -> AcceptedImages:
     """Return the images but those of ``out`` (N,), and the fit to the rest.
 
     ``is_near`` is for images that are as good as those that stay.
@@ -198,7 +208,7 @@ def _leave_out(
         cofactors=kept.cofactors[stay],
         sigmas=kept.sigmas[stay],
         joint=None,
-        reach=None,
+        prediction=None,
     )
     return _refit(rig, pen, rest, starts[stay], is_near=is_near) if len(rest) else rest
 
@@ -206,13 +216,13 @@ def _leave_out(
 def _refit(
     rig: Rig,
     pen: Pen,
-    kept: KeptImages,
+    kept: AcceptedImages,
     starts: FloatArray,
     *,
     is_near: bool = False,
-) -> KeptImages:
+) -> AcceptedImages:
     """Return the images with a new fit, whose rotations (N, 3, 3) start there."""
-    kept = replace(kept, joint=None, reached=NOT_REACHED)
+    kept = replace(kept, joint=None, predicted=UNKNOWN_UNCERTAINTY)
     fixed = len(kept) >= MIN_JOINT and posture_spread(starts)[0][0] >= MIN_SPREAD
     seat = kept.seat
     if seat is None or not fixed:
@@ -223,7 +233,9 @@ def _refit(
     try:
         joint = fit_contact(
             ContactModel(rig, pen, kept.pixels),
-            *(starts, seat.tip_pen, seat.cone_cam),
+            starts,
+            seat.tip_pen,
+            seat.cone_cam,
             is_near=is_near,
         )
     except CalibrationError:  # an image too bad to settle; the next ones may help
@@ -232,25 +244,27 @@ def _refit(
     if posture_spread(joint.rotations[used])[0][0] < MIN_SPREAD:
         return replace(kept, seat=seat)  # as the solution of the whole swing judges
     fitted = Seat(joint.tip_pen, joint.cone_cam, joint.covariance)
-    reach = reach_of(rig, pen, kept.pixels, joint, kept.reach)
-    reached = reach.reached(joint, max(joint.sigma, NO_NOISE), kept.assumed)
-    return replace(kept, seat=fitted, joint=joint, reach=reach, reached=reached)
+    prediction = predict_uncertainty(rig, pen, kept.pixels, joint, kept.prediction)
+    predicted = prediction.predicted(joint, max(joint.sigma, NO_NOISE), kept.assumed)
+    return replace(
+        kept, seat=fitted, joint=joint, prediction=prediction, predicted=predicted
+    )
 
 
-def distance_unit(kept: KeptImages) -> float:
-    """Return what a distance of 1 is worth by the kept images, 1 or more.
+def distance_unit(kept: AcceptedImages) -> float:
+    """Return the median distance of accepted images over its expectation, 1 or more.
 
     A model that fits worse than the covariances say (geometry errors, a worn cone)
-    must not cost good images, as in `lightpen.estimation.pivot`.
+    must not cost good images, as in `lightpen.estimation.pivot.pivot`.
     """
     if len(kept) < MIN_JOINT:
         return 1.0
-    return max(1.0, float(np.median(_distances(kept))) / MEDIAN_CHI)
+    return max(1.0, float(np.median(_distances(kept))) / median_distance())
 
 
 def without_slipped(
-    rig: Rig, pen: Pen, kept: KeptImages, since: float = np.inf
-) -> tuple[KeptImages, set[int]]:
+    rig: Rig, pen: Pen, kept: AcceptedImages, since: float = np.inf
+) -> tuple[AcceptedImages, set[int]]:
     """Leave out the images whose tip is not in the cone.
 
     Parameters
@@ -261,15 +275,17 @@ def without_slipped(
 
     Returns
     -------
-    kept : KeptImages
+    kept : AcceptedImages
         The rest, with a new fit.
     numbers : set of int
         Of the images left out.
     """
     numbers = set[int]()
     for _ in range(MAX_PASSES):
-        gates = np.where(kept.times >= since, NEAR_GATE, GATE)
-        out = _distances(kept) > gates * distance_unit(kept)
+        thresholds = np.where(
+            kept.times >= since, chi_quantile(3, LEAVING), outlier_distance()
+        )
+        out = _distances(kept) > thresholds * distance_unit(kept)
         if not out.any():
             break
         numbers |= set(map(int, kept.numbers[out]))
@@ -277,7 +293,7 @@ def without_slipped(
     return kept, numbers
 
 
-def _distances(kept: KeptImages) -> FloatArray:
+def _distances(kept: AcceptedImages) -> FloatArray:
     if kept.seat is None or not len(kept):
         return np.zeros(len(kept))
     covariances = kept.cofactors * kept.sigma**2

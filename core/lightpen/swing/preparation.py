@@ -1,4 +1,4 @@
-"""What a calibration needs before the pen is swung, and what of it is missing."""
+"""The choices for a calibration, and which of them are missing."""
 
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -10,10 +10,11 @@ from lightpen import __version__
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.replay import RECORDED
-from lightpen.cameras.source import Needs, Source
+from lightpen.cameras.source import Source, SourceNeeds
 from lightpen.cameras.sources import SIMULATED, source_named
-from lightpen.detection.aim import Aim
+from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.formats.camera_files import CAMERA_FILE
+from lightpen.formats.json_records import plain
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import PEN_FILE
 from lightpen.formats.rig_files import RIG_FILE, RigFile
@@ -24,12 +25,12 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
-from lightpen.record.assumed import Plain, assumption_entries
-from lightpen.record.header import FileCopy, Header, RigCopies
-from lightpen.record.names import Names
-from lightpen.record.recordings import is_simulated_recording
-from lightpen.record.results import Result
-from lightpen.record.tip_library import ListedTip
+from lightpen.record.library.tip_library import ListedTip
+from lightpen.record.results.results import Result
+from lightpen.record.swings.assumed import Plain, assumption_entries
+from lightpen.record.swings.header import FileCopy, Header, RigCopies
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.recordings import is_simulated_recording
 from lightpen.swing.state import SwingSetup
 
 N_CAMERAS = 2  # that are live at once
@@ -62,13 +63,13 @@ class SourceChoice:
 
     @property
     def source(self) -> Source:
-        """What was chosen; the simulated pen for a kind of a later version."""
+        """The source; the simulated pen for an unknown kind."""
         return source_named(self.kind) or SIMULATED
 
     @property
     def lacks_place(self) -> bool:
-        """Whether it has to be said where the images come from."""
-        return self.source.needs is not Needs.NOTHING and not self.place
+        """Whether the place of the images is missing."""
+        return self.source.needs is not SourceNeeds.NOTHING and not self.place
 
 
 @dataclass(frozen=True)
@@ -113,8 +114,8 @@ class SecondCamera:
         return None if self.rig_file is None else self.rig_file.rig
 
 
-class Lack(StrEnum):
-    """What keeps a step from being complete, in the order of the steps."""
+class MissingInput(StrEnum):
+    """Missing inputs, in the order of the steps."""
 
     STATION = "station"
     OPERATOR = "operator"
@@ -137,7 +138,7 @@ class Lack(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Preparation:
-    """All that was chosen for a calibration.
+    """The choices for a calibration.
 
     Attributes
     ----------
@@ -195,7 +196,7 @@ class Preparation:
 
     @property
     def origin(self) -> Origin:
-        """What its images are of: nothing is real that needs a simulated file."""
+        """Origin of the images: simulated if any file is."""
         seen_by = self.camera_file if self.second is None else self.second.rig_file
         files = seen_by, self.pen_file
         if any(file is not None and file.is_simulated for file in files):
@@ -298,81 +299,90 @@ class Preparation:
         return replace(self, names=names, nominal_tip=tip.nominal_tip)
 
     @property
-    def aim(self) -> Aim:
-        """What to look for in the images."""
-        others: tuple[Aim, ...] = ()
+    def region(self) -> RegionOfInterest:
+        """Camera, pen and mask for the detection."""
+        others: tuple[RegionOfInterest, ...] = ()
         if self.second is not None:
             rig = self.second.rig
             camera = None if rig is None else rig.cameras[1]
-            others = (Aim(camera, self.pen, self.second.mask),)
-        return Aim(self.camera, self.pen, self.mask, others)
+            others = (RegionOfInterest(camera, self.pen, self.second.mask),)
+        return RegionOfInterest(self.camera, self.pen, self.mask, others)
 
-    def start_lacks(self) -> tuple[Lack, ...]:
-        """Return what the step Start lacks."""
+    def start_missing_inputs(self) -> tuple[MissingInput, ...]:
+        """Return the missing inputs of the step Start."""
         names = self.names
         given = {
-            Lack.STATION: names.station,
-            Lack.OPERATOR: names.operator,
-            Lack.PEN: names.pen,
-            Lack.TIP: names.tip,
-            Lack.CONE: names.cone,
+            MissingInput.STATION: names.station,
+            MissingInput.OPERATOR: names.operator,
+            MissingInput.PEN: names.pen,
+            MissingInput.TIP: names.tip,
+            MissingInput.CONE: names.cone,
         }
         return tuple(lack for lack, name in given.items() if not name.strip())
 
-    def camera_lacks(self) -> tuple[Lack, ...]:
-        """Return what the step Camera lacks."""
-        lacks = []
+    def camera_missing_inputs(self) -> tuple[MissingInput, ...]:
+        """Return the missing inputs of the step Camera."""
+        missing_inputs = []
         if self.source.lacks_place:
-            is_of_files = self.source.source.needs is Needs.FILES
-            lacks.append(Lack.SOURCE_PLACE if is_of_files else Lack.DEVICE)
+            is_of_files = self.source.source.needs is SourceNeeds.FILES
+            missing_inputs.append(
+                MissingInput.SOURCE_PLACE if is_of_files else MissingInput.DEVICE
+            )
         elif self.image_size is None:
-            lacks.append(Lack.IMAGES)
+            missing_inputs.append(MissingInput.IMAGES)
         camera = self.camera
         if camera is None and self.second is None:
-            lacks.append(Lack.CAMERA_FILE)
+            missing_inputs.append(MissingInput.CAMERA_FILE)
         if camera is not None and self.image_size not in (None, camera.image_size):
-            lacks.append(Lack.IMAGE_SIZE)
-        return (*lacks, *self._second_lacks())
+            missing_inputs.append(MissingInput.IMAGE_SIZE)
+        return (*missing_inputs, *self._second_missing_inputs())
 
-    def _second_lacks(self) -> tuple[Lack, ...]:
-        """Return what is missing of a second camera that is wanted."""
+    def _second_missing_inputs(self) -> tuple[MissingInput, ...]:
+        """Return the missing inputs of the second camera."""
         second = self.second
         if second is None:
             return ()
-        lacks = []
+        missing_inputs = []
         if second.source.lacks_place:
-            lacks.append(Lack.SECOND_DEVICE)
+            missing_inputs.append(MissingInput.SECOND_DEVICE)
         elif second.image_size is None:
-            lacks.append(Lack.SECOND_IMAGES)
+            missing_inputs.append(MissingInput.SECOND_IMAGES)
         if second.rig is None:
-            lacks.append(Lack.RIG_FILE)
+            missing_inputs.append(MissingInput.RIG_FILE)
         elif second.rig.n_cameras != N_CAMERAS:
-            lacks.append(Lack.RIG_OF_TWO)
+            missing_inputs.append(MissingInput.RIG_OF_TWO)
         elif second.image_size not in (None, second.rig.cameras[1].image_size):
-            lacks.append(Lack.SECOND_IMAGE_SIZE)
-        return tuple(lacks)
+            missing_inputs.append(MissingInput.SECOND_IMAGE_SIZE)
+        return tuple(missing_inputs)
 
-    def leds_lacks(self) -> tuple[Lack, ...]:
-        """Return what the step LEDs lacks."""
-        lacks = {
-            Lack.PEN_FILE: self.pen_file is None,
-            Lack.SAVED_LEDS: self.has_unsaved_leds,
+    def leds_missing_inputs(self) -> tuple[MissingInput, ...]:
+        """Return the missing inputs of the step LEDs."""
+        missing_inputs = {
+            MissingInput.PEN_FILE: self.pen_file is None,
+            MissingInput.SAVED_LEDS: self.has_unsaved_leds,
         }
-        return tuple(lack for lack, is_lacking in lacks.items() if is_lacking)
+        return tuple(lack for lack, is_lacking in missing_inputs.items() if is_lacking)
 
-    def lacks(self) -> tuple[Lack, ...]:
-        """Return all that is missing before a swing."""
-        return self.start_lacks() + self.camera_lacks() + self.leds_lacks()
+    def missing_inputs(self) -> tuple[MissingInput, ...]:
+        """Return all missing inputs."""
+        return (
+            self.start_missing_inputs()
+            + self.camera_missing_inputs()
+            + self.leds_missing_inputs()
+        )
 
     def swing_setup(self) -> SwingSetup:
-        """Return what the swing is captured with; nothing may be missing."""
+        """Return the setup of the swing; nothing may be missing."""
         camera, pen = self.camera, self.pen
         if camera is None or pen is None:
             raise ValueError("`camera_file` and `pen_file` must be chosen.")
         is_recording = self.source.kind == SourceKind.RECORDED
         second = self.second
         return SwingSetup(
-            *(camera, pen, self.limits, self.mask),
+            camera,
+            pen,
+            self.limits,
+            self.mask,
             assumptions=self.assumptions,
             is_recording=is_recording,
             beside=None if second is None else second.rig,
@@ -414,8 +424,8 @@ class Preparation:
         if origin is Origin.RECORDED and is_simulated_recording(self.source.place):
             origin = Origin.SIMULATED
         return Header(
-            camera=FileCopy.of(camera_path, CAMERA_FILE),
-            pen=FileCopy.of(self.pen_file.path, PEN_FILE),
+            camera_file=FileCopy.of(camera_path, CAMERA_FILE),
+            pen_file=FileCopy.of(self.pen_file.path, PEN_FILE),
             created=local_now(),
             program=f"lightpen {__version__}",
             station=self.names.station,
@@ -423,8 +433,8 @@ class Preparation:
             tip=self.names.tip,
             cone=self.names.cone,
             units=self.pen_file.units,
-            nominal_tip=self.nominal_tip,
-            mask=self.mask,
+            nominal_tip_mm=plain(self.nominal_tip),
+            mask_px=plain(self.mask),
             settings={
                 "pen": self.names.pen,
                 "ball_diameter_mm": self.names.ball_diameter,
@@ -446,7 +456,7 @@ class Preparation:
 
 
 def _camera_entries(used: CameraInUse | None) -> dict[str, Plain]:
-    """Return what a record tells of the camera that took its images."""
+    """Return the entries of a record on the camera."""
     if used is None:
         return {}
     settings, region = used.settings, used.settings.region
@@ -466,7 +476,7 @@ def _camera_entries(used: CameraInUse | None) -> dict[str, Plain]:
 
 
 def _second_entries(second: SecondCamera | None) -> dict[str, Plain]:
-    """Return what a record tells of the second camera."""
+    """Return the entries of a record on the second camera."""
     if second is None:
         return {}
     entries: dict[str, Plain] = {
@@ -482,9 +492,9 @@ def _rig_copies(second: SecondCamera) -> RigCopies | None:
     if file is None:
         return None
     return RigCopies(
-        file=FileCopy.of(file.path, RIG_FILE),
-        cameras=tuple(FileCopy.of(path, CAMERA_FILE) for path in file.camera_files[1:]),
-        masks=(second.mask,),
+        FileCopy.of(file.path, RIG_FILE),
+        tuple(FileCopy.of(path, CAMERA_FILE) for path in file.camera_files[1:]),
+        (plain(second.mask),),
     )
 
 

@@ -1,16 +1,16 @@
-"""Whether the tip rests in the cone, by the images of the last second."""
+"""Check that the tip rests in the cone, by the images of the last second."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.estimation.pivot import GATE
+from lightpen.estimation.pivot.pivot import outlier_distance
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
 from lightpen.model.pen import Pen
 from lightpen.swing.kept_images import distance_unit
 from lightpen.swing.seat import Seat, fit_seat, tip_distances, tip_offsets
-from lightpen.swing.state import Glimpse, SwingState
+from lightpen.swing.state import RecentDetection, SwingState
 
 BATCH = 1.0  # s, of images in which the tip must rest
 FULL = 0.8  # of a batch, that its images must span
@@ -20,7 +20,7 @@ MIN_KEPT = 3  # images whose noise is better known than that of the last ones
 
 
 def seat_of(state: SwingState) -> Seat | None:
-    """Return where the tip should be by the best that is known."""
+    """Return the best estimate of tip and cone."""
     return state.kept.seat or state.seat
 
 
@@ -30,57 +30,66 @@ def steady_seat(pen: Pen, state: SwingState) -> Seat | None:
     With a nominal tip the pen may stand still. Without one it must swing a little, or
     any still pen would do.
     """
-    glimpses = state.recent
-    if len(glimpses) < MIN_BATCH or state.time - glimpses[0].time < FULL * BATCH:
+    recent_detections = state.recent
+    if (
+        len(recent_detections) < MIN_BATCH
+        or state.time - recent_detections[0].time < FULL * BATCH
+    ):
         return None
-    rotations, translations = _poses(glimpses)
+    rotations, translations = _poses(recent_detections)
     if pen.nominal_tip is None and posture_spread(rotations)[0][1] < MIN_SPREAD:
         return None
-    covariances = _covariances(state, glimpses)
+    covariances = _covariances(state, recent_detections)
     seat = fit_seat(pen, rotations, translations, covariances)
     distances = tip_distances(seat, rotations, translations, covariances)
     return seat if np.median(distances) < STEADY else None
 
 
-def in_place(state: SwingState, glimpses: Sequence[Glimpse]) -> BoolArray:
-    """Return in which glimpses the tip is where it should be, (N,)."""
+def in_place(
+    state: SwingState, recent_detections: Sequence[RecentDetection]
+) -> BoolArray:
+    """Return in which detections the tip is in the cone, (N,)."""
     seat = seat_of(state)
-    if seat is None or not glimpses:
-        return np.zeros(len(glimpses), dtype=bool)
-    rotations, translations = _poses(glimpses)
-    covariances = _covariances(state, glimpses)
+    if seat is None or not recent_detections:
+        return np.zeros(len(recent_detections), dtype=bool)
+    rotations, translations = _poses(recent_detections)
+    covariances = _covariances(state, recent_detections)
     distances = tip_distances(seat, rotations, translations, covariances)
-    return np.asarray(distances <= GATE * distance_unit(state.kept))
+    return np.asarray(distances <= outlier_distance() * distance_unit(state.kept))
 
 
 def rests_in_place(state: SwingState, seconds: float) -> bool:
-    """Return whether the tip was where it should be for this time."""
-    glimpses = [g for g in state.recent if g.time >= state.time - seconds]
-    enough = len(glimpses) > 1 and glimpses[-1].time - glimpses[0].time > (
-        FULL * seconds
-    )
-    return enough and bool(np.mean(in_place(state, glimpses)) > FULL)
+    """Return whether the tip was in the cone for this time."""
+    recent_detections = [g for g in state.recent if g.time >= state.time - seconds]
+    enough = len(recent_detections) > 1 and recent_detections[
+        -1
+    ].time - recent_detections[0].time > (FULL * seconds)
+    return enough and bool(np.mean(in_place(state, recent_detections)) > FULL)
 
 
 def offset(state: SwingState, seconds: float = 0.0) -> float:
-    """Return how far the tip was from where it should be, mm; the median of a time."""
+    """Return the median distance of the tip from the cone over a time, mm."""
     seat = seat_of(state)
-    glimpses = [g for g in state.recent if g.time >= state.time - seconds]
-    if seat is None or not glimpses:
+    recent_detections = [g for g in state.recent if g.time >= state.time - seconds]
+    if seat is None or not recent_detections:
         return 0.0
-    lengths = np.linalg.norm(tip_offsets(seat, *_poses(glimpses)), axis=1)
+    lengths = np.linalg.norm(tip_offsets(seat, *_poses(recent_detections)), axis=1)
     return float(np.median(lengths))
 
 
-def _poses(glimpses: Sequence[Glimpse]) -> tuple[FloatArray, FloatArray]:
+def _poses(
+    recent_detections: Sequence[RecentDetection],
+) -> tuple[FloatArray, FloatArray]:
     return (
-        np.array([g.sighting.rotation for g in glimpses]),
-        np.array([g.sighting.translation for g in glimpses]),
+        np.array([g.detection.rotation for g in recent_detections]),
+        np.array([g.detection.translation for g in recent_detections]),
     )
 
 
-def _covariances(state: SwingState, glimpses: Sequence[Glimpse]) -> FloatArray:
+def _covariances(
+    state: SwingState, recent_detections: Sequence[RecentDetection]
+) -> FloatArray:
     sigma = state.kept.sigma
     if state.n_kept < MIN_KEPT:
-        sigma = float(np.median([g.sighting.sigma for g in state.recent]))
-    return np.array([g.sighting.cofactors for g in glimpses]) * sigma**2
+        sigma = float(np.median([g.detection.sigma for g in state.recent]))
+    return np.array([g.detection.cofactors for g in recent_detections]) * sigma**2

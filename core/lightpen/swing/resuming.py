@@ -1,4 +1,4 @@
-"""An interrupted swing read back, to go on with it."""
+"""Reading an interrupted swing back, to resume it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,16 +9,16 @@ import numpy as np
 from lightpen.cameras.sources import source_named
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
-from lightpen.record.header import damaged_file
-from lightpen.record.journal import JOURNAL
-from lightpen.record.reading import (
+from lightpen.record.swings.header import damaged_file
+from lightpen.record.swings.journal import JOURNAL
+from lightpen.record.swings.reading import (
     Record,
     is_of_recording,
     open_record,
     recorded_limits,
 )
-from lightpen.record.recorded_source import source
-from lightpen.record.writing import RecordWriter
+from lightpen.record.swings.recorded_source import source
+from lightpen.record.swings.writing import RecordWriter
 from lightpen.swing.kept_images import kept_before
 from lightpen.swing.preparation import SourceChoice
 from lightpen.swing.rules import start_again
@@ -30,7 +30,7 @@ ROUNDING = 1e-6  # of a rotation
 
 @dataclass(frozen=True, eq=False)
 class Resumable:
-    """An interrupted swing, ready to go on.
+    """An interrupted swing, ready to be resumed.
 
     Attributes
     ----------
@@ -54,19 +54,17 @@ class Resumable:
         return SourceChoice(kind, place if isinstance(place, str) else "")
 
     def is_of(self, sources: Sequence[SourceChoice]) -> bool:
-        """Return whether images of these sources can go on with it."""
+        """Return whether images of these sources can continue it."""
         if len(sources) != self.setup.rig.n_cameras:
             return False
         source, settings = sources[0], self.record.header.settings
         kind, place = settings.get("source"), settings.get("source_place")
-        if kind is None:  # of a version that did not say
-            return True
         return source.kind == kind and (
             not self.setup.is_recording or source.place == place
         )
 
     def fits(self, image_size: tuple[int, int]) -> bool:
-        """Return whether images of this width and height, px, can go on with it."""
+        """Return whether images of this width and height, px, can continue it."""
         return image_size == self.setup.camera.image_size
 
 
@@ -108,10 +106,7 @@ def read_for_more(folder: Path) -> Resumable:
 
 
 def _shows(record: Record, pen: Pen, rig: Rig) -> bool:
-    """Return whether the journal can be of this pen before these cameras.
-
-    Lines of format 1 have no checksum that would tell.
-    """
+    """Return whether the journal can be of this pen before these cameras."""
     for image in record.images:
         R, t = image.rotation, image.translation
         if image.rig_pixels.shape[:2] != (rig.n_cameras, pen.n_leds):
@@ -149,7 +144,7 @@ def resume_swing(setup: SwingSetup, record: Record, time: float = 0.0) -> SwingS
 
 
 def recorded_setup(record: Record) -> SwingSetup:
-    """Return what a record was captured with, from its own copies of the files.
+    """Return the setup of a record, from its own copies of the files.
 
     Raises
     ------
@@ -158,7 +153,10 @@ def recorded_setup(record: Record) -> SwingSetup:
     """
     found = source(record)
     return SwingSetup(
-        *(found.camera, found.pen, recorded_limits(record), found.masks[0]),
+        found.camera,
+        found.pen,
+        recorded_limits(record),
+        found.masks[0],
         assumptions=found.assumptions,
         is_recording=is_of_recording(record),
         beside=found.rig,

@@ -1,4 +1,4 @@
-"""The rules of a swing: from one image to the next.
+"""The rules of a swing: transition from one image to the next.
 
 `advance_swing` takes the state of a swing, what the next image shows and when it was
 taken, and returns the new state and what happened. It has no clock and no threads.
@@ -17,9 +17,26 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.constellation import certain_leds
+from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import Sighting
-from lightpen.messages import (
+from lightpen.messages import Message
+from lightpen.model.posture import angles_between, posture_of
+from lightpen.swing.kept_images import AcceptedImages, keep, none_kept, without_slipped
+from lightpen.swing.rest import BATCH, in_place, offset, rests_in_place, steady_seat
+from lightpen.swing.seat import Seat
+from lightpen.swing.shortfall import guided, measure_shortfall, oriented
+from lightpen.swing.state import (
+    Pause,
+    Phase,
+    RecentDetection,
+    SwingEvent,
+    SwingEventKind,
+    SwingSetup,
+    SwingState,
+    start_swing,
+    trace_of,
+)
+from lightpen.swing_messages import (
     FOLLOW_ARROW,
     HOLD_STILL,
     LEAN_TO_YOUR_RIGHT,
@@ -37,29 +54,6 @@ from lightpen.messages import (
     starts_in,
     tip_elsewhere,
     tip_slipped,
-)
-from lightpen.model.posture import angles_between, posture_of
-from lightpen.sentences import Sentence
-from lightpen.swing.kept_images import KeptImages, keep, none_kept, without_slipped
-from lightpen.swing.rest import (
-    BATCH,
-    in_place,
-    offset,
-    rests_in_place,
-    steady_seat,
-)
-from lightpen.swing.seat import Seat
-from lightpen.swing.shortfall import guided, measure_shortfall, oriented
-from lightpen.swing.state import (
-    Glimpse,
-    Happening,
-    Pause,
-    Phase,
-    SwingEvent,
-    SwingSetup,
-    SwingState,
-    start_swing,
-    trace_of,
 )
 
 SETTLING = 0.5  # s between the tip being found at rest and the countdown
@@ -88,7 +82,7 @@ class Transition:
 
 
 def advance_swing(
-    setup: SwingSetup, state: SwingState, sighting: Sighting, time: float
+    setup: SwingSetup, state: SwingState, detection: PenDetection, time: float
 ) -> Transition:
     """Take one more image.
 
@@ -100,16 +94,15 @@ def advance_swing(
     Returns
     -------
     Transition
-        An event `Happening.KEPT` asks for the image to be recorded under its number,
-        before the next image is taken; one of `Happening.SLIPPED` names kept images
-        that are dropped.
+        An event `KEPT` asks for the image to be recorded under its number, before the
+        next image is taken; one of `SLIPPED` names kept images that are dropped.
     """
-    state = _noticed(setup, state, sighting, time)
+    state = _noticed(setup, state, detection, time)
     rule = _RULES.get(state.phase)
     if rule is None:
         return Transition(state)
-    transition = rule(setup, state, sighting)
-    if any(event.what is Happening.SLIPPED for event in transition.events):
+    transition = rule(setup, state, detection)
+    if any(event.what is SwingEventKind.SLIPPED for event in transition.events):
         return replace(transition, state=replace(transition.state, slipped_at=time))
     return transition
 
@@ -138,17 +131,19 @@ def resume(state: SwingState) -> SwingState:
 def finish(state: SwingState) -> Transition:
     """End the capture, whatever is missing."""
     solving = _enter(state, Phase.SOLVING, SOLVING)
-    return Transition(replace(solving, target=None), (SwingEvent(Happening.CAPTURED),))
+    return Transition(
+        replace(solving, target=None), (SwingEvent(SwingEventKind.CAPTURED),)
+    )
 
 
-def conclude(state: SwingState, verdict: Sentence, passed: bool) -> Transition:
+def conclude(state: SwingState, verdict: Message, passed: bool) -> Transition:
     """Show the verdict on the solved swing."""
-    happening = Happening.DONE if passed else Happening.FAILED
-    return Transition(_enter(state, Phase.VERDICT, verdict), (SwingEvent(happening),))
+    event_kind = SwingEventKind.DONE if passed else SwingEventKind.FAILED
+    return Transition(_enter(state, Phase.VERDICT, verdict), (SwingEvent(event_kind),))
 
 
 def has_just_slipped(state: SwingState) -> bool:
-    """Return whether a slip is so recent that the operator has to be told."""
+    """Return whether the last slip is so recent that it is shown."""
     return state.slipped_at is not None and state.time - state.slipped_at < SLIP_TOLD
 
 
@@ -160,20 +155,20 @@ def has_enough(setup: SwingSetup, state: SwingState) -> bool:
 
 
 def stillness(state: SwingState) -> float:
-    """Return how much of the time to say yes the pen is upright and still, 0 to 1."""
+    """Return the fraction of the confirmation hold elapsed, 0 to 1."""
     if state.still_since is None:
         return 0.0
     return min((state.time - state.still_since) / CONFIRMING, 1.0)
 
 
 def start_again(
-    setup: SwingSetup, kept: KeptImages, next_number: int, time: float = 0.0
+    setup: SwingSetup, kept: AcceptedImages, next_number: int, time: float = 0.0
 ) -> SwingState:
     """Return an interrupted swing with the images that it had kept.
 
     Parameters
     ----------
-    kept : KeptImages
+    kept : AcceptedImages
         See `lightpen.swing.kept_images.kept_before`.
     next_number : int
         Of the next image in the swing's record.
@@ -186,40 +181,44 @@ def start_again(
 
 
 def _noticed(
-    setup: SwingSetup, state: SwingState, sighting: Sighting, time: float
+    setup: SwingSetup, state: SwingState, detection: PenDetection, time: float
 ) -> SwingState:
-    """Return the state that remembers the sighting."""
-    recent = [glimpse for glimpse in state.recent if glimpse.time > time - BATCH]
-    if not sighting.has_pose:
+    """Return the state with the detection added."""
+    recent = [
+        recent_detection
+        for recent_detection in state.recent
+        if recent_detection.time > time - BATCH
+    ]
+    if not detection.has_pose:
         return replace(state, time=time, recent=tuple(recent), still_since=None)
     still_since = state.still_since
-    if posture_of(setup.pen, sighting.rotation).tilt > UPRIGHT:
+    if posture_of(setup.pen, detection.rotation).tilt > UPRIGHT:
         still_since = None
-    elif still_since is None or not _is_still(recent, sighting):
+    elif still_since is None or not _is_still(recent, detection):
         still_since = time
     return replace(
         state,
         time=time,
-        recent=(*recent, Glimpse(time, sighting)),
+        recent=(*recent, RecentDetection(time, detection)),
         last_seen=time,
         still_since=still_since,
     )
 
 
-def _is_still(recent: list[Glimpse], sighting: Sighting) -> bool:
+def _is_still(recent: list[RecentDetection], detection: PenDetection) -> bool:
     if not recent:
         return False
-    before = recent[0].sighting.rotation
-    return bool(angles_between(before[None], sighting.rotation[None])[0, 0] < STILL)
+    before = recent[0].detection.rotation
+    return bool(angles_between(before[None], detection.rotation[None])[0, 0] < STILL)
 
 
-def _wait(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
-    if not sighting.has_pose:
+def _wait(setup: SwingSetup, state: SwingState, detection: PenDetection) -> Transition:
+    if not detection.has_pose:
         return Transition(state)
     return Transition(_enter(state, Phase.SEEN, _seating(setup)))
 
 
-def _seen(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+def _seen(setup: SwingSetup, state: SwingState, detection: PenDetection) -> Transition:
     if _is_lost(state):
         return Transition(_enter(state, Phase.WAIT, SHOW_PEN))
     seat = steady_seat(setup.pen, state)
@@ -229,8 +228,8 @@ def _seen(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transitio
 
 
 def _settle(setup: SwingSetup, state: SwingState, seat: Seat) -> Transition:
-    """Begin with a tip at rest; go on with the kept images if it is where it was."""
-    events = [SwingEvent(Happening.SEATED)]
+    """Begin with a tip at rest, or continue if it is where it was."""
+    events = [SwingEvent(SwingEventKind.SEATED)]
     if state.n_kept and not rests_in_place(state, BATCH):
         if state.n_kept >= FEW:
             return Transition(replace(state, message=_elsewhere(state)))
@@ -240,7 +239,9 @@ def _settle(setup: SwingSetup, state: SwingState, seat: Seat) -> Transition:
     return Transition(replace(settled, seat=state.kept.seat or seat), tuple(events))
 
 
-def _settled(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+def _settled(
+    setup: SwingSetup, state: SwingState, detection: PenDetection
+) -> Transition:
     unsettled = _unsettled(setup, state)
     if unsettled is not None:
         return unsettled
@@ -251,7 +252,9 @@ def _settled(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transi
     return Transition(_enter(state, Phase.COUNTDOWN, starts_in(ceil(COUNTDOWN))))
 
 
-def _countdown(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+def _countdown(
+    setup: SwingSetup, state: SwingState, detection: PenDetection
+) -> Transition:
     unsettled = _unsettled(setup, state)
     if unsettled is not None:
         return unsettled
@@ -263,7 +266,7 @@ def _countdown(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Tran
 
 def _unsettled(setup: SwingSetup, state: SwingState) -> Transition | None:
     """Return the step back if the pen is lost or its tip has left the seat."""
-    lost = (SwingEvent(Happening.LOST),)
+    lost = (SwingEvent(SwingEventKind.LOST),)
     if _is_lost(state):
         return Transition(_await_seat(state), lost)
     if in_place(
@@ -275,49 +278,47 @@ def _unsettled(setup: SwingSetup, state: SwingState) -> Transition | None:
     )
 
 
-def _capturing(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+def _capturing(
+    setup: SwingSetup, state: SwingState, detection: PenDetection
+) -> Transition:
     if _is_lost(state):
         return _pause_for(state, Pause.LOST, PEN_LOST)
-    if sighting.reason is Reason.UNHANDLED:
-        state = replace(state, n_dropped=_more(state, 1, sighting.reason))
-    if not sighting.has_pose:
+    if detection.reason is Reason.UNHANDLED:
+        state = replace(state, n_dropped=_more(state, 1, detection.reason))
+    if not detection.has_pose:
         return Transition(state)
     if not in_place(state, state.recent[-1:]).all():
-        return _astray(setup, state, sighting)
+        return _astray(setup, state, detection)
     state = replace(state, strayed_since=None, stray_rotations=np.zeros((0, 3, 3)))
-    state = guided(setup, oriented(setup, state, sighting), sighting)
+    state = guided(setup, oriented(setup, state, detection), detection)
     state = replace(state, message=_asking(state))
-    if not _is_new(state.kept.rotations, sighting, setup.limits.spacing):
+    if not _is_new(state.kept.rotations, detection, setup.limits.spacing):
         return Transition(state)
-    flaw = _flaw(setup, state, sighting)
+    flaw = _flaw(setup, state, detection)
     if flaw is not Reason.NONE:
-        return Transition(_flawed(setup, state, sighting, flaw))
-    return _kept(setup, state, sighting)
+        return Transition(_flawed(setup, state, detection, flaw))
+    return _kept(setup, state, detection)
 
 
-def _kept(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+def _kept(setup: SwingSetup, state: SwingState, detection: PenDetection) -> Transition:
     """Keep an image, and drop those that turn out to have slipped."""
     number, counts = state.next_number, state.counts
-    kept = keep(setup.rig, setup.pen, state.kept, sighting, number, state.time)
+    kept = keep(setup.rig, setup.pen, state.kept, detection, number, state.time)
     kept, dropped = without_slipped(setup.rig, setup.pen, kept)
     state = replace(state, kept=kept)
     if number in dropped:  # it was never recorded
         return _dropped(replace(state, n_dropped=_more(state, 1)), dropped - {number})
-    state = replace(
-        state,
-        next_number=number + 1,
-        flawed_rotations=np.zeros((0, 3, 3)),
-    )
+    state = replace(state, next_number=number + 1, flawed_rotations=np.zeros((0, 3, 3)))
     transition = _dropped(state, dropped)
     state, events = (
         transition.state,
-        [SwingEvent(Happening.KEPT, (number,)), *transition.events],
+        [SwingEvent(SwingEventKind.KEPT, (number,)), *transition.events],
     )
     state = replace(state, trace=state.trace.with_estimate(kept))
     enough = setup.limits.min_per_field
     full = (state.counts >= enough) & (counts < enough)
     events += [
-        SwingEvent(Happening.FIELD_FULL, (int(row), int(column)))
+        SwingEvent(SwingEventKind.FIELD_FULL, (int(row), int(column)))
         for row, column in np.argwhere(full)
     ]
     if has_enough(setup, state):
@@ -326,7 +327,9 @@ def _kept(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transitio
     return Transition(state, tuple(events))
 
 
-def _astray(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+def _astray(
+    setup: SwingSetup, state: SwingState, detection: PenDetection
+) -> Transition:
     """Note that the tip is out of the cone; never keep such an image."""
     if state.strayed_since is None:  # one image alone may be a bad one
         return Transition(replace(state, strayed_since=state.time))
@@ -336,7 +339,7 @@ def _astray(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transit
     if begins:
         since = state.strayed_since - ABOUT_TO_SLIP
         kept, dropped = without_slipped(setup.rig, setup.pen, kept, since)
-    strays = _with_new(setup, state.stray_rotations, sighting)
+    strays = _with_new(setup, state.stray_rotations, detection)
     n_new = len(strays) - len(state.stray_rotations)
     state = replace(
         state, kept=kept, stray_rotations=strays, n_dropped=_more(state, n_new)
@@ -356,29 +359,31 @@ def _astray(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transit
         seating = _enter(transition.state, Phase.SEEN, _seating(setup))
         return Transition(replace(seating, recent=()), (*events, *transition.events))
     if begins and not events:
-        events = (SwingEvent(Happening.SLIPPED),)
+        events = (SwingEvent(SwingEventKind.SLIPPED),)
     n_dropped = len(strays) + len(dropped)
     return Transition(replace(state, message=tip_slipped(n_dropped)), events)
 
 
-def _paused(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+def _paused(
+    setup: SwingSetup, state: SwingState, detection: PenDetection
+) -> Transition:
     if state.pause is Pause.BY_USER:
         return Transition(state)
     if _is_lost(state):
         return Transition(replace(state, pause=Pause.LOST, message=PEN_LOST))
     is_in_place = bool(state.recent) and bool(in_place(state, state.recent[-1:]).all())
-    if state.pause is Pause.LOST and sighting.has_pose and not is_in_place:
+    if state.pause is Pause.LOST and detection.has_pose and not is_in_place:
         state = replace(state, pause=Pause.LIFTED, message=PEN_LIFTED)
     if state.time - state.since > RESEATED and rests_in_place(state, RESEATED):
         capturing = _enter(state, Phase.CAPTURING, _asking(state))
-        return Transition(capturing, (SwingEvent(Happening.SEATED),))
+        return Transition(capturing, (SwingEvent(SwingEventKind.SEATED),))
     seat = steady_seat(setup.pen, state)
     if seat is None or in_place(state, state.recent[-1:]).all():
         return Transition(state)
     return _settle(setup, state, seat)
 
 
-_RULES: dict[Phase, Callable[[SwingSetup, SwingState, Sighting], Transition]] = {
+_RULES: dict[Phase, Callable[[SwingSetup, SwingState, PenDetection], Transition]] = {
     Phase.WAIT: _wait,
     Phase.SEEN: _seen,
     Phase.SETTLED: _settled,
@@ -388,7 +393,7 @@ _RULES: dict[Phase, Callable[[SwingSetup, SwingState, Sighting], Transition]] = 
 }
 
 
-def _enter(state: SwingState, phase: Phase, message: Sentence) -> SwingState:
+def _enter(state: SwingState, phase: Phase, message: Message) -> SwingState:
     return replace(
         state,
         phase=phase,
@@ -405,55 +410,55 @@ def _await_seat(state: SwingState) -> SwingState:
     return replace(_enter(state, Phase.WAIT, SHOW_PEN), recent=())
 
 
-def _pause_for(state: SwingState, why: Pause, message: Sentence) -> Transition:
+def _pause_for(state: SwingState, why: Pause, message: Message) -> Transition:
     paused = replace(_enter(state, Phase.PAUSED, message), pause=why)
-    return Transition(paused, (SwingEvent(Happening.LOST),))
+    return Transition(paused, (SwingEvent(SwingEventKind.LOST),))
 
 
 def _is_lost(state: SwingState) -> bool:
     return state.time - state.last_seen > LOST_AFTER
 
 
-def _seating(setup: SwingSetup) -> Sentence:
+def _seating(setup: SwingSetup) -> Message:
     known = setup.pen.nominal_tip is not None
     return SEAT_TIP if known else SWING_TO_SEAT
 
 
-def _elsewhere(state: SwingState) -> Sentence:
+def _elsewhere(state: SwingState) -> Message:
     return tip_elsewhere(offset(state, BATCH))
 
 
-def _asking(state: SwingState) -> Sentence:
+def _asking(state: SwingState) -> Message:
     if state.heading is None:
         return LEAN_TO_YOUR_RIGHT
     return FOLLOW_ARROW
 
 
-def _is_new(rotations: FloatArray, sighting: Sighting, spacing: float) -> bool:
+def _is_new(rotations: FloatArray, detection: PenDetection, spacing: float) -> bool:
     if not len(rotations):
         return True
-    return bool(angles_between(sighting.rotation[None], rotations).min() >= spacing)
+    return bool(angles_between(detection.rotation[None], rotations).min() >= spacing)
 
 
 def _with_new(
-    setup: SwingSetup, rotations: FloatArray, sighting: Sighting
+    setup: SwingSetup, rotations: FloatArray, detection: PenDetection
 ) -> FloatArray:
-    """Return the postures, with that of the sighting if it differs from all."""
-    if not _is_new(rotations, sighting, setup.limits.spacing):
+    """Return the postures, with that of the detection if it is new."""
+    if not _is_new(rotations, detection, setup.limits.spacing):
         return rotations
-    return np.concatenate([rotations, sighting.rotation[None]])
+    return np.concatenate([rotations, detection.rotation[None]])
 
 
 def _flawed(
-    setup: SwingSetup, state: SwingState, sighting: Sighting, flaw: Reason
+    setup: SwingSetup, state: SwingState, detection: PenDetection, flaw: Reason
 ) -> SwingState:
-    """Say what is wrong with an image, and count it once a posture."""
-    flawed = _with_new(setup, state.flawed_rotations, sighting)
+    """Set the message on an unusable image, and count it once a posture."""
+    flawed = _with_new(setup, state.flawed_rotations, detection)
     needed = certain_leds(setup.pen)
     messages = {
-        Reason.TOO_FEW_LEDS: few_leds(sighting.n_leds, needed),
+        Reason.TOO_FEW_LEDS: few_leds(detection.n_leds, needed),
         Reason.BLURRED: TOO_FAST,
-        Reason.MISFIT: bad_fit(sighting.sigma, state.kept.sigma),
+        Reason.MISFIT: bad_fit(detection.sigma, state.kept.sigma),
     }
     return replace(
         state,
@@ -463,24 +468,26 @@ def _flawed(
     )
 
 
-def _flaw(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Reason:
+def _flaw(setup: SwingSetup, state: SwingState, detection: PenDetection) -> Reason:
     """Return why an image with a new posture is of no use."""
-    if sighting.n_leds < certain_leds(setup.pen):
+    if detection.n_leds < certain_leds(setup.pen):
         return Reason.TOO_FEW_LEDS
-    if sighting.is_blurred:
+    if detection.is_blurred:
         return Reason.BLURRED
     usual = state.kept.sigma if state.n_kept >= FEW else np.inf
-    if sighting.sigma > max(BAD_SIGMA * usual, SOME_SIGMA):
+    if detection.sigma > max(BAD_SIGMA * usual, SOME_SIGMA):
         return Reason.MISFIT
     return Reason.NONE
 
 
 def _dropped(state: SwingState, numbers: set[int]) -> Transition:
-    """Count kept images that are dropped, and say so."""
+    """Count rejected images, with an event."""
     if not numbers:
         return Transition(state)
     state = replace(state, n_dropped=_more(state, len(numbers)))
-    return Transition(state, (SwingEvent(Happening.SLIPPED, tuple(sorted(numbers))),))
+    return Transition(
+        state, (SwingEvent(SwingEventKind.SLIPPED, tuple(sorted(numbers))),)
+    )
 
 
 def _dropped_all(setup: SwingSetup, state: SwingState) -> Transition:

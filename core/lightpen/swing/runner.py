@@ -1,177 +1,177 @@
-"""The one owner of a swing, from its first image to the accepted tip.
+"""The owner of a swing, from its first image to the accepted tip.
 
-A thread of its own leads the course of the swing. What a user wants reaches it through
-one queue, and so do the images, one at a time: an image that is kept is on the disk
-before the next is asked for. It tells of every change and every event, and hears
-nothing else. Solving and reading take long and run beside it; all other work on the
-disk is done in its turn, between two images.
+A thread of its own runs the workflow. Commands and images reach it through one queue:
+an accepted image is on the disk before the next is taken. A listener is notified of
+every change and event. Solving and reading run in the background; all other work on
+the disk is done between two images.
 """
 
 from collections.abc import Callable, Iterable
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 
-from lightpen.archive.late_logbook import LateLogbook
+from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.cameras.protocol import Frame, Stats
-from lightpen.detection.sighting import Sighting
+from lightpen.detection.pen_detection import PenDetection
 from lightpen.local_time import local_now
-from lightpen.record.archive import Archive
-from lightpen.record.results import Result
-from lightpen.record.supervision import Signature
-from lightpen.swing.course import SwingCourse
+from lightpen.record.library.supervision import Signature
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.runners.serial_queue import SerialQueue
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import Resumable
-from lightpen.swing.serial_queue import SerialQueue
 from lightpen.swing.state import SwingSetup
 from lightpen.swing.status import SwingListener, SwingStatus
+from lightpen.swing.workflow import SwingWorkflow
 
 
 class SwingRunner:
     """Captures, solves and accepts one swing after another.
 
-    Every method returns at once, but for `take` and `await_end`. What cannot be done
-    in the state that the swing is in by then is not done.
+    Every method returns at once, except `take` and `await_end`. A command that is not
+    possible in the state of the swing by then is ignored.
 
     Parameters
     ----------
     records : Path
         Folder that a new swing's record is made in.
-    archive : Archive
+    archive : FolderArchive
         Of the accepted results.
     now : callable
         Returns date and time with the time zone.
-    logbook : LateLogbook, optional
-        That what becomes of swings is entered in; without one, files alone tell of it.
+    logbook : LazyLogbook, optional
+        For the outcome of swings; without one, it is in the files alone.
     """
 
     def __init__(
         self,
         records: Path,
-        archive: Archive,
+        archive: FolderArchive,
         listener: SwingListener,
         now: Callable[[], datetime] = local_now,
-        logbook: LateLogbook | None = None,
+        logbook: LazyLogbook | None = None,
     ) -> None:
-        self._queue = SerialQueue("swing", lambda: self._course.recover())
-        self._course = SwingCourse(
-            *(records, archive, listener, now, self._queue.start, logbook)
+        self._queue = SerialQueue("swing", lambda: self._workflow.recover())
+        self._workflow = SwingWorkflow(
+            records, archive, listener, now, self._queue.start, logbook
         )
 
     @property
     def status(self) -> SwingStatus:
-        """The swing as it was told last, from any thread."""
-        return self._course.status
+        """The status as published last; may be read from any thread."""
+        return self._workflow.status
 
     # Commands
 
     def begin(self, preparation: Preparation) -> None:
         """Begin a new swing; the one before stays on the disk as it is."""
-        self._queue.ask(partial(self._course.begin, preparation))
+        self._queue.ask(lambda: self._workflow.begin(preparation))
 
     def go_on(self, swing: Resumable) -> None:
-        """Go on with an interrupted swing that was read back."""
-        self._queue.ask(partial(self._course.go_on, swing))
+        """Resume an interrupted swing that was read back."""
+        self._queue.ask(lambda: self._workflow.go_on(swing))
 
     def choose(self, preparation: Preparation) -> None:
-        """Know what is chosen, for the next swing that begins by itself.
+        """Set the choices for the next swing that begins automatically.
 
-        With another source of images, a swing that is captured is left.
+        Another source of images ends a swing that is being captured.
         """
-        self._queue.ask(partial(self._course.choose, preparation))
+        self._queue.ask(lambda: self._workflow.choose(preparation))
 
     def keep_choices(self) -> None:
-        """Go on with what the swing began with: `has_other_choices` is settled."""
-        self._queue.ask(self._course.keep_choices)
+        """Continue with the choices that the swing began with."""
+        self._queue.ask(self._workflow.keep_choices)
 
     def come(self) -> None:
-        """Somebody is at the swing: begin with the next image, or go on."""
-        self._queue.ask(self._course.come)
+        """Operator present: begin with the next image, or resume."""
+        self._queue.ask(self._workflow.come)
 
     def leave(self) -> None:
-        """Nobody is at the swing: pause what is captured until somebody comes."""
-        self._queue.ask(self._course.leave)
+        """Operator absent: pause the capture."""
+        self._queue.ask(self._workflow.leave)
 
     def try_again(self) -> None:
-        """Begin a swing by itself that was refused before."""
-        self._queue.ask(self._course.try_again)
+        """Retry the automatic begin after it was refused."""
+        self._queue.ask(self._workflow.try_again)
 
     def pause(self) -> None:
         """Pause the capture for its user."""
-        self._queue.ask(self._course.pause)
+        self._queue.ask(self._workflow.pause)
 
     def resume(self) -> None:
-        """Go on after a pause of the user."""
-        self._queue.ask(self._course.resume)
+        """Resume after a pause by the user."""
+        self._queue.ask(self._workflow.resume)
 
     def finish(self) -> None:
-        """End the capture with what there is, and solve."""
-        self._queue.ask(self._course.finish)
+        """End the capture with the present images, and solve."""
+        self._queue.ask(self._workflow.finish)
 
     def solve(self) -> None:
         """Compute the tip from the images on the disk."""
-        self._queue.ask(self._course.solve)
+        self._queue.ask(self._workflow.solve)
 
     def cancel(self) -> None:
         """Stop computing and reading; images, record and solution stay as they are."""
-        self._queue.ask(self._course.cancel)
+        self._queue.ask(self._workflow.cancel)
 
     def take_out(self, numbers: Iterable[int]) -> None:
-        """Leave images out, and solve again at once."""
-        self._queue.ask(partial(self._course.take_out, tuple(numbers)))
+        """Exclude images, and solve again."""
+        chosen = tuple(numbers)
+        self._queue.ask(lambda: self._workflow.take_out(chosen))
 
     def put_back(self, numbers: Iterable[int]) -> None:
-        """Let images take part again, and solve again at once."""
-        self._queue.ask(partial(self._course.put_back, tuple(numbers)))
+        """Include images again, and solve again."""
+        chosen = tuple(numbers)
+        self._queue.ask(lambda: self._workflow.put_back(chosen))
 
     def capture_more(self) -> None:
-        """Go on with this swing after its verdict, as soon as its images are read."""
-        self._queue.ask(self._course.capture_more)
+        """Capture more images after the verdict, once those of the swing are read."""
+        self._queue.ask(self._workflow.capture_more)
 
     def accept(self, reason: str = "", signature: Signature | None = None) -> None:
-        """Put the tip in force; the one before stays where it cannot be stored.
+        """Accept the tip; the previous one stays in force if it cannot be stored.
 
         Parameters
         ----------
         reason : str
-            Why it is accepted though it is to be checked.
+            For accepting it despite findings.
         signature : Signature, optional
-            Of a supervisor, where it takes one.
+            Of a supervisor, where one is required.
         """
-        self._queue.ask(partial(self._course.accept, reason, signature))
+        self._queue.ask(lambda: self._workflow.accept(reason, signature))
 
-    def take_back(self, result: Result, operator: str) -> None:
-        """Let the result before one in force be in force again.
+    def revoke(self, result: Result, operator: str) -> None:
+        """Revoke a result in favour of the one before.
 
         Parameters
         ----------
         operator : str
-            Who takes it back.
+            Who revokes it.
         """
-        self._queue.ask(partial(self._course.take_back, result, operator))
+        self._queue.ask(lambda: self._workflow.revoke(result, operator))
 
     def set_aside(self) -> None:
-        """Leave the swing for good, as before a repetition; its images are kept."""
-        self._queue.ask(self._course.set_aside)
+        """Discard the swing, as before a repetition; its images are kept."""
+        self._queue.ask(self._workflow.set_aside)
 
     def start_over(self) -> None:
-        """Set the swing aside and begin anew, with what is chosen now."""
-        self._queue.ask(self._course.start_over)
+        """Discard the swing and begin a new one, with the present choices."""
+        self._queue.ask(self._workflow.start_over)
 
     def abandon(self) -> None:
-        """Leave the swing; its record can be resumed."""
-        self._queue.ask(self._course.abandon)
+        """Leave the swing, to be resumed later."""
+        self._queue.ask(self._workflow.abandon)
 
     def open_logbook(self) -> None:
-        """Have entered what the files tell of and the archive does not yet."""
-        self._queue.ask(self._course.open_logbook)
+        """Enter in the archive what is in the files only."""
+        self._queue.ask(self._workflow.open_logbook)
 
     def shut_down(self) -> None:
-        """Do what was commanded, leave the swing to be resumed, and end."""
-        self._queue.end(self._course.shut_down)
+        """Finish pending commands, leave the swing to be resumed, and end."""
+        self._queue.end(self._workflow.shut_down)
 
     def await_end(self, timeout_s: float) -> bool:
-        """Wait for the end after `shut_down` and return whether it came."""
+        """Wait for the end after `shut_down`; return whether it came in time."""
         return self._queue.await_end(timeout_s)
 
     # Images
@@ -179,25 +179,25 @@ class SwingRunner:
     def take(
         self,
         frame: Frame,
-        sighting: Sighting | None,
+        detection: PenDetection | None,
         setup: SwingSetup | None = None,
         n_images: int | None = None,
         stats: Stats | None = None,
     ) -> None:
-        """Take an image, and return when all is done that it asks for.
+        """Process an image; returns when it is done.
 
         Parameters
         ----------
-        sighting : Sighting or None
-            What it shows, if it is of the right size.
+        detection : PenDetection or None
+            In the image; None if its size is wrong.
         setup : SwingSetup, optional
-            What was looked for; images of another swing than the present are not kept.
+            That the image was searched with; images of another swing are ignored.
         n_images : int, optional
-            Of the recording that is shown over and over; a swing of recorded images
-            ends with the last.
+            Length of the recording, which is replayed in a loop; the swing ends with
+            the last image.
         stats : Stats, optional
-            What the camera has counted by now.
+            Counters of the camera at this image.
         """
         self._queue.ask_and_wait(
-            partial(self._course.take, frame, sighting, setup, n_images, stats)
+            lambda: self._workflow.take(frame, detection, setup, n_images, stats)
         )

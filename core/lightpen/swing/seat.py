@@ -1,6 +1,6 @@
-"""Where the tip rests, as far as a few poses tell, and which poses have it elsewhere.
+"""Tip and cone by a few poses, and distances of poses from them.
 
-The equations are those of `lightpen.estimation.pivot`, R_i tip_pen + t_i = cone_cam,
+The equations are those of `estimation.pivot.pivot`, R_i tip_pen + t_i = cone_cam,
 weighed by the covariances of the poses. What is known of the tip beforehand joins them
 as a prior, so that a second of hardly moving poses already gives the cone point.
 """
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.pivot import (
+from lightpen.estimation.pivot.pivot import (
     contact_matrix,
     contact_residuals,
     in_deviations,
@@ -26,7 +26,7 @@ SEATING = 0.01  # mm, by which the tip may move in a good cone
 
 @dataclass(frozen=True, eq=False)
 class Seat:
-    """Tip and cone, and how well they are known.
+    """Tip and cone with their covariance.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Seat:
 
 
 def prior_of(pen: Pen) -> tuple[FloatArray, float]:
-    """Return where the tip of a pen should be, mm, and the standard deviation of it."""
+    """Return the prior of the tip, (3,), mm, and its standard deviation."""
     if pen.nominal_tip is None:
         return pen.leds.mean(axis=0), UNKNOWN_SIGMA
     return pen.nominal_tip, NOMINAL_SIGMA
@@ -53,7 +53,7 @@ def prior_of(pen: Pen) -> tuple[FloatArray, float]:
 def fit_seat(
     pen: Pen, rotations: FloatArray, translations: FloatArray, covariances: FloatArray
 ) -> Seat:
-    """Fit tip and cone to poses and to what is known of the tip beforehand.
+    """Fit tip and cone to poses and to a prior of the tip.
 
     Parameters
     ----------
@@ -82,10 +82,7 @@ def tip_offsets(
 
 
 def tip_distances(
-    seat: Seat,
-    rotations: FloatArray,
-    translations: FloatArray,
-    covariances: FloatArray,
+    seat: Seat, rotations: FloatArray, translations: FloatArray, covariances: FloatArray
 ) -> FloatArray:
     """Return how far from the cone poses put the tip, in standard deviations.
 

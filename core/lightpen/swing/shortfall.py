@@ -1,4 +1,4 @@
-"""How far a swing has come: what is missing, and where to lean the pen next."""
+"""Progress of a swing: missing images, and the next posture."""
 
 from dataclasses import dataclass, replace
 from math import ceil
@@ -6,15 +6,8 @@ from math import ceil
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.detection.sighting import Sighting
-from lightpen.messages import (
-    UNKNOWN,
-    cannot_get_below,
-    not_upright,
-    too_few_images,
-    too_little_tilt,
-    uncertain,
-)
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.messages import Message
 from lightpen.model.coverage import N_DIRECTIONS
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
@@ -25,12 +18,16 @@ from lightpen.model.posture import (
     rotations_of,
     turns_of,
 )
-from lightpen.sentences import Sentence
-from lightpen.swing.guidance import Outlook, next_posture, visible_fields
+from lightpen.swing.guidance import GuidanceInput, next_posture, visible_fields
 from lightpen.swing.seat import Seat
-from lightpen.swing.state import (
-    SwingSetup,
-    SwingState,
+from lightpen.swing.state import SwingSetup, SwingState
+from lightpen.swing_messages import (
+    UNKNOWN,
+    cannot_get_below,
+    not_upright,
+    too_few_images,
+    too_little_tilt,
+    uncertain,
 )
 
 LEARNING_TILT = np.radians(12.0)  # tells to which side the operator leans
@@ -42,7 +39,7 @@ ENOUGH_FILLED = 0.5  # of the fields, before it is said what no image can lower
 
 @dataclass(frozen=True, eq=False)
 class Shortfall:
-    """What a swing lacks.
+    """Images that a swing still needs.
 
     Attributes
     ----------
@@ -73,7 +70,7 @@ class Shortfall:
 
 
 def measure_shortfall(setup: SwingSetup, state: SwingState) -> Shortfall:
-    """Measure what the postures and the uncertainty of a swing lack.
+    """Measure what postures and uncertainty still need.
 
     Fields of the dial in which the camera would not see enough LEDs are not asked for.
     """
@@ -95,7 +92,7 @@ def measure_shortfall(setup: SwingSetup, state: SwingState) -> Shortfall:
 
 def _n_for_uncertainty(state: SwingState, limits: SwingLimits) -> int:
     """Return how many images would bring U to its limit; 0 where none can."""
-    limit, floor = limits.max_uncertainty, state.kept.reached.floor
+    limit, floor = limits.max_uncertainty, state.kept.predicted.floor
     if state.kept.uncertainty <= limit or floor >= limit:
         return 0
     # All but the floor goes with one over the number of images.
@@ -105,7 +102,7 @@ def _n_for_uncertainty(state: SwingState, limits: SwingLimits) -> int:
 
 
 def limits_for_more(limits: SwingLimits, n_kept: int) -> SwingLimits:
-    """Return limits by which a swing that has all it needs goes on nevertheless."""
+    """Return limits by which a complete swing continues."""
     n_images = n_kept + N_MORE
     return replace(
         limits,
@@ -116,13 +113,13 @@ def limits_for_more(limits: SwingLimits, n_kept: int) -> SwingLimits:
 
 def out_of_reach(
     limits: SwingLimits, state: SwingState, short: Shortfall
-) -> Sentence | None:
+) -> Message | None:
     """Return why no number of images brings U to its limit, if none does.
 
     More images of the same kind do not lower the floor, but other postures do. So
     nothing is said before half of those that are wanted are there.
     """
-    reached = state.kept.reached
+    reached = state.kept.predicted
     is_early = short.fields.sum() > (1 - ENOUGH_FILLED) * short.wanted.sum()
     if is_early or reached.floor < limits.max_uncertainty:
         return None
@@ -148,8 +145,8 @@ def turn_range(pen: Pen, rotations: FloatArray) -> tuple[float, float] | None:
     return float(turns.min()), float(turns.max())
 
 
-def missing(setup: SwingSetup, state: SwingState) -> tuple[Sentence, ...]:
-    """Return what a swing lacks, for an operator who wants to finish early."""
+def missing(setup: SwingSetup, state: SwingState) -> tuple[Message, ...]:
+    """Return messages on what a swing lacks, for an early finish."""
     short = measure_shortfall(setup, state)
     found = []
     if short.fields[1:].any():
@@ -174,7 +171,7 @@ def missing(setup: SwingSetup, state: SwingState) -> tuple[Sentence, ...]:
 def next_target(
     setup: SwingSetup, state: SwingState, present: FloatArray
 ) -> Posture | None:
-    """Return where to lean the pen from the rotation (3, 3) that it has.
+    """Return the next posture, from the present rotation (3, 3).
 
     Once the uncertainty suffices, only fields that lack images are chosen from.
     """
@@ -188,10 +185,12 @@ def next_target(
     return next_posture(outlook, present)
 
 
-def oriented(setup: SwingSetup, state: SwingState, sighting: Sighting) -> SwingState:
-    """Learn the operator's side from the first lean, asked for to the right."""
+def oriented(
+    setup: SwingSetup, state: SwingState, detection: PenDetection
+) -> SwingState:
+    """Set the heading of the operator by the first lean, requested to the right."""
     if state.heading is None:
-        posture = posture_of(setup.pen, sighting.rotation)
+        posture = posture_of(setup.pen, detection.rotation)
         if posture.tilt > LEARNING_TILT:
             eighth = 2 * np.pi / N_DIRECTIONS
             heading = float(round(posture.direction / eighth) % N_DIRECTIONS * eighth)
@@ -199,7 +198,7 @@ def oriented(setup: SwingSetup, state: SwingState, sighting: Sighting) -> SwingS
     return state
 
 
-def guided(setup: SwingSetup, state: SwingState, sighting: Sighting) -> SwingState:
+def guided(setup: SwingSetup, state: SwingState, detection: PenDetection) -> SwingState:
     """Choose a target if there is none, it is reached, or it stays out of reach."""
     if state.heading is None:
         return state
@@ -211,18 +210,18 @@ def guided(setup: SwingSetup, state: SwingState, sighting: Sighting) -> SwingSta
             np.array([target.direction]),
             np.array([target.turn]),
         )
-        if angles_between(wanted, sighting.rotation[None])[0, 0] > REACHED:
+        if angles_between(wanted, detection.rotation[None])[0, 0] > REACHED:
             return state
-    chosen = next_target(setup, state, sighting.rotation)
+    chosen = next_target(setup, state, detection.rotation)
     return replace(state, target=chosen, target_since=state.time)
 
 
-def _outlook(setup: SwingSetup, state: SwingState, seat: Seat) -> Outlook:
-    sighting = state.sighting
+def _outlook(setup: SwingSetup, state: SwingState, seat: Seat) -> GuidanceInput:
+    detection = state.detection
     sigma = state.kept.sigma
-    if not state.n_kept and sighting is not None:
-        sigma = sighting.sigma
-    return Outlook(
+    if not state.n_kept and detection is not None:
+        sigma = detection.sigma
+    return GuidanceInput(
         rig=setup.rig,
         pen=setup.pen,
         tip_pen=seat.tip_pen,

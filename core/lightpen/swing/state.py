@@ -1,4 +1,4 @@
-"""A swing at one moment, what it needs, and what can happen to it.
+"""State of a swing at one moment, its setup and events.
 
     WAIT -> SEEN -> SETTLED -> COUNTDOWN -> CAPTURING <-> PAUSED
                                                 |
@@ -16,10 +16,10 @@ from enum import StrEnum
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.detection.aim import Aim
+from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import Sighting
-from lightpen.messages import SHOW_PEN, images_read
+from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.messages import Message
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import dial_counts
@@ -27,20 +27,20 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.posture import Posture
 from lightpen.model.rig import Rig, rig_of
-from lightpen.sentences import Sentence
 from lightpen.swing.kept_images import (
     MIN_JOINT,
-    KeptImages,
+    AcceptedImages,
     first_images,
     none_kept,
 )
 from lightpen.swing.seat import Seat
+from lightpen.swing_messages import SHOW_PEN, images_read
 
 N_TRACED = 12  # estimates of a swing that is gone on with
 
 
 class Phase(StrEnum):
-    """Where a swing stands."""
+    """Phase of a swing."""
 
     WAIT = "wait"
     SEEN = "seen"
@@ -62,8 +62,8 @@ class Pause(StrEnum):
     BY_USER = "by user"
 
 
-class Happening(StrEnum):
-    """What can happen, each with a sound and a sign of its own."""
+class SwingEventKind(StrEnum):
+    """Kinds of events, each with a sound and a sign."""
 
     SEATED = "seated"
     KEPT = "kept"
@@ -87,13 +87,13 @@ class SwingEvent:
         that is full: its row and column on the dial.
     """
 
-    what: Happening
+    what: SwingEventKind
     numbers: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class SwingSetup:
-    """What a swing is captured with.
+    """Setup of a swing.
 
     Attributes
     ----------
@@ -125,24 +125,26 @@ class SwingSetup:
         return self.beside or rig_of(self.camera)
 
     @property
-    def aims(self) -> tuple[Aim, ...]:
-        """What is looked for in the images of each camera."""
+    def regions(self) -> tuple[RegionOfInterest, ...]:
+        """Camera, pen and mask for the detection in each camera."""
         masks = (self.mask, *self.other_masks)
         cameras = zip(self.rig.cameras, masks, strict=True)
-        return tuple(Aim(camera, self.pen, mask) for camera, mask in cameras)
+        return tuple(
+            RegionOfInterest(camera, self.pen, mask) for camera, mask in cameras
+        )
 
 
 @dataclass(frozen=True, eq=False)
-class Glimpse:
-    """A sighting with a pose, and when it was, s."""
+class RecentDetection:
+    """A detection with a pose, and its time, s."""
 
     time: float
-    sighting: Sighting
+    detection: PenDetection
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """How the estimate went along.
+    """History of the estimate.
 
     Attributes
     ----------
@@ -160,15 +162,15 @@ class Trace:
     uncertainties: FloatArray
     floors: FloatArray
 
-    def with_estimate(self, kept: KeptImages) -> "Trace":
-        """Return it with the estimate by these images, if there is one."""
+    def with_estimate(self, kept: AcceptedImages) -> "Trace":
+        """Return the trace with the estimate by these images, if there is one."""
         if kept.seat is None:
             return self
         return Trace(
             np.append(self.n_images, len(kept)),
             np.concatenate([self.tips, kept.seat.tip_pen[None]]),
-            np.append(self.uncertainties, kept.reached.uncertainty),
-            np.append(self.floors, kept.reached.floor),
+            np.append(self.uncertainties, kept.predicted.uncertainty),
+            np.append(self.floors, kept.predicted.floor),
         )
 
 
@@ -177,8 +179,8 @@ NO_TRACE = Trace(
 )
 
 
-def trace_of(rig: Rig, pen: Pen, kept: KeptImages) -> Trace:
-    """Return how the estimate went along with images that were kept before."""
+def trace_of(rig: Rig, pen: Pen, kept: AcceptedImages) -> Trace:
+    """Return the history of the estimate of images accepted before."""
     trace = NO_TRACE
     counts = np.linspace(0, len(kept), N_TRACED + 1).astype(np.int64)[1:]
     for n_images in sorted({int(n) for n in counts if n >= MIN_JOINT} - {len(kept)}):
@@ -188,7 +190,7 @@ def trace_of(rig: Rig, pen: Pen, kept: KeptImages) -> Trace:
 
 @dataclass(frozen=True)
 class Progress:
-    """How many images of a recording are read; all zero for a live camera."""
+    """Images of a recording read so far; all zero for a live camera."""
 
     n_read: int = 0
     n_images: int = 0
@@ -204,9 +206,9 @@ class SwingState:
         When the phase began, s.
     time : float
         Of the last image, s.
-    message : Sentence
+    message : Message
         What the operator should do or know now.
-    kept : KeptImages
+    kept : AcceptedImages
         The images and the running fit.
     next_number : int
         Of the image that is kept next, in the swing's record.
@@ -214,7 +216,7 @@ class SwingState:
         Postures that were new but of no use.
     seat : Seat or None
         Where the tip was found to rest.
-    recent : tuple of Glimpse
+    recent : tuple of RecentDetection
         Of the last second.
     last_seen : float
         When the pen was seen last, s.
@@ -239,12 +241,12 @@ class SwingState:
     phase: Phase
     since: float
     time: float
-    message: Sentence
-    kept: KeptImages
+    message: Message
+    kept: AcceptedImages
     next_number: int
     n_dropped: Mapping[Reason, int]
     seat: Seat | None
-    recent: tuple[Glimpse, ...]
+    recent: tuple[RecentDetection, ...]
     last_seen: float
     pause: Pause
     strayed_since: float | None
@@ -264,9 +266,9 @@ class SwingState:
         return len(self.kept)
 
     @property
-    def sighting(self) -> Sighting | None:
-        """The last sighting with a pose, if it was within a second."""
-        return self.recent[-1].sighting if self.recent else None
+    def detection(self) -> PenDetection | None:
+        """The last detection with a pose, if it was within a second."""
+        return self.recent[-1].detection if self.recent else None
 
     @property
     def counts(self) -> IntArray:

@@ -1,22 +1,22 @@
-"""All there is to know of a swing at one moment, for whoever shows or leads it."""
+"""Snapshot of a swing at one moment."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Protocol
 
-from lightpen.estimation.verdict import Verdict
+from lightpen.estimation.reports.verdict import Verdict
+from lightpen.messages import Message
 from lightpen.model.origin import Origin
-from lightpen.record.assessment import Assessment
-from lightpen.record.names import Names
-from lightpen.record.results import Result
-from lightpen.record.solving import Solution
-from lightpen.sentences import Sentence
+from lightpen.record.results.assessment import SwingAssessment
+from lightpen.record.results.results import Result
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.solving import Solution
 from lightpen.swing.state import Pause, Phase, SwingEvent, SwingSetup, SwingState
 
 
 class Activity(StrEnum):
-    """What is under way beside the images."""
+    """Background activity."""
 
     NONE = ""
     READING = "reading"  # the images of the swing, to capture more
@@ -26,7 +26,7 @@ class Activity(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class SwingStatus:
-    """A swing from its first image to the accepted tip; nothing of it is ever changed.
+    """A swing from its first image to the accepted tip.
 
     Attributes
     ----------
@@ -42,15 +42,15 @@ class SwingStatus:
         The tip by its images; None until it is solved.
     origin : Origin or None
         What its images are of.
-    assessment : Assessment or None
+    assessment : SwingAssessment or None
         What the solution is worth, beside what is in force.
     result : Result or None
         The result that was accepted.
-    taken_back : Result or None
+    revoked : Result or None
         The result that was taken back last, of this swing or another.
-    refusal : Sentence or None
+    refusal : Message or None
         Why no swing could begin by itself.
-    is_troubled : bool
+    has_fault : bool
         Whether it is paused because an image could not be recorded.
     has_other_choices : bool
         Whether something else was chosen since it began, and it is neither being
@@ -63,12 +63,12 @@ class SwingStatus:
     names: Names = field(default_factory=Names)
     origin: Origin | None = None
     solution: Solution | None = None
-    assessment: Assessment | None = None
+    assessment: SwingAssessment | None = None
     result: Result | None = None
-    taken_back: Result | None = None
+    revoked: Result | None = None
     activity: Activity = Activity.NONE
-    refusal: Sentence | None = None
-    is_troubled: bool = False
+    refusal: Message | None = None
+    has_fault: bool = False
     has_other_choices: bool = False
 
     @property
@@ -99,21 +99,21 @@ class SwingStatus:
 
     @property
     def is_paused_by_user(self) -> bool:
-        """Whether it waits for its user to go on."""
+        """Whether it was paused by the user."""
         return self.state is not None and self.state.pause is Pause.BY_USER
 
 
 class SwingListener(Protocol):
-    """Who is told, on the threads of a runner; must return soon."""
+    """Listener, called on runner threads; must return soon."""
 
     def on_swing(self, status: SwingStatus, events: tuple[SwingEvent, ...]) -> None:
-        """Take the status after a change, and what happened."""
+        """Handle a new status and the events."""
 
     def on_progress(self, fraction: float) -> None:
-        """Take how far the tip is computed, 0 to 1."""
+        """Handle the progress of the solution, 0 to 1."""
 
-    def on_trouble(self, sentence: Sentence) -> None:
-        """Take a sentence to be read: something could not be done, nothing is lost."""
+    def on_fault(self, message: Message) -> None:
+        """Handle a fault: something could not be done, nothing is lost."""
 
-    def on_relief(self, sentence: Sentence) -> None:
-        """Take the sentence of a trouble whose cause is gone."""
+    def on_fault_cleared(self, message: Message) -> None:
+        """Handle a fault that is cleared."""

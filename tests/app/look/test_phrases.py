@@ -1,10 +1,14 @@
 """What the operator is told, in few words and by his own sides."""
 
 import math
+from string import Formatter
 
 import pytest
 
-from lightpen.messages import (
+from lightpen.messages import CATALOGUE, Message
+from lightpen.model.posture import Posture
+from lightpen.swing.state import Pause, Phase
+from lightpen.swing_messages import (
     FOLLOW_ARROW,
     HOLD_STILL,
     LEAN_TO_YOUR_RIGHT,
@@ -25,9 +29,6 @@ from lightpen.messages import (
     tip_slipped,
     too_little_tilt,
 )
-from lightpen.model.posture import Posture
-from lightpen.sentences import Sentence
-from lightpen.swing.state import Pause, Phase
 from lightpen_app.look.phrases import lean_phrase, phase_text, phrase
 
 FAR, LITTLE = math.radians(28), math.radians(14)
@@ -43,13 +44,13 @@ DURING_A_SWING = (
 @pytest.mark.parametrize(
     ("direction", "heading", "words"),
     [
-        (RIGHT, 0.0, "Lean right"),
-        (AWAY, 0.0, "Lean away"),
-        (TOWARDS, 0.0, "Lean to you"),
-        (RIGHT, math.pi, "Lean left"),  # an operator who faces the camera
-        (AWAY, math.pi, "Lean to you"),
-        (RIGHT, math.pi / 2, "Lean to you"),  # who has the camera at his left
-        (AWAY, math.pi / 2, "Lean right"),
+        (RIGHT, 0.0, "Tilt right"),
+        (AWAY, 0.0, "Tilt away"),
+        (TOWARDS, 0.0, "Tilt towards you"),
+        (RIGHT, math.pi, "Tilt left"),  # an operator who faces the camera
+        (AWAY, math.pi, "Tilt towards you"),
+        (RIGHT, math.pi / 2, "Tilt towards you"),  # who has the camera at his left
+        (AWAY, math.pi / 2, "Tilt right"),
     ],
 )
 def test_a_posture_is_told_by_the_operators_own_sides(
@@ -64,8 +65,12 @@ def test_the_hint_tells_how_far_and_which_way_to_turn() -> None:
     here = Posture(0.0, 0.0, 0.0)
 
     assert lean_phrase(Posture(0.0, 2.0, 0.0), here, 0.0).short == "Upright"
-    assert lean_phrase(Posture(LITTLE, RIGHT, 0.1), here, 0.0).hint.startswith("A litt")
-    assert lean_phrase(Posture(FAR, RIGHT, 0.1), here, 0.0).hint.startswith("Far.")
+    assert lean_phrase(Posture(LITTLE, RIGHT, 0.1), here, 0.0).hint.startswith(
+        "Slight tilt."
+    )
+    assert lean_phrase(Posture(FAR, RIGHT, 0.1), here, 0.0).hint.startswith(
+        "Large tilt."
+    )
     turned = lean_phrase(Posture(FAR, RIGHT, 0.4), here, 0.0)
     assert turned.hint == "Turn it counter-clockwise, seen from above."
     turned = lean_phrase(Posture(FAR, RIGHT, -0.4), here, 0.0)
@@ -76,8 +81,8 @@ def test_some_missing_sides_are_named_and_many_are_not() -> None:
     seen_by_the_camera = phrase(too_little_tilt(4, [2, 0])).hint
     seen_by_an_operator_who_faces_it = phrase(too_little_tilt(4, [2, 0]), math.pi).hint
 
-    assert "tilt to the right, away from the camera. Lean" in seen_by_the_camera
-    assert "tilt to the left, towards you. Lean" in seen_by_an_operator_who_faces_it
+    assert "tilt to the right, away from the camera. Tilt" in seen_by_the_camera
+    assert "tilt to the left, towards you. Tilt" in seen_by_an_operator_who_faces_it
     assert "tilt to most sides." in phrase(too_little_tilt(9, range(7)), math.pi).hint
 
 
@@ -85,17 +90,18 @@ def test_what_to_do_at_the_screen_is_told_there_alone() -> None:
     good = tip_is_good(0.00412)
 
     assert str(good) == "U (k = 2) of the tip is 0.0041 mm."
-    assert phrase(good).hint == f"{good} Accept it at the screen."
-    assert phrase(PAUSED).hint == "Press Space to go on."
+    assert phrase(good).hint == f"{good} Accept at the computer."
+    assert phrase(PAUSED).hint == "Press Space to continue."
 
 
 @pytest.mark.parametrize("code", list(Code))
 def test_every_message_has_a_few_words_to_be_read_from_afar(code: Code) -> None:
-    assert phrase(Sentence(code, "", {"seconds": 3})).short
+    fields = {name for _, name, *_ in Formatter().parse(CATALOGUE[code]) if name}
+    assert phrase(Message(code, dict.fromkeys({*fields, "seconds"}, 3))).short
 
 
 @pytest.mark.parametrize("message", DURING_A_SWING, ids=lambda each: each.code)
-def test_instructions_are_short_enough_for_the_distance(message: Sentence) -> None:
+def test_instructions_are_short_enough_for_the_distance(message: Message) -> None:
     assert len(phrase(message).short) <= LONGEST
 
 

@@ -15,8 +15,8 @@ from lightpen_app.look.sounds import (
     RATE,
     TONES,
     FileSounds,
-    Mute,
-    Silence,
+    MutedSounds,
+    SilentSounds,
     Sound,
     find_sounds,
     sound_wav,
@@ -106,7 +106,7 @@ def test_a_full_disk_silences_but_stops_nothing(tmp_path: Path) -> None:
 
 def test_mute_lets_nothing_through_until_it_is_lifted() -> None:
     recorder = Recorder()
-    mute = Mute(recorder, muted=True)
+    mute = MutedSounds(recorder, muted=True)
 
     mute.play(Sound.SEATED)
     mute.muted = False
@@ -123,7 +123,7 @@ def test_a_machine_without_a_player_says_why_it_is_silent(
 
     sounds = find_sounds(tmp_path)
 
-    assert isinstance(sounds, Silence)
+    assert isinstance(sounds, SilentSounds)
     assert "aplay" in sounds.why_silent()
     sounds.play(Sound.DONE)
 

@@ -15,9 +15,10 @@ from PySide6.QtGui import QFont, QRawFont
 from PySide6.QtWidgets import QAbstractButton, QApplication
 from pytestqt.qtbot import QtBot
 
-from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen_app.look.languages import LanguageSwitch, own_name
 from lightpen_app.look.theme import FAMILIES, RESOURCES, font
-from lightpen_app.shell.notice_bar import NoticeBar
+from lightpen_app.shell.page_area import NoticeBar
+from lightpen_resources import SOURCE_LANGUAGE, languages
 
 ROOT = RESOURCES.parents[1]
 APPLICATION = ROOT / "app" / "lightpen_app"
@@ -30,13 +31,14 @@ WORDS = re.compile(
     r"[A-Za-z]{2}[,.:]? [A-Za-z]{2}|^[A-Z][a-z]{2,}:? ?$|^ [a-z]{3}|[a-z]{3} $"
     r"|\{\} [A-Za-z]{3}|[A-Za-z]{3}:? \{\}"
 )
-TRANSLATING = {"tr", "translate", "sentence", "QT_TRANSLATE_NOOP"}
+TRANSLATING = {"tr", "translate", "QT_TRANSLATE_NOOP"}
 UNSEEN = {"setObjectName", "TypeVar", "ValueError"}  # whose words no user reads
 ENGLISH = ("self_test", "crash.py", "desktop_entry.py")  # files, and both languages
 NAMES = {
     *("Lightpen", "English", "Fusion", "Lightpen Sans", "Lightpen Sans SC", "Cgk"),
     *("Demo", "Trial"),  # of stations, pens and tips
     *("yyyy-MM-dd hh:mm", "fixed point", "export folder", "under way"),  # for programs
+    *("other windows", "without images"),  # causes of notifications
 }
 
 
@@ -90,6 +92,8 @@ def bare_texts(node: ast.AST) -> Iterator[str]:
     match node:
         case ast.Call(func=function) if name_of(function) in TRANSLATING | UNSEEN:
             return
+        case ast.Call(func=ast.Attribute(value=ast.Name(id="_logger"))):
+            return  # the log is in English
         case ast.Expr(value=ast.Constant()):  # a docstring
             return
         case ast.Constant(value=str() as text):
@@ -143,7 +147,7 @@ def test_every_text_is_translated(tmp_path: Path) -> None:
     fresh = tmp_path / CHINESE.name
     fresh.write_bytes(CHINESE.read_bytes())
 
-    TOOL.collect(fresh, APPLICATION, CORE)
+    TOOL.collect(fresh, APPLICATION, TOOL.translated_templates())
 
     assert untranslated(fresh) == []
 
@@ -155,10 +159,10 @@ def test_a_text_that_is_not_translated_is_noticed(tmp_path: Path) -> None:
     (application / "page.py").write_text(
         "class Page(QWidget):\n    def f(self):\n        self.tr('New text')\n"
     )
-    (core / "files.py").write_text("error = sentence('file.new', 'New {what}')\n")
+    (core / "files.py").write_text("error = message('file.new', 'New {what}')\n")
     fresh = tmp_path / CHINESE.name
 
-    TOOL.collect(fresh, application, core)
+    TOOL.collect(fresh, application, ["New {what}"])
 
     assert sorted(untranslated(fresh)) == ["Page: New text", "core: New {what}"]
 
@@ -225,10 +229,10 @@ def test_the_language_changes_while_a_widget_is_shown(
     (close,) = notice.findChildren(QAbstractButton)
     switch = LanguageSwitch(qapp)
 
-    switch.set_language(Language.CHINESE)
+    switch.set_language("zh_CN")
     QCoreApplication.processEvents()
     chinese = close.text()
-    switch.set_language(Language.ENGLISH)
+    switch.set_language(SOURCE_LANGUAGE)
     QCoreApplication.processEvents()
 
     assert chinese == "\u5173\u95ed"
@@ -237,7 +241,7 @@ def test_the_language_changes_while_a_widget_is_shown(
 
 def test_texts_of_qt_itself_are_translated_too(qapp: QApplication) -> None:
     switch = LanguageSwitch(qapp)
-    switch.set_language(Language.CHINESE)
+    switch.set_language("zh_CN")
 
     assert QCoreApplication.translate("QPlatformTheme", "Cancel") == "\u53d6\u6d88"
 
@@ -277,16 +281,53 @@ def test_a_missing_character_is_noticed() -> None:
     assert missing_characters("a\u9f98") == {"\u9f98"}
 
 
-@pytest.mark.parametrize("language", list(Language))
+@pytest.mark.parametrize("language", languages())
 @pytest.mark.parametrize("topic", HELP_TOPICS)
-def test_every_step_has_help(language: Language, topic: str) -> None:
+def test_every_step_has_help(language: str, topic: str) -> None:
     text = (RESOURCES / "help" / language / f"{topic}.md").read_text("utf-8")
 
     assert text.startswith("# ")
     assert len(text) > 100
 
 
-def test_the_languages_name_themselves() -> None:
-    names = [language.own_name for language in Language]
+def test_labels_are_translated_as_in_the_glossary() -> None:
+    lines = (RESOURCES / "help" / "en" / "glossary.md").read_text("utf-8").splitlines()
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[6:]]
+    terms = {english: chinese for english, chinese, _, _ in rows[2:]}
+    assert len(terms) >= 40
+    assert list(terms) == sorted(terms)
+    others = {
+        f"{source}: {translation.text}"
+        for _, source, translation in messages(CHINESE)
+        if translation.text != terms.get(source.lower(), translation.text)
+    }
 
-    assert names == ["English", "\u7b80\u4f53\u4e2d\u6587"]
+    assert others == set()
+
+
+@pytest.mark.parametrize("page", sorted((RESOURCES / "help").glob("*/*.md")), ids=str)
+def test_a_page_of_the_help_links_only_to_others(page: Path) -> None:
+    for name in re.findall(r"\]\((\w[\w-]*\.md)\)", page.read_text("utf-8")):
+        assert (RESOURCES / "help" / "en" / name).is_file()
+
+
+def test_the_languages_name_themselves() -> None:
+    names = [own_name(language) for language in languages()]
+
+    assert names[0] == "English"
+    assert "\u7b80\u4f53\u4e2d\u6587" in names
+    assert len(set(names)) == len(names)
+
+
+def test_a_language_is_there_by_its_file_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for file in TRANSLATIONS.glob("*.qm"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    chinese = tmp_path / "lightpen_zh_CN.qm"
+    (tmp_path / "lightpen_de.qm").write_bytes(chinese.read_bytes())
+    monkeypatch.setattr("lightpen_resources.TRANSLATIONS", tmp_path)
+    monkeypatch.setattr("lightpen_app.look.languages.TRANSLATIONS", tmp_path)
+
+    assert languages() == ("en", "de", "zh_CN")
+    assert own_name("de") == own_name("zh_CN")

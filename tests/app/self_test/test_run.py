@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from lightpen_app.self_test.installed_files import FILE_LIST, damaged_files
 from lightpen_app.self_test.report import Report, SelfTestError
+from lightpen_app.self_test.run import FILE_LIST, damaged_files
 from lightpen_app.self_test.run import test_program as run_self_test
 
 

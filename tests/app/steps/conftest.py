@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from lightpen.simulator.motion import Pursuit
+from lightpen.simulator.motion import TrackingMotion
 from lightpen_app.look.words import unbroken
 from lightpen_app.steps.page import Page
 from lightpen_app.widgets.image_view import ImageView, Marker
@@ -17,7 +17,7 @@ from lightpen_app.widgets.state_banner import StateBanner
 
 W = TypeVar("W", bound=QWidget)
 
-QUICK_ARM = Pursuit(gain=12.0, lag=0.0325, top_speed=3000.0)
+QUICK_ARM = TrackingMotion(gain=12.0, lag=0.0325, top_speed=3000.0)
 
 
 @pytest.fixture(autouse=True)

@@ -9,8 +9,8 @@ from pytestqt.qtbot import QtBot
 from lightpen.model.posture import Posture
 from lightpen.simulator.swings import paper_pen
 from lightpen_app.widgets.pen_in_space import (
+    DisplayedPosture,
     PenInSpace,
-    PenStand,
     seen_from_behind,
 )
 
@@ -21,7 +21,7 @@ RIGHT = Posture(math.radians(30), 0.0, 0.0)
 
 
 def middle(posture: Posture, heading: float = 0.0) -> tuple[float, float]:
-    places = seen_from_behind(PenStand(PEN, TIP, heading=heading), posture)
+    places = seen_from_behind(DisplayedPosture(PEN, TIP, heading=heading), posture)
     right, up = places.mean(axis=0).tolist()
     return right, up
 
@@ -46,7 +46,7 @@ def test_pen_and_goal_are_drawn(qtbot: QtBot) -> None:
     qtbot.addWidget(view)
     view.resize(200, 260)
 
-    def drawn(stand: PenStand | None) -> bytes:
+    def drawn(stand: DisplayedPosture | None) -> bytes:
         view.set_value(stand)
         picture = view.grab().toImage()  # its bits are there as long as it is
         return bytes(picture.constBits())
@@ -55,10 +55,10 @@ def test_pen_and_goal_are_drawn(qtbot: QtBot) -> None:
         drawn(stand)
         for stand in (
             None,
-            PenStand(PEN, TIP),
-            PenStand(PEN, TIP, UPRIGHT),
-            PenStand(PEN, TIP, RIGHT),
-            PenStand(PEN, TIP, UPRIGHT, RIGHT),
+            DisplayedPosture(PEN, TIP),
+            DisplayedPosture(PEN, TIP, UPRIGHT),
+            DisplayedPosture(PEN, TIP, RIGHT),
+            DisplayedPosture(PEN, TIP, UPRIGHT, RIGHT),
         )
     ]
     assert len(set(pictures)) == len(pictures)

@@ -47,7 +47,9 @@ def shown_colors(plot: Plot) -> set[str]:
 
 @pytest.fixture
 def trace(qtbot: QtBot) -> TracePlot:
-    plot = TracePlot(Axes("Misfit / px", "image"), [Curve("misfit_px")], y_zero=True)
+    plot = TracePlot(
+        Axes("RMS residual / px", "image"), [Curve("misfit_px")], y_zero=True
+    )
     show(qtbot, plot)
     plot.set_data(IMAGES, VALUES)
     return plot
@@ -74,7 +76,7 @@ def test_new_data_draws_on_the_same_curve(trace: TracePlot) -> None:
     assert trace.n_items() == n_items
 
 
-def test_one_value_or_none_is_no_trouble(trace: TracePlot) -> None:
+def test_one_value_or_none_is_no_fault(trace: TracePlot) -> None:
     trace.set_data(np.array([]), np.array([]))
     trace.set_data(np.array([1.0]), np.array([0.0]))
     trace.set_data(np.array([1.0]), np.array([np.nan]))
@@ -123,12 +125,7 @@ def test_arrows_point_along_the_residuals_with_v_downwards(qtbot: QtBot) -> None
     scale = plot.scale()
     assert (x[0], y[0], x[1], y[1]) == (1000, 500, 1000 + 0.05 * scale, 500)
     assert (x[6], y[6], x[7], y[7]) == (600, 1500, 600, 1500 - 0.1 * scale)
-    assert sorted(plot.columns()) == [
-        "residual_x_px",
-        "residual_y_px",
-        "x_px",
-        "y_px",
-    ]
+    assert sorted(plot.columns()) == ["residual_x_px", "residual_y_px", "x_px", "y_px"]
 
 
 def test_the_place_of_the_leds_stays_in_sight_when_the_plot_is_resized(
@@ -205,7 +202,7 @@ def test_dots_keep_their_numbers(qtbot: QtBot) -> None:
 
 @pytest.fixture
 def misfits(qtbot: QtBot) -> MisfitPlot:
-    plot = MisfitPlot(Axes("Misfit / px", "image"))
+    plot = MisfitPlot(Axes("RMS residual / px", "image"))
     show(qtbot, plot)
     numbers = np.array([1, 2, 4, 5])
     values = np.array([0.05, 0.06, 3.0, np.nan])

@@ -12,7 +12,7 @@ from pytestqt.qtbot import QtBot
 from lightpen.arrays import IntArray
 from lightpen.model.coverage import measure_coverage
 from lightpen.model.posture import Posture, posture_of, rotations_of
-from lightpen.simulator.sample_pens import eight_led_pen
+from lightpen.simulator.samples import eight_led_pen
 from lightpen_app.look.theme import DARK, LIGHT, apply_theme
 from lightpen_app.widgets.posture_dial import (
     BAR_SHARE,
@@ -164,7 +164,7 @@ def test_the_dial_counts_its_fields_for_screen_readers(dial: PostureDial) -> Non
         DialValue(counts=counts, needed=WANTED, n_upright=4, n_upright_needed=4)
     )
 
-    assert dial.accessibleDescription() == "9 of 17 postures are done."
+    assert dial.accessibleDescription() == "9 of 17 postures complete"
 
 
 def test_the_camera_is_drawn_where_it_stands(dial: PostureDial) -> None:

@@ -58,7 +58,7 @@ def test_the_first_values_do_not_hide_the_newest(qtbot: QtBot) -> None:
 
 
 def test_few_images_are_not_drawn_as_fractions(qtbot: QtBot) -> None:
-    plot = shown(qtbot, TracePlot(Axes("Misfit / px"), [Curve("misfit_px")]))
+    plot = shown(qtbot, TracePlot(Axes("RMS residual / px"), [Curve("misfit_px")]))
     (left, right), _ = plot.ranges()
     assert right - left >= 9
 
@@ -122,7 +122,7 @@ def test_the_words_of_a_limit_cover_no_curve(
 
 
 def test_without_images_the_axes_are_as_at_the_beginning(qtbot: QtBot) -> None:
-    plot = shown(qtbot, TracePlot(Axes("Misfit / px"), [Curve("misfit_px")]))
+    plot = shown(qtbot, TracePlot(Axes("RMS residual / px"), [Curve("misfit_px")]))
     before = plot.ranges()
     plot.set_data(np.arange(20.0, 80.0), np.linspace(3.0, 9.0, 60))
     assert plot.ranges() != before

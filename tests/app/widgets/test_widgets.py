@@ -11,7 +11,7 @@ from lightpen.detection.inspection import Exposure
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import DARK, TextSize, Tone
 from lightpen_app.look.words import BREAK, breakable, unbroken
-from lightpen_app.shell.notice_bar import NoticeBar
+from lightpen_app.shell.page_area import NoticeBar
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.fitted_text import FittedText
@@ -24,15 +24,15 @@ from lightpen_app.widgets.operator_view import (
     other_screen,
 )
 from lightpen_app.widgets.posture_dial import DialValue
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.state_banner import State, StateBanner
 
 
 @pytest.mark.parametrize(
     ("peaks", "words"),
     [
-        ((), "No LED is seen"),
-        ((0.5, 0.7, 0.9), "Good: 3 LEDs"),
+        ((), "No LED detected"),
+        ((0.5, 0.7, 0.9), "OK: 3 LEDs"),
         ((0.5, 0.2, 0.1), "Too dark: 2 of 3 LEDs"),
         ((0.1, 1.0, 0.5), "Saturated: 1 of 3 LEDs"),
     ],
@@ -109,7 +109,7 @@ def test_long_words_shrink_until_they_fit(qtbot: QtBot) -> None:
     qtbot.addWidget(text)
     text.resize(600, 120)
 
-    text.set_text("Lean right")
+    text.set_text("Tilt right")
     short = text.size_px()
     text.set_text("Lean the pen much further towards the camera and to your right")
     long = text.size_px()
@@ -230,7 +230,7 @@ def test_an_instruction_has_the_size_that_the_distance_asks_for(
     view.set_distance_m(distance)
     view.set_value(
         OperatorValue(
-            instruction="Lean RIGHT",
+            instruction="Tilt RIGHT",
             hint="Further down.",
             state=State("CAPTURING", "All 10 LEDs are seen.", Sign.RECORD, Tone.GOOD),
             count="184 / 300",
@@ -252,10 +252,10 @@ def test_the_count_is_read_on_a_small_screen_too(
     view.set_distance_m(distance)
     view.set_value(
         OperatorValue(
-            instruction="Lean right",
-            hint="Far. Keep the tip pressed in.",
+            instruction="Tilt right",
+            hint="Large tilt. Keep the tip pressed in.",
             state=State("CAPTURING", "10 of 10 LEDs.", Sign.RECORD, Tone.GOOD),
-            count="60 kept, 240 to go",
+            count="60 of about 240 images",
             fraction=0.2,
             dial=dial,
         )
@@ -268,7 +268,7 @@ def test_the_count_is_read_on_a_small_screen_too(
 def test_the_operator_view_fits_every_screen_at_every_distance(
     view: OperatorView,
 ) -> None:
-    view.set_value(OperatorValue(instruction="Lean right", dial=DialValue()))
+    view.set_value(OperatorValue(instruction="Tilt right", dial=DialValue()))
 
     for distance in DISTANCES_M:
         view.set_distance_m(distance)
@@ -279,11 +279,11 @@ def test_the_operator_view_fits_every_screen_at_every_distance(
 
 
 def test_what_there_is_no_value_for_is_not_drawn(view: OperatorView) -> None:
-    view.set_value(OperatorValue(instruction="Show the pen"))
+    view.set_value(OperatorValue(instruction="Hold the pen in view"))
     view.show()
     before = view.grab().toImage()
 
-    view.set_value(OperatorValue(instruction="Show the pen", fraction=0.5))
+    view.set_value(OperatorValue(instruction="Hold the pen in view", fraction=0.5))
 
     assert view.grab().toImage() != before
 
@@ -304,11 +304,13 @@ LONG_WORDS = (
 
 
 @pytest.mark.parametrize("text", LONG_WORDS)
-def test_a_remark_with_a_long_word_needs_no_wide_place(qtbot: QtBot, text: str) -> None:
+def test_a_message_with_a_long_word_needs_no_wide_place(
+    qtbot: QtBot, text: str
+) -> None:
     label = SignLabel()
     qtbot.addWidget(label)
 
-    label.set_value(Remark(text))
+    label.set_value(StatusMessage(text))
 
     assert label.minimumSizeHint().width() < 280
     assert label.value().text == label.accessibleName() == text

@@ -9,10 +9,11 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from lightpen.formats.opened_files import CameraFile, PenFile
-from lightpen.record.names import Names
+from lightpen.record.swings.names import Names
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.swing.preparation import Preparation
+from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.verification_run import VerificationRun
 
@@ -33,9 +34,17 @@ def prepared(
 
 
 @pytest.fixture
-def run(tmp_path: Path, qapp: QApplication) -> Iterator[SwingRun]:
+def notifications(qapp: QApplication) -> Notifications:
+    """What is published by a run, a verification and a live view."""
+    return Notifications()
+
+
+@pytest.fixture
+def run(
+    tmp_path: Path, qapp: QApplication, notifications: Notifications
+) -> Iterator[SwingRun]:
     """A run without a camera; it goes by the same moment always."""
-    run = SwingRun(tmp_path / "run", lambda: NOON)
+    run = SwingRun(tmp_path / "run", lambda: NOON, notifications)
     yield run
     run.runner.shut_down()
     assert run.runner.await_end(60.0)
@@ -43,9 +52,13 @@ def run(tmp_path: Path, qapp: QApplication) -> Iterator[SwingRun]:
 
 
 @pytest.fixture
-def verification(run: SwingRun, tmp_path: Path) -> Iterator[VerificationRun]:
+def verification(
+    run: SwingRun, tmp_path: Path, notifications: Notifications
+) -> Iterator[VerificationRun]:
     """A verification of what the run puts in force."""
-    verification = VerificationRun(run.archive, tmp_path / "run", lambda: NOON)
+    verification = VerificationRun(
+        *(run.archive, tmp_path / "run", lambda: NOON, notifications)
+    )
     yield verification
     verification.runner.shut_down()
     assert verification.runner.await_end(60.0)

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from lightpen.errors import CalibrationError
-from lightpen.sentences import sentence
+from lightpen.messages import message
 from lightpen_app.work.job import Job, Report
 
 
@@ -35,13 +35,13 @@ def test_the_result_arrives_on_the_gui_thread(qtbot: QtBot) -> None:
 
 def test_a_failure_carries_the_text_for_the_user(qtbot: QtBot) -> None:
     def refuse(report: Report) -> None:
-        raise CalibrationError(sentence("test.tilt", "Tilt the pen further."))
+        raise CalibrationError(message("swing.follow-arrow"))
 
     job = Job(refuse)
     with qtbot.waitSignal(job.failed) as blocker:
         job.start()
 
-    assert blocker.args == ["Tilt the pen further."]
+    assert blocker.args == ["Keep the tip pressed into the cone."]
 
 
 def test_a_cancelled_job_stops_and_tells_only_that_it_ended(qtbot: QtBot) -> None:

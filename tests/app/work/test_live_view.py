@@ -10,27 +10,26 @@ import pytest
 from PySide6.QtCore import QObject, QSize
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
+from tests.faulty_camera import FaultyCamera
 from typing_extensions import override
 
 from lightpen.cameras.protocol import CameraSettings, Frame
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker_events import Connection
 from lightpen.formats.decoding import encode_png
-from lightpen.live.sources import Surroundings
-from lightpen.record.reading import open_record
-from lightpen.simulator.camera import SimulatedCamera
+from lightpen.live.sources import SourceEnvironment
+from lightpen.record.swings.reading import open_record
 from lightpen.simulator.hand import Operator
 from lightpen.streaming.server import PoseStream
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
-from lightpen_app.work.live_view import LiveView, Shown
+from lightpen_app.work.live_view import DisplayedImage, LiveView
+from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.verification_run import VerificationRun
 
 TIMEOUT = 60.0  # s until a test gives up
-SIGNALS = (
-    *("image_shown", "connection_changed", "settings_applied", "troubled", "failed"),
-)
+SIGNALS = (*("image_shown", "connection_changed", "settings_applied"),)
 N_IMAGES = 20  # of the record that is resumed
 
 
@@ -50,8 +49,10 @@ class Diary:
 
 
 @pytest.fixture
-def view(run: SwingRun, verification: VerificationRun) -> Iterator[LiveView]:
-    view = LiveView(run, verification, PoseStream())
+def view(
+    run: SwingRun, verification: VerificationRun, notifications: Notifications
+) -> Iterator[LiveView]:
+    view = LiveView(run, verification, PoseStream(), notifications)
     yield view
     view.close()
     view.await_closed()
@@ -64,7 +65,7 @@ def diary(view: LiveView) -> Diary:
 
 @pytest.fixture
 def stage(
-    view: LiveView, around: Surroundings, tmp_path: Path, qtbot: QtBot
+    view: LiveView, around: SourceEnvironment, tmp_path: Path, qtbot: QtBot
 ) -> "Stage":
     return Stage(view, around, tmp_path, qtbot)
 
@@ -73,20 +74,20 @@ class Stage:
     """The simulated pen before a live view."""
 
     def __init__(
-        self, view: LiveView, around: Surroundings, folder: Path, qtbot: QtBot
+        self, view: LiveView, around: SourceEnvironment, folder: Path, qtbot: QtBot
     ) -> None:
         self.view, self.folder, self.qtbot = view, folder, qtbot
         self.around = around
 
-    def open(self, camera: SimulatedCamera | ReplayCamera | None = None) -> None:
+    def open(self, camera: FaultyCamera | ReplayCamera | None = None) -> None:
         """Show a camera; a simulated operator follows the swing."""
         self.view.open([camera or self.camera()], CameraSettings(), self.around.clock)
         self.view.set_following(True)
 
-    def camera(self) -> SimulatedCamera:
+    def camera(self) -> FaultyCamera:
         clock = self.around.clock
         operator = Operator(clock, seated=True)
-        return SimulatedCamera(self.around.scene, clock, operator)
+        return FaultyCamera(self.around.scene, clock, operator)
 
     def hold_up(self, n_images: int) -> None:
         """Let the GUI do nothing while so many images come."""
@@ -115,15 +116,15 @@ class Stage:
 def test_an_image_is_shown_at_half_its_size_with_what_is_seen_in_it(
     view: LiveView, stage: Stage, prepared: Preparation, qtbot: QtBot
 ) -> None:
-    view.set_aim(prepared.aim)
+    view.set_region(prepared.region)
     with qtbot.waitSignal(view.image_shown) as shown:
         stage.open()
     (image,) = shown.args
 
-    assert isinstance(image, Shown)
+    assert isinstance(image, DisplayedImage)
     assert image.size == QSize(1224, 1024)
     assert image.half.shape == (512, 612)
-    assert image.seen.sighting is not None
+    assert image.seen.detection is not None
 
 
 def test_a_gui_that_was_busy_is_shown_the_newest_image_only(
@@ -166,7 +167,7 @@ def test_the_connection_is_told_as_it_changes(
     stage.close()
 
     assert diary.of("connection_changed") == [
-        *(Connection.OPENING, Connection.STREAMING, Connection.CLOSED),
+        *(Connection.OPENING, Connection.STREAMING, Connection.CLOSED)
     ]
     assert not view.is_open
     assert view.caps is None
@@ -192,10 +193,9 @@ def test_exposure_and_gain_are_told_when_they_are_in_force(
 def test_a_camera_that_is_not_there_is_told_and_another_can_be_opened(
     view: LiveView, stage: Stage, qtbot: QtBot
 ) -> None:
-    with qtbot.waitSignal(view.failed) as failed:
+    with qtbot.waitSignal(view.failed):
         stage.open(ReplayCamera(str(stage.folder / "nothing")))
-    assert failed.args is not None
-    assert "There is no folder, video or image at" in failed.args[0]
+    assert "There is no folder, video or image at" in view.why_no_images
     assert view.operator is None
     view.set_following(True)  # nobody is there to follow
 
@@ -204,20 +204,26 @@ def test_a_camera_that_is_not_there_is_told_and_another_can_be_opened(
 
 
 def test_a_lost_camera_is_told_and_comes_back(
-    view: LiveView, stage: Stage, diary: Diary, qtbot: QtBot
+    view: LiveView,
+    stage: Stage,
+    diary: Diary,
+    notifications: Notifications,
+    qtbot: QtBot,
 ) -> None:
     camera = stage.camera()
     with qtbot.waitSignal(view.image_shown):
         stage.open(camera)
-    with qtbot.waitSignal(view.troubled) as troubled:
-        camera.faults.unplug()
-    assert troubled.args is not None
-    assert "no longer answers. Check its cable" in troubled.args[0]
+    with qtbot.waitSignal(notifications.raised) as raised:
+        camera.unplug()
+    assert raised.args is not None
+    assert "no longer responds (unplugged)." in raised.args[0]
+    assert view.why_no_images == raised.args[0]
     qtbot.waitUntil(lambda: view.connection is Connection.LOST)
-    camera.faults.plug_in()
-    with qtbot.waitSignal(view.relieved) as relieved:
+    camera.plug_in()
+    with qtbot.waitSignal(notifications.withdrawn) as withdrawn:
         qtbot.waitUntil(lambda: view.connection is Connection.STREAMING)
-    assert relieved.args == troubled.args
+    assert withdrawn.args == [raised.args[0]]
+    assert not view.why_no_images
     with qtbot.waitSignal(view.image_shown):
         pass
 
@@ -227,7 +233,7 @@ def test_a_lost_camera_is_told_and_comes_back(
 # Closing
 
 
-class StubbornCamera(SimulatedCamera):
+class StubbornCamera(FaultyCamera):
     """Takes its time to close."""
 
     may_close = threading.Event()

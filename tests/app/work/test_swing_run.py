@@ -12,16 +12,17 @@ from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
-from lightpen.record.unfinished import find_unfinished
-from lightpen.simulator.follower import Follower
+from lightpen.record.swings.interrupted import find_unfinished
+from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.hand import Operator
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.state import Happening, Phase, SwingState
+from lightpen.swing.state import Phase, SwingEventKind, SwingState
+from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
 
 TIMEOUT = 60.0  # s until a test gives up
-SIGNALS = ("changed", "happened", "progressed", "troubled", "relieved")
+SIGNALS = ("changed", "happened", "progressed", "refused")
 
 
 class Diary:
@@ -40,7 +41,7 @@ class Diary:
     def of(self, name: str) -> list[Any]:
         return [values[0] for told, values in self.entries if told == name]
 
-    def happenings(self) -> list[Happening]:
+    def event_kinds(self) -> list[SwingEventKind]:
         return [event.what for event in self.of("happened")]
 
     def _writer(self, name: str) -> Callable[..., None]:
@@ -112,7 +113,7 @@ def test_a_gui_that_was_busy_is_told_every_event_and_then_the_newest_status(
     QApplication.processEvents()
 
     assert diary.names() == ["happened"] * 4 + ["changed"]
-    assert diary.happenings() == [Happening.CAPTURED, Happening.FAILED] * 2
+    assert diary.event_kinds() == [SwingEventKind.CAPTURED, SwingEventKind.FAILED] * 2
     assert run.status is run.runner.status
 
 
@@ -129,7 +130,8 @@ def test_an_event_comes_before_the_status_after_it(
     run.runner.begin(prepared)
     run.runner.finish()
     qtbot.waitUntil(
-        lambda: Happening.FAILED in diary.happenings(), timeout=round(1000 * TIMEOUT)
+        lambda: SwingEventKind.FAILED in diary.event_kinds(),
+        timeout=round(1000 * TIMEOUT),
     )
 
     assert phases[-1] is Phase.VERDICT  # which a slot of the event can rely on
@@ -141,15 +143,17 @@ def test_all_is_told_on_the_thread_of_the_gui(
     diary: Diary,
     prepared: Preparation,
     interrupted: Path,
+    notifications: Notifications,
     qapp: QApplication,
     qtbot: QtBot,
 ) -> None:
+    told, withdrawn = list[str](), list[str]()
+    notifications.raised.connect(lambda text, _: told.append(text))
+    notifications.withdrawn.connect(withdrawn.append)
     run.records_folder.rename(run.records_folder.with_name("old"))
     run.records_folder.write_text("not a folder")
     run.runner.begin(prepared)
-    qtbot.waitUntil(
-        lambda: len(diary.of("troubled")) == 1, timeout=round(1000 * TIMEOUT)
-    )
+    qtbot.waitUntil(lambda: "refused" in diary.names(), timeout=round(1000 * TIMEOUT))
     run.records_folder.unlink()
     run.records_folder.with_name("old").rename(run.records_folder)
     run.runner.go_on(read_resumable(interrupted))
@@ -163,15 +167,15 @@ def test_all_is_told_on_the_thread_of_the_gui(
     fractions = diary.of("progressed")
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
-    (sentence,) = diary.of("troubled")
-    assert "cannot be written" in sentence
-    assert diary.of("relieved") == [sentence]
+    assert len(told) == 1
+    assert "cannot be written" in told[0]
+    assert withdrawn == told
 
 
 def test_a_follower_sees_every_state_though_the_gui_is_busy(
     run: SwingRun, prepared: Preparation
 ) -> None:
-    class Watcher(Follower):
+    class Watcher(GuidedOperator):
         seen: list[SwingState]
 
         @override

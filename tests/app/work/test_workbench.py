@@ -1,5 +1,6 @@
 """What is chosen at a station is in force at once, and there again the next time."""
 
+import json
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -21,13 +22,19 @@ from lightpen.formats.pen_files import read_pen
 from lightpen.live.sources import sample_files
 from lightpen.model.assumptions import USUAL, with_focal_length
 from lightpen.model.limits import SwingLimits
-from lightpen.record.folder_archive import SIMULATED
-from lightpen.record.names import Names
+from lightpen.record.results.result_folder import SIMULATED
+from lightpen.record.swings.names import Names
 from lightpen.streaming.server import StreamPlace
-from lightpen.swing.preparation import Lack, Preparation, SourceChoice, SourceKind
+from lightpen.swing.preparation import (
+    MissingInput,
+    Preparation,
+    SourceChoice,
+    SourceKind,
+)
 from lightpen.swing.status import SwingStatus
-from lightpen_app.look.languages import Language, LanguageSwitch
-from lightpen_app.work.settings import Settings, Station
+from lightpen_app.look.languages import LanguageSwitch
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import FilePaths, StoredCamera
 from lightpen_app.work.workbench import Workbench
 
 OTHER = Names("Hall 3", "Bo", "LP-05", "T-11", "C-2", 6.0)
@@ -47,8 +54,8 @@ class Stage:
 
     def choose(self, **choices: object) -> None:
         """Choose something in place of what is chosen."""
-        self.workbench.set_preparation(
-            replace(self.workbench.preparation, **choices)  # type: ignore[arg-type]
+        self.workbench.selection.set_preparation(
+            replace(self.workbench.selection.preparation, **choices)  # type: ignore[arg-type]
         )
 
     def start_again(self) -> Preparation:
@@ -56,23 +63,31 @@ class Stage:
         self.workbench.shut_down()
         again = Settings(self.settings.file)
         self.workbench = Workbench(again, self.folder, self.workbench.around)
-        self.workbench.troubled.connect(self.sentences.append)
+        self.listen()
         self.applied.clear()
         self.workbench.live.settings_applied.connect(self.applied.append)
         self.workbench.start()
         self.wait_for_files()
-        return self.workbench.preparation
+        return self.workbench.selection.preparation
+
+    def listen(self) -> None:
+        """Write down what is to be read."""
+        self.workbench.notifications.raised.connect(
+            lambda text, _: self.sentences.append(text)
+        )
 
     def choose_station(self, name: str) -> None:
         """Take over what was chosen last at a station, its files, too."""
-        self.workbench.choose_station(name)
+        self.workbench.selection.choose_station(name)
         self.wait_for_files()
 
     def wait_for_files(self) -> None:
-        self.qtbot.waitUntil(lambda: not self.workbench.is_reading)
+        self.qtbot.waitUntil(lambda: not self.workbench.files.is_reading)
 
     def wait_for_size(self, size: tuple[int, int]) -> None:
-        self.qtbot.waitUntil(lambda: self.workbench.preparation.image_size == size)
+        self.qtbot.waitUntil(
+            lambda: self.workbench.selection.preparation.image_size == size
+        )
 
 
 @pytest.fixture
@@ -80,7 +95,7 @@ def stage(
     settings: Settings, tmp_path: Path, workbench: Workbench, qtbot: QtBot
 ) -> Iterator[Stage]:
     stage = Stage(settings, tmp_path / "data", workbench, qtbot)
-    workbench.troubled.connect(stage.sentences.append)
+    stage.listen()
     yield stage
     stage.workbench.shut_down()
 
@@ -99,7 +114,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 def test_everything_that_was_chosen_is_chosen_at_the_next_start(stage: Stage) -> None:
-    before = stage.workbench.preparation
+    before = stage.workbench.selection.preparation
     assumed = replace(with_focal_length(USUAL, 0.001), temperature_c=23.5, warmth=4.0)
     stage.choose(
         nominal_tip=np.array([0.1, -90.0, 1 / 3]),
@@ -122,7 +137,7 @@ def test_everything_that_was_chosen_is_chosen_at_the_next_start(stage: Stage) ->
     assert now.pen_file is not None
     assert before.pen_file is not None
     assert now.pen_file.path == before.pen_file.path
-    assert now.start_lacks() == now.leds_lacks() == ()
+    assert now.start_missing_inputs() == now.leds_missing_inputs() == ()
     assert stage.sentences == []
 
 
@@ -139,7 +154,7 @@ def test_a_mask_comes_back_to_the_last_digit(stage: Stage, mask: FloatArray) -> 
 def test_the_units_of_a_pen_file_that_does_not_say_are_remembered(
     stage: Stage, tmp_path: Path
 ) -> None:
-    pen = stage.workbench.preparation.pen
+    pen = stage.workbench.selection.preparation.pen
     assert pen is not None
     path = tmp_path / "leds.csv"
     rows = [f"{i + 1},{x},{y},{z}" for i, (x, y, z) in enumerate(pen.leds / 10)]
@@ -154,23 +169,26 @@ def test_the_units_of_a_pen_file_that_does_not_say_are_remembered(
 
 
 def test_each_station_has_choices_of_its_own(stage: Stage) -> None:
-    first = stage.workbench.preparation
+    first = stage.workbench.selection.preparation
     stage.choose(names=OTHER, mask=MASK)
     stage.choose_station(first.names.station)
-    assert stage.workbench.preparation.names == first.names
-    assert len(stage.workbench.preparation.mask) == 0
+    assert stage.workbench.selection.preparation.names == first.names
+    assert len(stage.workbench.selection.preparation.mask) == 0
 
     stage.choose_station(OTHER.station)
-    assert stage.workbench.preparation.names == OTHER
-    np.testing.assert_array_equal(stage.workbench.preparation.mask, MASK)
-    assert set(stage.workbench.stations()) == {first.names.station, OTHER.station}
+    assert stage.workbench.selection.preparation.names == OTHER
+    np.testing.assert_array_equal(stage.workbench.selection.preparation.mask, MASK)
+    assert set(stage.workbench.selection.stations()) == {
+        first.names.station,
+        OTHER.station,
+    }
     assert stage.start_again().names == OTHER
 
 
 def test_without_a_station_nothing_is_remembered(stage: Stage) -> None:
     stage.choose(names=replace(OTHER, station=""))
 
-    assert stage.workbench.stations() == ("Hall 2",)
+    assert stage.workbench.selection.stations() == ("Hall 2",)
 
 
 def test_a_first_start_has_the_files_of_the_simulated_pen(
@@ -179,15 +197,15 @@ def test_a_first_start_has_the_files_of_the_simulated_pen(
     settings = Settings(tmp_path / "new" / "lightpen.json")
     first = Workbench(settings, tmp_path / "new data", workbench.around)
     first.start()
-    qtbot.waitUntil(lambda: not first.is_reading)
-    now = first.preparation
+    qtbot.waitUntil(lambda: not first.files.is_reading)
+    now = first.selection.preparation
 
     assert now.names == Names()
     assert now.camera is not None
     assert (now.camera.width, now.camera.height) == (1224, 1024)
-    assert now.leds_lacks() == ()
+    assert now.leds_missing_inputs() == ()
     assert (tmp_path / "new data" / SIMULATED).is_dir()
-    qtbot.waitUntil(lambda: first.preparation.camera_lacks() == ())
+    qtbot.waitUntil(lambda: first.selection.preparation.camera_missing_inputs() == ())
     first.shut_down()
 
 
@@ -197,14 +215,14 @@ def test_a_first_start_has_the_files_of_the_simulated_pen(
 def test_a_file_that_cannot_be_read_is_told_and_must_be_chosen_again(
     stage: Stage,
 ) -> None:
-    pen_file = stage.workbench.preparation.pen_file
+    pen_file = stage.workbench.selection.preparation.pen_file
     assert pen_file is not None
     pen_file.path.write_text("led 1 is here")
     now = stage.start_again()
 
     assert now.pen_file is None
     assert now.camera_file is not None
-    assert now.leds_lacks() == (Lack.PEN_FILE,)
+    assert now.leds_missing_inputs() == (MissingInput.PEN_FILE,)
     assert len(stage.sentences) == 1
     assert "pen.json" in stage.sentences[0]
 
@@ -214,7 +232,7 @@ def test_files_that_are_gone_are_told_one_by_one(
 ) -> None:
     source = SourceChoice(SourceKind.RECORDED, str(recording))
     stage.choose(source=source)
-    pen_file = stage.workbench.preparation.pen_file
+    pen_file = stage.workbench.selection.preparation.pen_file
     assert pen_file is not None
     shutil.rmtree(pen_file.path.parent)
     now = stage.start_again()
@@ -224,7 +242,7 @@ def test_files_that_are_gone_are_told_one_by_one(
 
 
 def test_the_files_of_the_simulated_pen_are_those_of_its_scene(stage: Stage) -> None:
-    now = stage.workbench.preparation
+    now = stage.workbench.selection.preparation
     assert now.camera_file is not None
     assert now.pen_file is not None
     scene = stage.workbench.around.scene
@@ -237,8 +255,8 @@ def test_the_files_of_the_simulated_pen_are_those_of_its_scene(stage: Stage) -> 
 @pytest.mark.parametrize(
     "read",
     [
-        lambda workbench: workbench.use_sample_files(),
-        lambda workbench: workbench.choose_station("Hall 2"),
+        lambda workbench: workbench.files.use_samples(),
+        lambda workbench: workbench.selection.choose_station("Hall 2"),
     ],
     ids=["sample files", "files of the station"],
 )
@@ -247,10 +265,12 @@ def test_files_of_the_simulated_pen_that_come_late_are_not_those_of_another_sour
 ) -> None:
     read(stage.workbench)
     source = SourceChoice(SourceKind.RECORDED, str(recording))
-    stage.workbench.set_preparation(stage.workbench.preparation.with_source(source))
+    stage.workbench.selection.set_preparation(
+        stage.workbench.selection.preparation.with_source(source)
+    )
     stage.wait_for_files()
 
-    now = stage.workbench.preparation
+    now = stage.workbench.selection.preparation
     assert (now.camera_file, now.pen_file) == (None, None)
 
 
@@ -261,12 +281,12 @@ def test_sample_files_that_cannot_be_written_are_told(
     settings = Settings(tmp_path / "new.ini")
     first = Workbench(settings, tmp_path / "a file", workbench.around)
     sentences: list[str] = []
-    first.troubled.connect(sentences.append)
+    first.notifications.raised.connect(lambda text, _: sentences.append(text))
     first.start()
-    qtbot.waitUntil(lambda: not first.is_reading)
+    qtbot.waitUntil(lambda: not first.files.is_reading)
     first.shut_down()
 
-    assert first.preparation.camera_file is None
+    assert first.selection.preparation.camera_file is None
     assert "a file" in sentences[0]
 
 
@@ -274,13 +294,13 @@ def test_why_a_file_cannot_be_read_is_taken_back_when_another_is_chosen(
     stage: Stage, qtbot: QtBot
 ) -> None:
     stage.choose(names=OTHER)
-    chosen = stage.workbench.preparation
+    chosen = stage.workbench.selection.preparation
     assert chosen.pen_file is not None
     chosen.pen_file.path.unlink()
     stage.start_again()
     assert stage.sentences
 
-    with qtbot.waitSignal(stage.workbench.relieved) as relieved:
+    with qtbot.waitSignal(stage.workbench.notifications.withdrawn) as relieved:
         stage.choose(pen_file=chosen.pen_file)
 
     assert relieved.args == stage.sentences[-1:]
@@ -294,29 +314,34 @@ def test_choices_that_cannot_be_saved_are_told_and_in_force_all_the_same(
     stage.settings.file.parent.write_text("not a folder")
     stage.choose(names=OTHER)
 
-    assert stage.workbench.preparation.names == OTHER
+    assert stage.workbench.selection.preparation.names == OTHER
     stage.qtbot.waitUntil(lambda: bool(stage.sentences))
-    assert "The settings cannot be saved" in stage.sentences[0]
+    assert "Settings not saved:" in stage.sentences[0]
 
 
 @pytest.mark.parametrize(
-    "station",
+    "entries",
     [
-        Station(source="a camera of a later version"),
-        Station(mask="1 2; x y z; 1 2 3 4; ; 5 6 inf"),
-        Station(nominal_tip="1 2"),
-        Station(camera_file="", pen_file=""),
-        Station(min_images=-5, max_images=0),
-        Station(max_uncertainty=-1.0),
-        Station(warmth=-1.0),
+        {"camera": {"source": {"kind": "a camera of a later version"}}},
+        {"camera": {"mask": [[1, 2]]}},
+        {"camera": {"mask": "1 2 3"}},
+        {"nominal_tip": [1, 2]},
+        {"files": {"camera": "", "pen": ""}},
+        {"limits": {"min_images": -5, "max_images": 0}},
+        {"limits": {"max_uncertainty": -1.0}},
+        {"assumptions": {"warmth": -1.0}},
     ],
 )
 def test_settings_that_make_no_sense_are_passed_over(
-    stage: Stage, station: Station
+    stage: Stage, entries: dict[str, object]
 ) -> None:
-    stage.settings.set_station("Hall 4", station)
+    assert stage.settings.await_saved(120.0)
+    content = json.loads(stage.settings.file.read_text())
+    content["stations"] = {"Hall 4": entries}
+    stage.settings.file.write_text(json.dumps(content))
+    stage.start_again()
     stage.choose_station("Hall 4")
-    now = stage.workbench.preparation
+    now = stage.workbench.selection.preparation
 
     assert now.source == SourceChoice()
     assert now.limits == SwingLimits()
@@ -330,13 +355,13 @@ def test_settings_that_make_no_sense_are_passed_over(
 
 
 def test_the_size_of_the_images_is_known_as_soon_as_they_come(stage: Stage) -> None:
-    assert stage.workbench.preparation.camera_lacks() == (Lack.IMAGES,)
-    stage.workbench.open_camera()
-    with stage.qtbot.waitSignal(stage.workbench.changed):
-        pass
+    assert stage.workbench.selection.preparation.camera_missing_inputs() == (
+        MissingInput.IMAGES,
+    )
+    stage.workbench.camera.open()
+    stage.wait_for_size((1224, 1024))
 
-    assert stage.workbench.preparation.image_size == (1224, 1024)
-    assert stage.workbench.preparation.lacks() == ()
+    assert stage.workbench.selection.preparation.missing_inputs() == ()
 
 
 def test_choosing_before_the_start_opens_no_camera(
@@ -348,72 +373,76 @@ def test_choosing_before_the_start_opens_no_camera(
 
 
 def test_another_source_is_opened_at_once(stage: Stage, recording: Path) -> None:
-    stage.workbench.open_camera()
+    stage.workbench.camera.open()
     stage.wait_for_size((1224, 1024))
     stage.choose(source=SourceChoice(SourceKind.RECORDED, str(recording)))
-    assert stage.workbench.preparation.image_size is None
+    assert stage.workbench.selection.preparation.image_size is None
     stage.wait_for_size((80, 60))
-    assert stage.workbench.preparation.camera_lacks() == (Lack.IMAGE_SIZE,)
+    assert stage.workbench.selection.preparation.camera_missing_inputs() == (
+        MissingInput.IMAGE_SIZE,
+    )
 
     stage.choose(source=SourceChoice())
     stage.wait_for_size((1224, 1024))
-    assert stage.workbench.preparation.camera_lacks() == ()
+    assert stage.workbench.selection.preparation.camera_missing_inputs() == ()
 
 
 def test_a_recording_is_opened_when_its_place_is_named(
     stage: Stage, recording: Path
 ) -> None:
-    stage.workbench.open_camera()
+    stage.workbench.camera.open()
     stage.choose(source=SourceChoice(SourceKind.RECORDED))
     assert not stage.workbench.live.is_open
-    assert stage.workbench.preparation.camera_lacks() == (Lack.SOURCE_PLACE,)
+    assert stage.workbench.selection.preparation.camera_missing_inputs() == (
+        MissingInput.SOURCE_PLACE,
+    )
     stage.choose(source=SourceChoice(SourceKind.RECORDED, str(recording)))
 
     stage.wait_for_size((80, 60))
 
 
 def test_the_same_source_stays_open(stage: Stage) -> None:
-    stage.workbench.open_camera()
+    stage.workbench.camera.open()
     stage.wait_for_size((1224, 1024))
     before = stage.workbench.live.stats.delivered
     stage.choose(names=OTHER, mask=MASK)
 
     assert stage.workbench.live.connection is Connection.STREAMING
     assert stage.workbench.live.stats.delivered >= before > 0
-    assert stage.workbench.preparation.image_size == (1224, 1024)
+    assert stage.workbench.selection.preparation.image_size == (1224, 1024)
 
 
 def test_a_source_that_is_not_there_is_told_and_can_be_tried_again(
     stage: Stage, recording: Path
 ) -> None:
     moved = recording.rename(recording.with_name("moved"))
-    stage.workbench.open_camera()
+    stage.workbench.camera.open()
     stage.choose(source=SourceChoice(SourceKind.RECORDED, str(recording)))
     stage.qtbot.waitUntil(lambda: len(stage.sentences) == 1)
     assert "There is no folder, video or image at" in stage.sentences[0]
     moved.rename(recording)
-    stage.workbench.open_camera()
+    stage.workbench.camera.open()
 
     stage.wait_for_size((80, 60))
 
 
 def test_what_is_chosen_is_looked_for_in_the_images(stage: Stage) -> None:
-    stage.workbench.open_camera()
+    stage.workbench.camera.open()
     with stage.qtbot.waitSignal(
         stage.workbench.live.image_shown,
-        check_params_cb=lambda shown: shown.seen.sighting is not None,
+        check_params_cb=lambda shown: shown.seen.detection is not None,
     ):
         pass
     stage.choose(pen_file=None)
     with stage.qtbot.waitSignal(
         stage.workbench.live.image_shown,
-        check_params_cb=lambda shown: shown.seen.sighting is None,
+        check_params_cb=lambda shown: shown.seen.detection is None,
     ):
         pass
 
 
 def test_settings_come_back_with_their_camera(stage: Stage) -> None:
-    stage.workbench.open_camera()
+    stage.workbench.camera.open()
     set_camera(stage, 500.0, 6.0)
     stage.choose(names=OTHER)
     stage.choose_station("Hall 2")
@@ -435,7 +464,7 @@ def set_camera(stage: Stage, exposure_us: float, gain_db: float) -> None:
 def test_a_recording_does_not_forget_the_exposure(
     stage: Stage, recording: Path
 ) -> None:
-    stage.workbench.open_camera()
+    stage.workbench.camera.open()
     set_camera(stage, 500.0, 6.0)
     stage.choose(source=SourceChoice(SourceKind.RECORDED, str(recording)))
     stage.wait_for_size((80, 60))
@@ -456,9 +485,9 @@ def test_a_swing_of_a_recorded_source_finds_its_images(
         source=SourceChoice(SourceKind.RECORDED, str(swung())),
         camera_file=CameraFile.read(swung() / "camera.yaml"),
     )
-    stage.workbench.open_camera()
+    stage.workbench.camera.open()
     stage.wait_for_size((1224, 1024))
-    stage.workbench.run.runner.begin(stage.workbench.preparation)
+    stage.workbench.run.runner.begin(stage.workbench.selection.preparation)
     run = stage.workbench.run
     stage.qtbot.waitUntil(
         lambda: run.status.state is not None and run.status.state.n_kept >= 3
@@ -466,7 +495,7 @@ def test_a_swing_of_a_recorded_source_finds_its_images(
 
 
 def test_shutting_down_twice_does_no_harm(stage: Stage) -> None:
-    stage.workbench.open_camera()
+    stage.workbench.camera.open()
     stage.workbench.shut_down()
     stage.workbench.shut_down()
 
@@ -494,13 +523,13 @@ def test_a_new_station_keeps_no_file_that_was_being_read_for_another(
     stage: Stage,
 ) -> None:
     stage.choose(names=OTHER)
-    stage.workbench.choose_station(OTHER.station)  # its files are being read
-    stage.workbench.choose_station("")
+    stage.workbench.selection.choose_station(OTHER.station)  # its files are being read
+    stage.workbench.selection.choose_station("")
     stage.choose(names=replace(OTHER, station="Hall 9"))
     stage.wait_for_files()
 
     kept = stage.settings.station("Hall 9")
-    assert (kept.camera_file, kept.pen_file) == ("", "")
+    assert (kept.files.camera, kept.files.pen) == ("", "")
 
 
 def test_why_a_rig_file_cannot_be_read_is_taken_back_with_the_second_camera(
@@ -510,14 +539,16 @@ def test_why_a_rig_file_cannot_be_read_is_taken_back_with_the_second_camera(
     lost = str(stage.folder / "lost.json")
     there = stage.settings.station(OTHER.station)
     stage.settings.set_station(
-        OTHER.station, replace(there, second_source="simulated", rig_file=lost)
+        OTHER.station, replace(there, second=StoredCamera(), files=FilePaths(rig=lost))
     )
     stage.choose_station(OTHER.station)
     (told,) = (each for each in stage.sentences if "lost.json" in each)
     found = sample_files(stage.workbench.around, stage.folder / "rig").rig_file
     assert found is not None
-    with qtbot.waitSignal(stage.workbench.relieved) as relieved:
-        stage.workbench.set_preparation(stage.workbench.preparation.with_rig(found))
+    with qtbot.waitSignal(stage.workbench.notifications.withdrawn) as relieved:
+        stage.workbench.selection.set_preparation(
+            stage.workbench.selection.preparation.with_rig(found)
+        )
 
     assert relieved.args == [told]
 
@@ -531,10 +562,10 @@ def test_what_could_not_be_saved_is_taken_back_in_the_language_it_was_told_in(
     config.write_text("not a folder")
     stage.choose(names=OTHER)
     stage.qtbot.waitUntil(lambda: bool(stage.sentences))
-    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    LanguageSwitch(qapp).set_language("zh_CN")
     config.unlink()
 
-    with qtbot.waitSignal(stage.workbench.relieved) as relieved:
+    with qtbot.waitSignal(stage.workbench.notifications.withdrawn) as relieved:
         stage.choose(names=replace(OTHER, operator="Eve"))
 
     assert relieved.args == stage.sentences

@@ -14,8 +14,8 @@ from benchmarks.postgres_server import Postgres, postgres_programs
 
 from lightpen.archive.chains import append, own_chain
 from lightpen.archive.database import Database, open_file
-from lightpen.archive.entries import Event, Kind, Written, text_sha256
-from lightpen.record.names import Names
+from lightpen.archive.entries import Event, Kind, StoredEntry, text_sha256
+from lightpen.record.swings.names import Names
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 
@@ -44,7 +44,7 @@ class Station:
     chain: str
     name: str
 
-    def enter(self, n_entries: int, first: int = 0) -> list[Written]:
+    def enter(self, n_entries: int, first: int = 0) -> list[StoredEntry]:
         entries = []
         for n in range(first, first + n_entries):
             entry = append(self.database, self.chain, *accepted(n, self.name))

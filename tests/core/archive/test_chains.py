@@ -22,7 +22,7 @@ from lightpen.archive.chains import (
 )
 from lightpen.archive.database import open_file
 from lightpen.archive.entries import NOTHING_BEFORE, FileHash, Kind
-from lightpen.archive.queries import Wanted, last_accepted, n_wanted, newest
+from lightpen.archive.queries import EntryFilter, last_accepted, n_wanted, newest
 from lightpen.errors import ArchiveError
 
 N_EACH = 20
@@ -99,9 +99,7 @@ def test_two_programs_of_one_folder_share_a_chain(tmp_path: Path) -> None:
     )
 
 
-def test_a_copy_takes_each_entry_once(
-    make_station: Callable[[str], Station],
-) -> None:
+def test_a_copy_takes_each_entry_once(make_station: Callable[[str], Station]) -> None:
     here, there = make_station("Hall 2"), make_station("Hall 3")
     entries = here.enter(4)
     records = records_of(here.database, entries)
@@ -125,14 +123,18 @@ def test_a_copy_does_not_go_on_with_another_history(
     other = replace(entries[1], sha256="0" * 64)
     copy_entries(there.database, here.chain, [entries[0], other], records)
 
-    with pytest.raises(ArchiveError, match="go on with entry 2 of the station Hall 2"):
+    with pytest.raises(
+        ArchiveError, match="not continue with entry 2 of the station Hall 2"
+    ):
         copy_entries(there.database, here.chain, entries, records)
-    with pytest.raises(ArchiveError, match="go on with entry 3 of the station Hall 2"):
+    with pytest.raises(
+        ArchiveError, match="not continue with entry 3 of the station Hall 2"
+    ):
         copy_entries(there.database, here.chain, entries[2:], records)
 
     (_, second) = nameless.enter(2)
     records = records_of(nameless.database, [second])
-    told = f"go on with entry 2 of the chain {nameless.chain[:8]}"
+    told = f"not continue with entry 2 of chain {nameless.chain[:8]}"
     with pytest.raises(ArchiveError, match=told):
         copy_entries(there.database, nameless.chain, [second], records)
 
@@ -144,7 +146,7 @@ def test_a_copy_refuses_a_record_that_is_not_the_one(
     entries = here.enter(1)
     changed = dict.fromkeys(records_of(here.database, entries), "{}")
 
-    with pytest.raises(ArchiveError, match="missing or was changed"):
+    with pytest.raises(ArchiveError, match="is missing or was modified"):
         copy_entries(there.database, here.chain, entries, changed)
     assert heads(there.database) == heads(make_station("Hall 3").database)
 
@@ -160,13 +162,21 @@ def test_entries_are_found_by_pen_station_and_time(
     )
     database = here.database
 
-    assert newest(database, Wanted(pen="LP-04"), 3) == tuple(reversed(foreign))
-    assert newest(database, Wanted(station="Hall 2"), 9) == tuple(reversed(entries))
-    assert n_wanted(database, Wanted(tip="T-11")) == 0
+    assert newest(database, EntryFilter(pen="LP-04"), 3) == tuple(reversed(foreign))
+    assert newest(database, EntryFilter(station="Hall 2"), 9) == tuple(
+        reversed(entries)
+    )
+    assert n_wanted(database, EntryFilter(tip="T-11")) == 0
     begin, end = NOON + timedelta(minutes=1), NOON + timedelta(minutes=3)
-    assert newest(database, Wanted(begin=begin, end=end), 9) == (entries[2], entries[1])
-    page = newest(database, Wanted(), 2)
-    assert newest(database, Wanted(), 2, page[-1].entry) == (foreign[0], entries[4])
+    assert newest(database, EntryFilter(begin=begin, end=end), 9) == (
+        entries[2],
+        entries[1],
+    )
+    page = newest(database, EntryFilter(), 2)
+    assert newest(database, EntryFilter(), 2, page[-1].entry) == (
+        foreign[0],
+        entries[4],
+    )
 
 
 def test_names_of_any_characters_are_kept_and_found(station: Station) -> None:
@@ -174,5 +184,5 @@ def test_names_of_any_characters_are_kept_and_found(station: Station) -> None:
     odd = replace(event.names, pen="笔\udcff\0'%")
     append(station.database, station.chain, structs.replace(event, names=odd), record)
 
-    (found,) = newest(station.database, Wanted(pen=odd.pen), 9)
+    (found,) = newest(station.database, EntryFilter(pen=odd.pen), 9)
     assert found.entry.event.names == odd

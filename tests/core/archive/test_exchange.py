@@ -80,7 +80,7 @@ def test_an_export_replaces_no_file(station: Station, tmp_path: Path) -> None:
         (lambda lines: [*lines[:2], *lines[3:]], 4),  # an entry is missing
         (lambda lines: [*lines[:2], lines[2][:-40] + "\n", *lines[3:]], 3),
         (lambda lines: [*lines[:3], lines[3].replace("T-10", "T-11"), lines[4]], 5),
-        (lambda lines: ['{"lightpen_archive": 1}\n', *lines[1:]], 2),
+        (lambda lines: ['{"lightpen_archive": 2}\n', *lines[1:]], 2),
         (lambda lines: ["Dear archive\n"], 2),
     ],
 )

@@ -14,26 +14,26 @@ from tests.core.archive.conftest import NOON, Station, accepted
 
 from lightpen.archive.chains import append
 from lightpen.archive.due import due_tips
-from lightpen.archive.entries import Event, Kind, Written
+from lightpen.archive.entries import Event, Kind, StoredEntry
 from lightpen.archive.exchange import export_entries, import_entries
-from lightpen.archive.history import TipState, known_names, lines, remarks_on
+from lightpen.archive.history import TipState, known_names, lines, messages_on
 from lightpen.archive.listing import COLUMNS, save_entries
-from lightpen.archive.queries import Wanted, n_wanted
-from lightpen.model.due_rule import DueRule
+from lightpen.archive.queries import EntryFilter, n_wanted
+from lightpen.model.limits import DueRule
 from lightpen.model.origin import Origin
 
-ALL = Wanted()
+ALL = EntryFilter()
 IN_FORCE, REPLACED = TipState.IN_FORCE, TipState.REPLACED
 TAKEN_BACK = TipState.TAKEN_BACK
 
 
-def enter(station: Station, event: Event) -> Written:
+def enter(station: Station, event: Event) -> StoredEntry:
     entry = append(station.database, station.chain, event)
     assert entry is not None
     return entry
 
 
-def about(entry: Written, kind: Kind, n: int) -> Event:
+def about(entry: StoredEntry, kind: Kind, n: int) -> Event:
     """Return an event that concerns an entry."""
     return Event(
         kind=kind,
@@ -45,7 +45,7 @@ def about(entry: Written, kind: Kind, n: int) -> Event:
     )
 
 
-def states(station: Station, wanted: Wanted = ALL) -> list[TipState]:
+def states(station: Station, wanted: EntryFilter = ALL) -> list[TipState]:
     found = lines(station.database, wanted, 0, 100)
     return [line.state for line in found if line.state is not TipState.NONE]
 
@@ -65,7 +65,7 @@ def test_a_simulated_or_another_tip_replaces_none(station: Station) -> None:
     enter(station, practice)
 
     assert states(station) == [IN_FORCE] * 3
-    assert states(station, Wanted(is_simulated=True)) == [IN_FORCE]
+    assert states(station, EntryFilter(is_simulated=True)) == [IN_FORCE]
 
 
 def test_an_entry_from_another_station_replaces_no_tip_here(
@@ -79,7 +79,7 @@ def test_an_entry_from_another_station_replaces_no_tip_here(
 
     assert states(here) == [IN_FORCE, IN_FORCE]
     assert known_names(here.database).stations == ("Hall 2", "Hall 3")
-    assert states(here, Wanted(station="Hall 3")) == [IN_FORCE]
+    assert states(here, EntryFilter(station="Hall 3")) == [IN_FORCE]
 
 
 def test_every_block_of_lines_follows_the_one_before(station: Station) -> None:
@@ -87,23 +87,23 @@ def test_every_block_of_lines_follows_the_one_before(station: Station) -> None:
     blocks = [lines(station.database, ALL, first, 3) for first in (0, 3, 6, 9)]
 
     assert [[line.number for line in block] for block in blocks] == [
-        *([7, 6, 5], [4, 3, 2], [1], []),
+        *([7, 6, 5], [4, 3, 2], [1], [])
     ]
 
 
 @pytest.mark.parametrize(
     ("wanted", "n_found"),
     [
-        (Wanted(pen="LP-04"), 4),
-        (Wanted(pen="LP-04", tip="T-11"), 1),
-        (Wanted(tip="T-12"), 0),
-        (Wanted(begin=NOON + timedelta(minutes=2)), 2),
-        (Wanted(end=NOON + timedelta(minutes=2)), 2),
-        (Wanted(station="Hall 3"), 0),
+        (EntryFilter(pen="LP-04"), 4),
+        (EntryFilter(pen="LP-04", tip="T-11"), 1),
+        (EntryFilter(tip="T-12"), 0),
+        (EntryFilter(begin=NOON + timedelta(minutes=2)), 2),
+        (EntryFilter(end=NOON + timedelta(minutes=2)), 2),
+        (EntryFilter(station="Hall 3"), 0),
     ],
 )
 def test_only_what_is_looked_for_is_shown(
-    station: Station, wanted: Wanted, n_found: int
+    station: Station, wanted: EntryFilter, n_found: int
 ) -> None:
     station.enter(3)
     enter(station, accepted(3, tip="T-11")[0])
@@ -121,11 +121,11 @@ def test_what_follows_a_clock_that_was_ahead_is_found_by_the_days_it_says(
     enter(station, structs.replace(ahead, at=NOON + timedelta(days=9000)))
     station.enter(2, first=2)
 
-    today = Wanted(begin=NOON, end=NOON + timedelta(days=1))
+    today = EntryFilter(begin=NOON, end=NOON + timedelta(days=1))
     found = lines(station.database, today, 0, 100)
     assert [line.number for line in found] == [4, 3, 1]
     assert n_wanted(station.database, today) == 3
-    late = Wanted(begin=NOON + timedelta(days=1))
+    late = EntryFilter(begin=NOON + timedelta(days=1))
     assert [line.number for line in lines(station.database, late, 0, 100)] == [2]
     assert states(station) == [IN_FORCE, REPLACED, REPLACED, REPLACED]
 
@@ -140,7 +140,7 @@ def test_a_changed_entry_is_told_of_and_nothing_it_says_is_shown(
 
     found = lines(station.database, ALL, 0, 100)
     assert [(line.number, line.entry is None) for line in found] == [
-        *((3, False), (2, True), (1, False)),
+        *((3, False), (2, True), (1, False))
     ]
 
 
@@ -149,9 +149,9 @@ def test_what_concerns_an_entry_is_found_in_its_order(station: Station) -> None:
     for kind in (Kind.NOTE, Kind.TAKEN_BACK):
         enter(station, about(first, kind, 10))
 
-    kinds = [each.entry.event.kind for each in remarks_on(station.database, first)]
+    kinds = [each.entry.event.kind for each in messages_on(station.database, first)]
     assert kinds == [Kind.NOTE, Kind.TAKEN_BACK]
-    assert remarks_on(station.database, second) == ()
+    assert messages_on(station.database, second) == ()
 
 
 def test_a_tip_is_due_by_its_age_or_by_the_swings_of_its_pen(station: Station) -> None:

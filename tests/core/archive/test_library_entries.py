@@ -16,25 +16,25 @@ from lightpen.archive.due import due_tips
 from lightpen.archive.entries import Entry, Kind
 from lightpen.archive.history import known_names
 from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.standing import standings
+from lightpen.archive.tip_status import statuses
 from lightpen.formats.decoding import encode_png
-from lightpen.model.due_rule import DueRule
-from lightpen.record.library_changes import (
+from lightpen.messages import Message
+from lightpen.model.limits import DueRule
+from lightpen.record.library.calibration_status import StationStatus, TipStatus
+from lightpen.record.library.library_changes import (
     Author,
     add_item,
     change_item,
     keep_picture,
     retire_item,
 )
-from lightpen.record.standing import Standings, TipStanding
-from lightpen.record.tip_library import (
+from lightpen.record.library.tip_library import (
     ItemKind,
     Library,
     ListedCone,
     ListedTip,
     library_files,
 )
-from lightpen.sentences import Sentence
 
 ANN = Author("Hall 2", "Ann", "bought in May")
 RULE = DueRule(30, 0)
@@ -51,7 +51,7 @@ def entered(logbook: Logbook) -> list[Entry]:
     return [each.entry for each in entries_of(logbook.database, logbook.chain)]
 
 
-def findings(data: Path) -> tuple[Sentence, ...]:
+def findings(data: Path) -> tuple[Message, ...]:
     with closing(look_into(data / ARCHIVE)) as database:
         return check_archive(database, data).findings
 
@@ -115,23 +115,21 @@ def test_a_damaged_file_of_the_library_stays_owed_and_is_told(
     assert len(entered(logbook)) == 1
 
 
-def stand(station: Station, library: Library, days: float) -> Standings:
+def stand(station: Station, library: Library, days: float) -> StationStatus:
     now = NOON + timedelta(days=days)
-    return standings(station.database, station.chain, RULE, library, now)
+    return statuses(station.database, station.chain, RULE, library, now)
 
 
 def test_tips_are_valid_overdue_not_calibrated_or_retired(station: Station) -> None:
     append(station.database, station.chain, *accepted(0))
     library = Library()
 
-    assert stand(station, library, 29).of_tip("LP-04", "T-10") is TipStanding.VALID
-    assert stand(station, library, 31).of_tip("LP-04", "T-10") is TipStanding.OVERDUE
-    assert (
-        stand(station, library, 1).of_tip("LP-05", "T-10") is TipStanding.UNCALIBRATED
-    )
+    assert stand(station, library, 29).of_tip("LP-04", "T-10") is TipStatus.VALID
+    assert stand(station, library, 31).of_tip("LP-04", "T-10") is TipStatus.OVERDUE
+    assert stand(station, library, 1).of_tip("LP-05", "T-10") is TipStatus.UNCALIBRATED
     retired = Library(tips={"T-10": ListedTip(id="T-10", is_retired=True)})
-    assert stand(station, retired, 1).of_tip("LP-04", "T-10") is TipStanding.RETIRED
-    assert Standings().of_tip("LP-04", "T-10") is None  # nothing was read yet
+    assert stand(station, retired, 1).of_tip("LP-04", "T-10") is TipStatus.RETIRED
+    assert StationStatus().of_tip("LP-04", "T-10") is None  # nothing was read yet
 
 
 def test_a_tip_of_a_day_still_to_come_is_overdue_for_its_age_is_not_known(
@@ -140,8 +138,8 @@ def test_a_tip_of_a_day_still_to_come_is_overdue_for_its_age_is_not_known(
     append(station.database, station.chain, *accepted(0))
     library = Library()
 
-    assert stand(station, library, -0.5).of_tip("LP-04", "T-10") is TipStanding.VALID
-    assert stand(station, library, -40).of_tip("LP-04", "T-10") is TipStanding.OVERDUE
+    assert stand(station, library, -0.5).of_tip("LP-04", "T-10") is TipStatus.VALID
+    assert stand(station, library, -40).of_tip("LP-04", "T-10") is TipStatus.OVERDUE
 
 
 def test_a_tip_is_due_by_its_own_rule_or_its_own_date(station: Station) -> None:
@@ -149,8 +147,8 @@ def test_a_tip_is_due_by_its_own_rule_or_its_own_date(station: Station) -> None:
     weekly = Library(tips={"T-10": ListedTip(id="T-10", max_days=7)})
     dated = Library(tips={"T-10": ListedTip(id="T-10", due=date(2026, 1, 3))})
 
-    assert stand(station, weekly, 8).of_tip("LP-04", "T-10") is TipStanding.OVERDUE
-    assert stand(station, dated, 8).of_tip("LP-04", "T-10") is TipStanding.OVERDUE
+    assert stand(station, weekly, 8).of_tip("LP-04", "T-10") is TipStatus.OVERDUE
+    assert stand(station, dated, 8).of_tip("LP-04", "T-10") is TipStatus.OVERDUE
     assert stand(station, dated, 8).due("LP-04", "T-10") == date(2026, 1, 3)
     (tip,) = due_tips(station.database, station.chain, RULE, weekly)
     assert tip.due == NOON + timedelta(days=7)
@@ -161,8 +159,6 @@ def test_a_cone_is_overdue_after_its_date(tmp_path: Path, station: Station) -> N
     add_item(tmp_path, cone, ANN, NOON)
     library = change_item(tmp_path, cone, ANN, NOON)
 
-    assert stand(station, library, 0).of_item(ItemKind.CONE, "C-1") is TipStanding.VALID
-    assert (
-        stand(station, library, 3).of_item(ItemKind.CONE, "C-1") is TipStanding.OVERDUE
-    )
+    assert stand(station, library, 0).of_item(ItemKind.CONE, "C-1") is TipStatus.VALID
+    assert stand(station, library, 3).of_item(ItemKind.CONE, "C-1") is TipStatus.OVERDUE
     assert stand(station, library, 3).of_item(ItemKind.CONE, "C-2") is None

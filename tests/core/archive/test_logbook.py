@@ -8,20 +8,23 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
+from benchmarks.small_records import with_images
+from msgspec import structs
 from tests.core.archive.conftest import NOON
 
 from lightpen.archive.chains import entries_of, records_of
-from lightpen.archive.check import Checked, check_archive
+from lightpen.archive.check import ArchiveCheckResult, check_archive
 from lightpen.archive.database import look_into
 from lightpen.archive.entries import Entry, Kind
 from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.errors import ArchiveError
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.origin import Origin
-from lightpen.record.folder_archive import RECORDS, FolderArchive
-from lightpen.record.names import Names
-from lightpen.record.reading import open_record
-from lightpen.record.results import Result
-from lightpen.record.unfinished import discard_damaged, discard_swing
+from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.interrupted import discard_damaged, discard_swing
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import open_record
 
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
 
@@ -44,18 +47,16 @@ def result(data: Path, n: int = 0, **changes: object) -> Result:
     """Return an accepted tip of the swing, whose images it names."""
     record = open_record(data / RECORDS / "swing")
     images = [{"file": i.file.name, "sha256": i.sha256} for i in record.images]
-    calibration = {
-        "program": {"name": "lightpen", "version": "0.0.1"},
-        "tip_pen_mm": [float(n), 2.0, 3.0],
-        "expanded_uncertainty_mm": [0.1, 0.1, 0.1],
-        "cone_cam_mm": [1.0, 2.0, 3.0],
-        "covariance": [[0.25] * 6] * 6,
-        "inputs": {"observations": images},
-    }
+    calibration = with_images(images)
+    calibration = structs.replace(
+        calibration,
+        tip_pen_mm=(float(n), 2.0, 3.0),
+        expanded_uncertainty_mm=(0.1, 0.1, 0.1),
+    )
     whole = Result(
         names=NAMES,
         accepted=NOON + timedelta(hours=n),
-        grade="pass",
+        grade=Grade.PASS,
         record=record.folder,
         images=tuple(record.numbers.tolist()),
         calibration=calibration,
@@ -68,7 +69,7 @@ def entered(logbook: Logbook) -> list[Entry]:
     return [each.entry for each in entries_of(logbook.database, logbook.chain)]
 
 
-def checked(data: Path) -> Checked:
+def checked(data: Path) -> ArchiveCheckResult:
     with closing(look_into(data / ARCHIVE)) as database:
         return check_archive(database, data)
 
@@ -87,7 +88,7 @@ def test_an_accepted_tip_is_entered_with_all_that_it_was_made_from(
     assert event.result is not None
     assert event.result.place == "results/000001.json"
     assert [Path(file.place).name for file in event.files] == [
-        *("header.json", "journal.jsonl", "camera.yaml", "pen.json"),
+        *("header.json", "journal.jsonl", "camera.yaml", "pen.json")
     ]
     assert event.settings["min_images"] == 20
     (written,) = entries_of(logbook.database, logbook.chain)
@@ -116,7 +117,7 @@ def test_what_is_taken_back_names_the_entry_of_its_result(
 ) -> None:
     archive = FolderArchive(data)
     archive.store(result(data))
-    archive.take_back(result(data), "Ben", NOON + timedelta(days=1))
+    archive.revoke(result(data), "Ben", NOON + timedelta(days=1))
     logbook.enter_owed()
 
     accepted, back = entries_of(logbook.database, logbook.chain)
@@ -131,14 +132,14 @@ def test_a_swing_is_entered_that_was_set_aside_after_its_result_was_taken_back(
 ) -> None:
     archive = FolderArchive(data)
     archive.store(result(data))
-    archive.take_back(result(data), "Ben", NOON)
+    archive.revoke(result(data), "Ben", NOON)
     logbook.enter_owed()
     discard_swing(data / RECORDS / "swing")
     for _ in range(2):
         logbook.enter_owed()
 
     assert [entry.event.kind for entry in entered(logbook)] == [
-        *(Kind.ACCEPTED, Kind.TAKEN_BACK, Kind.ABANDONED),
+        *(Kind.ACCEPTED, Kind.TAKEN_BACK, Kind.ABANDONED)
     ]
 
 

@@ -33,7 +33,7 @@ from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
     Failed,
-    Troubled,
+    FaultRaised,
     WorkerEvent,
 )
 
@@ -216,9 +216,9 @@ def test_a_camera_that_is_unplugged_comes_back_with_its_settings(
 
     assert frame.image.shape == (region.height, region.width)
     assert frame.exposure_us == 777.0
-    errors = [event.error for event in events if isinstance(event, Troubled)]
+    errors = [event.error for event in events if isinstance(event, FaultRaised)]
     assert isinstance(errors[0], DeviceLost)
-    assert "no longer answers" in str(errors[0])
+    assert "no longer responds" in str(errors[0])
 
 
 # What befalls the stream

@@ -26,12 +26,12 @@ def test_a_link_that_carries_all_is_not_told_of() -> None:
 def test_images_that_get_lost_are_told_with_what_to_do(lost: Stats) -> None:
     trouble = told(lost)
 
-    assert "loses images: of 60" in str(trouble)
+    assert "of 60 incomplete" in str(trouble)
     assert "Lower the frame rate" in str(trouble)
 
 
 def test_a_frame_rate_that_is_not_reached_is_told() -> None:
-    assert "sends 10.0 images a second, not the 20.0" in str(told(Stats(37)))
+    assert "10.0 fps instead of 20.0 fps" in str(told(Stats(37)))
 
 
 def test_a_triggered_camera_need_not_reach_its_rate() -> None:
@@ -45,7 +45,7 @@ def test_nothing_is_told_before_enough_was_seen() -> None:
     assert told(Stats(7, 5), seconds=WATCHED / 2) is None
 
 
-def test_a_trouble_is_told_once() -> None:
+def test_a_fault_is_told_once() -> None:
     watch, _ = LinkWatch().after(Stats(), 0.0, AT_20)
     watch, first = watch.after(Stats(50, 10), WATCHED, AT_20)
     watch, second = watch.after(Stats(100, 20), 2 * WATCHED, AT_20)

@@ -24,7 +24,7 @@ from lightpen.cameras.replay import ReplayCamera
 from lightpen.errors import FileError
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.images import ImageSource
-from lightpen.sentences import sentence
+from lightpen.messages import message
 
 N_IMAGES = 5
 
@@ -171,7 +171,7 @@ def test_a_folder_that_is_not_there_is_not_found(tmp_path: Path) -> None:
 
 def test_a_source_without_images_is_not_found() -> None:
     camera = ReplayCamera("swing 17", lambda: ImageSource((), (), lambda: iter(())))
-    with pytest.raises(DeviceNotFound, match="swing 17 holds no images"):
+    with pytest.raises(DeviceNotFound, match="swing 17 contains no images"):
         camera.open()
 
 
@@ -199,7 +199,7 @@ def test_a_folder_that_is_gone_is_a_lost_camera_until_it_is_back(
     camera = opened(folder, frame_rate=frame_rate)
     camera.read(1.0)
     folder.rename(elsewhere)
-    with pytest.raises(DeviceLost, match=r"No image of .*swing can be read any more\."):
+    with pytest.raises(DeviceLost, match=r"Images of .* are no longer readable"):
         camera.read(1.0)
     camera.close()
     with pytest.raises(DeviceNotFound):
@@ -233,7 +233,7 @@ def test_a_video_that_is_gone_is_a_lost_camera(tmp_path: Path) -> None:
 
 def test_a_whole_round_of_damaged_images_is_a_lost_camera() -> None:
     def damaged() -> Image:
-        raise FileError(sentence("test.trouble", "It is damaged."))
+        raise FileError(message("image.wrong-checksum", name="a.png"))
 
     def loaders() -> Iterator[Callable[[], Image]]:
         good = partial(np.full, (4, 6), 0, np.uint8)
@@ -283,10 +283,7 @@ def test_an_image_of_another_depth_comes_as_it_is(tmp_path: Path, number: int) -
 
 @pytest.mark.parametrize(
     "spoiled",
-    [
-        b"no image",
-        encode_png(np.zeros((10, 10), np.uint8)),
-    ],
+    [b"no image", encode_png(np.zeros((10, 10), np.uint8))],
     ids=["unreadable", "of another size"],
 )
 def test_a_first_image_unlike_the_others_costs_none_but_itself(

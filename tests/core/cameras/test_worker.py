@@ -1,3 +1,4 @@
+import logging
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -5,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.faulty_camera import FaultyCamera
 from typing_extensions import override
 
 from lightpen.cameras.clock import Clock, MachineClock, SkippingClock
 from lightpen.cameras.frame_box import FrameBox, FrameQueue
 from lightpen.cameras.protocol import (
+    CameraCapabilities,
     CameraSettings,
-    Caps,
     ConfigError,
     DeviceBusy,
     DeviceLost,
@@ -30,17 +32,16 @@ from lightpen.cameras.worker import CameraWorker, is_too_slow
 from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
-    Ended,
     Failed,
+    FaultRaised,
     FrameReady,
-    KeepsUp,
+    ProcessingKeepsUp,
     SettingsApplied,
-    Troubled,
     WorkerEvent,
+    WorkerStopped,
 )
 from lightpen.formats.decoding import encode_png
 from lightpen.model.camera import Camera
-from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
 
@@ -82,13 +83,13 @@ class Events:
             changes = [e for e in self.all if isinstance(e, ConnectionChanged)]
         return [change.connection for change in changes]
 
-    def troubles(self, kind: type[Exception]) -> list[str]:
+    def faults(self, kind: type[Exception]) -> list[str]:
         with self._changed:
-            troubles = [e for e in self.all if isinstance(e, Troubled | Failed)]
-        return [str(e.error) for e in troubles if isinstance(e.error, kind)]
+            faults = [e for e in self.all if isinstance(e, FaultRaised | Failed)]
+        return [str(e.error) for e in faults if isinstance(e.error, kind)]
 
 
-class SpiedCamera(SimulatedCamera):
+class SpiedCamera(FaultyCamera):
     """Notes who calls it, and when it is opened."""
 
     def __init__(self, clock: Clock) -> None:
@@ -154,7 +155,7 @@ class SpiedCamera(SimulatedCamera):
         return super().stats()
 
 
-class HungCamera(SimulatedCamera):
+class HungCamera(FaultyCamera):
     """Does not come back from a read until it is let go."""
 
     def __init__(self) -> None:
@@ -169,7 +170,7 @@ class HungCamera(SimulatedCamera):
         return super().read(timeout_s)
 
 
-class PacedCamera(SimulatedCamera):
+class PacedCamera(FaultyCamera):
     """Sends as many images as it may."""
 
     def __init__(self) -> None:
@@ -187,7 +188,7 @@ class LinkedCamera(SpiedCamera):
 
     @property
     @override
-    def caps(self) -> Caps:
+    def caps(self) -> CameraCapabilities:
         return replace(super().caps, has_link=True)
 
 
@@ -219,9 +220,9 @@ class Workbench:
     def wait_for(self, kind: type[WorkerEvent], after: int = 0) -> int:
         return self.events.wait_for(lambda event: isinstance(event, kind), after)
 
-    def wait_for_trouble(self, kind: type[Exception]) -> int:
+    def wait_for_fault(self, kind: type[Exception]) -> int:
         return self.events.wait_for(
-            lambda e: isinstance(e, Troubled | Failed) and isinstance(e.error, kind)
+            lambda e: isinstance(e, FaultRaised | Failed) and isinstance(e.error, kind)
         )
 
     def wait_for_frames(self, n_frames: int) -> None:
@@ -265,7 +266,7 @@ class Benches:
 
     def live(self, frame_rate: float = 100, n_queued: int = 16) -> Workbench:
         settings = CameraSettings(frame_rate=frame_rate)
-        return self.make(SimulatedCamera(SCENE), settings=settings, n_queued=n_queued)
+        return self.make(FaultyCamera(SCENE), settings=settings, n_queued=n_queued)
 
     def stop(self) -> None:
         for workbench in self._made:
@@ -301,15 +302,33 @@ def drain(worker: CameraWorker, seconds_per_frame: float) -> list[Frame]:
         busy.wait(seconds_per_frame)
 
 
+def test_a_camera_that_comes_and_goes_is_logged(
+    benches: Benches, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, "lightpen.cameras.worker")
+    workbench, camera = benches.spied()
+    workbench.worker.start()
+    workbench.wait_for_frames(1)
+    camera.unplug()
+    workbench.wait_until(Connection.LOST)
+    workbench.worker.stop()
+
+    said = [(each.levelname, each.message) for each in caplog.records]
+    name = f"camera {workbench.worker.serial}"
+    assert said[:2] == [("INFO", f"{name}: opening"), ("INFO", f"{name}: streaming")]
+    assert ("WARNING", f"{name}: lost") in said
+    assert said[-1] == ("INFO", f"{name}: closed")
+
+
 def test_all_calls_of_the_camera_come_from_one_thread(benches: Benches) -> None:
     workbench, camera = benches.spied()
     workbench.worker.start()
     workbench.worker.set_exposure(500)
     workbench.worker.set_gain(6)
     workbench.wait_for_frames(1)
-    camera.faults.unplug()
+    camera.unplug()
     workbench.wait_until(Connection.LOST)
-    camera.faults.plug_in()
+    camera.plug_in()
     workbench.wait_until(
         Connection.STREAMING, after=workbench.wait_until(Connection.LOST)
     )
@@ -335,7 +354,7 @@ def test_the_newest_frame_waits_and_is_announced_once(benches: Benches) -> None:
 def test_no_frame_is_shown_twice(benches: Benches, recording: Path) -> None:
     workbench = benches.make(ReplayCamera(str(recording), frame_rate=1000))
     workbench.worker.start()
-    workbench.wait_for(Ended)
+    workbench.wait_for(WorkerStopped)
 
     assert workbench.worker.latest() is not None
     assert workbench.worker.latest() is None
@@ -351,7 +370,7 @@ def test_a_recording_waits_for_a_slow_reader_and_then_ends(
 
     assert [int(frame.image[0, 0]) for frame in frames] == list(range(N_IMAGES))
     workbench.wait_until(Connection.CLOSED)
-    assert Ended() in workbench.events.all
+    assert WorkerStopped() in workbench.events.all
     assert workbench.worker.stats == Stats(delivered=N_IMAGES)
 
 
@@ -361,14 +380,14 @@ def test_frames_of_a_live_camera_that_nobody_takes_in_time_are_reported(
     workbench = benches.live(n_queued=3)
     workbench.worker.measure(True)
     workbench.worker.start()
-    workbench.wait_for_trouble(FramesSkipped)
+    workbench.wait_for_fault(FramesSkipped)
     n_skipped = workbench.worker.stats.skipped
     workbench.wait_for_frames(5)
-    n_reported = len(workbench.events.troubles(FramesSkipped))
+    n_reported = len(workbench.events.faults(FramesSkipped))
     kept = [workbench.worker.next_frame(TIMEOUT).seq for _ in range(3)]
 
     assert n_reported == 1  # not once an image
-    assert "too slow: 20 of 23 images" in workbench.events.troubles(FramesSkipped)[0]
+    assert "20 of 23 images skipped" in workbench.events.faults(FramesSkipped)[0]
     assert kept == sorted(set(kept))
     # The first ones, but for those that the camera could not hand over.
     assert kept[-1] <= 2 + workbench.worker.stats.missed
@@ -388,7 +407,7 @@ def test_a_reader_that_was_held_up_once_is_not_called_slow(benches: Benches) -> 
         camera.may_send.release()
         workbench.worker.next_frame(TIMEOUT)
 
-    assert workbench.events.troubles(FramesSkipped) == []
+    assert workbench.events.faults(FramesSkipped) == []
     camera.may_send.release(MANY)  # so that it can be stopped
 
 
@@ -411,25 +430,25 @@ def test_a_reader_that_falls_behind_again_and_again_is_told_once_a_measurement(
     for _ in range(3):
         workbench.wait_for_frames(30)
         workbench.worker.next_frame(TIMEOUT)
-    assert len(workbench.events.troubles(FramesSkipped)) == 1
+    assert len(workbench.events.faults(FramesSkipped)) == 1
     workbench.worker.measure(False)
     workbench.worker.measure(True)
     workbench.wait_for_frames(30)
 
-    assert len(workbench.events.troubles(FramesSkipped)) == 2
+    assert len(workbench.events.faults(FramesSkipped)) == 2
 
 
 def test_it_is_told_when_no_image_is_skipped_any_more(benches: Benches) -> None:
     workbench = benches.live(n_queued=1)
     workbench.worker.measure(True)
     workbench.worker.start()
-    workbench.wait_for_trouble(FramesSkipped)
-    assert KeepsUp() not in workbench.events.all
+    workbench.wait_for_fault(FramesSkipped)
+    assert ProcessingKeepsUp() not in workbench.events.all
 
     workbench.worker.measure(False)
     workbench.wait_for_frames(3)
 
-    assert workbench.events.all.count(KeepsUp()) == 1
+    assert workbench.events.all.count(ProcessingKeepsUp()) == 1
 
 
 def test_it_is_over_when_no_image_was_skipped_for_a_while(
@@ -439,13 +458,13 @@ def test_it_is_over_when_no_image_was_skipped_for_a_while(
     workbench = benches.live(n_queued=16)
     workbench.worker.measure(True)
     workbench.worker.start()
-    workbench.wait_for_trouble(FramesSkipped)
+    workbench.wait_for_fault(FramesSkipped)
 
     for _ in range(100):  # far fewer than make the skipped ones a small share
         workbench.worker.next_frame(TIMEOUT)
-        if KeepsUp() in workbench.events.all:
+        if ProcessingKeepsUp() in workbench.events.all:
             break
-    assert workbench.events.all.count(KeepsUp()) == 1
+    assert workbench.events.all.count(ProcessingKeepsUp()) == 1
 
 
 def test_a_camera_rests_while_nobody_wants_images_but_is_looked_after(
@@ -453,7 +472,7 @@ def test_a_camera_rests_while_nobody_wants_images_but_is_looked_after(
 ) -> None:
     monkeypatch.setattr("lightpen.cameras.worker.PROBING", 0.02)
     workbench = benches.live()
-    assert isinstance(workbench.camera, SimulatedCamera)
+    assert isinstance(workbench.camera, FaultyCamera)
     workbench.worker.start()
     workbench.wait_for_frames(3)
 
@@ -462,9 +481,9 @@ def test_a_camera_rests_while_nobody_wants_images_but_is_looked_after(
     threading.Event().wait(0.3)
     assert workbench.worker.stats.delivered <= n_delivered + 1  # that was under way
 
-    workbench.camera.faults.unplug()
+    workbench.camera.unplug()
     lost = workbench.wait_until(Connection.LOST)
-    workbench.camera.faults.plug_in()
+    workbench.camera.plug_in()
     workbench.wait_until(Connection.STREAMING, after=lost)
     workbench.worker.set_rest(0.0)
     workbench.wait_for_frames(3)
@@ -548,17 +567,17 @@ def test_a_lost_camera_comes_back_with_its_settings(benches: Benches) -> None:
     workbench.worker.start()
     workbench.worker.set_exposure(444)
     workbench.wait_for_frames(2)
-    camera.faults.unplug()
+    camera.unplug()
     lost = workbench.wait_until(Connection.LOST)
     before = workbench.worker.stats.delivered
-    camera.faults.plug_in()
+    camera.plug_in()
     workbench.wait_until(Connection.STREAMING, after=lost)
     applied = workbench.events.all[workbench.wait_for(SettingsApplied, after=lost)]
     workbench.wait_for_frames(2)
 
     assert isinstance(applied, SettingsApplied)
     assert applied.settings == CameraSettings(444, 3, 20, "Mono12")
-    assert "cable" in workbench.events.troubles(DeviceLost)[0]
+    assert "cable" in workbench.events.faults(DeviceLost)[0]
     assert workbench.worker.stats.delivered > before
 
 
@@ -566,7 +585,7 @@ def test_attempts_to_reconnect_back_off(benches: Benches) -> None:
     workbench, camera = benches.spied()
     workbench.worker.start()
     workbench.wait_for_frames(1)
-    camera.faults.unplug()
+    camera.unplug()
     for _ in range(7):
         assert camera.n_opened.acquire(timeout=TIMEOUT)
     attempts = camera.opened_at[1:7]
@@ -580,19 +599,19 @@ def test_a_silent_camera_that_answers_is_given_up_after_six_seconds(
     workbench, camera = benches.spied()
     workbench.worker.start()
     workbench.wait_for_frames(1)
-    camera.faults.stall(1e6)
+    camera.stall(1e6)
     silent = workbench.wait_until(Connection.SILENT)
     lost = workbench.wait_until(Connection.LOST)
 
     assert silent < lost
-    assert "sent no image for 6 s" in workbench.events.troubles(DeviceLost)[0]
+    assert "SIM-1 for 6 s" in workbench.events.faults(DeviceLost)[0]
 
 
 def test_a_short_silence_is_waited_for(benches: Benches) -> None:
     workbench, camera = benches.spied()
     workbench.worker.start()
     workbench.wait_for_frames(1)
-    camera.faults.stall(4.0)
+    camera.stall(4.0)
     silent = workbench.wait_until(Connection.SILENT)
     workbench.wait_until(Connection.STREAMING, after=silent)
 
@@ -611,35 +630,35 @@ def test_a_slow_camera_is_not_taken_for_silent(benches: Benches) -> None:
 
 def test_a_busy_camera_is_waited_for(benches: Benches) -> None:
     workbench, camera = benches.spied()
-    camera.faults.occupy(3.0)
+    camera.occupy(3.0)
     workbench.worker.start()
     workbench.wait_until(Connection.STREAMING)
 
     assert camera.opened_at[-1] == pytest.approx(3.0)
-    told = workbench.events.troubles(DeviceBusy)
+    told = workbench.events.faults(DeviceBusy)
     assert len(told) == 1
     assert "Another program" in told[0]
 
 
 def test_a_camera_that_stays_busy_is_given_up(benches: Benches) -> None:
     workbench, camera = benches.spied()
-    camera.faults.occupy(3600)
+    camera.occupy(3600)
     workbench.worker.start()
     workbench.wait_until(Connection.CLOSED)
 
-    assert "Another program" in workbench.events.troubles(DeviceBusy)[0]
+    assert "Another program" in workbench.events.faults(DeviceBusy)[0]
     assert camera.opened_at[-1] == pytest.approx(8.0)
 
 
 def test_a_missing_camera_ends_the_worker(benches: Benches) -> None:
     workbench, camera = benches.spied()
-    camera.faults.unplug()
+    camera.unplug()
     workbench.worker.start()
     failed = workbench.wait_for(Failed)
     closed = workbench.wait_until(Connection.CLOSED)
 
     assert failed < closed
-    assert "not plugged in" in workbench.events.troubles(DeviceNotFound)[0]
+    assert "There is no camera" in workbench.events.faults(DeviceNotFound)[0]
     with pytest.raises(EndOfImages):
         workbench.worker.next_frame(TIMEOUT)
 
@@ -649,20 +668,20 @@ def test_impossible_settings_at_first_end_the_worker(benches: Benches) -> None:
     workbench.worker.start()
     workbench.wait_until(Connection.CLOSED)
 
-    assert "BayerRG8" in workbench.events.troubles(ConfigError)[0]
+    assert "BayerRG8" in workbench.events.faults(ConfigError)[0]
 
 
 def test_kept_settings_that_are_impossible_now_are_told_when_images_come(
     benches: Benches,
 ) -> None:
-    camera = SimulatedCamera(SCENE)
+    camera = FaultyCamera(SCENE)
     kept = {camera.serial: CameraSettings(pixel_format="BayerRG8")}
     workbench = benches.make(camera, known=kept)
     workbench.worker.start()
-    told = workbench.wait_for_trouble(ConfigError)
+    told = workbench.wait_for_fault(ConfigError)
 
     assert workbench.wait_until(Connection.STREAMING) < told
-    assert "BayerRG8" in workbench.events.troubles(ConfigError)[0]
+    assert "BayerRG8" in workbench.events.faults(ConfigError)[0]
     workbench.wait_for_frames(2)
 
 
@@ -672,19 +691,19 @@ def test_one_image_that_a_link_damaged_is_counted_but_disturbs_nobody(
     clock = SkippingClock()
     camera = LinkedCamera(clock)
     workbench = benches.make(camera, clock)
-    camera.faults.spoil_frames(1)
+    camera.spoil_frames(1)
     workbench.worker.start()
     workbench.wait_for_frames(2)
 
     assert workbench.worker.stats.incomplete == 1
-    assert workbench.events.troubles(FrameIncomplete) == []
+    assert workbench.events.faults(FrameIncomplete) == []
 
 
 def test_a_damaged_image_is_told_and_the_next_one_comes(benches: Benches) -> None:
     workbench, camera = benches.spied()
-    camera.faults.spoil_frames(1)
+    camera.spoil_frames(1)
     workbench.worker.start()
-    workbench.wait_for_trouble(FrameIncomplete)
+    workbench.wait_for_fault(FrameIncomplete)
     workbench.wait_for_frames(2)
 
     assert workbench.worker.stats.incomplete == 1
@@ -704,11 +723,11 @@ def test_stopping_ends_a_worker_whose_reader_is_gone(
 
 
 def test_stopping_ends_a_worker_that_seeks_its_camera(benches: Benches) -> None:
-    camera = SimulatedCamera(SCENE)
+    camera = FaultyCamera(SCENE)
     workbench = benches.make(camera, settings=CameraSettings(frame_rate=100))
     workbench.worker.start()
     workbench.wait_for_frames(1)
-    camera.faults.unplug()
+    camera.unplug()
     workbench.wait_until(Connection.LOST)
     workbench.worker.stop()
 

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from lightpen.cameras.clock import SkippingClock
-from lightpen.cameras.protocol import CameraSettings, Caps, Frame, Range
+from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Frame, Range
 from lightpen.detection.auto_exposure import (
     MAX_BLIND,
     TARGET,
     AutoExposure,
-    Standing,
+    ExposureState,
 )
 from lightpen.detection.exposure_advice import LONGEST_EXPOSURE_US
 from lightpen.detection.inspection import inspect
-from lightpen.detection.sighting import look
+from lightpen.detection.pen_detection import detect_pen
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
@@ -35,23 +35,23 @@ class Loop:
         self.camera.open()
         self.settings = self.camera.configure(settings or CameraSettings())
         self.camera.start()
-        self.limits = Caps(0, 0, ())
+        self.limits = CameraCapabilities(0, 0, ())
         self.frame: Frame | None = None
 
-    def run(self, caps: Caps | None = None) -> AutoExposure:
+    def run(self, caps: CameraCapabilities | None = None) -> AutoExposure:
         """Adjust until there is an outcome."""
         caps = caps or self.camera.caps
         now = AutoExposure.begun(self.settings)
         for _ in range(100):
             self.frame = frame = self.camera.read(1.0)
             scene = self.scene
-            seen = look(
+            seen = detect_pen(
                 *(frame.image, scene.camera, scene.pen, None, None, frame.full_scale)
             )
             assert seen.spots is not None
             before = now
             now = now.after(frame, seen.spots, inspect(seen.spots, seen.labels), caps)
-            if now.outcome is not Standing.ADJUSTING:
+            if now.outcome is not ExposureState.ADJUSTING:
                 return now
             if now.asked != before.asked:
                 self.camera.set_exposure(now.asked.exposure_us or 0.0)
@@ -69,7 +69,7 @@ def test_the_brightest_led_comes_to_80_percent_and_none_is_saturated(
     loop.camera.operator.seat()
     found = loop.run()
 
-    assert found.outcome is Standing.DONE
+    assert found.outcome is ExposureState.DONE
     assert found.level == pytest.approx(TARGET, abs=0.05)
     assert loop.frame is not None
     assert loop.frame.image.max() < loop.frame.full_scale
@@ -83,7 +83,7 @@ def test_gain_does_what_a_longer_exposure_would_smear() -> None:
     loop.camera.operator.seat()
     found = loop.run()
 
-    assert found.outcome is Standing.DONE
+    assert found.outcome is ExposureState.DONE
     assert found.asked.exposure_us == LONGEST_EXPOSURE_US
     assert (found.asked.gain_db or 0.0) > 3
     assert found.level == pytest.approx(TARGET, abs=0.05)
@@ -91,8 +91,8 @@ def test_gain_does_what_a_longer_exposure_would_smear() -> None:
 
 def test_leds_that_stay_too_dark_or_too_bright_are_said_to_be() -> None:
     for exposure_us, offered, outcome in (
-        (100.0, Range(10, 300), Standing.TOO_DARK),
-        (5000.0, Range(3500, 50_000), Standing.TOO_BRIGHT),
+        (100.0, Range(10, 300), ExposureState.TOO_DARK),
+        (5000.0, Range(3500, 50_000), ExposureState.TOO_BRIGHT),
     ):
         loop = Loop(settings=CameraSettings(exposure_us=exposure_us))
         loop.camera.operator.seat()
@@ -105,7 +105,7 @@ def test_the_least_light_that_saturates_is_remembered() -> None:
     loop.camera.operator.seat()
     for _ in range(40):  # until it is seated
         frame = loop.camera.read(1.0)
-        seen = look(frame.image, SCENE.camera, SCENE.pen)
+        seen = detect_pen(frame.image, SCENE.camera, SCENE.pen)
         assert seen.spots is not None
         leds = inspect(seen.spots, seen.labels)
         if leds.exposure.n_saturated:
@@ -124,7 +124,7 @@ def test_without_leds_it_gives_up_and_changes_nothing() -> None:
     loop = Loop()
     found = loop.run()
 
-    assert found.outcome is Standing.NO_LEDS
+    assert found.outcome is ExposureState.NO_LEDS
     assert found.n_blind == MAX_BLIND
     assert found.asked.exposure_us == loop.settings.exposure_us
 
@@ -134,7 +134,7 @@ def test_images_of_another_exposure_are_passed_over() -> None:
     loop.camera.operator.seat()
     now = AutoExposure.begun(CameraSettings(exposure_us=77.0, gain_db=0.0))
     frame = loop.camera.read(1.0)
-    spots = look(frame.image, SCENE.camera, SCENE.pen).spots
+    spots = detect_pen(frame.image, SCENE.camera, SCENE.pen).spots
     assert spots is not None
 
     assert now.after(frame, spots, inspect(spots), loop.camera.caps) is now

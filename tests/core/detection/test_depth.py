@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.sighting import look
+from lightpen.detection.pen_detection import detect_pen
 from lightpen.model.ellipse import disc_images
 from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.scenes import Scene
@@ -33,7 +33,7 @@ def errors(
         image, full_scale = render_plan(scene, plan), scene.sensor.full_scale
         if cut_to_8:
             image, full_scale = (image >> 4).astype(np.uint8), 255
-        seen = look(image, scene.camera, scene.pen, full_scale=full_scale)
+        seen = detect_pen(image, scene.camera, scene.pen, full_scale=full_scale)
         places = leds_in_camera(scene.pen, plan.rotation, plan.translation)
         truth = disc_images(scene.camera, *places, scene.pen.diameter / 2).centers
         off.append(seen.pixels - truth)

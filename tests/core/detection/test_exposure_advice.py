@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from lightpen.cameras.protocol import CameraSettings, Caps, Range
+from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Range
 from lightpen.detection.exposure_advice import LONGEST_EXPOSURE_US, Advice, advise
 from lightpen.detection.inspection import Exposure
 
-CAPS = Caps(
+CAPS = CameraCapabilities(
     *(2448, 2048, ("Mono8",)),
     exposure_us=Range(10.0, 50_000.0),
     gain_db=Range(0.0, 24.0),
@@ -43,7 +43,9 @@ def test_the_cheapest_remedy_comes_first(
 
 
 @pytest.mark.parametrize("caps", [RECORDED, None])
-def test_what_cannot_be_set_is_left_to_the_lens(caps: Caps | None) -> None:
+def test_what_cannot_be_set_is_left_to_the_lens(
+    caps: CameraCapabilities | None,
+) -> None:
     assert advise(BRIGHT, CameraSettings(), caps) is Advice.CLOSE_APERTURE
     assert advise(DARK, CameraSettings(), caps) is Advice.OPEN_APERTURE
 

@@ -5,7 +5,7 @@ import numpy as np
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.fixed_lamps import fixed_lamps, lamps_among, masked_lights
 from lightpen.detection.labelling.labels import Labels, label_images
-from lightpen.detection.sighting import Sighting, sightings_of
+from lightpen.detection.pen_detection import PenDetection, detections_of
 from lightpen.detection.spots import detect_spots
 from lightpen.model.camera import Camera
 from lightpen.simulator.image_plans import plan_scene, render_plan
@@ -25,9 +25,9 @@ def disc_at(*places: tuple[float, float]) -> Image:
     return image.astype(np.uint8)
 
 
-def seen(image: Image) -> Sighting:
+def seen(image: Image) -> PenDetection:
     spots = detect_spots(image)
-    return sightings_of([spots], label_images([spots], SMALL, PEN), SMALL)[0]
+    return detections_of([spots], label_images([spots], SMALL, PEN), SMALL)[0]
 
 
 def nothing_masked(n_images: int) -> FloatArray:
@@ -46,15 +46,17 @@ def test_a_masked_circle_without_light_shows_none() -> None:
 
 
 def test_a_spot_that_stays_is_a_lamp_and_one_that_moves_is_none() -> None:
-    sightings = [seen(disc_at((80.0, 60.0), (100.0 + 15 * i, 180.0))) for i in range(8)]
-    lamps = fixed_lamps(nothing_masked(8), sightings)
+    detections = [
+        seen(disc_at((80.0, 60.0), (100.0 + 15 * i, 180.0))) for i in range(8)
+    ]
+    lamps = fixed_lamps(nothing_masked(8), detections)
     assert lamps.shape == (8, 1, 2)
     np.testing.assert_allclose(lamps[:, 0], [[80.0, 60.0]] * 8, atol=0.02)
 
 
 def test_a_lamp_that_few_images_show_is_none() -> None:
-    sightings = [seen(disc_at(*[(80.0, 60.0)] * (i < 4))) for i in range(8)]
-    assert fixed_lamps(nothing_masked(8), sightings).shape == (8, 0, 2)
+    detections = [seen(disc_at(*[(80.0, 60.0)] * (i < 4))) for i in range(8)]
+    assert fixed_lamps(nothing_masked(8), detections).shape == (8, 0, 2)
 
 
 def test_lights_of_a_masked_circle_that_stay_nowhere_are_no_lamp() -> None:
@@ -98,7 +100,7 @@ def test_the_leds_of_the_pen_are_no_lamps() -> None:
     image = render_plan(scene, plan_scene(scene).image_plans[0])
     spots = detect_spots(image)
     labels: list[Labels] = label_images([spots], scene.camera, scene.pen)
-    sighting = sightings_of([spots], labels, scene.camera)[0]
-    lamps = fixed_lamps(nothing_masked(1), [sighting])
+    detection = detections_of([spots], labels, scene.camera)[0]
+    lamps = fixed_lamps(nothing_masked(1), [detection])
     assert len(spots) == scene.pen.n_leds + 1
     assert lamps.shape == (1, 1, 2)

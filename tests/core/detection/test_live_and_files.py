@@ -7,24 +7,24 @@ from functools import partial
 import cv2
 import numpy as np
 import pytest
+from tests.simulated_plans import live_plan
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.detection.observations import Observations, observe_images
+from lightpen.detection.pen_detection import (
+    PenDetection,
+    detect_from_centers,
+    detect_pen,
+)
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import Sighting, look, sight_centers
 from lightpen.errors import CalibrationError
 from lightpen.formats.images import ImageSource
 from lightpen.model.ellipse import disc_images, ellipse_centers
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.image_plans import (
-    ImagePlan,
-    live_plan,
-    plan_scene,
-    render_plan,
-)
-from lightpen.simulator.sample_pens import six_led_pen
+from lightpen.simulator.image_plans import ImagePlan, plan_scene, render_plan
+from lightpen.simulator.samples import six_led_pen
 from lightpen.simulator.scenes import HARD, Scene
 from lightpen.simulator.sensor import Sensor
 from lightpen.simulator.swings import flat_pen, leds_in_camera
@@ -136,10 +136,7 @@ SCENES: dict[str, tuple[Callable[[], Image], Reason]] = {
         Reason.EMPTY,
     ),
     "LEDs off": (lambda: shown(lit()), Reason.EMPTY),
-    "LEDs off before a bright background": (
-        lambda: backlit(0.05, lit()),
-        Reason.EMPTY,
-    ),
+    "LEDs off before a bright background": (lambda: backlit(0.05, lit()), Reason.EMPTY),
     "six LEDs lit": (lambda: shown(lit(0, 1, 2, 3, 4, 5)), Reason.NONE),
     "five LEDs lit": (lambda: shown(lit(*FEW, 8)), Reason.NONE),
     "four LEDs lit": (lambda: shown(lit(*FEW)), Reason.TOO_FEW_LEDS),
@@ -184,8 +181,8 @@ def clean() -> Image:
 
 
 @pytest.fixture(scope="module")
-def before(clean: Image) -> Sighting:
-    return look(clean, CAMERA, PEN)
+def before(clean: Image) -> PenDetection:
+    return detect_pen(clean, CAMERA, PEN)
 
 
 def loader(image: Image) -> Callable[[], Image]:
@@ -200,7 +197,7 @@ def on_files(
     return observe_images(source, CAMERA, pen, mask=mask)
 
 
-def assert_alike(live: Sighting, files: Observations, index: int) -> None:
+def assert_alike(live: PenDetection, files: Observations, index: int) -> None:
     """Assert that an image shows the same on files as live, from nothing."""
     assert live.reason is files.reasons[index]
     assert_same = partial(np.testing.assert_allclose, rtol=0, atol=1e-9)  # px; rounding
@@ -213,16 +210,16 @@ def assert_alike(live: Sighting, files: Observations, index: int) -> None:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_an_image_shows_the_same_live_and_on_files(
-    name: str, clean: Image, before: Sighting
+    name: str, clean: Image, before: PenDetection
 ) -> None:
     render, reason = SCENES[name]
     image = render()
-    live = look(image, CAMERA, PEN)
+    live = detect_pen(image, CAMERA, PEN)
 
     assert live.reason is reason
     # Most of a set must be of use, or the set as a whole is refused or diagnosed.
     assert_alike(live, on_files([clean, image, clean]), 1)
-    assert look(image, CAMERA, PEN, before=before).reason is reason
+    assert detect_pen(image, CAMERA, PEN, before=before).reason is reason
 
 
 def test_every_reason_that_one_image_can_have_is_among_the_scenes() -> None:
@@ -249,9 +246,9 @@ def test_hard_images_show_the_same_live_and_on_files() -> None:
     files = on_files(images)
     assert len(set(files.reasons)) > 2
     for i, (image, shot) in enumerate(zip(images, plan.image_plans, strict=True)):
-        live = look(image, CAMERA, PEN)
+        live = detect_pen(image, CAMERA, PEN)
         assert_alike(live, files, i)
-        tracked = look(image, CAMERA, PEN, before=turned(shot, PEN))
+        tracked = detect_pen(image, CAMERA, PEN, before=turned(shot, PEN))
         if tracked.has_pose and not live.has_pose:
             assert live.reason in UNSURE
         else:
@@ -263,14 +260,14 @@ def test_only_the_image_before_tells_how_a_symmetric_pen_is_held() -> None:
     grid = [(x, y, 0.0) for x in (-25.0, 25.0) for y in (20.0, 70.0, 120.0, 170.0)]
     pen = flat_pen("symmetric", grid)
     image = of_pen(pen)
-    start = look(image, CAMERA, pen)
-    tracked = look(image, CAMERA, pen, before=turned(SHOT, pen))
+    start = detect_pen(image, CAMERA, pen)
+    tracked = detect_pen(image, CAMERA, pen, before=turned(SHOT, pen))
 
     assert start.reason is Reason.AMBIGUOUS
     assert_alike(start, on_files([image], pen), 0)
     assert tracked.has_pose
     np.testing.assert_allclose(tracked.rotation, SHOT.rotation, atol=1e-3)
-    assert look(of_pen(pen, defocus=8.0), CAMERA, pen).reason is Reason.BLURRED
+    assert detect_pen(of_pen(pen, defocus=8.0), CAMERA, pen).reason is Reason.BLURRED
 
 
 @pytest.mark.parametrize("n_dark", [0, 3])
@@ -304,7 +301,7 @@ def test_a_recorded_image_is_as_deep_as_on_files() -> None:
     camera.open()
     camera.start()
     frame = camera.read(1.0)
-    live = look(frame.image, CAMERA, PEN, full_scale=frame.full_scale)
+    live = detect_pen(frame.image, CAMERA, PEN, full_scale=frame.full_scale)
 
     assert np.isfinite(live.areas).all()
     assert_alike(live, on_files([image]), 0)
@@ -317,14 +314,14 @@ def test_light_that_is_masked_is_no_smear() -> None:
     mask = np.array([[900.0, 365.0, 700.0]])
 
     for circles, reason in ((None, Reason.BLURRED), (mask, Reason.EMPTY)):
-        live = look(image, CAMERA, PEN, circles)
+        live = detect_pen(image, CAMERA, PEN, circles)
         assert live.reason is reason
         assert_alike(live, on_files([image], mask=circles), 0)
 
 
-def turned(shot: ImagePlan, pen: Pen) -> Sighting:
+def turned(shot: ImagePlan, pen: Pen) -> PenDetection:
     """Return the sighting of a pen an image before, turned a little about its tip."""
     R = rotation_from_vector(np.array([0.010, -0.008, 0.006])) @ shot.rotation
     t = shot.translation + (shot.rotation - R) @ SCENE.tip_pen
     centers = ellipse_centers(CAMERA, *leds_in_camera(pen, R, t), pen.diameter / 2)
-    return sight_centers(CAMERA, pen, centers, R, t)
+    return detect_from_centers(CAMERA, pen, centers, R, t)

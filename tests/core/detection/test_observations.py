@@ -13,13 +13,13 @@ from lightpen.detection.observations import (
     observe_centers,
     observe_images,
 )
+from lightpen.detection.pen_detection import detect_from_centers
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import sight_centers
 from lightpen.errors import FileError
 from lightpen.formats.images import ImageSource
 from lightpen.formats.observation_files import Centers
+from lightpen.messages import message
 from lightpen.model.ellipse import ellipse_centers
-from lightpen.sentences import sentence
 from lightpen.simulator.image_plans import ScenePlan, plan_scene, render_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import leds_in_camera, paper_camera, paper_pen
@@ -40,7 +40,7 @@ def images(plan: ScenePlan) -> list[Image]:
 
 
 def damaged() -> Image:
-    raise FileError(sentence("image.cut-off", "frame_2.png is cut off."))
+    raise FileError(message("image.cut-off", name="frame_2.png"))
 
 
 def observe(loaders: list[Callable[[], Image]]) -> Observations:
@@ -146,17 +146,17 @@ def test_given_centres_show_the_same_alone_as_among_others(plan: ScenePlan) -> N
         Centers(np.arange(6) + 1, pixels, Path("centers.csv")), CAMERA, PEN
     )
     alone = [
-        sight_centers(CAMERA, PEN, *image)
+        detect_from_centers(CAMERA, PEN, *image)
         for image in zip(pixels, found.rotations, found.translations, strict=True)
     ]
 
-    assert found.reasons == tuple(sighting.reason for sighting in alone)
+    assert found.reasons == tuple(detection.reason for detection in alone)
     assert found.reasons[:4] == (
         *(Reason.NONE, Reason.EMPTY),
         *(Reason.TOO_FEW_LEDS, Reason.MISFIT),
     )
-    for sighting, translation in zip(alone[4:], swing.translations[4:], strict=True):
-        np.testing.assert_allclose(sighting.translation, translation, atol=0.01)
+    for detection, translation in zip(alone[4:], swing.translations[4:], strict=True):
+        np.testing.assert_allclose(detection.translation, translation, atol=0.01)
 
 
 def test_centres_of_a_larger_image_are_refused(plan: ScenePlan) -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.simulated_centers import displace_centers, drop_centers, swap_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pose import (
@@ -14,13 +15,10 @@ from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
 from lightpen.simulator.swings import (
     Swing,
-    displace_centers,
-    drop_centers,
     paper_camera,
     paper_pen,
     select_frames,
     simulate_centers,
-    swap_centers,
     swing_poses,
 )
 
@@ -115,11 +113,7 @@ def test_the_covariance_agrees_with_the_scatter_of_many_fits() -> None:
         truth.tips_cam,
     )
     fit = fit_poses(
-        CAMERA,
-        PEN,
-        centers(repeated, 0.05),
-        repeated.rotations,
-        repeated.translations,
+        CAMERA, PEN, centers(repeated, 0.05), repeated.rotations, repeated.translations
     )
     turns = vector_from_rotation(fit.rotations @ truth.rotations[0].T)
     errors = np.hstack([turns, fit.translations - truth.translations[0]])

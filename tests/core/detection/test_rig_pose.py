@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 from tests.accepted_tip import Hold, Holder, seen_by
 
+from lightpen.detection.pen_detection import unseen
 from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_pose import fit_rig_poses, see_together
-from lightpen.detection.sighting import unseen
 from lightpen.model.rig import from_first, rig_of
-from lightpen.simulator.sample_rigs import row_of_cameras
+from lightpen.simulator.samples import row_of_cameras
 from lightpen.simulator.swings import paper_pen, swing_poses
 
 RIG = replace(from_first(row_of_cameras(2, 800.0)), names=("left", "right"))
@@ -56,22 +56,22 @@ def test_a_second_camera_sees_the_depth_that_one_hardly_sees() -> None:
 
 
 def test_a_camera_that_does_not_see_the_pen_counts_for_nothing() -> None:
-    (sighting,) = Holder(RIG, PEN).still(Hold(), 1)
-    lost = replace(sighting, others=(unseen(PEN, Reason.EMPTY),))
+    (detection,) = Holder(RIG, PEN).still(Hold(), 1)
+    lost = replace(detection, others=(unseen(PEN, Reason.EMPTY),))
     together = see_together(RIG, PEN, lost)
 
     assert together.has_pose
-    np.testing.assert_allclose(together.translation, sighting.translation, atol=1e-6)
+    np.testing.assert_allclose(together.translation, detection.translation, atol=1e-6)
     assert not np.isfinite(together.rig_pixels[1]).any()
 
 
 def test_what_only_the_second_camera_sees_is_in_the_frame_of_the_first() -> None:
-    (sighting,) = Holder(RIG, PEN).still(Hold(), 1)
-    lost = replace(unseen(PEN, Reason.EMPTY), others=sighting.others)
+    (detection,) = Holder(RIG, PEN).still(Hold(), 1)
+    lost = replace(unseen(PEN, Reason.EMPTY), others=detection.others)
     together = see_together(RIG, PEN, lost)
 
     assert together.has_pose
-    np.testing.assert_allclose(together.translation, sighting.translation, atol=0.5)
+    np.testing.assert_allclose(together.translation, detection.translation, atol=0.5)
 
 
 def test_what_no_camera_sees_stays_unseen() -> None:
@@ -82,5 +82,5 @@ def test_what_no_camera_sees_stays_unseen() -> None:
 
 
 def test_a_camera_alone_is_as_it_is() -> None:
-    (sighting,) = Holder(rig_of(RIG.cameras[0]), PEN).still(Hold(), 1)
-    assert see_together(rig_of(RIG.cameras[0]), PEN, sighting) is sighting
+    (detection,) = Holder(rig_of(RIG.cameras[0]), PEN).still(Hold(), 1)
+    assert see_together(rig_of(RIG.cameras[0]), PEN, detection) is detection

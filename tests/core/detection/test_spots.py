@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.spots import MAX_SPOTS, Flaw, Spots, detect_spots
+from lightpen.detection.spots import MAX_SPOTS, SpotFlaw, Spots, detect_spots
 
 SHAPE = (700, 900)
 SUPERSAMPLING = 8
 ELECTRONS_AT_FULL_SCALE = 10_000.0
-WHOLE_FLAWS = Flaw.MERGED | Flaw.CUT
+WHOLE_FLAWS = SpotFlaw.MERGED | SpotFlaw.CUT
 
 Hidden = Callable[[FloatArray, FloatArray], npt.NDArray[np.bool_]]
 
@@ -142,8 +142,8 @@ def center_rms(spots: Spots, lamps: Sequence[Lamp]) -> float:
     return float(np.sqrt(np.mean(errors**2)))
 
 
-def flaws_of(spots: Spots, lamps: Sequence[Lamp]) -> list[Flaw]:
-    return [Flaw(int(spots.flaws[i])) for i in nearest(spots, lamps)]
+def flaws_of(spots: Spots, lamps: Sequence[Lamp]) -> list[SpotFlaw]:
+    return [SpotFlaw(int(spots.flaws[i])) for i in nearest(spots, lamps)]
 
 
 def frames(folder: Path, every: int = 1) -> list[tuple[Image, dict[str, FloatArray]]]:
@@ -184,15 +184,15 @@ def test_clean_sets_give_every_led_unflagged_and_nothing_else(
 @pytest.mark.parametrize(
     ("level", "sigma", "limit", "flaws"),
     [
-        pytest.param(200.0, 0.8, 0.005, Flaw.NONE, id="normal"),
-        pytest.param(25.0, 0.8, 0.015, Flaw.NONE, id="dim"),
-        pytest.param(510.0, 0.8, 0.010, Flaw.SATURATED, id="saturated"),
-        pytest.param(200.0, 2.5, 0.010, Flaw.BLURRED, id="defocused"),
-        pytest.param(200.0, 5.0, 0.015, Flaw.BLURRED, id="far out of focus"),
+        pytest.param(200.0, 0.8, 0.005, SpotFlaw.NONE, id="normal"),
+        pytest.param(25.0, 0.8, 0.015, SpotFlaw.NONE, id="dim"),
+        pytest.param(510.0, 0.8, 0.010, SpotFlaw.SATURATED, id="saturated"),
+        pytest.param(200.0, 2.5, 0.010, SpotFlaw.BLURRED, id="defocused"),
+        pytest.param(200.0, 5.0, 0.015, SpotFlaw.BLURRED, id="far out of focus"),
     ],
 )
 def test_centers_stay_exact_in_bad_light(
-    level: float, sigma: float, limit: float, flaws: Flaw
+    level: float, sigma: float, limit: float, flaws: SpotFlaw
 ) -> None:
     lamps = grid_of_lamps(level=level)
     spots = detect_spots(expose(render(lamps, sigma)))
@@ -242,8 +242,8 @@ def test_an_led_at_the_limit_of_ten_bits_is_saturated_only_if_ten_bits_are_known
     None
 ):
     image = expose(render(grid_of_lamps(level=2000.0)), 1023)
-    assert not (detect_spots(image).flaws & Flaw.SATURATED).any()
-    assert (detect_spots(image, full_scale=1023).flaws & Flaw.SATURATED).all()
+    assert not (detect_spots(image).flaws & SpotFlaw.SATURATED).any()
+    assert (detect_spots(image, full_scale=1023).flaws & SpotFlaw.SATURATED).all()
 
 
 def test_discs_of_six_pixels_are_found_in_a_large_image() -> None:
@@ -293,14 +293,14 @@ def test_leds_in_front_of_a_bright_window_are_found_and_the_window_is_not() -> N
 @pytest.mark.parametrize(
     ("level", "full_scale", "flaw"),
     [
-        (200.0, 255, Flaw.NONE),
-        (300.0, 255, Flaw.SATURATED),
-        (300.0, 4095, Flaw.SATURATED),
+        (200.0, 255, SpotFlaw.NONE),
+        (300.0, 255, SpotFlaw.SATURATED),
+        (300.0, 4095, SpotFlaw.SATURATED),
     ],
 )
 @pytest.mark.parametrize("background", ["gradient", "glow", "wall"])
 def test_leds_before_an_uneven_background_are_found_and_told_if_saturated(
-    background: str, level: float, full_scale: int, flaw: Flaw
+    background: str, level: float, full_scale: int, flaw: SpotFlaw
 ) -> None:
     lamps = grid_of_lamps(level=level)
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]] / max(SHAPE)
@@ -315,7 +315,7 @@ def test_leds_before_an_uneven_background_are_found_and_told_if_saturated(
     spots = detect_spots(np.clip(np.rint(noisy), 0, full_scale).astype(depth))
 
     found = flaws_of(spots, lamps)
-    assert [each & Flaw.SATURATED for each in found] == [flaw] * len(lamps)
+    assert [each & SpotFlaw.SATURATED for each in found] == [flaw] * len(lamps)
 
 
 def test_streaks_are_not_spots() -> None:
@@ -389,8 +389,8 @@ def test_discs_with_a_dark_gap_are_parted(gap: float) -> None:
 def test_a_disc_parted_from_the_light_of_its_neighbour_is_flagged() -> None:
     lamps = [Lamp(200.3, 200.4, b=21.0), Lamp(242.8, 200.4, b=21.0), Lamp(500.0, 400.0)]
     spots = detect_spots(expose(render(lamps)))
-    assert flaws_of(spots, lamps)[2] is Flaw.NONE
-    assert all(flaw & Flaw.MERGED for flaw in flaws_of(spots, lamps)[:2])
+    assert flaws_of(spots, lamps)[2] is SpotFlaw.NONE
+    assert all(flaw & SpotFlaw.MERGED for flaw in flaws_of(spots, lamps)[:2])
 
 
 def test_overlapping_discs_are_flagged_as_merged() -> None:
@@ -400,7 +400,7 @@ def test_overlapping_discs_are_flagged_as_merged() -> None:
     assert center_rms(spots, whole) < 0.005
     rest = np.delete(np.arange(len(spots)), nearest(spots, whole))
     assert len(rest) == 1
-    assert Flaw(int(spots.flaws[rest[0]])) & Flaw.MERGED
+    assert SpotFlaw(int(spots.flaws[rest[0]])) & SpotFlaw.MERGED
 
 
 @pytest.mark.parametrize("sliver", [1.0, 3.0, 10.0, 20.0])
@@ -418,7 +418,7 @@ def test_discs_partly_behind_a_finger_are_flagged_as_cut(sliver: float) -> None:
     assert not (spots.flaws[nearest(spots, whole)] & WHOLE_FLAWS).any()
     rest = np.delete(np.arange(len(spots)), nearest(spots, whole))
     assert len(rest) == 2
-    assert (spots.flaws[rest] & Flaw.CUT).all()
+    assert (spots.flaws[rest] & SpotFlaw.CUT).all()
 
 
 def test_discs_that_leave_the_image_are_flagged_as_cut() -> None:
@@ -426,7 +426,7 @@ def test_discs_that_leave_the_image_are_flagged_as_cut() -> None:
     lamps = [Lamp(2.0, 300.0), Lamp(500.0, height - 9.0), Lamp(width - 15.0, 100.0)]
     spots = detect_spots(expose(render(lamps)))
     assert len(spots) == 3
-    assert (spots.flaws & Flaw.CUT).all()
+    assert (spots.flaws & SpotFlaw.CUT).all()
 
 
 @pytest.mark.parametrize(
@@ -477,7 +477,7 @@ def test_motion_blur_is_flagged_and_keeps_the_center() -> None:
     lamps = grid_of_lamps()
     spots = detect_spots(expose(render(lamps, motion=(11.0, 4.0))))
     assert center_rms(spots, lamps) < 0.01
-    assert (spots.flaws & Flaw.BLURRED).all()
+    assert (spots.flaws & SpotFlaw.BLURRED).all()
 
 
 def test_edge_width_is_the_rise_of_the_rim() -> None:
@@ -491,7 +491,9 @@ def test_edge_width_is_the_rise_of_the_rim() -> None:
 def test_spots_hardly_above_the_noise_are_flagged_as_dim() -> None:
     lamps = grid_of_lamps(level=6.0)
     spots = detect_spots(expose(render(lamps)))
-    assert [f & Flaw.DIM for f in flaws_of(spots, lamps)] == [Flaw.DIM] * len(lamps)
+    assert [f & SpotFlaw.DIM for f in flaws_of(spots, lamps)] == [SpotFlaw.DIM] * len(
+        lamps
+    )
 
 
 def test_a_view_of_a_larger_image_gives_the_same_spots() -> None:

@@ -6,18 +6,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.simulated_plans import live_plan
 
 from lightpen.arrays import Image, IntArray
 from lightpen.detection import observations
 from lightpen.detection.labelling.labels import Labels, label_images
 from lightpen.detection.observations import Observations, observe_images
+from lightpen.detection.pen_detection import detect_pen
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import look
 from lightpen.detection.spots import Spots
 from lightpen.formats.images import ImageSource
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.simulator.image_plans import live_plan, render_plan
+from lightpen.simulator.image_plans import render_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.sensor import Sensor
 
@@ -113,9 +114,9 @@ def test_no_ugly_image_is_beyond_the_live_way() -> None:
         rng = np.random.default_rng([9, seed])
         size = SEEN if seed % 40 == 0 else SMALL
         image = ugly_image(rng, *(LARGE[seed] if seed < len(LARGE) else size))
-        sighting = look(image, camera_of(*image.shape), PEN, before=before)
-        reasons.append(sighting.reason)
-        before = sighting if image.shape == SEEN else before
+        detection = detect_pen(image, camera_of(*image.shape), PEN, before=before)
+        reasons.append(detection.reason)
+        before = detection if image.shape == SEEN else before
 
     assert Reason.UNHANDLED not in reasons
     assert {Reason.NONE, Reason.EMPTY, Reason.BLURRED, Reason.TOO_FEW_LEDS} <= {
@@ -144,7 +145,7 @@ def test_an_image_that_the_search_fails_on_is_left_out_with_its_reason() -> None
     assert found.reasons == (Reason.NONE, Reason.UNHANDLED, Reason.NONE)
     assert "float32" in str(found.details[1])
     assert found.details[0] is None
-    assert look(unforeseen, CAMERA, PEN).reason is Reason.UNHANDLED
+    assert detect_pen(unforeseen, CAMERA, PEN).reason is Reason.UNHANDLED
 
 
 def test_an_image_that_labelling_fails_on_leaves_the_others_of_its_batch(

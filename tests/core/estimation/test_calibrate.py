@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import (
-    observe_centers,
-)
+from lightpen.detection.observations import observe_centers
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
@@ -138,8 +136,7 @@ def test_seated_operator_swings_calibrate() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "message"),
-    [("one-axis", "one axis"), ("upright", "hardly moved")],
+    ("kind", "message"), [("one-axis", "one axis"), ("upright", "hardly moved")]
 )
 def test_degenerate_swings_are_refused(kind: SwingKind, message: str) -> None:
     with pytest.raises(CalibrationError, match=message):
@@ -165,14 +162,14 @@ def test_a_tip_that_was_not_in_the_cone_is_refused() -> None:
     circle = 30 * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
     moving = replace(truth, translations=truth.translations + circle)
 
-    with pytest.raises(CalibrationError, match="did not stay in one place"):
+    with pytest.raises(CalibrationError, match="times the image noise"):
         calibration(centers(moving, 0.02))
 
 
 def test_a_pen_file_of_another_pen_is_refused() -> None:
     other = replace(PEN, leds=PEN.leds * [1.3, 0.8, 1.5] + [0, 5, 0])
 
-    with pytest.raises(CalibrationError, match="do not fit"):
+    with pytest.raises(CalibrationError, match="LED positions and images disagree:"):
         calibration(centers(swing(), 0.02), other)
 
 

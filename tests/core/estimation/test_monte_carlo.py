@@ -94,3 +94,14 @@ def test_exact_files_and_images_give_no_error(calibration: Calibration) -> None:
 def test_too_few_trials_are_refused(calibration: Calibration) -> None:
     with pytest.raises(ValueError, match="20 or more"):
         run_monte_carlo(calibration, 5, in_this_process)
+
+
+def test_trials_of_a_seat_that_jitters_differ_by_it(calibration: Calibration) -> None:
+    still = replace(trials_of(calibration), jitter=np.zeros((3, 3)))
+    shaken = replace(still, jitter=0.02**2 * np.eye(3))
+    found = [(run_trial(still, n), run_trial(shaken, n)) for n in range(4)]
+
+    differences = [b - a for a, b in found if a is not None and b is not None]
+    assert len(differences) >= 3
+    # 25 images with 0.02 mm of jitter move the tip by some hundredths.
+    assert 0.003 < np.std(differences) < 0.1

@@ -4,12 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import correlated_noise
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.formats.observation_files import read_poses
-from lightpen.simulator.swings import correlated_noise, swing_poses
+from lightpen.simulator.swings import swing_poses
 
 N_POSES = 200
 
@@ -65,7 +66,7 @@ def test_a_minority_elsewhere_is_left_out_and_named() -> None:
     assert not found.fit.used[others].any()
     assert found.fit.used[~others].all()
     (warning,) = found.warnings
-    assert "On one: poses 1-150. On the other: poses 151-200." in str(warning)
+    assert "poses 1-150. Second point: poses 151-200." in str(warning)
 
 
 def test_all_poses_alike_are_taken_with_a_warning() -> None:
@@ -93,7 +94,7 @@ def test_scattered_outliers_are_named() -> None:
 
     (warning,) = calibrate_pivot(R, t).warnings
 
-    assert "30 of 200 poses agree with no common tip" in str(warning)
+    assert "30 of 200 poses are outliers and were excluded:" in str(warning)
     assert "11-40" in str(warning)
 
 
@@ -103,7 +104,7 @@ def test_inverted_poses_are_told() -> None:
 
     (warning,) = calibrate_pivot(inverse, -np.einsum("nij,nj->ni", inverse, t)).warnings
 
-    assert "Inverted poses give this" in str(warning)
+    assert "This indicates inverted poses" in str(warning)
 
 
 def test_stated_covariances_are_a_floor_to_the_uncertainty() -> None:

@@ -6,35 +6,36 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.small_records import entries_of
+from tests.simulated_centers import simulate_rig_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_observations import observe_rig_centers
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
-from lightpen.estimation.report import calibration_record
-from lightpen.estimation.report_warnings import warnings_of
-from lightpen.estimation.summary import calibration_text
-from lightpen.estimation.uncertainty import ShareName
-from lightpen.estimation.verdict import Grade, judge
+from lightpen.estimation.reports.report import calibration_record
+from lightpen.estimation.reports.report_warnings import warnings_of
+from lightpen.estimation.reports.summary import calibration_text
+from lightpen.estimation.reports.verdict import Grade, judge
+from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.hashes import InputFile, Inputs, RigInputs
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.pairing import pair_images
-from lightpen.messages import Code
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.rig import Rig, from_first
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.postures import operator_postures
-from lightpen.simulator.sample_rigs import row_of_cameras
+from lightpen.simulator.samples import row_of_cameras
 from lightpen.simulator.swings import (
     Swing,
     paper_pen,
     seen_from,
-    simulate_rig_centers,
     swing_from_postures,
     swing_poses,
 )
+from lightpen.swing_messages import Code
 
 PEN = replace(paper_pen(), led_sigma=0.002)
 ROW = row_of_cameras(2, 1000.0)
@@ -132,7 +133,7 @@ def test_the_tip_lies_within_its_uncertainty_and_the_rig_has_a_share(
 
     # Three standard deviations.
     assert (error < 1.5 * good.budget.expanded_uncertainty[:3]).all()
-    assert ShareName.EXTRINSICS in {share.name for share in good.budget.shares}
+    assert ContributionName.EXTRINSICS in {share.name for share in good.budget.shares}
     assert not good.contradictions
 
 
@@ -142,7 +143,9 @@ def test_a_rig_whose_file_states_nothing_adds_nothing_to_what_the_images_say() -
 
     assert result.priors.extrinsics is not None
     assert result.priors.extrinsics.assumed
-    assert ShareName.EXTRINSICS not in {share.name for share in result.budget.shares}
+    assert ContributionName.EXTRINSICS not in {
+        share.name for share in result.budget.shares
+    }
     error = np.abs(result.joint.tip_pen - SWING.tip_pen)
     assert (error < 1.5 * result.budget.expanded_uncertainty[:3]).all()
 
@@ -165,9 +168,11 @@ def test_a_contradicted_camera_file_is_named_by_its_camera() -> None:
     result = calibrated(SEEN, rig)
     denied = result.contradictions[0]
 
-    assert "the file of camera right: they want the focal" in str(denied.sentence)
+    assert "the file of camera right: focal length" in str(denied.message)
     assert {each.camera for each in result.contradictions} == {"right"}
-    assert abs(denied.wanted - RIG.cameras[1].fx) < 1.5 * denied.wanted_uncertainty
+    assert (
+        abs(denied.estimated - RIG.cameras[1].fx) < 1.5 * denied.estimated_uncertainty
+    )
 
 
 def test_a_rig_file_that_is_contradicted_is_named_with_the_place_wanted() -> None:
@@ -176,9 +181,12 @@ def test_a_rig_file_that_is_contradicted_is_named_with_the_place_wanted() -> Non
     (denied,) = result.contradictions
 
     assert denied.of_rig
-    assert "along y" in str(denied.sentence)
-    assert "of camera right" in str(denied.sentence)
-    assert abs(denied.wanted - RIG.translations[1, 1]) < 1.5 * denied.wanted_uncertainty
+    assert "along y" in str(denied.message)
+    assert "of camera right" in str(denied.message)
+    assert (
+        abs(denied.estimated - RIG.translations[1, 1])
+        < 1.5 * denied.estimated_uncertainty
+    )
     error = np.abs(result.joint.tip_pen - SWING.tip_pen)
     assert (error < 1.5 * result.budget.expanded_uncertainty[:3]).all()
     verdict = judge(result, SwingLimits(max_uncertainty=0.1, min_images=10))
@@ -191,8 +199,8 @@ def test_a_camera_that_was_turned_is_found_by_its_turn() -> None:
     result = calibrated(SEEN, placed(turn @ RIG.rotations[1], RIG.translations[1]))
     (denied,) = result.contradictions
 
-    assert "turn of cam_from_rig about z" in str(denied.sentence)
-    assert denied.wanted == pytest.approx(-np.degrees(0.003), abs=0.01)
+    assert "turn of cam_from_rig about z" in str(denied.message)
+    assert denied.estimated == pytest.approx(-np.degrees(0.003), abs=0.01)
 
 
 def transposed(R: FloatArray, t: FloatArray) -> Rig:
@@ -219,10 +227,10 @@ def of_others(R: FloatArray, t: FloatArray) -> Rig:
     ("mistake", "words"),
     [
         (transposed, "its rotations are transposed"),
-        (inverted, "it holds rig_from_cam"),
-        (position, "the places of the cameras in the rig"),
+        (inverted, "it contains rig_from_cam"),
+        (position, "the camera positions in the rig"),
         (in_metres, "its lengths are in metres"),
-        (of_others, "the file of these cameras as they stand now"),
+        (of_others, "the file matches the current camera positions"),
     ],
 )
 def test_a_rig_file_in_another_convention_is_refused_by_name(
@@ -230,12 +238,12 @@ def test_a_rig_file_in_another_convention_is_refused_by_name(
 ) -> None:
     said = refusal(SEEN, mistake(RIG.rotations[1], RIG.translations[1]))
 
-    assert said.startswith("The rig file has camera right ")
+    assert said.startswith("The pose of camera right in the rig file")
     assert words in said
 
 
 def test_exchanged_images_are_told_with_the_order_that_is_needed() -> None:
-    assert "the images of left and right are exchanged" in refusal(SEEN[:, ::-1])
+    assert "those of left and right are swapped" in refusal(SEEN[:, ::-1])
 
 
 def test_lenses_tell_exchanged_images_from_an_inverted_file() -> None:
@@ -252,7 +260,7 @@ def test_lenses_tell_exchanged_images_from_an_inverted_file() -> None:
 
 @pytest.mark.parametrize(
     ("shift", "words"),
-    [(1, "its image 2 fits image 1"), (-2, "its image 1 fits image 3")],
+    [(1, "its image 2 matches image 1"), (-2, "its image 1 matches image 3")],
 )
 def test_images_paired_with_those_of_other_moments_are_told(
     shift: int, words: str
@@ -267,7 +275,7 @@ def test_images_of_another_swing_are_refused() -> None:
     pixels = SEEN.copy()
     pixels[:, 1] = np.random.default_rng(3).permutation(pixels[:, 1], axis=0)
 
-    assert "does not see the pen as the others do" in refusal(pixels)
+    assert "another rotation of the pen" in refusal(pixels)
 
 
 def test_a_single_image_of_another_moment_is_left_out_and_told() -> None:
@@ -278,9 +286,7 @@ def test_a_single_image_of_another_moment_is_left_out_and_told() -> None:
     apart = [why is Reason.OTHER_MOMENT for why in result.cameras[1].reasons]
     assert np.flatnonzero(apart).tolist() == [4, 20]
     assert result.used.all()
-    assert "another posture than the other cameras at 2 of 30 moments" in str(
-        warnings_of(result)[0]
-    )
+    assert "the other cameras at 2 of 30 instants" in str(warnings_of(result)[0])
     error = np.abs(result.joint.tip_pen - SWING.tip_pen)
     assert (error < 1.5 * result.budget.expanded_uncertainty[:3]).all()
 
@@ -313,8 +319,8 @@ def test_a_moment_that_one_camera_saw_is_used_and_the_missing_image_told() -> No
 
     assert result.used.all()
     said = [str(each) for each in warnings_of(result)]
-    assert said[0].startswith("Camera left has no image at 1 of 30 moments")
-    assert said[1].startswith("Camera right has no image at 2 of 30 moments")
+    assert said[0].startswith("Camera left has no image at 1 of 30 instants")
+    assert said[1].startswith("Camera right has no image at 2 of 30 instants")
     error = np.abs(result.joint.tip_pen - SWING.tip_pen)
     assert (error < 1.5 * result.budget.expanded_uncertainty[:3]).all()
 
@@ -323,7 +329,7 @@ def test_cameras_without_a_moment_in_common_are_refused() -> None:
     pixels = SEEN.copy()
     pixels[:14, 1, 3:] = pixels[15:, 0, 3:] = np.nan
 
-    assert "1 of 30 moments show the pen to camera right" in refusal(pixels)
+    assert "see the pen together at 1 of 30 instants" in refusal(pixels)
 
 
 def test_a_tip_that_slips_before_one_camera_slips_before_all() -> None:
@@ -348,7 +354,7 @@ def test_a_camera_that_sees_no_pen_is_named() -> None:
 def test_text_and_record_tell_of_each_camera(good: Calibration) -> None:
     inputs = Inputs(FILE, FILE, (FILE,), None, RigInputs(FILE, (FILE, FILE)))
     limits = SwingLimits()
-    record = calibration_record(good, inputs, "joint", limits)
+    record = entries_of(calibration_record(good, inputs, "joint", limits))
     text = calibration_text(good, "joint", None, judge(good, limits))
 
     left, right = record["rig"]["cameras"]
@@ -361,7 +367,7 @@ def test_text_and_record_tell_of_each_camera(good: Calibration) -> None:
     assert record["frames"][-1]["camera"] == "right"
     assert record["frames"][-1]["moment"] == 30
     assert len(record["inputs"]["cameras"]) == 2
-    assert "  right      30 of 30 images used" in text
+    assert "right      30 of 30 images used," in text
     assert "U from rig" in text
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.pivot import fit_pivot
+from lightpen.estimation.pivot.pivot import fit_pivot
 from lightpen.estimation.running_tip import fit_running_tip
 from lightpen.simulator.swings import paper_pen, swing_poses
 

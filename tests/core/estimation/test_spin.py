@@ -49,15 +49,17 @@ def test_the_axis_points_from_the_ball_into_the_pen() -> None:
 
 
 def test_a_pen_that_is_hardly_turned_is_refused() -> None:
-    with pytest.raises(CalibrationError, match="turned by 20 degrees about its stylus"):
+    with pytest.raises(
+        CalibrationError, match="turned by 20\N{DEGREE SIGN} about its stylus"
+    ):
         fit_spin(spun(20.0))
 
 
 def test_too_few_images_are_refused() -> None:
-    with pytest.raises(CalibrationError, match="seen in 5 images of the spin"):
+    with pytest.raises(CalibrationError, match="detected in 5 images of the rotation"):
         fit_spin(spun(90.0, n=5))
 
 
 def test_a_pen_that_is_tilted_as_it_is_spun_is_refused() -> None:
-    with pytest.raises(CalibrationError, match="was tilted while it was spun"):
+    with pytest.raises(CalibrationError, match="was tilted during the rotation"):
         fit_spin(spun(45.0, n=20, wobble=np.radians(15)))

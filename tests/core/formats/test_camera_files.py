@@ -5,7 +5,7 @@ import json
 import random
 from datetime import date
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import cv2
 import numpy as np
@@ -230,10 +230,7 @@ def test_single_precision_of_opencv_is_kept(tmp_path: Path, suffix: str) -> None
         ("%YAML:1.0\n---\n", ""),
         ("%YAML:1.0\n---\n", "# by hand\n"),
         ("2448\nimage_height: 2048", "2448\nimage_height: 2048 # px"),
-        (
-            "image_width: 2448\nimage_height: 2048",
-            "image_size: [2448, 2048]",
-        ),
+        ("image_width: 2448\nimage_height: 2048", "image_size: [2448, 2048]"),
         ("\n", "\r\n"),
     ],
 )
@@ -361,11 +358,11 @@ def test_a_temperature_that_no_camera_has_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("image_width: 2448\n", "", "does not say how large the images are"),
+        ("image_width: 2448\n", "", "does not state the image size."),
         ("2448", "2448.5", "image size of 2448.5 x 2048 px"),
         ("2448", "0", "image size of 0 x 2048 px"),
-        ("2448", "1e999", 'image_width .*"1e999" is too large a number'),
-        ("2448", "9" * 5000, "is too large a number"),
+        ("2448", "1e999", 'image_width .*"1e999" is too large'),
+        ("2448", "9" * 5000, "is too large."),
         ("2448", "[2448, 1]", "image_width .* has 2 numbers where 1 are needed"),
         ("2448", "wide", 'image_width .* "wide" is not a number'),
         ("4638.1999999999998", ".Nan", r'camera_matrix .* "\.Nan" is not a finite'),
@@ -380,7 +377,7 @@ def test_a_temperature_that_no_camera_has_is_refused(tmp_path: Path) -> None:
         ("0., 0., 1. ]", "0., 0. ]", "8 numbers where its 3 rows of 3 need 9"),
         ("   rows: 1\n   cols: 5", "   rows: 1\n   cols: 6", "5 numbers where its 1"),
         (", 0.33333333333333331 ]", ", 1, 2 ]", "6 numbers where its 1 rows of 5"),
-        ("dt: d", "dt: !!python/object/apply:os.getcwd []", "tag .*can ask for code"),
+        ("dt: d", "dt: !!python/object/apply:os.getcwd []", "tag .*For security"),
         ("camera_matrix", "camera", "has no camera_matrix"),
         ("distortion_coefficients", "distortions", "has no distortion_coefficients"),
         ("image_height:", "image_width:", 'image_width" is given a second time'),
@@ -402,15 +399,11 @@ def test_a_flaw_of_a_camera_file_is_named(
     [
         ("radtan", "equidistant", r"fisheye lens \(equidistant\)"),
         ("radtan", "fov", "fisheye lens"),
-        ("radtan", "thin_prism", 'model "thin_prism", which is not known'),
+        ("radtan", "thin_prism", 'model "thin_prism", which is not supported'),
         ("pinhole", "omni", 'model "omni"; the model pinhole is needed'),
         (", 1031.3]", "]", "intrinsics .* has 3 numbers where 4 are needed"),
         ("[2448, 2048]", "[]", "resolution .* has 0 numbers where 2 are needed"),
-        (
-            "cam0:\n",
-            "cam1: {camera_model: pinhole}\ncam0:\n",
-            "describes 2 cameras",
-        ),
+        ("cam0:\n", "cam1: {camera_model: pinhole}\ncam0:\n", "describes 2 cameras"),
         (KALIBR, "cam0: ", "cam0 .* has no named values below it"),
     ],
 )
@@ -578,7 +571,7 @@ def test_code_in_a_file_is_not_run(tmp_path: Path) -> None:
 
 
 def test_a_huge_camera_file_is_refused(tmp_path: Path) -> None:
-    assert "more than the 4 MB" in refusal(tmp_path, OPENCV + "#" * 5_000_000)
+    assert "the maximum is 4 MB." in refusal(tmp_path, OPENCV + "#" * 5_000_000)
 
 
 SERIAL_LETTERS = st.characters(min_codepoint=33, max_codepoint=126)
@@ -610,14 +603,12 @@ def cameras(draw: st.DrawFn) -> Camera:
     )
 
 
-@given(cameras(), st.sampled_from(["opencv", "ros"]))
+@given(cameras())
 def test_any_camera_is_read_back_to_the_last_digit(
-    tmp_path_factory: pytest.TempPathFactory,
-    expected: Camera,
-    layout: Literal["opencv", "ros"],
+    tmp_path_factory: pytest.TempPathFactory, expected: Camera
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "round_trip.yaml"
-    write_camera(expected, path, layout)
+    write_camera(expected, path)
     assert_same(read_camera(path), expected)
 
 

@@ -82,7 +82,7 @@ def test_a_huge_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
     path = tmp_path / "huge.yaml"
     with path.open("wb") as stream:
         stream.truncate(10**12)  # sparse: a terabyte to whoever tries to read it
-    with pytest.raises(FileError, match=r"1000000\.0 MB, more than the 0\.001 MB"):
+    with pytest.raises(FileError, match=r"1000000\.0 MB; the maximum is 0\.001 MB"):
         read_bytes(path, CAMERA_FILE, LIMIT)
 
 
@@ -130,13 +130,13 @@ def test_line_ends_of_every_system_are_one(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("data", "what"),
     [
-        (b"led,x\n1,\x002", "line 2 holds the control character 0"),
-        ("1,2".encode("utf-16-le"), "line 1 holds the control character 0"),
+        (b"led,x\n1,\x002", "line 2 contains the control character 0"),
+        ("1,2".encode("utf-16-le"), "line 1 contains the control character 0"),
         (b"\x89PNG\r\n\x1a\n", "control character 26"),
-        (b"\x81\x8d", "byte 1 fits no known encoding"),
-        (b"\xff\xfe1", "fits no known encoding"),
-        (b" \n\t\n", "nothing but blanks"),
-        (b"\xef\xbb\xbf", "nothing but blanks"),
+        (b"\x81\x8d", "byte 1 matches no known encoding"),
+        (b"\xff\xfe1", "matches no known encoding."),
+        (b" \n\t\n", "contains only blanks."),
+        (b"\xef\xbb\xbf", "contains only blanks."),
     ],
 )
 def test_what_is_not_text_is_refused(tmp_path: Path, data: bytes, what: str) -> None:

@@ -93,7 +93,7 @@ def test_a_png_with_a_header_of_two_bytes_is_damaged() -> None:
 def test_more_pixels_than_those_of_cameras_are_refused() -> None:
     pgm = b"P5\n60000 60000\n255\n"
 
-    with pytest.raises(FileError, match=r"60000 x 60000 px; at most 70,000,000"):
+    with pytest.raises(FileError, match=r"60000 x 60000 px; the maximum is 70,000,000"):
         header_of(pgm)
 
 

@@ -130,7 +130,9 @@ def test_an_image_that_takes_too_much_memory_is_refused() -> None:
     deep = b"\x89PNG\r\n\x1a\n" + (13).to_bytes(4, "big") + b"IHDR"
     deep += (6000).to_bytes(4, "big") * 2 + bytes([16, 6, 0, 0, 0])
 
-    with pytest.raises(FileError, match=r"would take 576 MB .* at most 250 MB"):
+    with pytest.raises(
+        FileError, match="needs 576 MB for decoding; the maximum is 250 MB"
+    ):
         decode_image(deep, "deep.png")
 
 
@@ -248,7 +250,7 @@ def test_a_folder_that_may_not_be_looked_into_is_refused(
 
     sentence = (
         f"The source of images {folder / place} cannot be read: Permission denied. "
-        "Check that it is yours to read and that its disk is connected."
+        "Check the read permission and the disk connection."
     )
     assert told.stdout.splitlines() == [sentence, sentence]
 
@@ -310,7 +312,7 @@ def test_a_video_of_an_unknown_codec_is_refused(tmp_path: Path) -> None:
     write_video(path)
     path.write_bytes(path.read_bytes().replace(b"MJPG", b"FV1k"))
 
-    with pytest.raises(FileError, match='coded as "FV1K"'):
+    with pytest.raises(FileError, match='unsupported codec "FV1K"'):
         find_images(str(path))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 LIMITED = """
 import ctypes, sys
-from lightpen.formats.memory_limit import limit_memory
+from lightpen.formats.video_process import limit_memory
 limit_memory(100_000_000)
 block = bytearray(50_000_000)
 if sys.platform == "win32":

@@ -7,7 +7,7 @@ from threading import Event
 
 import pytest
 
-from lightpen.formats.memory_room import MemoryRoom
+from lightpen.formats.images import MemoryRoom
 
 
 @pytest.fixture

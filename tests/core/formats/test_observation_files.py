@@ -12,10 +12,7 @@ from hypothesis import strategies as st
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, LightpenError
-from lightpen.formats.observation_files import (
-    read_centers,
-    read_poses,
-)
+from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.model.rigid import rotation_from_vector
 
 HEADER = "frame,led,x_px,y_px"
@@ -113,7 +110,7 @@ def test_the_first_led_given_twice_is_named_with_both_lines(tmp_path: Path) -> N
         tmp_path, "9,1,0,0", "1,3,0,0", "9,1,0,0", "1,3,0,0", "9,1,0,0"
     )
     assert text.startswith(
-        "Line 3 of obs.csv: LED 1 of frame 9 stands already on line 1"
+        "Line 3 of obs.csv: LED 1 of frame 9 is already given on line 1"
     )
 
 
@@ -134,7 +131,7 @@ def test_a_huge_file_of_centres_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "obs.csv"
     with path.open("wb") as stream:
         stream.truncate(10**11)
-    with pytest.raises(FileError, match="more than the 16 MB"):
+    with pytest.raises(FileError, match="the maximum is 16 MB"):
         read_centers(path, 3)
 
 

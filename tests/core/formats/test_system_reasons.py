@@ -4,13 +4,13 @@ import errno
 import os
 
 from lightpen.formats.system_reasons import strerror
-from lightpen.sentences import Sentence
+from lightpen.messages import Message
 
 
 def test_a_known_reason_is_worded_as_the_system_does_and_can_be_translated() -> None:
     said = strerror(PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
 
-    assert isinstance(said, Sentence)
+    assert isinstance(said, Message)
     assert str(said) == "Permission denied"
     assert said.code == "system.denied"
 

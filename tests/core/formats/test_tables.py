@@ -13,9 +13,9 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.pen_files import PEN_FILE
 from lightpen.formats.tables import Table, number_flaw, parse_table, read_table
-from lightpen.sentences import sentence
+from lightpen.messages import message
 
-LEDS = sentence("test.leds", "the LEDs")
+LEDS = message("table.of-leds")
 COLUMNS = (("led",), ("x_mm",), ("y_mm",))
 NUMBERS = [[1, 0.5, -2.25], [2, 60.125, 1e-7], [3, 120.0, 3e2]]
 
@@ -82,8 +82,8 @@ def test_rows_know_their_lines() -> None:
     table = parse_table("# one\nled,x\n\n1,2\n# five\n3,4\n", "t.csv")
     assert table.lines == [4, 6]
     assert (
-        str(table.error(1, sentence("test.flaw", "wrong.")))
-        == "Line 6 of t.csv: wrong."
+        str(table.error(1, message("number.no-list")))
+        == "Line 6 of t.csv: it is not a list of numbers."
     )
 
 
@@ -140,13 +140,13 @@ def test_decimal_commas_between_commas_are_explained() -> None:
 
 
 def test_a_column_named_twice_is_refused() -> None:
-    assert 'the header names "x" twice' in refusal("led,x,X\n1,2,3\n")
+    assert 'duplicate column "x" in the header.' in refusal("led,x,X\n1,2,3\n")
 
 
 def test_columns_that_mean_the_same_are_refused() -> None:
     table = parse_table("led,x,x_px\n1,2,3\n", "t.csv")
-    with pytest.raises(FileError, match=r"Columns 2 and 3 of t\.csv both hold x_px"):
-        table.columns((("led",), ("x_px", "x")), sentence("test.centres", "centres"))
+    with pytest.raises(FileError, match=r"Columns 2 and 3 of t\.csv both contain x_px"):
+        table.columns((("led",), ("x_px", "x")), message("table.of-centers"))
 
 
 def test_a_missing_column_is_named() -> None:
@@ -157,7 +157,7 @@ def test_a_missing_column_is_named() -> None:
 
 def test_a_wrong_number_of_columns_without_header_is_refused() -> None:
     table = parse_table("1,2\n", "t.csv")
-    with pytest.raises(FileError, match="no header and 2 columns; the LEDs need the 3"):
+    with pytest.raises(FileError, match="no header and 2 columns; LEDs of a pen need"):
         table.columns(COLUMNS, LEDS)
 
 

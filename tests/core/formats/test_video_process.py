@@ -52,12 +52,12 @@ def frame_of_h264(side: int) -> bytes:
     sizes = f"{66:08b}" + "11000000" + f"{62:08b}"
     sizes += 4 * zero + exponential_golomb(1) + "0" + 2 * blocks + "1100"
     picture = 2 * zero + "00" + 3 * zero + "000" + 3 * zero + "000"
-    piece = zero + exponential_golomb(7) + zero + "0000" + zero + "0000" + "00" + zero
+    block = zero + exponential_golomb(7) + zero + "0000" + zero + "0000" + "00" + zero
     noise = np.random.default_rng(0).integers(0, 2, 4000)
     return (
         unit_of_h264(0x67, sizes)
         + unit_of_h264(0x68, picture)
-        + unit_of_h264(0x65, piece + "".join(map(str, noise)))
+        + unit_of_h264(0x65, block + "".join(map(str, noise)))
     )
 
 

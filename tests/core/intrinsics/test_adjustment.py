@@ -29,8 +29,7 @@ def fitted(views: Views, tolerances: BoardTolerances = VAGUE, n: int = 5) -> Boa
 
 
 @pytest.mark.parametrize(
-    "word",
-    ["chessboard:9x6:20", "circles:9x6:20:12", "asymmetric-circles:4x11:20:16"],
+    "word", ["chessboard:9x6:20", "circles:9x6:20:12", "asymmetric-circles:4x11:20:16"]
 )
 def test_exact_points_give_the_exact_camera(
     make_views: MakeViews, camera: Camera, word: str

@@ -15,7 +15,7 @@ from lightpen.intrinsics.calibration import (
 )
 from lightpen.intrinsics.coverage import cover
 from lightpen.intrinsics.next_view import choose_next_view
-from lightpen.intrinsics.regions import measure_regions
+from lightpen.intrinsics.report import measure_regions
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
@@ -49,7 +49,7 @@ def test_five_coefficients_are_kept_where_eight_gain_nothing(
     found: CameraCalibration,
 ) -> None:
     assert found.choice.n_coefficients == 5
-    assert "5 coefficients" in str(found.choice.sentence)
+    assert "5 distortion coefficients:" in str(found.choice.message)
 
 
 def test_eight_coefficients_are_taken_where_the_lens_needs_them(
@@ -62,7 +62,7 @@ def test_eight_coefficients_are_taken_where_the_lens_needs_them(
     found = calibrate_camera(make_views(of=lens, n_views=24), BoardTolerances())
 
     assert found.choice.n_coefficients == 8
-    assert "lessen the error in views left out" in str(found.choice.sentence)
+    assert "they reduce the cross-validated error" in str(found.choice.message)
 
 
 def test_halves_agree_within_what_their_difference_may_be(
@@ -157,7 +157,7 @@ def test_points_of_another_board_are_refused(make_views: MakeViews) -> None:
     views = make_views()
     shuffled = views.pixels[:, :, np.random.default_rng(1).permutation(54)]
 
-    with pytest.raises(CalibrationError, match="other squares"):
+    with pytest.raises(CalibrationError, match="its squares differ"):
         calibrate_camera(replace(views, pixels=shuffled), BoardTolerances())
 
 
@@ -221,4 +221,4 @@ def test_a_wide_lens_is_fitted_though_no_view_reaches_the_corners(
 
     assert found.adjustment.rms < 1.1 * NOISE * 2**0.5
     assert np.isfinite(map_uncertainty(found.camera, np.eye(12)).worst)
-    assert any("the corners are a guess" in str(each) for each in found.remarks)
+    assert any("the corners are extrapolated" in str(each) for each in found.remarks)

@@ -7,7 +7,12 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.intrinsics.boards import parse_board
-from lightpen.intrinsics.capture import STILL_TIME, Capture, Sight, wanted_outline
+from lightpen.intrinsics.capture import (
+    STILL_TIME,
+    BoardVisibility,
+    Capture,
+    wanted_outline,
+)
 from lightpen.intrinsics.views import Views
 
 MakeViews = Callable[..., Views]
@@ -33,7 +38,7 @@ def test_a_board_held_still_is_kept_once(
     kept = held(capture, points)
     later = held(kept, points, 1.0)
 
-    assert kept.sight is Sight.KEPT
+    assert kept.sight is BoardVisibility.KEPT
     assert len(later.kept) == 1
 
 
@@ -42,7 +47,7 @@ def test_a_moving_board_is_not_kept(capture: Capture, make_views: MakeViews) -> 
     for step in range(20):
         capture = capture.after(points + 3.0 * step, 0.1 * step)
 
-    assert capture.sight is Sight.MOVING
+    assert capture.sight is BoardVisibility.MOVING
     assert not capture.kept
 
 
@@ -54,7 +59,7 @@ def test_a_view_like_one_that_was_kept_is_not_kept(
     for points, begin in ((first, 2.0), (second, 3.0)):
         again = held(both, points + 8.0, begin)
 
-        assert again.sight is Sight.ALIKE
+        assert again.sight is BoardVisibility.ALIKE
         assert len(again.kept) == 2
 
 
@@ -65,12 +70,12 @@ def test_a_board_that_has_just_come_to_rest_is_not_kept_yet(
     moved = held(capture, first).after(second, 10.0)
     still = moved.after(second, 10.0 + 0.5 * STILL_TIME)
 
-    assert (moved.sight, still.sight) == (Sight.MOVING, Sight.STILL)
+    assert (moved.sight, still.sight) == (BoardVisibility.MOVING, BoardVisibility.STILL)
     assert len(still.kept) == 1
 
 
 def test_a_board_that_is_not_seen_is_said_to_be_so(capture: Capture) -> None:
-    assert capture.after(None, 0.0).sight is Sight.UNSEEN
+    assert capture.after(None, 0.0).sight is BoardVisibility.UNSEEN
 
 
 def test_points_that_were_not_seen_are_none_of_the_view(

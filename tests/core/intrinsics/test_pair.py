@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.simulated_boards import simulate_board_poses
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
@@ -13,7 +14,6 @@ from lightpen.intrinsics.pair import PairCalibration, calibrate_pair
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.board_views import simulate_board_poses
 
 MakeViews = Callable[..., Views]
 TURN = rotation_from_vector(np.array([0.02, -0.2, 0.01]))
@@ -139,7 +139,7 @@ def test_what_either_camera_says_of_the_board_is_told_with_its_name(
 
     assert len(told) == 2
     for name, words in zip(NAMES, told, strict=True):
-        assert words.startswith(f"Camera {name}: The board is not what")
+        assert words.startswith(f"Camera {name}: The board does not match")
 
 
 def test_too_few_views_of_both_are_refused(camera: Camera) -> None:

@@ -6,6 +6,7 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
+from tests.simulated_boards import expose_board, render_board
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import CalibrationError, FileError
@@ -17,7 +18,6 @@ from lightpen.intrinsics.squares import CornerCount, count_from, goes_on
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.boards import expose_board, render_board
 from lightpen.simulator.sensor import Sensor
 
 SMALL = Camera(
@@ -193,7 +193,7 @@ def test_another_board_than_was_said_is_named(
 
     with pytest.raises(CalibrationError) as caught:
         observe_board(source_of(image), parse_board(said), lambda fraction: None)
-    assert caught.value.sentence.code == code
+    assert caught.value.message.code == code
 
 
 def test_the_corners_of_a_chessboard_are_counted_whole() -> None:
@@ -221,7 +221,7 @@ def test_a_part_of_a_far_larger_board_is_not_taken_for_the_board(said: str) -> N
     """OpenCV finds one, of every second corner or of corners that are none."""
     image = image_of(parse_board("chessboard:11x8:20"))
     board = parse_board(f"chessboard:{said}:20")
-    with pytest.raises(CalibrationError, match=r"but one of 11 x 8\."):
+    with pytest.raises(CalibrationError, match=r"the images show 11 x 8\."):
         observe_board(source_of(image), board, lambda fraction: None)
 
 
@@ -236,8 +236,8 @@ def test_of_a_board_that_leaves_the_image_it_is_said_how_many_corners_are_seen()
     board = parse_board("chessboard:4x3:20")
     with pytest.raises(CalibrationError) as caught:
         observe_board(source_of(image), board, lambda fraction: None)
-    assert caught.value.sentence.code == "intrinsics.larger-count"
-    assert f"{counted.columns} x {counted.rows} are seen" in str(caught.value)
+    assert caught.value.message.code == "intrinsics.larger-count"
+    assert f"{counted.columns} x {counted.rows} of a larger one" in str(caught.value)
 
 
 def test_a_board_of_which_a_part_is_seen_is_not_said_to_be_another() -> None:
@@ -245,7 +245,7 @@ def test_a_board_of_which_a_part_is_seen_is_not_said_to_be_another() -> None:
     image = image_of(whole, filled=0.75)[:, :250].copy()
     with pytest.raises(CalibrationError) as caught:
         observe_board(source_of(image), whole, lambda fraction: None)
-    assert caught.value.sentence.code == "intrinsics.unseen"
+    assert caught.value.message.code == "intrinsics.unseen"
 
 
 def test_a_mirrored_board_is_said_to_be_so() -> None:

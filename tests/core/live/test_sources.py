@@ -9,29 +9,29 @@ import pytest
 
 from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.cameras.protocol import CameraSettings, DeviceNotFound
-from lightpen.detection.sighting import look
-from lightpen.live.sources import Surroundings, camera_of, cameras_of
-from lightpen.record.reading import open_record
+from lightpen.detection.pen_detection import detect_pen
+from lightpen.live.sources import SourceEnvironment, camera_of, cameras_of
+from lightpen.record.swings.reading import open_record
 from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.sample_rigs import beside
+from lightpen.simulator.samples import beside
 from lightpen.simulator.scenes import Scene
 from lightpen.swing.preparation import SourceChoice, SourceKind
 
 
 @pytest.fixture
-def around() -> Surroundings:
-    return Surroundings(Scene(seed=7), SkippingClock())
+def around() -> SourceEnvironment:
+    return SourceEnvironment(Scene(seed=7), SkippingClock())
 
 
 def test_usually_the_simulated_pen_is_seen_in_real_time() -> None:
-    around = Surroundings()
+    around = SourceEnvironment()
 
     assert isinstance(around.clock, MachineClock)
     assert camera_of(SourceChoice(), around).serial == "SIM-1"
 
 
 def test_the_simulated_camera_shows_the_scene_of_the_surroundings(
-    around: Surroundings,
+    around: SourceEnvironment,
 ) -> None:
     camera = camera_of(SourceChoice(SourceKind.SIMULATED), around)
 
@@ -40,7 +40,7 @@ def test_the_simulated_camera_shows_the_scene_of_the_surroundings(
 
 
 def test_a_record_is_played_from_end_to_end_again_and_again(
-    around: Surroundings, swung: Callable[..., Path]
+    around: SourceEnvironment, swung: Callable[..., Path]
 ) -> None:
     n_images = len(open_record(swung()).images)
     camera = camera_of(SourceChoice(SourceKind.RECORDED, str(swung())), around)
@@ -56,7 +56,7 @@ def test_a_record_is_played_from_end_to_end_again_and_again(
 
 
 def test_a_recording_waits_by_the_clock_of_the_surroundings(
-    around: Surroundings, swung: Callable[..., Path]
+    around: SourceEnvironment, swung: Callable[..., Path]
 ) -> None:
     camera = camera_of(SourceChoice(SourceKind.RECORDED, str(swung())), around)
     camera.open()
@@ -69,7 +69,7 @@ def test_a_recording_waits_by_the_clock_of_the_surroundings(
 
 
 def test_a_recording_that_is_not_there_is_found_missing_when_it_is_opened(
-    around: Surroundings, tmp_path: Path
+    around: SourceEnvironment, tmp_path: Path
 ) -> None:
     choice = SourceChoice(SourceKind.RECORDED, str(tmp_path / "gone"))
     camera = camera_of(choice, around)
@@ -78,7 +78,7 @@ def test_a_recording_that_is_not_there_is_found_missing_when_it_is_opened(
 
 
 def test_two_simulated_cameras_see_one_pen_from_two_places(
-    around: Surroundings,
+    around: SourceEnvironment,
 ) -> None:
     first, second = cameras_of([SourceChoice(), SourceChoice()], around)
     assert isinstance(first, SimulatedCamera)
@@ -95,10 +95,10 @@ def test_two_simulated_cameras_see_one_pen_from_two_places(
     rig = beside(around.scene.camera, around.scene.cone_cam)
     pen, tip, cone = around.scene.pen, around.scene.tip_pen, around.scene.cone_cam
     seen = [
-        look(image, camera, pen)
+        detect_pen(image, camera, pen)
         for image, camera in zip(images, rig.cameras, strict=True)
     ]
-    assert all(sighting.has_pose for sighting in seen)
+    assert all(detection.has_pose for detection in seen)
     in_second = seen[1].rotation @ tip + seen[1].translation
     back = rig.rotations[1].T @ (in_second - rig.translations[1])
     np.testing.assert_allclose(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from tests.faulty_camera import FaultyCamera
 from tests.gige_simulator import ADDRESS, SECOND_ADDRESS, GigeSimulator
 from typing_extensions import override
 
@@ -24,18 +25,17 @@ from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
     Failed,
-    Troubled,
+    FaultRaised,
     WorkerEvent,
 )
-from lightpen.detection.aim import Aim
+from lightpen.detection.pen_detection import PenDetection, unseen
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import Sighting, unseen
+from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.formats.decoding import encode_png
-from lightpen.live.looking import LIVELY_NS, UNHURRIED, Live, LiveImage
+from lightpen.live.pipeline import LIVELY_NS, UNHURRIED, Live, LiveImage
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.sample_rigs import beside
+from lightpen.simulator.samples import beside
 from lightpen.simulator.scenes import Scene
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class Screen:
         self.images: tuple[list[LiveImage], list[LiveImage]] = ([], [])
         self.connections: tuple[list[Connection], list[Connection]] = ([], [])
         self.failures: list[str] = []
-        self.troubles: list[str] = []
+        self.faults: list[str] = []
         self._changed = threading.Condition()
 
     def on_image(self, image: LiveImage) -> None:
@@ -68,8 +68,8 @@ class Screen:
         with self._changed:
             if isinstance(event, ConnectionChanged):
                 self.connections[camera].append(event.connection)
-            if isinstance(event, Troubled):
-                self.troubles.append(str(event.error))
+            if isinstance(event, FaultRaised):
+                self.faults.append(str(event.error))
             if isinstance(event, Failed):
                 self.failures.append(str(event.error))
             self._changed.notify_all()
@@ -124,7 +124,7 @@ def make_live(
         live.stop()
 
 
-class PunctualCamera(SimulatedCamera):
+class PunctualCamera(FaultyCamera):
     """Its images take the same time on their way, whatever else the machine does."""
 
     @override
@@ -135,7 +135,7 @@ class PunctualCamera(SimulatedCamera):
 
 
 @pytest.fixture
-def simulated() -> tuple[SimulatedCamera, SimulatedCamera]:
+def simulated() -> tuple[FaultyCamera, FaultyCamera]:
     scene, clock = Scene(camera=TINY), MachineClock()
     first = PunctualCamera(scene, clock)
     rig = beside(scene.camera, scene.cone_cam)
@@ -143,9 +143,7 @@ def simulated() -> tuple[SimulatedCamera, SimulatedCamera]:
 
 
 def test_images_of_two_simulated_cameras_come_by_moments(
-    simulated: tuple[SimulatedCamera, SimulatedCamera],
-    make_live: MakeLive,
-    screen: Screen,
+    simulated: tuple[FaultyCamera, FaultyCamera], make_live: MakeLive, screen: Screen
 ) -> None:
     live = make_live(simulated)
     screen.wait_for_moments(15)
@@ -159,12 +157,10 @@ def test_images_of_two_simulated_cameras_come_by_moments(
 
 
 def test_a_second_camera_is_looked_at_before_it_is_known_what_for(
-    simulated: tuple[SimulatedCamera, SimulatedCamera],
-    station: "Station",
-    screen: Screen,
+    simulated: tuple[FaultyCamera, FaultyCamera], station: "Station", screen: Screen
 ) -> None:
     live = Live(simulated, SETTINGS, screen, station.runner)
-    live.set_aim(Aim(TINY))
+    live.set_region(RegionOfInterest(TINY))
     live.start()
     screen.wait_for_moments(2)
     live.stop()
@@ -173,40 +169,48 @@ def test_a_second_camera_is_looked_at_before_it_is_known_what_for(
 
 
 def test_each_camera_is_followed_by_itself_and_anew_with_each_pen(
-    simulated: tuple[SimulatedCamera, SimulatedCamera],
+    simulated: tuple[FaultyCamera, FaultyCamera],
     station: "Station",
     screen: Screen,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     cameras = [replace(TINY, serial=str(n)) for n in range(4)]
-    told_before: dict[str, list[Sighting | None]] = {c.serial: [] for c in cameras}
-    found: dict[str, list[Sighting]] = {c.serial: [] for c in cameras}
+    told_before: dict[str, list[PenDetection | None]] = {c.serial: [] for c in cameras}
+    found: dict[str, list[PenDetection]] = {c.serial: [] for c in cameras}
 
     def look(
-        image: Image, camera: Camera, pen: Pen, mask: object, before: Sighting | None,
-        full_scale: int, *, is_followed: bool,
-    ) -> Sighting:  # fmt: skip
+        image: Image,
+        camera: Camera,
+        pen: Pen,
+        mask: object,
+        before: PenDetection | None,
+        full_scale: int,
+        *,
+        is_followed: bool,
+    ) -> PenDetection:
         told_before[camera.serial].append(before)
         found[camera.serial].append(unseen(pen, Reason.EMPTY))
         return found[camera.serial][-1]
 
-    def has_several(sightings: list[Sighting]) -> bool:
-        return len(sightings) > 2
+    def has_several(detections: list[PenDetection]) -> bool:
+        return len(detections) > 2
 
-    monkeypatch.setattr("lightpen.live.looking.look", look)
+    monkeypatch.setattr("lightpen.live.pipeline.detect_pen", look)
     live = Live(simulated, SETTINGS, screen, station.runner)
     pen = station.preparation.pen
     for one, other in (cameras[:2], cameras[2:]):
-        live.set_aim(Aim(one, pen, others=(Aim(other, pen),)))
+        live.set_region(
+            RegionOfInterest(one, pen, others=(RegionOfInterest(other, pen),))
+        )
         if one is cameras[0]:
             live.start()
         screen.wait_until(partial(has_several, found[other.serial]))
     live.stop()
 
-    for serial, sightings in found.items():
+    for serial, detections in found.items():
         first, *rest = told_before[serial]
         assert first is None
-        assert all(a is b for a, b in zip(rest, sightings[:-1], strict=True))
+        assert all(a is b for a, b in zip(rest, detections[:-1], strict=True))
 
 
 class HeldUpCamera(PunctualCamera):
@@ -225,22 +229,20 @@ class HeldUpCamera(PunctualCamera):
 
 
 def test_images_held_up_at_first_are_told_and_paired_rightly_afterwards(
-    simulated: tuple[SimulatedCamera, SimulatedCamera],
-    make_live: MakeLive,
-    screen: Screen,
+    simulated: tuple[FaultyCamera, FaultyCamera], make_live: MakeLive, screen: Screen
 ) -> None:
     first, _ = simulated
     rig = beside(first.scene.camera, first.scene.cone_cam)
     second = HeldUpCamera(first.scene, MachineClock(), first.operator, rig=rig)
     make_live((first, second))
-    screen.wait_until(lambda: bool(screen.troubles))
+    screen.wait_until(lambda: bool(screen.faults))
     n_before = len(screen.moments())
     screen.wait_for_moments(4)
 
-    said = re.search(r"(\d+) ms apart", screen.troubles[0])
+    said = re.search(r"(\d+) ms apart", screen.faults[0])
     assert said is not None
     assert 1_000_000 * int(said[1]) == HELD_UP_NS
-    assert len(screen.troubles) == 1
+    assert len(screen.faults) == 1
     for one, other in screen.moments()[n_before + 1 :]:
         assert one.frame.device_ts_ns is not None
         assert other.frame.device_ts_ns is not None
@@ -249,14 +251,12 @@ def test_images_held_up_at_first_are_told_and_paired_rightly_afterwards(
 
 
 def test_a_lost_image_costs_its_moment_and_is_counted(
-    simulated: tuple[SimulatedCamera, SimulatedCamera],
-    make_live: MakeLive,
-    screen: Screen,
+    simulated: tuple[FaultyCamera, FaultyCamera], make_live: MakeLive, screen: Screen
 ) -> None:
     live = make_live(simulated)
     screen.wait_for_moments(3)
     before = live.stats.unpaired
-    simulated[1].faults.stall(0.3)
+    simulated[1].stall(0.3)
     screen.wait_until(lambda: live.stats.unpaired >= before + 4)
     screen.wait_for_moments(3)
     live.stop()
@@ -277,7 +277,7 @@ def test_two_recordings_of_other_moments_are_refused_once(
     make_live([ReplayCamera(place, loops=True) for place in places])
     screen.wait_until(lambda: len(screen.failures) == 1)
 
-    assert "another number of images" in screen.failures[0]
+    assert "The two recordings have different numbers of images." in screen.failures[0]
 
 
 @pytest.fixture
@@ -294,9 +294,7 @@ def gige_pair(
 
 
 def test_two_cameras_are_still_paired_when_nothing_has_moved_for_long(
-    gige_pair: tuple[GigeSimulator, GigeSimulator],
-    make_live: MakeLive,
-    screen: Screen,
+    gige_pair: tuple[GigeSimulator, GigeSimulator], make_live: MakeLive, screen: Screen
 ) -> None:
     places = (ADDRESS, SECOND_ADDRESS)
     make_live([DeviceCamera(AravisDevice(place)) for place in places])
@@ -322,9 +320,7 @@ def period_ms(images: Sequence[LiveImage]) -> float:
 
 
 def test_two_gige_cameras_are_paired_and_each_comes_back_by_itself(
-    gige_pair: tuple[GigeSimulator, GigeSimulator],
-    make_live: MakeLive,
-    screen: Screen,
+    gige_pair: tuple[GigeSimulator, GigeSimulator], make_live: MakeLive, screen: Screen
 ) -> None:
     places = (ADDRESS, SECOND_ADDRESS)
     live = make_live([DeviceCamera(AravisDevice(place)) for place in places])

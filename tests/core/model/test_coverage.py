@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.model.coverage import DIRECTION_NAMES, measure_coverage, posture_spread
+from lightpen.errors import CalibrationError
+from lightpen.model.coverage import (
+    DIRECTION_NAMES,
+    MIN_SPREAD,
+    measure_coverage,
+    posture_spread,
+    require_spread,
+)
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import swing_poses
 
@@ -74,3 +81,22 @@ def test_a_good_swing_misses_no_direction() -> None:
     swing = swing_poses(300, np.random.default_rng(0))
 
     assert measure_coverage(swing.rotations).missing == []
+
+
+def test_a_pen_that_hardly_moved_is_told_apart_from_one_that_moved_about_one_axis() -> (
+    None
+):
+    def turned(about: FloatArray, rms: float) -> FloatArray:
+        vectors = np.concatenate([rms * about, -rms * about])
+        return rotation_from_vector(np.sqrt(len(about)) * vectors)
+
+    two, one = np.eye(3)[1:], np.eye(3)[:1]
+    # Of two axes, the direction at right angles to both turns by 1.4 times as much.
+    with pytest.raises(CalibrationError) as hardly:
+        require_spread(turned(two, 0.9 * MIN_SPREAD))
+    with pytest.raises(CalibrationError) as about_one:
+        require_spread(turned(one, 1.1 * MIN_SPREAD))
+    require_spread(turned(two, 1.1 * MIN_SPREAD))
+
+    assert hardly.value.message.code == "coverage.hardly-moved"
+    assert about_one.value.message.code == "coverage.one-axis"

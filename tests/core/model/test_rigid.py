@@ -61,3 +61,24 @@ def test_a_rigid_motion_is_found_exactly() -> None:
 
     np.testing.assert_allclose(found_R, R, atol=1e-12)
     np.testing.assert_allclose(found_t, t, atol=1e-9)
+
+
+def test_small_angles_come_back_exactly() -> None:
+    for angle in (1e-6, 1e-3, 0.019):
+        vectors = angle * AXES
+        back = vector_from_rotation(rotation_from_vector(vectors))
+        np.testing.assert_allclose(back, vectors, atol=1e-14)
+
+
+def test_no_rotation_is_nearer_than_the_nearest() -> None:
+    """Also to a matrix that mirrors, of which the smallest axis is turned over."""
+    matrices = RNG.standard_normal((200, 3, 3))
+    assert (np.linalg.det(matrices) < 0).any()
+    alike = np.einsum("nij,nij->n", nearest_rotation(matrices), matrices)
+
+    sizes = np.linalg.svd(matrices, compute_uv=False)
+    sizes[:, 2] *= np.sign(np.linalg.det(matrices))
+    np.testing.assert_allclose(alike, sizes.sum(axis=1), atol=1e-12)
+    for vector in 0.1 * AXES[:20]:
+        other = rotation_from_vector(vector) @ nearest_rotation(matrices)
+        assert (np.einsum("nij,nij->n", other, matrices) < alike).all()

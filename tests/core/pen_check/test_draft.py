@@ -6,7 +6,7 @@ import pytest
 from lightpen.errors import FileError
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.pen_check.draft import FACING, PenDraft, check_draft
-from lightpen.simulator.sample_pens import fanned_pen
+from lightpen.simulator.samples import fanned_pen
 from lightpen.simulator.swings import paper_pen
 
 PEN = paper_pen()
@@ -41,7 +41,7 @@ def test_a_cell_that_is_no_number_is_named() -> None:
     (flaw,) = draft.flaws()
 
     assert (flaw.row, flaw.column) == (4, 1)
-    assert str(flaw.sentence) == 'LED 5, y: "12,4O" is not a number (letter O).'
+    assert str(flaw.message) == 'LED 5, y: "12,4O" is not a number (letter O).'
     with pytest.raises(FileError, match="LED 5, y"):
         draft.pen()
 
@@ -78,7 +78,7 @@ def test_a_normal_that_is_not_of_unit_length_is_named() -> None:
 
 @pytest.mark.parametrize("diameter", ["0", "-3", "200"])
 def test_a_disc_that_cannot_be_is_refused(diameter: str) -> None:
-    with pytest.raises(FileError, match="cannot be"):
+    with pytest.raises(FileError, match="is not valid"):
         replace(DRAFT, diameter=diameter).pen()
 
 

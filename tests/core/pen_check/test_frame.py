@@ -15,7 +15,7 @@ from lightpen.pen_check.frame import (
     examine_frame,
     moved_into_frame,
 )
-from lightpen.simulator.sample_pens import SAMPLE_PENS, six_led_pen
+from lightpen.simulator.samples import SAMPLE_PENS, six_led_pen
 from lightpen.simulator.swings import paper_pen
 
 PEN = paper_pen()
@@ -49,7 +49,7 @@ def test_each_pair_of_exchanged_leds_is_named(pair: tuple[int, int]) -> None:
     check = examine_frame(with_leds(leds))
 
     assert broken(check) == {Rule.NUMBERS}
-    assert f"LEDs {pair[0] + 1} and {pair[1] + 1} are exchanged" in str(check.error)
+    assert f"LEDs {pair[0] + 1} and {pair[1] + 1} are swapped" in str(check.error)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -134,6 +134,6 @@ def test_a_pen_is_in_error_exactly_where_the_frame_refuses_it(name: str) -> None
         check_frame(pen)
         refusal = None
     except FileError as error:
-        refusal = error.sentence
+        refusal = error.message
 
     assert examine_frame(pen).error == refusal

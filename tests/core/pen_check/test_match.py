@@ -10,14 +10,14 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import SkippingClock
-from lightpen.detection.spots import Flaw, Spots
+from lightpen.detection.spots import SpotFlaw, Spots
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import Pen
 from lightpen.pen_check.match import (
     MAX_VIEWS,
     Finding,
+    MatchFinding,
     PenMatch,
-    What,
     add_view,
     match_pen,
 )
@@ -140,14 +140,14 @@ def test_a_pen_held_still_names_the_led_but_not_by_how_much() -> None:
 
     finding = the_finding(match_pen(CAMERA, moved(7, (0.5, 0.0, 0.0)), views))
 
-    assert (finding.what, finding.leds) == (What.SHIFTED, (7,))
+    assert (finding.what, finding.leds) == (MatchFinding.SHIFTED, (7,))
     assert not finding.is_sure
 
 
 def test_an_led_far_off_is_found_among_the_spots_left_over() -> None:
     finding = the_finding(match_pen(CAMERA, moved(9, (0.0, 40.0, 5.0)), SWUNG))
 
-    assert (finding.what, finding.leds) == (What.SHIFTED, (9,))
+    assert (finding.what, finding.leds) == (MatchFinding.SHIFTED, (9,))
     assert finding.is_sure
     np.testing.assert_allclose(finding.by, [0.0, -40.0, -5.0], atol=0.1)
 
@@ -176,7 +176,7 @@ def test_an_exchanged_coordinate_is_named() -> None:
             pair = (one + 1, other + 1)
             # LEDs of one plane: exchanging x or y gives the same two places.
             named = "x/y" if PEN.leds[one, 2] == PEN.leds[other, 2] else "xyz"[axis]
-            if findings != (Finding(What.EXCHANGED, pair, axes=named),):
+            if findings != (Finding(MatchFinding.EXCHANGED, pair, axes=named),):
                 wrong.append((pair, axis, findings))
     assert wrong == []
 
@@ -197,13 +197,15 @@ def test_leds_exchanged_as_a_whole_fit_the_images() -> None:
 def test_an_led_that_is_off_is_named() -> None:
     views = views_of(images(hidden=5))
 
-    assert match_pen(CAMERA, PEN, views).findings == (Finding(What.UNSEEN, (6,)),)
+    assert match_pen(CAMERA, PEN, views).findings == (
+        Finding(MatchFinding.UNSEEN, (6,)),
+    )
 
 
 def test_an_led_that_the_file_lacks_is_found_on_the_pen() -> None:
     finding = the_finding(match_pen(CAMERA, with_leds(PEN.leds[:9]), SWUNG))
 
-    assert finding.what is What.UNKNOWN_LED
+    assert finding.what is MatchFinding.UNKNOWN_LED
     np.testing.assert_allclose(finding.by, PEN.leds[9], atol=0.1)
 
 
@@ -215,7 +217,7 @@ def test_a_file_with_twenty_leds_too_many_is_judged_as_fast_as_any() -> None:
 
     # Two of the twenty are taken for LEDs 9 and 10 of the pen.
     found = Counter(finding.what for finding in match.findings)
-    assert found == {What.SHIFTED: 2, What.UNSEEN: 18}
+    assert found == {MatchFinding.SHIFTED: 2, MatchFinding.UNSEEN: 18}
 
 
 def test_a_mirrored_file_is_told_as_such() -> None:
@@ -223,7 +225,7 @@ def test_a_mirrored_file_is_told_as_such() -> None:
 
     finding = the_finding(match_pen(CAMERA, mirrored, SWUNG))
 
-    assert finding.what is What.ADVICE
+    assert finding.what is MatchFinding.ADVICE
     assert "mirror image" in str(finding.advice)
 
 
@@ -233,14 +235,14 @@ def test_another_pen_is_told_as_such() -> None:
     match = match_pen(CAMERA, other, SWUNG)
 
     assert (match.n_labelled, match.fits) == (0, False)
-    assert "do not fit the pen file" in str(the_finding(match).advice)
+    assert "do not match the" in str(the_finding(match).advice)
 
 
 def test_leds_that_are_all_a_little_off_are_a_misfit_of_none() -> None:
     rng = np.random.default_rng(4)
     pen = replace(PEN, leds=PEN.leds + rng.normal(0, 0.05, PEN.leds.shape))
 
-    assert match_pen(CAMERA, pen, SWUNG).findings == (Finding(What.MISFIT),)
+    assert match_pen(CAMERA, pen, SWUNG).findings == (Finding(MatchFinding.MISFIT),)
 
 
 def test_without_views_nothing_is_said() -> None:
@@ -270,7 +272,7 @@ def test_old_views_make_room() -> None:
 
 def test_smeared_and_nearly_empty_images_are_passed_over() -> None:
     spots = SWUNG[0]
-    smeared = replace(spots, flaws=np.full(len(spots), int(Flaw.BLURRED)))
+    smeared = replace(spots, flaws=np.full(len(spots), int(SpotFlaw.BLURRED)))
     empty = Spots(
         *(spots.centers[:2], spots.shapes[:2], spots.areas[:2]),
         *(spots.contrasts[:2], spots.edge_widths[:2], spots.flaws[:2]),

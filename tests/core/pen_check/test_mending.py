@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
-from lightpen.pen_check.draft import PenDraft, check_draft
-from lightpen.pen_check.match import Finding, What
-from lightpen.pen_check.mending import exchanged, leds_to_exchange, mended
+from lightpen.pen_check.draft import (
+    PenDraft,
+    check_draft,
+    exchanged,
+    leds_to_exchange,
+    mended,
+)
+from lightpen.pen_check.match import Finding, MatchFinding
 from lightpen.simulator.swings import paper_pen
 
 DRAFT = PenDraft.of(paper_pen())
@@ -31,18 +36,18 @@ def test_of_two_coordinates_that_is_exchanged_which_the_frame_needs(
 ) -> None:
     wrong = exchanged(DRAFT, (5, 9), wrong_axis)
 
-    assert mended(wrong, Finding(What.EXCHANGED, (5, 9), axes="x/y")) == DRAFT
+    assert mended(wrong, Finding(MatchFinding.EXCHANGED, (5, 9), axes="x/y")) == DRAFT
 
 
 def test_several_coordinates_are_exchanged_together() -> None:
     wrong = exchanged(DRAFT, (2, 8), "yz")
 
-    assert mended(wrong, Finding(What.EXCHANGED, (2, 8), axes="y, z")) == DRAFT
+    assert mended(wrong, Finding(MatchFinding.EXCHANGED, (2, 8), axes="y, z")) == DRAFT
 
 
 def test_an_led_off_its_place_is_put_where_it_was_measured() -> None:
     by = (0.8, 0.0, -0.1234567)
-    result = mended(DRAFT, Finding(What.SHIFTED, (6,), by))
+    result = mended(DRAFT, Finding(MatchFinding.SHIFTED, (6,), by))
 
     moved = result.pen().leds - paper_pen().leds
     np.testing.assert_allclose(moved[5], by, atol=5e-4)  # written to the micrometre
@@ -51,8 +56,8 @@ def test_an_led_off_its_place_is_put_where_it_was_measured() -> None:
 
 
 def test_what_the_images_do_not_tell_is_left_to_the_user() -> None:
-    unsure = Finding(What.SHIFTED, (6,), (0.8, 0.0, 0.0), is_sure=False)
-    either = Finding(What.SHIFTED_EITHER, (6, 7), (0.8, 0.0, 0.0))
+    unsure = Finding(MatchFinding.SHIFTED, (6,), (0.8, 0.0, 0.0), is_sure=False)
+    either = Finding(MatchFinding.SHIFTED_EITHER, (6, 7), (0.8, 0.0, 0.0))
 
-    for finding in (unsure, either, Finding(What.UNSEEN, (6,))):
+    for finding in (unsure, either, Finding(MatchFinding.UNSEEN, (6,))):
         assert not finding.can_be_mended

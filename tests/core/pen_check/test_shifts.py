@@ -5,7 +5,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.pen_check.shifts import find_shifts
-from lightpen.simulator.sample_pens import six_led_pen
+from lightpen.simulator.samples import six_led_pen
 from lightpen.simulator.swings import (
     paper_camera,
     paper_pen,

@@ -2,6 +2,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from tests.faulty_camera import FaultyCamera
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import (
@@ -18,7 +19,6 @@ from lightpen.detection.pose import fit_poses
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.images import ImageSource
 from lightpen.model.camera import Camera
-from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
@@ -38,10 +38,10 @@ def seated_camera(
     scene: Scene = SCENE,
     clock: SkippingClock | None = None,
     lamps: tuple[Lamp, ...] = (),
-) -> SimulatedCamera:
+) -> FaultyCamera:
     clock = clock or SkippingClock()
     operator = Operator(clock, scene.seed, seated=True)
-    camera = SimulatedCamera(scene, clock, operator, lamps=lamps)
+    camera = FaultyCamera(scene, clock, operator, lamps=lamps)
     camera.open()
     return camera
 
@@ -50,13 +50,13 @@ def streaming_camera(
     scene: Scene = SCENE,
     clock: SkippingClock | None = None,
     lamps: tuple[Lamp, ...] = (),
-) -> SimulatedCamera:
+) -> FaultyCamera:
     camera = seated_camera(scene, clock, lamps)
     camera.start()
     return camera
 
 
-def read(camera: SimulatedCamera, n_frames: int) -> list[Frame]:
+def read(camera: FaultyCamera, n_frames: int) -> list[Frame]:
     return [camera.read(1.0) for _ in range(n_frames)]
 
 
@@ -73,7 +73,7 @@ def led_level(frame: Frame) -> float:
     return float(np.quantile(levels[levels > 0.1], 0.8))
 
 
-def play(camera: SimulatedCamera) -> list[Frame]:
+def play(camera: FaultyCamera) -> list[Frame]:
     camera.operator.swing()
     frames = read(camera, 20)
     camera.operator.slip(0.5, 0.5)
@@ -201,7 +201,7 @@ def test_covered_leds_are_dark_and_foreign_lights_stay() -> None:
 
 
 def test_an_absent_pen_leaves_the_image_dark() -> None:
-    camera = SimulatedCamera(SCENE, SkippingClock())
+    camera = FaultyCamera(SCENE, SkippingClock())
     camera.open()
     camera.start()
     assert read(camera, 1)[0].image.max() < 10
@@ -224,7 +224,7 @@ def test_a_live_camera_loses_images_when_more_wait_than_it_buffers(
 def test_lost_images_leave_a_gap_and_are_counted() -> None:
     camera = streaming_camera()
     (before,) = read(camera, 1)
-    camera.faults.lose_frames(4)
+    camera.lose_frames(4)
     after = read(camera, 2)
 
     assert [frame.seq - before.seq for frame in after] == [5, 6]
@@ -233,7 +233,7 @@ def test_lost_images_leave_a_gap_and_are_counted() -> None:
 
 def test_damaged_images_are_thrown_away_and_counted() -> None:
     camera = streaming_camera()
-    camera.faults.spoil_frames(2)
+    camera.spoil_frames(2)
     for _ in range(2):
         with pytest.raises(FrameIncomplete, match="incomplete"):
             camera.read(1.0)
@@ -246,7 +246,7 @@ def test_damaged_images_are_thrown_away_and_counted() -> None:
 def test_a_stalled_camera_sends_nothing_but_answers() -> None:
     clock = SkippingClock()
     camera = streaming_camera(clock=clock)
-    camera.faults.stall(3.0)
+    camera.stall(3.0)
     for _ in range(3):
         with pytest.raises(FrameTimeout):
             camera.read(0.9)
@@ -257,16 +257,14 @@ def test_a_stalled_camera_sends_nothing_but_answers() -> None:
     assert camera.stats().missed == 0
 
 
-def plug_out_and_in(camera: SimulatedCamera) -> None:
-    camera.faults.unplug()
-    camera.faults.plug_in()
+def plug_out_and_in(camera: FaultyCamera) -> None:
+    camera.unplug()
+    camera.plug_in()
 
 
-@pytest.mark.parametrize(
-    "act", [lambda camera: camera.faults.unplug(), plug_out_and_in]
-)
+@pytest.mark.parametrize("act", [lambda camera: camera.unplug(), plug_out_and_in])
 def test_an_unplugged_camera_is_silent_and_lost_until_it_is_opened_anew(
-    act: Callable[[SimulatedCamera], None],
+    act: Callable[[FaultyCamera], None],
 ) -> None:
     camera = streaming_camera()
     (before,) = read(camera, 1)
@@ -277,7 +275,7 @@ def test_an_unplugged_camera_is_silent_and_lost_until_it_is_opened_anew(
         with pytest.raises(DeviceLost, match="cable"):
             call()
     camera.close()
-    camera.faults.plug_in()
+    camera.plug_in()
     camera.open()
     camera.start()
 
@@ -285,16 +283,16 @@ def test_an_unplugged_camera_is_silent_and_lost_until_it_is_opened_anew(
 
 
 def test_an_unplugged_camera_is_not_found() -> None:
-    camera = SimulatedCamera(SCENE)
-    camera.faults.unplug()
+    camera = FaultyCamera(SCENE)
+    camera.unplug()
     with pytest.raises(DeviceNotFound, match="SIM-1"):
         camera.open()
 
 
 def test_a_camera_in_use_is_busy_until_it_is_free() -> None:
     clock = SkippingClock()
-    camera = SimulatedCamera(SCENE, clock)
-    camera.faults.occupy(2.0)
+    camera = FaultyCamera(SCENE, clock)
+    camera.occupy(2.0)
     with pytest.raises(DeviceBusy, match="Another program"):
         camera.open()
     clock.wait(2.0)

@@ -7,12 +7,17 @@ import pytest
 from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
-from lightpen.messages import HOLD_STILL, SEAT_TIP, SWING_TO_SEAT
 from lightpen.model.posture import Posture
-from lightpen.simulator.follower import FIRST_LEAN, GENTLE_LEANS, UPRIGHT, Follower
+from lightpen.simulator.follower import (
+    FIRST_LEAN,
+    GENTLE_LEANS,
+    UPRIGHT,
+    GuidedOperator,
+)
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.swings import paper_camera, paper_pen
 from lightpen.swing.state import Phase, SwingSetup, SwingState, start_swing
+from lightpen.swing_messages import HOLD_STILL, SEAT_TIP, SWING_TO_SEAT
 
 ASKED = Posture(tilt=0.3, direction=2.0, turn=0.1)
 
@@ -46,7 +51,7 @@ def state() -> SwingState:
 def test_the_pen_is_leant_to_the_target(
     operator: ToldOperator, state: SwingState
 ) -> None:
-    Follower(operator).follow(state)
+    GuidedOperator(operator).follow(state)
     for _ in range(60):
         operator.clock.wait(0.05)
         operator.held(np.array([operator.clock.now_ns() * 1e-9]))
@@ -59,7 +64,7 @@ def test_the_pen_is_leant_to_the_target(
 def test_a_target_is_told_once_and_the_next_one_anew(
     operator: ToldOperator, state: SwingState
 ) -> None:
-    follower = Follower(operator)
+    follower = GuidedOperator(operator)
     other = replace(ASKED, direction=-1.0)
     for target in (ASKED, ASKED, other, other):
         follower.follow(replace(state, target=target))
@@ -70,7 +75,7 @@ def test_a_target_is_told_once_and_the_next_one_anew(
 def test_the_first_lean_goes_to_the_operators_right(
     operator: ToldOperator, state: SwingState
 ) -> None:
-    Follower(operator, heading=np.pi / 2).follow(replace(state, heading=None))
+    GuidedOperator(operator, heading=np.pi / 2).follow(replace(state, heading=None))
 
     assert operator.told == [replace(FIRST_LEAN, direction=np.pi / 2)]
 
@@ -78,7 +83,7 @@ def test_the_first_lean_goes_to_the_operators_right(
 def test_without_a_target_the_hand_stays(
     operator: ToldOperator, state: SwingState
 ) -> None:
-    Follower(operator).follow(replace(state, target=None))
+    GuidedOperator(operator).follow(replace(state, target=None))
 
     assert operator.told == []
 
@@ -87,7 +92,7 @@ def test_without_a_target_the_hand_stays(
 def test_the_hand_is_led_only_while_images_are_captured(
     operator: ToldOperator, state: SwingState, phase: Phase
 ) -> None:
-    Follower(operator).follow(replace(state, phase=phase))
+    GuidedOperator(operator).follow(replace(state, phase=phase))
 
     assert operator.told == []
 
@@ -101,7 +106,7 @@ def seeking(state: SwingState) -> SwingState:
 def test_asked_to_swing_gently_the_pen_goes_round_upright(
     operator: ToldOperator, seeking: SwingState
 ) -> None:
-    follower = Follower(operator)
+    follower = GuidedOperator(operator)
     for time in np.arange(0.0, 2.0, 0.05):
         follower.follow(replace(seeking, time=float(time)))
 
@@ -111,7 +116,7 @@ def test_asked_to_swing_gently_the_pen_goes_round_upright(
 def test_asked_to_put_the_tip_in_only_the_hand_stays(
     operator: ToldOperator, seeking: SwingState
 ) -> None:
-    Follower(operator).follow(replace(seeking, message=SEAT_TIP))
+    GuidedOperator(operator).follow(replace(seeking, message=SEAT_TIP))
 
     assert operator.told == []
 
@@ -119,7 +124,7 @@ def test_asked_to_put_the_tip_in_only_the_hand_stays(
 def test_after_the_gentle_swing_the_pen_is_held_upright_until_it_is_led(
     operator: ToldOperator, seeking: SwingState
 ) -> None:
-    follower = Follower(operator)
+    follower = GuidedOperator(operator)
     follower.follow(seeking)
     for phase in (Phase.SETTLED, Phase.COUNTDOWN, Phase.COUNTDOWN):
         follower.follow(replace(seeking, phase=phase, message=HOLD_STILL))
@@ -131,7 +136,7 @@ def test_after_the_gentle_swing_the_pen_is_held_upright_until_it_is_led(
 def test_after_a_pause_the_hand_is_led_anew(
     operator: ToldOperator, state: SwingState
 ) -> None:
-    follower = Follower(operator)
+    follower = GuidedOperator(operator)
     follower.follow(state)
     follower.follow(replace(state, phase=Phase.PAUSED))
     follower.follow(state)

@@ -10,8 +10,8 @@ from lightpen.simulator.hand import (
     GUIDED,
     HOVER,
     REACTION,
-    Doing,
-    Held,
+    HandActivity,
+    HandPose,
     Operator,
 )
 from lightpen.simulator.postures import MAX_TILT, TREMOR, Postures, operator_postures
@@ -38,13 +38,13 @@ class Scene:
     def now(self) -> float:
         return self.clock.now_ns() * 1e-9
 
-    def doing(self) -> Doing:
+    def doing(self) -> HandActivity:
         return self.operator.doing
 
-    def look(self) -> Held:
+    def look(self) -> HandPose:
         return self.operator.held(np.array([self.now]))
 
-    def watch(self, seconds: float, period: float = PERIOD) -> list[Held]:
+    def watch(self, seconds: float, period: float = PERIOD) -> list[HandPose]:
         seen = []
         for _ in range(round(seconds / period)):
             self.clock.wait(period)
@@ -52,7 +52,7 @@ class Scene:
         return seen
 
 
-def leans(seen: list[Held]) -> FloatArray:
+def leans(seen: list[HandPose]) -> FloatArray:
     """Return tilt to the right, tilt away and turn, (F, 3), rad."""
     return np.concatenate([lean_of(held.postures) for held in seen])
 
@@ -63,11 +63,11 @@ def lean_of(postures: Postures) -> FloatArray:
     return np.stack([right, away, postures.rolls], axis=-1)
 
 
-def offsets(seen: list[Held]) -> FloatArray:
+def offsets(seen: list[HandPose]) -> FloatArray:
     return np.concatenate([held.offsets for held in seen])
 
 
-def seen_after(act: Callable[[Operator], None], seconds: float = 2.0) -> list[Held]:
+def seen_after(act: Callable[[Operator], None], seconds: float = 2.0) -> list[HandPose]:
     scene = Scene()
     scene.watch(1)
     act(scene.operator)
@@ -110,15 +110,15 @@ def test_another_seed_swings_otherwise() -> None:
 def test_the_pen_is_absent_then_approaches_and_then_sits_in_the_cone() -> None:
     scene = Scene(seated=False)
     first = scene.look()
-    assert scene.doing() is Doing.ABSENT
+    assert scene.doing() is HandActivity.ABSENT
     assert first.is_away
 
     scene.operator.seat()
     scene.watch(0.5)
-    assert scene.doing() is Doing.APPROACHING
+    assert scene.doing() is HandActivity.APPROACHING
     seen = scene.watch(5)
 
-    assert scene.doing() is Doing.SEATED
+    assert scene.doing() is HandActivity.SEATED
     np.testing.assert_array_equal(offsets(seen[-20:]), 0)
     assert np.abs(np.diff(offsets(seen), axis=0)).max() < 300 * PERIOD + 2  # mm
 
@@ -130,7 +130,7 @@ def test_an_operator_who_was_asked_for_something_is_free_no_more() -> None:
     scene.operator.uncover()
     assert scene.operator.is_free
     scene.operator.swing()
-    assert scene.doing() is Doing.ABSENT
+    assert scene.doing() is HandActivity.ABSENT
     assert not scene.operator.is_free
     scene.watch(8)
     assert not scene.operator.is_free
@@ -151,7 +151,7 @@ def test_a_pen_that_is_away_shows_no_led_in_the_image() -> None:
     leds, _ = leds_in_camera(paper_pen(), rotation, translation)
     camera = paper_camera()
 
-    assert scene.doing() is Doing.ABSENT
+    assert scene.doing() is HandActivity.ABSENT
     assert held.is_away
     assert (camera.project(leds)[:, 0] > camera.width).all()
     assert np.linalg.norm(held.offsets[0] - AWAY) < 10
@@ -204,7 +204,7 @@ def test_the_swing_is_that_of_the_simulator() -> None:
     scene = Scene(seed=7)
     scene.operator.swing()
     scene.watch(3)
-    assert scene.doing() is Doing.SWINGING
+    assert scene.doing() is HandActivity.SWINGING
     times = []
     seen = []
     for _ in range(100):
@@ -224,7 +224,7 @@ def test_holding_stops_the_swing_where_it_is() -> None:
     scene.operator.hold()
     seen = leans(scene.watch(4))[20:]
 
-    assert scene.doing() is Doing.SEATED
+    assert scene.doing() is HandActivity.SEATED
     assert np.ptp(seen, axis=0).max() < 2 * SHAKE
     assert np.linalg.norm(seen[-1, :2]) > np.radians(5)
 
@@ -234,7 +234,7 @@ def test_a_swing_begins_with_seating_the_pen() -> None:
     scene.operator.swing()
     seen = scene.watch(6)
 
-    assert scene.doing() is Doing.SWINGING
+    assert scene.doing() is HandActivity.SWINGING
     free = np.linalg.norm(offsets(seen), axis=1) > 0
     assert np.linalg.norm(leans(seen)[free][:, :2], axis=1).max() < np.radians(5)
 
@@ -243,12 +243,12 @@ def test_a_lifted_pen_hovers_and_sits_again() -> None:
     scene = Scene()
     scene.operator.lift()
     lifted = offsets(scene.watch(3))[-1]
-    assert scene.doing() is Doing.LIFTED
+    assert scene.doing() is HandActivity.LIFTED
     np.testing.assert_allclose(lifted, HOVER, atol=5)
 
     scene.operator.seat()
     seated = offsets(scene.watch(3))[-1]
-    assert scene.doing() is Doing.SEATED
+    assert scene.doing() is HandActivity.SEATED
     np.testing.assert_array_equal(seated, 0)
 
 
@@ -290,7 +290,7 @@ def test_a_long_pause_costs_no_time() -> None:
     scene.clock.wait(30 * 24 * 3600)  # would take an hour step by step
     held = scene.look()
 
-    assert scene.doing() is Doing.SEATED
+    assert scene.doing() is HandActivity.SEATED
     np.testing.assert_array_equal(held.offsets, 0)
 
 

@@ -3,9 +3,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.simulated_plans import live_plan
 
-from lightpen.simulator.image_plans import SLIP, live_plan, plan_scene, render_plan
-from lightpen.simulator.sample_pens import SAMPLE_PENS
+from lightpen.simulator.image_plans import SLIP, plan_scene, render_plan
+from lightpen.simulator.samples import SAMPLE_PENS
 from lightpen.simulator.scenes import HARD, SCENES, Disturbances, Scene
 from lightpen.simulator.swings import PAPER_CONE, leds_in_camera, paper_camera
 

@@ -16,8 +16,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.rigid import fit_rigid
 from lightpen.simulator.image_plans import plan_scene
 from lightpen.simulator.render import render_view
-from lightpen.simulator.sample_pens import six_led_pen
-from lightpen.simulator.sample_rigs import row_of_cameras
+from lightpen.simulator.samples import row_of_cameras, six_led_pen
 from lightpen.simulator.scene_files import scene_truth, write_rig_scene, write_scene
 from lightpen.simulator.scenes import HARD, Disturbances, Scene
 from lightpen.simulator.sensor import Sensor, quantize
@@ -182,7 +181,7 @@ def test_nothing_is_written_into_a_folder_that_holds_something(
 ) -> None:
     """A real file in it would be taken for a simulated one by the mark beside it."""
     (tmp_path / name).write_text("real")
-    with pytest.raises(FileError, match=f"not empty: it holds {name}"):
+    with pytest.raises(FileError, match=f"not empty: it contains {name}"):
         write_scene(SMALL, tmp_path)
     assert [path.read_text() for path in tmp_path.iterdir()] == ["real"]
 

@@ -4,16 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_centers import displace_centers, drop_centers, swap_centers
 
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.simulator.postures import SWING_KINDS, Postures
-from lightpen.simulator.sample_pens import SAMPLE_PENS
+from lightpen.simulator.samples import SAMPLE_PENS
 from lightpen.simulator.swings import (
     MIN_GAP,
     PAPER_CONE,
     PAPER_TIP,
-    displace_centers,
-    drop_centers,
     faces_camera,
     leds_in_camera,
     paper_camera,
@@ -22,7 +21,6 @@ from lightpen.simulator.swings import (
     rim_gaps,
     simulate_centers,
     slip_tip,
-    swap_centers,
     swing_from_postures,
     swing_poses,
 )

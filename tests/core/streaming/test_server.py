@@ -12,13 +12,13 @@ from pyigtl import OpenIGTLinkClient, TransformMessage
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import Frame, sealed
+from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import Sighting
 from lightpen.errors import StreamError
-from lightpen.estimation.instrument import Instrument, instrument_of_files
+from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
 from lightpen.model.rig import rig_of
-from lightpen.record.names import Names
+from lightpen.record.swings.names import Names
 from lightpen.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
@@ -34,7 +34,11 @@ from lightpen.streaming.server import (
     StreamPlace,
     StreamStatus,
 )
-from lightpen.verification.touch import StillFrames, TouchFrame, measure_touches
+from lightpen.verification.tasks.probed_point import (
+    ProbingFrame,
+    StillFrames,
+    measure_touches,
+)
 
 LONGEST = 60.0  # s until a test gives up
 ANY = StreamPlace(port=0)
@@ -76,7 +80,7 @@ def tip(instrument: Instrument) -> StreamedTip:
 
 
 @pytest.fixture(scope="module")
-def sighting(instrument: Instrument) -> Sighting:
+def detection(instrument: Instrument) -> PenDetection:
     """A pen that stands upright in the cone."""
     t = PAPER_CONE - UPRIGHT @ PAPER_TIP
     pixels = simulate_centers(
@@ -84,7 +88,7 @@ def sighting(instrument: Instrument) -> Sighting:
         *(SIGMA, np.random.default_rng(1)),
     )
     poses = fit_poses(instrument.camera, instrument.pen, pixels, UPRIGHT[None], t[None])
-    return Sighting(
+    return PenDetection(
         *(pixels[0], pixels[0], Reason.NONE, poses.rotations[0], poses.translations[0]),
         *(poses.covariances[0] / poses.sigma**2, poses.sigma),
     )
@@ -135,18 +139,18 @@ def covariance_in(message: TransformMessage) -> FloatArray:
 
 
 def test_a_client_receives_the_pose_with_its_covariance(
-    stream: PoseStream, client: OpenIGTLinkClient, sighting: Sighting
+    stream: PoseStream, client: OpenIGTLinkClient, detection: PenDetection
 ) -> None:
-    stream.take(frame(7), sighting)
+    stream.take(frame(7), detection)
 
     message = received(client, "PenToCamera")
 
-    np.testing.assert_allclose(message.matrix[:3, :3], sighting.rotation, atol=1e-6)
+    np.testing.assert_allclose(message.matrix[:3, :3], detection.rotation, atol=1e-6)
     # A transform is sent with 24 bits: 0.0001 mm at 2 m.
-    np.testing.assert_allclose(message.matrix[:3, 3], sighting.translation, atol=1e-4)
-    sigma = max(sighting.sigma, SIGMA)
+    np.testing.assert_allclose(message.matrix[:3, 3], detection.translation, atol=1e-4)
+    sigma = max(detection.sigma, SIGMA)
     np.testing.assert_allclose(
-        covariance_in(message), sighting.cofactors * sigma**2, rtol=1e-7
+        covariance_in(message), detection.cofactors * sigma**2, rtol=1e-7
     )
     assert message.metadata["CovarianceOrder"] == "rx ry rz x y z"
     assert message.metadata["Units"] == "mm rad"
@@ -156,14 +160,14 @@ def test_a_client_receives_the_pose_with_its_covariance(
 def test_it_receives_the_tip_as_a_touch_would_measure_it(
     stream: PoseStream,
     client: OpenIGTLinkClient,
-    sighting: Sighting,
+    detection: PenDetection,
     instrument: Instrument,
 ) -> None:
-    pixels = sighting.pixels[None]
-    seen = TouchFrame("", pixels, sighting.rotation, sighting.translation)
+    pixels = detection.pixels[None]
+    seen = ProbingFrame("", pixels, detection.rotation, detection.translation)
     (touch,) = measure_touches(instrument, [StillFrames((seen,))])
 
-    stream.take(frame(), sighting)
+    stream.take(frame(), detection)
     message = received(client, "TipToCamera")
 
     np.testing.assert_allclose(message.matrix[:3, 3], touch.point_cam, atol=1e-4)
@@ -173,30 +177,30 @@ def test_it_receives_the_tip_as_a_touch_would_measure_it(
 
 
 def test_a_name_that_is_not_ascii_arrives_escaped(
-    stream: PoseStream, client: OpenIGTLinkClient, sighting: Sighting
+    stream: PoseStream, client: OpenIGTLinkClient, detection: PenDetection
 ) -> None:
-    stream.take(frame(), sighting)
+    stream.take(frame(), detection)
 
     assert received(client, "TipToCamera").metadata["Pen"] == r"\u5149\u7b14-04"
 
 
 def test_without_a_tip_in_force_the_pose_goes_out_alone(
-    stream: PoseStream, client: OpenIGTLinkClient, sighting: Sighting
+    stream: PoseStream, client: OpenIGTLinkClient, detection: PenDetection
 ) -> None:
     stream.set_tip(None)
-    stream.take(frame(), sighting)
+    stream.take(frame(), detection)
     received(client, "PenToCamera")
-    stream.take(frame(), sighting)
+    stream.take(frame(), detection)
     received(client, "PenToCamera")
 
     assert client.wait_for_message("TipToCamera", timeout=0) is None
 
 
 def test_a_message_tells_when_its_image_was_taken(
-    stream: PoseStream, client: OpenIGTLinkClient, sighting: Sighting
+    stream: PoseStream, client: OpenIGTLinkClient, detection: PenDetection
 ) -> None:
     before = time.time()
-    stream.take(frame(age_s=100.0), sighting)
+    stream.take(frame(age_s=100.0), detection)
     after = time.time()
 
     taken = received(client, "PenToCamera").timestamp
@@ -204,19 +208,19 @@ def test_a_message_tells_when_its_image_was_taken(
 
 
 def test_an_image_without_the_pen_sends_nothing(
-    stream: PoseStream, client: OpenIGTLinkClient, sighting: Sighting
+    stream: PoseStream, client: OpenIGTLinkClient, detection: PenDetection
 ) -> None:
-    stream.take(frame(1), replace(sighting, reason=Reason.EMPTY))
+    stream.take(frame(1), replace(detection, reason=Reason.EMPTY))
     stream.take(frame(2), None)
-    stream.take(frame(3), sighting)
+    stream.take(frame(3), detection)
 
     assert received(client, "PenToCamera").metadata["Image"] == "3"
 
 
-def test_an_unknown_covariance_is_left_out(sighting: Sighting) -> None:
-    rough = replace(sighting, cofactors=np.full((6, 6), np.nan))
+def test_an_unknown_covariance_is_left_out(detection: PenDetection) -> None:
+    rough = replace(detection, cofactors=np.full((6, 6), np.nan))
 
-    assert b"Covariance" in pose_messages(sighting, None, 0, 0.0)
+    assert b"Covariance" in pose_messages(detection, None, 0, 0.0)
     assert b"Covariance" not in pose_messages(rough, None, 0, 0.0)
 
 
@@ -224,7 +228,7 @@ def test_a_client_that_stalls_holds_up_nobody_and_misses_poses(
     stream: PoseStream,
     statuses: Statuses,
     client: OpenIGTLinkClient,
-    sighting: Sighting,
+    detection: PenDetection,
 ) -> None:
     with socket.socket() as stalled:
         stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -232,7 +236,7 @@ def test_a_client_that_stalls_holds_up_nobody_and_misses_poses(
         statuses.wait_for_clients(2)
 
         for number in range(100):  # more than lies between the two
-            stream.take(frame(number), sighting)
+            stream.take(frame(number), detection)
             assert received(client, "TipToCamera").metadata["Image"] == str(number)
 
         stalled.settimeout(LONGEST)
@@ -271,22 +275,22 @@ def test_what_a_client_says_is_passed_over(
     stream: PoseStream,
     statuses: Statuses,
     client: OpenIGTLinkClient,
-    sighting: Sighting,
+    detection: PenDetection,
 ) -> None:
     with socket.create_connection((LOOPBACK, port_of(stream))) as rude:
         statuses.wait_for_clients(2)
         rude.sendall(b"GET / HTTP/1.1\r\n\r\n" * 1000)
-        stream.take(frame(), sighting)
+        stream.take(frame(), detection)
 
         received(client, "PenToCamera")
 
 
 def test_it_is_closed_until_it_is_opened_and_after_it_is_closed(
-    sighting: Sighting,
+    detection: PenDetection,
 ) -> None:
     stream = PoseStream()
     assert stream.status == StreamStatus()
-    stream.take(frame(), sighting)  # of which nothing comes
+    stream.take(frame(), detection)  # of which nothing comes
 
     stream.open(ANY)
     place = LOOPBACK, port_of(stream)
@@ -326,7 +330,7 @@ def test_an_address_of_another_computer_is_said() -> None:
 
 
 def test_an_impossible_port_is_said() -> None:
-    with pytest.raises(StreamError, match="Choose a port from 1024 to 65535"):
+    with pytest.raises(StreamError, match="Choose a free port from 1024 to 65535"):
         PoseStream().open(StreamPlace(port=70_000))
 
 

@@ -8,42 +8,39 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.small_records import entries_of
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame
-from lightpen.detection.observations import (
-    observe_images,
-)
+from lightpen.detection.observations import observe_images
+from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import Sighting, look
 from lightpen.errors import FileError
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.report import calibration_record
+from lightpen.estimation.reports.report import calibration_record
 from lightpen.formats.camera_files import CAMERA_FILE, write_camera
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.pen_files import PEN_FILE, write_pen
+from lightpen.messages import message
 from lightpen.model.limits import SwingLimits
-from lightpen.record.header import FileCopy, Header
-from lightpen.record.reading import open_record
-from lightpen.record.recorded_source import source
-from lightpen.record.writing import RecordWriter
-from lightpen.sentences import sentence
+from lightpen.record.swings.header import FileCopy, Header
+from lightpen.record.swings.reading import open_record
+from lightpen.record.swings.recorded_source import source
+from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP, paper_camera
-from lightpen.swing.capture import (
-    capture_image,
-)
 from lightpen.swing.resuming import resume_swing
 from lightpen.swing.rules import Transition
 from lightpen.swing.state import (
-    Happening,
     Phase,
     SwingEvent,
+    SwingEventKind,
     SwingSetup,
     SwingState,
     start_swing,
 )
+from lightpen.swing.swing_recorder import capture_image
 
 FRAME_RATE = 10.0  # 1/s: half of the usual one, as looking at an image takes long
 
@@ -54,11 +51,11 @@ def small_scene() -> Scene:
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class SwingViewState:
     """An image of a camera and what is seen in it, at a time in s."""
 
     frame: Frame
-    sighting: Sighting
+    detection: PenDetection
     time: float
 
 
@@ -72,20 +69,22 @@ class Swung:
         self._camera.open()
         self._camera.configure(CameraSettings(frame_rate=FRAME_RATE))
         self._camera.start()
-        self._moments: list[Moment] = []
+        self._moments: list[SwingViewState] = []
         self.operator = self._camera.operator
         self.operator.swing()
 
-    def moments(self) -> Iterator[Moment]:
+    def moments(self) -> Iterator[SwingViewState]:
         """Yield what is seen, from the first image on."""
         for index in count():
             if index == len(self._moments):
                 frame = self._camera.read(1.0)
                 scene = self._camera.scene
-                before = self._moments[-1].sighting if self._moments else None
-                sighting = look(frame.image, scene.camera, scene.pen, before=before)
+                before = self._moments[-1].detection if self._moments else None
+                detection = detect_pen(
+                    frame.image, scene.camera, scene.pen, before=before
+                )
                 now = self._clock.now_ns() * 1e-9
-                self._moments.append(Moment(frame, sighting, now))
+                self._moments.append(SwingViewState(frame, detection, now))
             yield self._moments[index]
 
 
@@ -97,8 +96,8 @@ class Wizard:
         write_camera(scene.camera, folder / "camera.yaml")
         write_pen(scene.pen, folder / "lp04.json")
         header = Header(
-            camera=FileCopy.of(folder / "camera.yaml", CAMERA_FILE),
-            pen=FileCopy.of(folder / "lp04.json", PEN_FILE),
+            camera_file=FileCopy.of(folder / "camera.yaml", CAMERA_FILE),
+            pen_file=FileCopy.of(folder / "lp04.json", PEN_FILE),
             created=datetime(2026, 1, 2, tzinfo=UTC),
         )
         self.folder = folder / "swing"
@@ -112,7 +111,7 @@ class Wizard:
         while self.state.n_kept < n_images:
             now = next(self._moments)
             transition = capture_image(
-                *(self.setup, self.state, self.writer, now.frame.image, now.sighting),
+                *(self.setup, self.state, self.writer, now.frame.image, now.detection),
                 *(now.time, now.frame.device_ts_ns),
             )
             self.state = transition.state
@@ -159,7 +158,7 @@ def test_the_record_gives_the_same_tip_to_the_last_digit(wizard: Wizard) -> None
         *(InputFile(Path("a"), ""), InputFile(Path("b"), "")), (), nominal_tip=None
     )
     records = [
-        calibration_record(one, inputs, "joint", SwingLimits())
+        entries_of(calibration_record(one, inputs, "joint", SwingLimits()))
         for one in (first, again)
     ]
     for record in records:
@@ -246,9 +245,9 @@ def test_state_and_record_must_belong_together(wizard: Wizard) -> None:
     wizard.run(1)
     other = start_swing(wizard.setup)
     image = np.zeros((1024, 1224), np.uint8)
-    sighting = look(image, wizard.setup.camera, wizard.setup.pen)
+    detection = detect_pen(image, wizard.setup.camera, wizard.setup.pen)
     with pytest.raises(ValueError, match="at image 1, the record at 2"):
-        capture_image(wizard.setup, other, wizard.writer, image, sighting, 0.0)
+        capture_image(wizard.setup, other, wizard.writer, image, detection, 0.0)
 
 
 def test_a_slip_that_cannot_be_recorded_leaves_state_and_record_together(
@@ -257,18 +256,21 @@ def test_a_slip_that_cannot_be_recorded_leaves_state_and_record_together(
     wizard.run(3)
 
     def slipped_and_kept(
-        setup: SwingSetup, state: SwingState, sighting: Sighting, time: float
+        setup: SwingSetup, state: SwingState, detection: PenDetection, time: float
     ) -> Transition:
-        events = (SwingEvent(Happening.KEPT, (4,)), SwingEvent(Happening.SLIPPED, (2,)))
+        events = (
+            SwingEvent(SwingEventKind.KEPT, (4,)),
+            SwingEvent(SwingEventKind.SLIPPED, (2,)),
+        )
         return Transition(replace(state, next_number=5), events)
 
     def fail(writer: RecordWriter, numbers: Sequence[int], reason: str) -> None:
-        raise FileError(sentence("test.trouble", "The disk is full."))
+        raise FileError(message("system.full"))
 
     with monkeypatch.context() as patch:
-        patch.setattr("lightpen.swing.capture.advance_swing", slipped_and_kept)
+        patch.setattr("lightpen.swing.swing_recorder.advance_swing", slipped_and_kept)
         patch.setattr(RecordWriter, "take_out", fail)
-        with pytest.raises(FileError, match="disk is full"):
+        with pytest.raises(FileError, match="No space left"):
             wizard.run(4)
     assert wizard.writer.next_number == wizard.state.next_number == 4
     wizard.run(5)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.joint import fit_joint
+from lightpen.estimation.contact.joint import fit_joint
 from lightpen.model.posture import Posture, angles_between, rotations_of
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
@@ -22,7 +22,7 @@ from lightpen.simulator.swings import (
 from lightpen.swing.guidance import (
     TILTS,
     TURNS,
-    Outlook,
+    GuidanceInput,
     image_information,
     next_posture,
     usable_leds,
@@ -41,16 +41,16 @@ def rotation(tilt: float, direction: float, turn: float = 0.0) -> FloatArray:
     return np.asarray(rotations_of(PEN, *angles)[0])
 
 
-def outlook(rotations: FloatArray) -> Outlook:
+def outlook(rotations: FloatArray) -> GuidanceInput:
     """Return what images of these postures leave to be known."""
-    blind = Outlook(
+    blind = GuidanceInput(
         rig_of(CAMERA), PEN, PAPER_TIP, PAPER_CONE, PRIOR, SIGMA, rotations, SPACING
     )
     known = image_information(blind, rotations).sum(axis=0)
     return replace(blind, information=PRIOR + known)
 
 
-def swung(*degrees: tuple[float, float, float]) -> Outlook:
+def swung(*degrees: tuple[float, float, float]) -> GuidanceInput:
     return outlook(np.array([rotation(*posture) for posture in degrees]))
 
 

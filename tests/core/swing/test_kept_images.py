@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lightpen.detection.observations import observe_centers
-from lightpen.detection.sighting import sight_centers
+from lightpen.detection.pen_detection import detect_from_centers
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.observation_files import Centers
 from lightpen.model.assumptions import USUAL
@@ -21,7 +21,7 @@ from lightpen.simulator.swings import (
     swing_poses,
 )
 from lightpen.swing.kept_images import (
-    KeptImages,
+    AcceptedImages,
     distance_unit,
     keep,
     kept_before,
@@ -38,14 +38,14 @@ def centers(swing: Swing) -> np.ndarray:
     return simulate_centers(CAMERA, PEN, swing.rotations, swing.translations, 0.05, rng)
 
 
-def grown(swing: Swing) -> KeptImages:
+def grown(swing: Swing) -> AcceptedImages:
     """Keep the images of a swing one by one, 0.1 s apart."""
     kept = none_kept(1, PEN.n_leds)
     for i, pixels in enumerate(centers(swing)):
-        sighting = sight_centers(
+        detection = detect_from_centers(
             *(CAMERA, PEN, pixels, swing.rotations[i], swing.translations[i])
         )
-        kept = keep(RIG, PEN, kept, sighting, i + 1, 0.1 * i)
+        kept = keep(RIG, PEN, kept, detection, i + 1, 0.1 * i)
     return kept
 
 
@@ -72,17 +72,17 @@ def test_the_uncertainty_during_the_swing_is_that_of_the_verdict(
         *(swing.rotations[:most], swing.translations[:most]),
     )
     for i in range(most, n_images):  # an image more adds its own alone
-        sighting = sight_centers(
+        detection = detect_from_centers(
             *(camera, PEN, pixels[i], swing.rotations[i], swing.translations[i])
         )
-        kept = keep(rig_of(camera), PEN, kept, sighting, i + 1, 0.1 * i)
+        kept = keep(rig_of(camera), PEN, kept, detection, i + 1, 0.1 * i)
     seen = observe_centers(
         Centers(np.arange(n_images), pixels, Path("simulated")), camera, PEN
     )
     budget = calibrate(camera, PEN, seen).budget
     assert budget.correlation_factor < 1.1
     assert kept.uncertainty == pytest.approx(budget.weakest_uncertainty, rel=0.02)
-    assert 0 < kept.reached.floor < kept.uncertainty
+    assert 0 < kept.predicted.floor < kept.uncertainty
 
 
 def test_what_is_assumed_of_the_station_counts_during_the_swing() -> None:
@@ -95,15 +95,14 @@ def test_what_is_assumed_of_the_station_counts_during_the_swing() -> None:
         for assumed in (USUAL, replace(USUAL, form_error=0.01))
     )
     assert worn.uncertainty > 2 * usual.uncertainty
-    assert worn.reached.floor > usual.reached.floor
+    assert worn.predicted.floor > usual.predicted.floor
 
 
 def test_kept_one_by_one_or_all_at_once_gives_the_same_tip() -> None:
     swing = swing_poses(30, np.random.default_rng(0))
     kept = grown(swing)
     together = kept_before(
-        *(RIG, PEN, kept.numbers, kept.pixels),
-        *(swing.rotations, swing.translations),
+        *(RIG, PEN, kept.numbers, kept.pixels), *(swing.rotations, swing.translations)
     )
     assert kept.joint is not None
     assert together.joint is not None

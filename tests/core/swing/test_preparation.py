@@ -5,17 +5,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from lightpen.errors import FileError
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
-from lightpen.record.names import Names
-from lightpen.record.reading import Record, open_record, recorded_names
-from lightpen.record.writing import RecordWriter
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import Record, open_record, recorded_names
+from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
-from lightpen.swing.preparation import Lack, Preparation, SourceChoice, SourceKind
+from lightpen.swing.preparation import (
+    MissingInput,
+    Preparation,
+    SourceChoice,
+    SourceKind,
+)
 from lightpen.swing.resuming import recorded_setup
 
 NAMES = Names("Hall 2", "Zoë", "LP-04", "T-10", "C-1", 3.0005)
@@ -41,23 +47,31 @@ def recorded(preparation: Preparation, folder: Path) -> Record:
 
 
 def test_a_whole_preparation_lacks_nothing(whole: Preparation) -> None:
-    assert whole.lacks() == ()
+    assert whole.missing_inputs() == ()
 
 
 def test_at_first_all_is_missing_in_the_order_of_the_steps() -> None:
-    assert Preparation().lacks() == (
-        *(Lack.STATION, Lack.OPERATOR, Lack.PEN, Lack.TIP, Lack.CONE),
-        *(Lack.IMAGES, Lack.CAMERA_FILE, Lack.PEN_FILE),
+    assert Preparation().missing_inputs() == (
+        *(
+            MissingInput.STATION,
+            MissingInput.OPERATOR,
+            MissingInput.PEN,
+            MissingInput.TIP,
+            MissingInput.CONE,
+        ),
+        *(MissingInput.IMAGES, MissingInput.CAMERA_FILE, MissingInput.PEN_FILE),
     )
 
 
 @pytest.mark.parametrize("blank", ["", "  \t"])
-@pytest.mark.parametrize("lack", list(Lack)[:5])
-def test_each_name_must_be_given(whole: Preparation, lack: Lack, blank: str) -> None:
+@pytest.mark.parametrize("lack", list(MissingInput)[:5])
+def test_each_name_must_be_given(
+    whole: Preparation, lack: MissingInput, blank: str
+) -> None:
     texts = {"station": "S", "operator": "O", "pen": "P", "tip": "T", "cone": "C"}
     names = Names(**(texts | {str(lack): blank}), ball_diameter=3.0)
 
-    assert replace(whole, names=names).start_lacks() == (lack,)
+    assert replace(whole, names=names).start_missing_inputs() == (lack,)
 
 
 def test_a_ball_diameter_and_a_nominal_tip_need_not_be_known(
@@ -65,11 +79,11 @@ def test_a_ball_diameter_and_a_nominal_tip_need_not_be_known(
 ) -> None:
     names = replace(NAMES, ball_diameter=None)
 
-    assert replace(whole, names=names, nominal_tip=None).lacks() == ()
+    assert replace(whole, names=names, nominal_tip=None).missing_inputs() == ()
 
 
 def test_a_camera_must_send_images(whole: Preparation) -> None:
-    assert replace(whole, image_size=None).lacks() == (Lack.IMAGES,)
+    assert replace(whole, image_size=None).missing_inputs() == (MissingInput.IMAGES,)
 
 
 def test_a_recording_must_be_chosen_before_its_images_are_missed(
@@ -78,27 +92,35 @@ def test_a_recording_must_be_chosen_before_its_images_are_missed(
     nowhere = replace(whole, source=SourceChoice(SourceKind.RECORDED), image_size=None)
     chosen = replace(nowhere, source=SourceChoice(SourceKind.RECORDED, "/images"))
 
-    assert nowhere.camera_lacks() == (Lack.SOURCE_PLACE,)
-    assert chosen.camera_lacks() == (Lack.IMAGES,)
+    assert nowhere.camera_missing_inputs() == (MissingInput.SOURCE_PLACE,)
+    assert chosen.camera_missing_inputs() == (MissingInput.IMAGES,)
 
 
 def test_images_must_have_the_size_of_the_intrinsics(whole: Preparation) -> None:
-    assert replace(whole, image_size=(1224, 1024)).lacks() == (Lack.IMAGE_SIZE,)
+    assert replace(whole, image_size=(1224, 1024)).missing_inputs() == (
+        MissingInput.IMAGE_SIZE,
+    )
 
 
 def test_a_size_that_is_not_known_yet_is_no_wrong_one(whole: Preparation) -> None:
-    assert Lack.IMAGE_SIZE not in replace(whole, image_size=None).lacks()
+    assert (
+        MissingInput.IMAGE_SIZE not in replace(whole, image_size=None).missing_inputs()
+    )
 
 
 def test_both_files_must_be_chosen(whole: Preparation) -> None:
-    assert replace(whole, camera_file=None).lacks() == (Lack.CAMERA_FILE,)
-    assert replace(whole, pen_file=None).lacks() == (Lack.PEN_FILE,)
+    assert replace(whole, camera_file=None).missing_inputs() == (
+        MissingInput.CAMERA_FILE,
+    )
+    assert replace(whole, pen_file=None).missing_inputs() == (MissingInput.PEN_FILE,)
 
 
 def test_edited_leds_must_be_saved_or_discarded_before_a_swing(
     whole: Preparation,
 ) -> None:
-    assert replace(whole, has_unsaved_leds=True).lacks() == (Lack.SAVED_LEDS,)
+    assert replace(whole, has_unsaved_leds=True).missing_inputs() == (
+        MissingInput.SAVED_LEDS,
+    )
 
 
 def test_no_swing_begins_without_both_files(whole: Preparation) -> None:
@@ -185,7 +207,7 @@ def test_a_record_brings_its_setup_back_to_the_last_digit(
 def test_a_record_of_an_older_program_gets_the_usual_limits(
     whole: Preparation, tmp_path: Path
 ) -> None:
-    header = replace(whole.header(), settings={"min_images": "many"})
+    header = structs.replace(whole.header(), settings={"min_images": "many"})
     RecordWriter.create(tmp_path / "swing", header).close()
     record = open_record(tmp_path / "swing")
 
@@ -199,7 +221,7 @@ def test_a_file_that_vanished_since_is_told_when_a_record_begins(
     assert whole.pen_file is not None
     gone = replace(whole.pen_file, path=tmp_path / "gone.csv")
 
-    with pytest.raises(FileError, match=r"pen file .*gone\.csv does not exist"):
+    with pytest.raises(FileError, match=r"LED file .*gone\.csv does not exist"):
         replace(whole, pen_file=gone).header()
 
 

@@ -14,21 +14,21 @@ import pytest
 from lightpen.cameras.protocol import Frame, FrameIncomplete
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.detection.observations import observe_images
+from lightpen.detection.pen_detection import detect_pen
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import look
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.verdict import Grade, judge
+from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.formats.decoding import encode_png, read_image
 from lightpen.formats.images import find_images
-from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
-from lightpen.record.reading import open_record, recorded_origin
-from lightpen.record.recorded_source import source
-from lightpen.record.solving import solve_record
+from lightpen.record.swings.reading import open_record, recorded_origin
+from lightpen.record.swings.recorded_source import source
+from lightpen.record.swings.solving import solve_record
 from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.state import Happening, Phase, Progress
+from lightpen.swing.state import Phase, Progress, SwingEventKind
+from lightpen.swing_messages import Code
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station
@@ -58,7 +58,7 @@ class Recording:
         station = self.station
         setup = station.status.setup
         assert setup is not None
-        seen = look(frame.image, setup.camera, setup.pen, setup.mask)
+        seen = detect_pen(frame.image, setup.camera, setup.pen, setup.mask)
         n_images = self.camera.caps.n_images
         station.runner.take(frame, seen, setup, n_images)
 
@@ -86,9 +86,9 @@ def test_all_images_are_read_once_and_in_order_and_then_the_tip_is_computed(
     images, again = swung() / "images", station.record_folder / "images"
     shown = [path.read_bytes() for path in sorted(images.iterdir())]
     assert [path.read_bytes() for path in sorted(again.iterdir())] == shown
-    happenings = station.witness.happenings
-    assert happenings.count(Happening.KEPT) == N_IMAGES
-    assert Happening.SEATED not in happenings
+    event_kinds = station.witness.event_kinds
+    assert event_kinds.count(SwingEventKind.KEPT) == N_IMAGES
+    assert SwingEventKind.SEATED not in event_kinds
     tip = solve_record(open_record(swung())).calibration.joint.tip_pen
     assert station.tip == tip.tolist()
 
@@ -162,12 +162,12 @@ def test_an_image_takes_part_that_would_on_files_with_few_leds_whole(
     assert preparation.camera is not None
     assert preparation.pen is not None
     image = read_image(path)
-    sighting = look(image, preparation.camera, preparation.pen)
+    detection = detect_pen(image, preparation.camera, preparation.pen)
     image = image.copy()
-    for x, y in np.rint(sighting.pixels[:5]).astype(int).tolist():
+    for x, y in np.rint(detection.pixels[:5]).astype(int).tolist():
         cv2.circle(image, (x, y - 10), 3, 255, -1)  # at the rim of the disc
     path.write_bytes(encode_png(image))
-    spoiled = look(image, preparation.camera, preparation.pen)
+    spoiled = detect_pen(image, preparation.camera, preparation.pen)
     assert spoiled.has_pose
     assert spoiled.n_leds == 5
     recording = Recording(station, images)
@@ -179,7 +179,7 @@ def test_an_image_takes_part_that_would_on_files_with_few_leds_whole(
     assert not station.state.n_dropped
 
 
-def test_the_postures_that_lack_are_named_at_the_end(
+def test_the_postures_that_are_missing_are_named_at_the_end(
     station: "Station", swung: Callable[..., Path]
 ) -> None:
     recording = Recording(station, swung() / "images")
@@ -233,7 +233,7 @@ def test_after_the_verdict_nothing_more_can_be_captured_or_confirmed(
     recording.show(N_IMAGES)
 
     assert station.state.phase is Phase.VERDICT
-    assert Happening.CONFIRMED not in station.witness.happenings
+    assert SwingEventKind.CONFIRMED not in station.witness.event_kinds
     assert station.n_recorded == N_IMAGES
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.sighting import sight_centers
+from lightpen.detection.pen_detection import detect_from_centers
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
     PAPER_CONE,
@@ -15,14 +15,8 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_from_postures,
 )
-from lightpen.swing.rest import (
-    in_place,
-    offset,
-    rests_in_place,
-    seat_of,
-    steady_seat,
-)
-from lightpen.swing.state import Glimpse, SwingSetup, SwingState, start_swing
+from lightpen.swing.rest import in_place, offset, rests_in_place, seat_of, steady_seat
+from lightpen.swing.state import RecentDetection, SwingSetup, SwingState, start_swing
 
 CAMERA, PEN = paper_camera(), paper_pen()
 STILL = np.zeros((21, 3))
@@ -39,17 +33,19 @@ def state_after(moves: FloatArray, seat: bool = False) -> SwingState:
     pixels = simulate_centers(
         CAMERA, PEN, swing.rotations, swing.translations, 0.05, rng
     )
-    glimpses = tuple(
-        Glimpse(
+    recent_detections = tuple(
+        RecentDetection(
             0.05 * i,
-            sight_centers(
+            detect_from_centers(
                 CAMERA, PEN, pixels[i], swing.rotations[i], swing.translations[i]
             ),
         )
         for i in range(n)
     )
     state = replace(
-        start_swing(SwingSetup(CAMERA, PEN)), recent=glimpses, time=0.05 * (n - 1)
+        start_swing(SwingSetup(CAMERA, PEN)),
+        recent=recent_detections,
+        time=0.05 * (n - 1),
     )
     return replace(state, seat=steady_seat(PEN, state)) if seat else state
 

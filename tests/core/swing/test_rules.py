@@ -8,22 +8,8 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import SkippingClock
+from lightpen.detection.pen_detection import PenDetection, detect_from_centers, unseen
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import Sighting, sight_centers, unseen
-from lightpen.messages import (
-    FOLLOW_ARROW,
-    LEAN_TO_YOUR_RIGHT,
-    PEN_LOST,
-    SEAT_TIP,
-    SWING_TO_SEAT,
-    Code,
-    few_leds,
-    tip_is_good,
-    tip_slipped,
-    too_few_images,
-    too_little_tilt,
-    uncertain,
-)
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.posture import angles_between
@@ -51,13 +37,27 @@ from lightpen.swing.rules import (
 from lightpen.swing.seat import Seat
 from lightpen.swing.shortfall import missing
 from lightpen.swing.state import (
-    Happening,
     Pause,
     Phase,
     SwingEvent,
+    SwingEventKind,
     SwingSetup,
     SwingState,
     start_swing,
+)
+from lightpen.swing_messages import (
+    FOLLOW_ARROW,
+    LEAN_TO_YOUR_RIGHT,
+    PEN_LOST,
+    SEAT_TIP,
+    SWING_TO_SEAT,
+    Code,
+    few_leds,
+    tip_is_good,
+    tip_slipped,
+    too_few_images,
+    too_little_tilt,
+    uncertain,
 )
 
 PERIOD = 0.15  # s, thrice the usual one: what is decided takes longer than either
@@ -94,7 +94,7 @@ class Station:
         self.told: object = None
         self.taken: list[Transition] = []
 
-    def sight(self) -> Sighting:
+    def sight(self) -> PenDetection:
         """Return what the camera sees now."""
         held = self.operator.held(np.array([self.now]))
         rotations = held.postures.rotations
@@ -110,7 +110,7 @@ class Station:
         pixels[[led - 1 for led in held.covered]] = np.nan
         if held.is_away:
             pixels[:] = np.nan
-        return sight_centers(
+        return detect_from_centers(
             *(self.setup.camera, self.setup.pen, pixels),
             *(rotations[0], translations[0]),
         )
@@ -150,8 +150,8 @@ class Station:
                 break
         return self
 
-    def happenings(self) -> list[Happening]:
-        frequent = (Happening.KEPT, Happening.FIELD_FULL)
+    def event_kinds(self) -> list[SwingEventKind]:
+        frequent = (SwingEventKind.KEPT, SwingEventKind.FIELD_FULL)
         return [event.what for event in self.events if event.what not in frequent]
 
     @property
@@ -194,20 +194,26 @@ def centers_of(swing: Swing, sigma: float) -> FloatArray:
 
 
 def shown(
-    state: SwingState, frames: range, *, sigma: float = 0.05, offset: float = 0.0
+    state: SwingState,
+    frames: range,
+    *,
+    sigma: float = 0.05,
+    offset: float = 0.0,
+    n_hidden: int = 0,
 ) -> Transition:
     """Return the swing after further postures, 0.1 s apart, the tip off the cone."""
     moved = replace(
         POSTURES, translations=POSTURES.translations + np.array([offset, 0.0, 0.0])
     )
     setup, pixels = SwingSetup(paper_camera(), paper_pen()), centers_of(moved, sigma)
+    pixels[:, :n_hidden] = np.nan
     events: tuple[SwingEvent, ...] = ()
     for i in frames:
-        sighting = sight_centers(
+        detection = detect_from_centers(
             *(setup.camera, setup.pen, pixels[i]),
             *(moved.rotations[i], moved.translations[i]),
         )
-        transition = advance_swing(setup, state, sighting, state.time + 0.1)
+        transition = advance_swing(setup, state, detection, state.time + 0.1)
         state, events = transition.state, (*events, *transition.events)
     return Transition(state, events)
 
@@ -246,7 +252,7 @@ def test_a_guided_swing_goes_through_its_phases_without_a_key(whole: Station) ->
         Phase.CAPTURING,
         Phase.SOLVING,
     ]
-    assert whole.happenings() == [Happening.SEATED, Happening.CAPTURED]
+    assert whole.event_kinds() == [SwingEventKind.SEATED, SwingEventKind.CAPTURED]
 
 
 def test_it_ends_when_postures_and_uncertainty_suffice(whole: Station) -> None:
@@ -268,13 +274,13 @@ def test_kept_postures_differ_from_each_other_by_the_spacing(whole: Station) -> 
 
 
 def test_each_kept_image_gets_the_next_number(whole: Station) -> None:
-    kept = [e.numbers[0] for e in whole.events if e.what is Happening.KEPT]
+    kept = [e.numbers[0] for e in whole.events if e.what is SwingEventKind.KEPT]
     assert kept == list(range(1, whole.state.next_number))
     np.testing.assert_array_equal(whole.state.kept.numbers, kept)
 
 
 def test_each_field_is_full_once(whole: Station) -> None:
-    full = [e.numbers for e in whole.events if e.what is Happening.FIELD_FULL]
+    full = [e.numbers for e in whole.events if e.what is SwingEventKind.FIELD_FULL]
     assert len(set(full)) == len(full) == 17
 
 
@@ -342,7 +348,7 @@ def test_lifting_in_the_countdown_starts_over() -> None:
     station.operator.lift()
     station.run(2.0)
     assert station.state.phase is Phase.SEEN
-    assert station.happenings()[-1] is Happening.LOST
+    assert station.event_kinds()[-1] is SwingEventKind.LOST
 
 
 def test_a_slip_drops_its_own_images_only() -> None:
@@ -352,7 +358,7 @@ def test_a_slip_drops_its_own_images_only() -> None:
     station.run(4.0)
 
     assert station.state.phase is Phase.CAPTURING
-    assert Happening.SLIPPED in station.happenings()
+    assert SwingEventKind.SLIPPED in station.event_kinds()
     assert station.state.n_dropped[Reason.SLIPPED] > 2
     lost = np.setdiff1d(before, station.state.kept.numbers)
     assert len(lost) <= 3  # of the half second before, by a gate of 99 %
@@ -364,7 +370,7 @@ def test_a_slip_drops_the_images_before_it_that_were_half_out() -> None:
     creeping = set(state.kept.numbers.tolist()) - set(range(1, 41))
     after = shown(state, range(46, 52), offset=0.5)
 
-    (slip,) = (e for e in after.events if e.what is Happening.SLIPPED)
+    (slip,) = (e for e in after.events if e.what is SwingEventKind.SLIPPED)
     assert set(slip.numbers) <= creeping
     assert len(slip.numbers) >= 2
     assert set(range(1, 41)) <= set(after.state.kept.numbers.tolist())
@@ -377,7 +383,7 @@ def test_a_slip_says_so_once_with_the_number_of_images() -> None:
     n_slipped = station.state.n_dropped[Reason.SLIPPED]
     assert station.state.message == tip_slipped(n_slipped)
     station.run(2.5)
-    assert station.happenings().count(Happening.SLIPPED) == 1
+    assert station.event_kinds().count(SwingEventKind.SLIPPED) == 1
     assert station.state.message == FOLLOW_ARROW
 
 
@@ -396,7 +402,7 @@ def test_images_that_slipped_are_found_when_more_is_known() -> None:
     assert len(hidden) >= 2
     assert station.state.phase is Phase.CAPTURING
     dropped = {
-        n for e in station.events if e.what is Happening.SLIPPED for n in e.numbers
+        n for e in station.events if e.what is SwingEventKind.SLIPPED for n in e.numbers
     }
     assert dropped & set(hidden.tolist())
     assert station.tip_error < 1.5 * station.state.kept.uncertainty
@@ -414,7 +420,7 @@ def test_a_tip_that_stays_elsewhere_pauses_until_it_is_put_back() -> None:
 
     station.run(3.0)
     assert station.state.phase is Phase.CAPTURING
-    assert station.happenings()[-1] is Happening.SEATED
+    assert station.event_kinds()[-1] is SwingEventKind.SEATED
 
 
 def test_images_from_a_wrong_place_give_way_to_more_from_the_right_one() -> None:
@@ -440,7 +446,7 @@ def test_a_lifted_pen_pauses_and_goes_on_in_the_cone() -> None:
     station.run(3.0)
     assert station.state.pause is Pause.LIFTED
     assert station.state.n_kept <= n_kept + 1
-    assert station.happenings()[-1] is Happening.LOST
+    assert station.event_kinds()[-1] is SwingEventKind.LOST
 
     station.operator.seat()
     station.run(6.0)
@@ -477,6 +483,17 @@ def test_too_few_leds_are_said_and_not_kept() -> None:
     station.operator.uncover()
     station.run(1.0)
     assert station.state.message == FOLLOW_ARROW
+
+
+def test_a_posture_that_was_of_no_use_counts_again_after_a_kept_image() -> None:
+    def hidden(state: SwingState, frame: int) -> SwingState:
+        return shown(state, range(frame, frame + 1), n_hidden=5).state
+
+    once = hidden(hidden(capturing_from(20), 30), 30)
+    assert once.n_dropped[Reason.TOO_FEW_LEDS] == 1
+    kept = shown(once, range(21, 22)).state
+    assert kept.n_kept == 21
+    assert hidden(kept, 30).n_dropped[Reason.TOO_FEW_LEDS] == 2
 
 
 def test_an_image_that_the_program_failed_on_is_counted_and_the_swing_goes_on() -> None:
@@ -527,7 +544,7 @@ def test_finishing_early_says_what_is_missing() -> None:
 
     transition = finish(station.state)
     assert transition.state.phase is Phase.SOLVING
-    assert transition.events == (SwingEvent(Happening.CAPTURED),)
+    assert transition.events == (SwingEvent(SwingEventKind.CAPTURED),)
 
 
 def test_the_ceiling_ends_a_swing_that_is_not_good_enough() -> None:
@@ -553,9 +570,9 @@ def test_the_verdict_is_told(whole: Station) -> None:
     transition = conclude(whole.state, good, passed=True)
     assert transition.state.phase is Phase.VERDICT
     assert transition.state.message == good
-    assert transition.events == (SwingEvent(Happening.DONE),)
+    assert transition.events == (SwingEvent(SwingEventKind.DONE),)
     assert conclude(whole.state, good, passed=False).events == (
-        SwingEvent(Happening.FAILED),
+        SwingEvent(SwingEventKind.FAILED),
     )
     assert (
         advance_swing(whole.setup, transition.state, whole.sight(), whole.now).events
@@ -612,10 +629,10 @@ def test_whatever_happens_the_events_tell_what_is_kept(seed: int, drops: bool) -
     recorded: set[int] = set()
     n_lost = 0
     for event in station.events:
-        if event.what is Happening.KEPT:
+        if event.what is SwingEventKind.KEPT:
             assert event.numbers[0] not in recorded
             recorded |= set(event.numbers)
-        elif event.what is Happening.SLIPPED:
+        elif event.what is SwingEventKind.SLIPPED:
             assert set(event.numbers) <= recorded
             recorded -= set(event.numbers)
             n_lost += len(event.numbers)

@@ -14,20 +14,20 @@ import pytest
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker_events import WorkerEvent
 from lightpen.errors import FileError
-from lightpen.estimation.verdict import Grade
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
-from lightpen.live.looking import Live, LiveImage
-from lightpen.messages import Code
+from lightpen.live.pipeline import Live, LiveImage
 from lightpen.model.limits import SwingLimits
-from lightpen.record.journal import JOURNAL
-from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, IMAGES, open_record
-from lightpen.record.solving import solve_record
-from lightpen.record.writing import RecordWriter
-from lightpen.simulator.sample_pens import SAMPLE_PENS
+from lightpen.record.swings.journal import JOURNAL
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import DISCARDED, IMAGES, open_record
+from lightpen.record.swings.solving import solve_record
+from lightpen.record.swings.writing import RecordWriter
+from lightpen.simulator.samples import SAMPLE_PENS
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.state import Happening, Pause, Phase
+from lightpen.swing.state import Pause, Phase, SwingEventKind
+from lightpen.swing_messages import Code
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 TIMEOUT = 60.0  # s until a test gives up
 N_IMAGES = 20  # of the record that is resumed
 FRAME_RATE = 6.0  # 1/s: a third of the usual one, as looking at an image takes long
-BETWEEN = (Happening.KEPT, Happening.FIELD_FULL, Happening.SLIPPED)
+BETWEEN = (SwingEventKind.KEPT, SwingEventKind.FIELD_FULL, SwingEventKind.SLIPPED)
 Command = Callable[[Path], dict[str, Any]]
 
 
@@ -62,17 +62,19 @@ def test_a_swing_goes_from_the_first_image_to_the_accepted_tip_without_a_key(
         *(Screen(), station.runner),
         clock=station.clock,
     )
-    live.set_aim(station.preparation.aim)
+    live.set_region(station.preparation.region)
     live.start()
     try:
         station.wait_for_phase(Phase.VERDICT)
         station.operator.lean(0.0, 0.0, 0.0)
-        station.wait_until(lambda: Happening.CONFIRMED in witness.happenings)
+        station.wait_until(lambda: SwingEventKind.CONFIRMED in witness.event_kinds)
     finally:
         live.stop()
     station.accept()
-    kept = [event.numbers for event in witness.events if event.what is Happening.KEPT]
-    others = [what for what in witness.happenings if what not in BETWEEN]
+    kept = [
+        event.numbers for event in witness.events if event.what is SwingEventKind.KEPT
+    ]
+    others = [what for what in witness.event_kinds if what not in BETWEEN]
     phases = [status.state.phase for status in witness.statuses if status.state]
 
     assert list(dict.fromkeys(phases)) == [
@@ -81,9 +83,14 @@ def test_a_swing_goes_from_the_first_image_to_the_accepted_tip_without_a_key(
     ]
     assert kept == [(number,) for number in range(1, station.n_recorded + 1)]
     assert others == [
-        *(Happening.SEATED, Happening.CAPTURED, Happening.DONE, Happening.CONFIRMED)
+        *(
+            SwingEventKind.SEATED,
+            SwingEventKind.CAPTURED,
+            SwingEventKind.DONE,
+            SwingEventKind.CONFIRMED,
+        )
     ]
-    assert witness.troubles == []
+    assert witness.faults == []
     assert station.status.verdict is not None
     assert station.status.verdict.grade is not Grade.REPEAT
     assert station.tip == command(station.record_folder)["tip_pen_mm"]
@@ -107,7 +114,7 @@ def test_without_a_nominal_tip_the_swing_finds_the_seat_and_goes_to_the_verdict(
     station.see_until(lambda: not station.status.is_capturing)
     station.wait_for_phase(Phase.VERDICT)
 
-    assert station.witness.happenings[0] is Happening.SEATED
+    assert station.witness.event_kinds[0] is SwingEventKind.SEATED
     assert station.status.verdict is not None
     assert station.status.verdict.grade is not Grade.REPEAT
     uncertainty = station.status.setup.limits.max_uncertainty
@@ -151,9 +158,9 @@ def test_a_record_that_cannot_be_made_leaves_the_swing_before(
     station.records.rename(station.records.with_name("old"))
     station.records.write_text("not a folder")
     station.runner.begin(station.preparation)
-    station.wait_until(lambda: len(station.witness.troubles) == 1)
+    station.wait_until(lambda: len(station.witness.faults) == 1)
 
-    assert "cannot be written" in station.witness.troubles[0]
+    assert "cannot be written" in station.witness.faults[0]
     assert station.state is state
     assert station.record_folder == before
     assert station.status.is_capturing
@@ -181,9 +188,9 @@ def test_files_that_are_gone_are_told_before_anything_begins(
     assert pen_file is not None
     gone = replace(pen_file, path=tmp_path / "gone.csv")
     station.runner.begin(replace(station.preparation, pen_file=gone))
-    station.wait_until(lambda: len(station.witness.troubles) == 1)
+    station.wait_until(lambda: len(station.witness.faults) == 1)
 
-    assert "does not exist" in station.witness.troubles[0]
+    assert "does not exist" in station.witness.faults[0]
     assert station.status.state is None
 
 
@@ -208,7 +215,7 @@ def test_commands_without_a_swing_do_nothing(station: "Station") -> None:
     station.see()
 
     assert station.witness.told == []
-    assert station.witness.troubles == []
+    assert station.witness.faults == []
     assert not station.records.exists()
 
 
@@ -250,7 +257,7 @@ def test_nothing_is_kept_after_the_end(station: "Station", interrupted: Path) ->
     station.solve()
     before = (interrupted / JOURNAL).read_bytes()
     frame = station.camera.read(1.0)
-    station.runner.take(frame, station.state.sighting, setup)
+    station.runner.take(frame, station.state.detection, setup)
 
     assert (interrupted / JOURNAL).read_bytes() == before
 
@@ -264,10 +271,10 @@ def test_an_image_of_another_swing_is_not_kept(
     assert setup is not None
     frame = station.camera.read(1.0)
     for other in (None, replace(setup)):  # it was looked for something else
-        station.runner.take(frame, state.sighting, other)
+        station.runner.take(frame, state.detection, other)
         assert station.state is state
 
-    station.runner.take(frame, state.sighting, setup)
+    station.runner.take(frame, state.detection, setup)
     assert station.state is not state
 
 
@@ -276,8 +283,11 @@ def test_a_swing_without_images_ends_with_the_sentence_why(station: "Station") -
     station.solve()
 
     assert station.state.message.code == Code.NO_TIP
-    assert "holds no images. Resume the swing" in str(station.state.message)
-    assert station.witness.happenings == [Happening.CAPTURED, Happening.FAILED]
+    assert "contains no images. Resume the swing" in str(station.state.message)
+    assert station.witness.event_kinds == [
+        SwingEventKind.CAPTURED,
+        SwingEventKind.FAILED,
+    ]
     assert (station.status.solution, station.status.verdict) == (None, None)
     assert not station.status.is_solving
 
@@ -290,15 +300,15 @@ def test_a_disk_that_is_gone_pauses_the_swing_and_costs_one_image(
     (interrupted / IMAGES).rename(interrupted / "elsewhere")
     station.see_until(lambda: station.status.is_paused_by_user)
     n_kept = station.state.n_kept
-    assert station.status.is_troubled
-    (sentence,) = station.witness.troubles
+    assert station.status.has_fault
+    (sentence,) = station.witness.faults
     assert "cannot be written" in sentence
 
     (interrupted / "elsewhere").rename(interrupted / IMAGES)
     assert station.n_recorded == n_kept == N_IMAGES + 1
     station.runner.resume()
     station.see()
-    assert not station.status.is_troubled
+    assert not station.status.has_fault
     assert station.witness.reliefs == []  # who knows yet
     station.keep(2)
     numbers = [image.number for image in open_record(interrupted).images]
@@ -308,7 +318,7 @@ def test_a_disk_that_is_gone_pauses_the_swing_and_costs_one_image(
     assert len(numbers) == n_kept + 2
 
 
-def test_a_pause_of_the_user_is_not_taken_for_a_trouble(
+def test_a_pause_of_the_user_is_not_taken_for_a_fault(
     station: "Station", interrupted: Path
 ) -> None:
     station.go_on(interrupted)
@@ -316,7 +326,7 @@ def test_a_pause_of_the_user_is_not_taken_for_a_trouble(
     station.see(2)
 
     assert station.status.is_paused_by_user
-    assert not station.status.is_troubled
+    assert not station.status.has_fault
 
 
 @pytest.mark.parametrize(
@@ -352,7 +362,7 @@ def test_an_image_that_is_kept_is_on_the_disk_when_it_is_told(
     on_swing = station.witness.on_swing
 
     def look_at_disk(*told: Any) -> None:
-        if any(event.what is Happening.KEPT for event in told[1]):
+        if any(event.what is SwingEventKind.KEPT for event in told[1]):
             on_disk.append(station.n_recorded)
         on_swing(*told)
 
@@ -377,7 +387,7 @@ def test_every_status_is_told_in_order_with_its_events_by_one_thread(
     (thread,) = station.witness.threads
     assert thread is not threading.current_thread()
     for status, events in station.witness.told:
-        n_kept += sum(event.what is Happening.KEPT for event in events)
+        n_kept += sum(event.what is SwingEventKind.KEPT for event in events)
         if status.state is not None and status.state.n_kept:
             assert status.state.next_number == n_kept + 1
     assert n_kept == N_IMAGES + 3
@@ -423,7 +433,7 @@ def test_resuming_the_swing_that_is_under_way_changes_nothing(
     station.runner.take(station.camera.read(1.0), None)
 
     assert station.status is status
-    assert station.witness.troubles == []
+    assert station.witness.faults == []
 
 
 def test_a_swing_that_was_changed_since_it_was_read_is_refused_and_nothing_begins(
@@ -433,9 +443,9 @@ def test_a_swing_that_was_changed_since_it_was_read_is_refused_and_nothing_begin
     with RecordWriter.resume(swing.record) as writer:
         writer.take_out([1], "by somebody else")
     station.runner.go_on(swing)
-    station.wait_until(lambda: len(station.witness.troubles) == 1)
+    station.wait_until(lambda: len(station.witness.faults) == 1)
 
-    assert "has changed since it was read" in station.witness.troubles[0]
+    assert "changed the swing" in station.witness.faults[0]
     assert station.status.state is None
 
 
@@ -475,10 +485,10 @@ def test_an_end_while_images_are_captured_keeps_all_of_them(
 ) -> None:
     station.go_on(interrupted)
     station.keep(2)
-    setup, sighting = station.status.setup, station.state.sighting
+    setup, detection = station.status.setup, station.state.detection
     station.runner.shut_down()
     assert station.runner.await_end(TIMEOUT)
-    station.runner.take(station.camera.read(1.0), sighting, setup)  # comes too late
+    station.runner.take(station.camera.read(1.0), detection, setup)  # comes too late
 
     assert len(open_record(interrupted).images) == N_IMAGES + 2
     assert station.interrupted() == [interrupted]

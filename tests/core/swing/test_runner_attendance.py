@@ -5,10 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lightpen.record.journal import JOURNAL
-from lightpen.record.reading import DISCARDED, IMAGES, open_record
+from lightpen.record.swings.journal import JOURNAL
+from lightpen.record.swings.reading import DISCARDED, IMAGES, open_record
 from lightpen.swing.preparation import (
-    Lack,
+    MissingInput,
     Preparation,
     SourceChoice,
     SourceKind,
@@ -36,7 +36,7 @@ def test_a_swing_begins_with_the_first_image_when_somebody_is_there(
 def test_no_swing_begins_while_something_lacks(station: "Station") -> None:
     prepared = station.preparation
     lacking = replace(prepared, image_size=None)
-    assert lacking.lacks() == (Lack.IMAGES,)
+    assert lacking.missing_inputs() == (MissingInput.IMAGES,)
     station.runner.come()
     station.see()
     assert station.status.state is None
@@ -65,7 +65,7 @@ def test_a_record_that_cannot_be_made_is_told_once_and_tried_again_when_asked_fo
 ) -> None:
     present.records.write_text("not a folder")
     present.see(3)
-    (sentence,) = present.witness.troubles
+    (sentence,) = present.witness.faults
     assert "cannot be written" in sentence
     assert str(present.status.refusal) == sentence
     assert present.status.state is None
@@ -135,18 +135,18 @@ def test_a_swing_that_is_paused_while_nobody_is_there_stays_paused(
     assert present.status.is_paused_by_user
 
 
-def test_a_trouble_while_nobody_is_there_is_not_over_when_somebody_comes(
+def test_a_fault_while_nobody_is_there_is_not_over_when_somebody_comes(
     present: "Station", interrupted: Path
 ) -> None:
     present.go_on(interrupted)
     present.runner.leave()
     present.runner.resume()  # by somebody who is elsewhere
     (interrupted / IMAGES).rename(interrupted / "elsewhere")
-    present.see_until(lambda: present.status.is_troubled)
+    present.see_until(lambda: present.status.has_fault)
     present.runner.come()
     present.see()
 
-    assert present.status.is_troubled
+    assert present.status.has_fault
     assert present.status.is_paused_by_user
 
 
@@ -164,9 +164,7 @@ def test_a_swing_that_begins_while_everybody_is_away_waits(
     assert not present.status.is_paused_by_user
 
 
-def test_more_that_is_captured_while_everybody_is_away_waits(
-    solved: "Station",
-) -> None:
+def test_more_that_is_captured_while_everybody_is_away_waits(solved: "Station") -> None:
     solved.runner.leave()
     solved.runner.capture_more()
     solved.wait_until(lambda: solved.status.is_paused_by_user)
@@ -275,7 +273,7 @@ def test_a_swing_that_cannot_be_set_aside_goes_on_instead_of_starting_over(
         solved.see()
         assert solved.status.record_folder == status.record_folder
         assert solved.status.solution is status.solution
-    assert len(solved.witness.troubles) == 2
+    assert len(solved.witness.faults) == 2
 
 
 def test_starting_over_a_swing_whose_tip_is_in_force_leaves_its_verdict(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from lightpen.record.reading import open_record
+from lightpen.record.swings.reading import open_record
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.state import Phase
 from lightpen.swing.status import Activity
@@ -53,18 +53,18 @@ def test_a_bug_while_an_image_is_taken_pauses_the_swing_and_costs_nothing_else(
     station.go_on(interrupted)
     station.keep(1)
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.capture.advance_swing", fail)
+        broken.setattr("lightpen.swing.swing_recorder.advance_swing", fail)
         station.see(5)
-    station.wait_until(lambda: len(station.witness.troubles) == 1)
+    station.wait_until(lambda: len(station.witness.faults) == 1)
 
     assert is_reported_once(crashes)  # not with every image
-    assert "made a mistake of its own" in station.witness.troubles[0]
+    assert "An internal error occurred" in station.witness.faults[0]
     assert station.status.is_paused_by_user
-    assert not station.status.is_troubled
+    assert not station.status.has_fault
     assert station.n_recorded == station.state.n_kept == N_IMAGES + 1
     station.runner.resume()
     station.keep(1)
-    assert station.witness.reliefs == station.witness.troubles
+    assert station.witness.reliefs == station.witness.faults
     station.solve()
     assert station.solution.numbers.tolist() == list(range(1, N_IMAGES + 3))
 
@@ -73,9 +73,9 @@ def test_a_bug_when_a_swing_begins_is_told_once_and_tried_again_when_asked_for(
     present: "Station", crashes: Crashes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.course.read_resumable", fail)
+        broken.setattr("lightpen.swing.workflow.read_resumable", fail)
         present.see(5)
-        present.wait_until(lambda: len(present.witness.troubles) == 1)
+        present.wait_until(lambda: len(present.witness.faults) == 1)
     assert is_reported_once(crashes)
     assert len(list(present.records.iterdir())) == 1
     assert present.status.state is None
@@ -93,9 +93,9 @@ def test_a_bug_in_a_command_pauses_the_swing_and_costs_nothing_else(
 ) -> None:
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.course.finish", fail)
+        broken.setattr("lightpen.swing.workflow.finish", fail)
         station.runner.finish()
-        station.wait_until(lambda: len(station.witness.troubles) == 1)
+        station.wait_until(lambda: len(station.witness.faults) == 1)
     assert is_reported_once(crashes)
     assert station.status.is_paused_by_user
 
@@ -116,9 +116,9 @@ def test_a_swing_whose_entrance_fails_by_a_bug_leaves_the_one_before_whole(
     shutil.copytree(swung(), other)
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.course.recorded_names", fail)
+        broken.setattr("lightpen.swing.workflow.recorded_names", fail)
         station.runner.go_on(read_resumable(other))
-        station.wait_until(lambda: len(station.witness.troubles) == 1)
+        station.wait_until(lambda: len(station.witness.faults) == 1)
     station.runner.resume()
     station.keep(1)
 
@@ -137,7 +137,7 @@ def test_a_bug_while_the_tip_is_computed_leaves_the_swing_to_be_solved_again(
 ) -> None:
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.course.solve_record", fail)
+        broken.setattr("lightpen.swing.workflow.solve_record", fail)
         station.runner.finish()
         station.wait_for_phase(Phase.SOLVING)
         station.wait_until(lambda: not station.status.is_solving)
@@ -157,7 +157,7 @@ def test_a_bug_when_the_tip_is_judged_leaves_the_swing_to_be_solved_again(
 ) -> None:
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.course.assess", fail)
+        broken.setattr("lightpen.swing.workflow.assess", fail)
         station.runner.finish()
         assert is_reported_once(crashes)
         station.wait_until(lambda: not station.status.is_solving)
@@ -172,7 +172,7 @@ def test_a_bug_while_images_are_read_again_leaves_the_solution(
 ) -> None:
     before = solved.solution
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.course.read_for_more", fail)
+        broken.setattr("lightpen.swing.workflow.read_for_more", fail)
         solved.runner.capture_more()
         assert is_reported_once(crashes)
         solved.wait_until(lambda: not solved.status.is_reading)
@@ -187,9 +187,9 @@ def test_a_bug_while_a_result_is_stored_leaves_the_tip_to_be_accepted(
     solved: "Station", crashes: Crashes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.course.accept", fail)
+        broken.setattr("lightpen.swing.workflow.accept", fail)
         solved.runner.accept("It is seen to.")
-        solved.wait_until(lambda: len(solved.witness.troubles) == 1)
+        solved.wait_until(lambda: len(solved.witness.faults) == 1)
     assert is_reported_once(crashes)
     assert solved.status.activity is Activity.NONE
     assert solved.status.result is None
@@ -205,10 +205,10 @@ def test_a_bug_in_a_command_lets_what_is_computed_go_on(
 ) -> None:
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.attendance.replace", fail)
+        broken.setattr("lightpen.swing.operator_presence.replace", fail)
         station.runner.finish()
         station.runner.come()
-        station.wait_until(lambda: len(station.witness.troubles) == 1)
+        station.wait_until(lambda: len(station.witness.faults) == 1)
     station.wait_for_phase(Phase.VERDICT)
 
     assert is_reported_once(crashes)

@@ -12,9 +12,9 @@ from lightpen.archive.chains import entries_of, heads
 from lightpen.archive.check import check_archive
 from lightpen.archive.database import look_into
 from lightpen.archive.entries import Event, Kind
-from lightpen.archive.late_logbook import LateLogbook
+from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.record.unfinished import discard_swing
+from lightpen.record.swings.interrupted import discard_swing
 from lightpen.swing.runner import SwingRunner
 
 
@@ -31,7 +31,7 @@ def logging(station: Station) -> Iterator[Station]:
     bare, folder = station.runner, station.folder
     station.runner = SwingRunner(
         *(station.records, station.archive, station.witness),
-        logbook=LateLogbook(folder),
+        logbook=LazyLogbook(folder),
     )
     yield station
     station.runner.shut_down()
@@ -59,8 +59,8 @@ def test_accepted_and_taken_back_tips_are_entered(
     assert accepted.tip_pen_mm == tuple(logging.tip)
 
     assert logging.status.result is not None
-    logging.runner.take_back(logging.status.result, "Ben")
-    logging.wait_until(lambda: logging.status.taken_back is not None)
+    logging.runner.revoke(logging.status.result, "Ben")
+    logging.wait_until(lambda: logging.status.revoked is not None)
     _, back = entered(logging)
     assert (back.kind, back.names.operator) == (Kind.TAKEN_BACK, "Ben")
 
@@ -123,4 +123,4 @@ def test_a_tip_comes_into_force_though_nothing_can_be_entered(
     logging.solve()
     logging.accept()
 
-    assert any("not a database" in trouble for trouble in logging.witness.troubles)
+    assert any("not a database" in trouble for trouble in logging.witness.faults)

@@ -8,18 +8,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from benchmarks.small_records import entries_of
 
-from lightpen.estimation.report import calibration_record
-from lightpen.estimation.verdict import Grade
-from lightpen.messages import Code
-from lightpen.record.journal import JOURNAL
-from lightpen.record.reading import DISCARDED, Record, open_record, recorded_limits
-from lightpen.record.solving import Solution, record_inputs, solve_record
+from lightpen.estimation.reports.report import calibration_record
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.record.swings.journal import JOURNAL
+from lightpen.record.swings.reading import (
+    DISCARDED,
+    Record,
+    open_record,
+    recorded_limits,
+)
+from lightpen.record.swings.solving import Solution, record_inputs, solve_record
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.rules import stillness
 from lightpen.swing.runner import SwingRunner
-from lightpen.swing.state import Happening, Phase
+from lightpen.swing.state import Phase, SwingEventKind
 from lightpen.swing.status import Activity
+from lightpen.swing_messages import Code
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station
@@ -38,7 +44,8 @@ def test_the_tip_is_that_of_the_command_line_to_the_last_digit(
     solution = solved.solution
     inputs = record_inputs(solution.source)
     limits = recorded_limits(open_record(solved.record_folder))
-    fields = calibration_record(solution.calibration, inputs, "joint", limits)
+    record = calibration_record(solution.calibration, inputs, "joint", limits)
+    fields = entries_of(record)
     fields.pop("created")
 
     assert fields == command(solved.record_folder)
@@ -81,9 +88,9 @@ def test_images_taken_out_in_quick_succession_all_count(
     assert set(solved.solution.taken_out) == {1, 2, 3, 5, 6, 7}
     assert set(open_record(solved.record_folder).taken_out) == {1, 2, 3, 5, 6, 7}
     assert solved.tip == command(solved.record_folder)["tip_pen_mm"]
-    happenings = solved.witness.happenings
-    assert happenings[-1] in (Happening.DONE, Happening.FAILED)
-    assert happenings.count(happenings[-1]) == 1  # the verdict is told once
+    event_kinds = solved.witness.event_kinds
+    assert event_kinds[-1] in (SwingEventKind.DONE, SwingEventKind.FAILED)
+    assert event_kinds.count(event_kinds[-1]) == 1  # the verdict is told once
 
 
 def test_too_few_images_left_keep_the_solution_and_the_record(
@@ -97,14 +104,17 @@ def test_too_few_images_left_keep_the_solution_and_the_record(
 
     assert solved.solution is before
     assert (solved.record_folder / JOURNAL).read_bytes() == journal
-    (sentence,) = solved.witness.troubles
+    (sentence,) = solved.witness.faults
     assert "images are usable" in sentence
-    assert "Without these images there is no tip, so they stay in." in sentence
+    assert (
+        "Without these images the tip is not determined; they remain included."
+        in sentence
+    )
     assert solved.witness.reliefs == []
     solved.runner.take_out([2])  # what failed is not asked for again
     solved.wait_until_solved()
     assert set(solved.solution.taken_out) == {1, 2}
-    assert solved.witness.reliefs == solved.witness.troubles
+    assert solved.witness.reliefs == solved.witness.faults
 
 
 def test_what_is_wished_for_while_a_wish_fails_is_fulfilled(solved: "Station") -> None:
@@ -113,7 +123,7 @@ def test_what_is_wished_for_while_a_wish_fails_is_fulfilled(solved: "Station") -
     solved.wait_until_solved()
 
     assert set(solved.solution.taken_out) == {1, 2, 3}
-    assert solved.witness.troubles == []
+    assert solved.witness.faults == []
 
 
 def test_a_record_that_cannot_be_written_keeps_the_solution(solved: "Station") -> None:
@@ -125,7 +135,7 @@ def test_a_record_that_cannot_be_written_keeps_the_solution(solved: "Station") -
     journal.with_name("elsewhere").rename(journal)
 
     assert solved.solution is before
-    (sentence,) = solved.witness.troubles
+    (sentence,) = solved.witness.faults
     assert "does not exist" in sentence
     assert "stay in" not in sentence
     assert solved.witness.reliefs == []
@@ -173,7 +183,7 @@ def test_nothing_comes_of_a_solution_after_its_swing_was_abandoned(
         is_solved.set()
         return solution
 
-    monkeypatch.setattr("lightpen.swing.course.solve_record", solve_late)
+    monkeypatch.setattr("lightpen.swing.workflow.solve_record", solve_late)
     station.go_on(interrupted)
     station.runner.finish()
     station.runner.abandon()
@@ -186,7 +196,7 @@ def test_nothing_comes_of_a_solution_after_its_swing_was_abandoned(
     station.see()
 
     assert station.status.solution is None
-    assert station.witness.troubles == []
+    assert station.witness.faults == []
 
 
 def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
@@ -214,13 +224,13 @@ def test_holding_the_pen_upright_and_still_after_the_verdict_is_told_once(
 ) -> None:
     solved.operator.lean(0.4, 0.0, 0.0)
     solved.see(35)
-    assert Happening.CONFIRMED not in solved.witness.happenings
+    assert SwingEventKind.CONFIRMED not in solved.witness.event_kinds
 
     solved.operator.lean(0.0, 0.0, 0.0)
-    solved.see_until(lambda: Happening.CONFIRMED in solved.witness.happenings)
+    solved.see_until(lambda: SwingEventKind.CONFIRMED in solved.witness.event_kinds)
     assert stillness(solved.state) == 1.0
     solved.see(10)
-    assert solved.witness.happenings.count(Happening.CONFIRMED) == 1
+    assert solved.witness.event_kinds.count(SwingEventKind.CONFIRMED) == 1
     assert solved.state.phase is Phase.VERDICT
 
 
@@ -277,7 +287,7 @@ def test_images_that_cannot_be_read_again_leave_the_solution_and_no_wish(
     solved.runner.take_out([3])
     solved.runner.capture_more()
     solved.runner.take_out([4])  # while they are read nothing is taken out
-    solved.wait_until(lambda: len(solved.witness.troubles) == 1)
+    solved.wait_until(lambda: len(solved.witness.faults) == 1)
     solved.wait_until(lambda: solved.status.activity is Activity.NONE)
     journal.with_name("elsewhere").rename(journal)
     assert solved.solution is before
@@ -383,11 +393,11 @@ def test_without_a_reason_a_tip_that_is_to_be_checked_is_not_accepted(
     solved: "Station",
 ) -> None:
     solved.runner.accept()
-    solved.wait_until(lambda: len(solved.witness.troubles) == 1)
+    solved.wait_until(lambda: len(solved.witness.faults) == 1)
 
     assert solved.status.result is None
     assert solved.status.activity is Activity.NONE
-    assert "Accept it with a reason" in solved.witness.troubles[0]
+    assert "Enter a reason to accept it." in solved.witness.faults[0]
     assert open_record(solved.record_folder).verdict is None
 
 
@@ -397,8 +407,8 @@ def test_what_was_accepted_can_be_taken_back_and_accepted_again(
     solved.accept("First.")
     first = solved.status.result
     assert first is not None
-    solved.runner.take_back(first, "Ben")
-    solved.wait_until(lambda: solved.status.taken_back is first)
+    solved.runner.revoke(first, "Ben")
+    solved.wait_until(lambda: solved.status.revoked is first)
 
     assert solved.status.result is None
     assert solved.in_force() is None
@@ -415,8 +425,8 @@ def test_a_result_of_another_swing_is_taken_back_and_this_one_stays(
     first = in_force.status.result
     assert first is not None
     in_force.go_on(other)
-    in_force.runner.take_back(first, "Ben")
-    in_force.wait_until(lambda: in_force.status.taken_back is first)
+    in_force.runner.revoke(first, "Ben")
+    in_force.wait_until(lambda: in_force.status.revoked is first)
 
     assert in_force.status.is_capturing
     assert in_force.in_force() is None
@@ -426,10 +436,10 @@ def test_a_result_that_is_not_in_force_is_not_taken_back(in_force: "Station") ->
     first = in_force.status.result
     assert first is not None
     for _ in range(2):
-        in_force.runner.take_back(first, "Ben")
-    in_force.wait_until(lambda: len(in_force.witness.troubles) == 1)
+        in_force.runner.revoke(first, "Ben")
+    in_force.wait_until(lambda: len(in_force.witness.faults) == 1)
 
-    assert "is not the one in force any more" in in_force.witness.troubles[0]
+    assert "is no longer current" in in_force.witness.faults[0]
 
 
 def test_a_tip_that_is_to_be_repeated_is_not_accepted(
@@ -440,7 +450,7 @@ def test_a_tip_that_is_to_be_repeated_is_not_accepted(
     station.solve()
     assert station.status.verdict is not None
     assert station.status.verdict.grade is Grade.REPEAT
-    assert station.witness.happenings[-1] is Happening.FAILED
+    assert station.witness.event_kinds[-1] is SwingEventKind.FAILED
 
     station.runner.accept("It is seen to.")
     station.see()
@@ -470,7 +480,7 @@ def test_a_result_that_cannot_be_stored_is_not_in_force(solved: "Station") -> No
     solved.results.parent.mkdir()
     solved.results.write_text("not a folder")
     solved.runner.accept("It is seen to.")
-    solved.wait_until(lambda: len(solved.witness.troubles) == 1)
+    solved.wait_until(lambda: len(solved.witness.faults) == 1)
     assert solved.status.result is None
     assert solved.status.activity is Activity.NONE
     assert open_record(solved.record_folder).verdict is None
@@ -478,7 +488,7 @@ def test_a_result_that_cannot_be_stored_is_not_in_force(solved: "Station") -> No
     solved.results.unlink()
     solved.accept()
     solved.see()
-    assert solved.witness.reliefs == solved.witness.troubles
+    assert solved.witness.reliefs == solved.witness.faults
 
 
 def test_a_result_bears_the_time_that_the_runner_goes_by(

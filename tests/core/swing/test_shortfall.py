@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lightpen.detection.sighting import sight_centers
-from lightpen.estimation.reach import Reached
-from lightpen.messages import SIDES, Code
+from lightpen.detection.pen_detection import detect_from_centers
+from lightpen.estimation.uncertainty.prediction import PredictedUncertainty
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import Posture, rotations_of
 from lightpen.simulator.postures import Postures
@@ -31,11 +30,8 @@ from lightpen.swing.shortfall import (
     out_of_reach,
     turn_range,
 )
-from lightpen.swing.state import (
-    SwingSetup,
-    SwingState,
-    start_swing,
-)
+from lightpen.swing.state import SwingSetup, SwingState, start_swing
+from lightpen.swing_messages import SIDES, Code
 
 CAMERA, PEN = paper_camera(), paper_pen()
 
@@ -83,8 +79,8 @@ def test_the_estimate_of_images_to_come_holds() -> None:
 def test_the_more_of_u_is_of_the_files_the_more_images_it_takes() -> None:
     setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=0.01))
     state = state_of(setup, swing_poses(20, np.random.default_rng(0)))
-    reached = Reached(uncertainty=0.02, floor=0.007)
-    state = replace(state, kept=replace(state.kept, reached=reached))
+    reached = PredictedUncertainty(uncertainty=0.02, floor=0.007)
+    state = replace(state, kept=replace(state.kept, predicted=reached))
 
     n_needed = measure_shortfall(setup, state).n_for_uncertainty
 
@@ -107,7 +103,7 @@ def test_no_images_are_asked_for_where_the_files_leave_too_much_open() -> None:
     setup = SwingSetup(CAMERA, vague, SwingLimits(max_uncertainty=0.02))
     state = state_of(setup, swing)
 
-    assert state.kept.reached.floor > 0.02
+    assert state.kept.predicted.floor > 0.02
     assert measure_shortfall(setup, state).n_for_uncertainty == 0
 
 
@@ -116,13 +112,13 @@ def test_what_no_image_can_mend_is_told_with_its_file() -> None:
     vague = replace(PEN, scale_sigma=1e-3)
     setup = SwingSetup(CAMERA, vague, SwingLimits(max_uncertainty=0.02))
     state = state_of(setup, swing)
-    floor = 1000 * state.kept.reached.floor
+    floor = 1000 * state.kept.predicted.floor
 
     short = measure_shortfall(setup, state)
 
     told = out_of_reach(setup.limits, state, short)
 
-    words = f"cannot get below {floor:.1f} \N{MICRO SIGN}m with this LED file"
+    words = f"the lowest achievable U (k = 2) is {floor:.1f} \N{MICRO SIGN}m"
     assert words in str(told)
     assert told in missing(setup, state)
     assert out_of_reach(SwingLimits(max_uncertainty=1.0), state, short) is None
@@ -133,7 +129,7 @@ def test_what_other_postures_still_lower_is_not_said_to_be_out_of_reach() -> Non
     setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=0.004))
     early = state_of(setup, to_the_right(15))
     whole = state_of(setup, swing_poses(60, np.random.default_rng(0)))
-    assert early.kept.reached.floor > 0.004 > whole.kept.reached.floor
+    assert early.kept.predicted.floor > 0.004 > whole.kept.predicted.floor
 
     assert out_of_reach(setup.limits, early, measure_shortfall(setup, early)) is None
 
@@ -183,10 +179,10 @@ def test_a_target_out_of_reach_is_chosen_anew_after_a_while() -> None:
         target_since=10.0,
     )
     pose = state.kept.rotations[-1], state.kept.translations[-1]
-    sighting = sight_centers(CAMERA, PEN, state.kept.pixels[-1, 0], *pose)
+    detection = detect_from_centers(CAMERA, PEN, state.kept.pixels[-1, 0], *pose)
 
-    soon = guided(setup, replace(state, time=13.9), sighting)
-    late = guided(setup, replace(state, time=14.0), sighting)
+    soon = guided(setup, replace(state, time=13.9), detection)
+    late = guided(setup, replace(state, time=14.0), detection)
 
     assert soon.target is target
     assert late.target != target
@@ -239,9 +235,9 @@ def test_the_operators_side_is_learnt_from_a_lean_and_kept() -> None:
             *(CAMERA, PEN, swing.rotations, swing.translations, 0.0),
             np.random.default_rng(0),
         )
-        sighting = sight_centers(
+        detection = detect_from_centers(
             CAMERA, PEN, pixels[0], swing.rotations[0], swing.translations[0]
         )
-        state = oriented(setup, state, sighting)
+        state = oriented(setup, state, detection)
         headings.append(state.heading)
     assert headings == [None, np.pi, np.pi]

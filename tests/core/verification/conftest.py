@@ -10,7 +10,7 @@ from tests.accepted_tip import accept_tip
 from tests.verifying import TIMEOUT, Verifier
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.instrument import Instrument, instrument_of_files
+from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
 from lightpen.model.posture import rotations_of
 from lightpen.model.rig import rig_of
 from lightpen.simulator.swings import (
@@ -20,17 +20,17 @@ from lightpen.simulator.swings import (
     simulate_centers,
 )
 from lightpen.swing.preparation import Preparation
-from lightpen.verification.touch import (
+from lightpen.verification.tasks.probed_point import (
+    ProbedPoint,
+    ProbingFrame,
     StillFrames,
-    Touch,
-    TouchFrame,
     measure_touches,
 )
 
 SIGMA = 0.01  # px
 TIP_SIGMA = 0.001  # mm
 
-Touching = Callable[..., tuple[Touch, ...]]
+Touching = Callable[..., tuple[ProbedPoint, ...]]
 
 
 @pytest.fixture(scope="session")
@@ -53,7 +53,7 @@ def touching(instrument: Instrument) -> Touching:
         n_frames: int = 1,
         tip_pen: FloatArray = PAPER_TIP,
         tilt: float = 0.3,
-    ) -> tuple[Touch, ...]:
+    ) -> tuple[ProbedPoint, ...]:
         rng = np.random.default_rng(seed)
         n = len(points)
         directions = np.linspace(0, 2 * np.pi, n, endpoint=False)
@@ -70,7 +70,7 @@ def touching(instrument: Instrument) -> Touching:
             held.append(
                 StillFrames(
                     tuple(
-                        TouchFrame(f"touch {i + 1} image {k + 1}", each[None], R, t)
+                        ProbingFrame(f"touch {i + 1} image {k + 1}", each[None], R, t)
                         for k, each in enumerate(pixels)
                     )
                 )

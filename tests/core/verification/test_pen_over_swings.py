@@ -1,4 +1,4 @@
-"""Tests of `lightpen.verification.pen_health` and `led_file`."""
+"""Tests of `lightpen.verification.history.pen_health` and `led_file`."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,20 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
+from tests.reference import assert_as_before, text_figures
 
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.report import calibration_record
-from lightpen.estimation.verdict import Grade
+from lightpen.estimation.reports.report import calibration_record
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.hashes import InputFile, Inputs
-from lightpen.formats.json_records import json_bytes
+from lightpen.formats.json_records import FileRecord, record_bytes
 from lightpen.formats.observation_files import Centers
-from lightpen.formats.own_json import with_checksum
 from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
-from lightpen.record.calibrations import CalibrationFile, read_calibration
+from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.simulator.swings import (
     PAPER_TIP,
     paper_camera,
@@ -29,9 +30,11 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.verification.led_file import improve_pen
-from lightpen.verification.length import Scale
-from lightpen.verification.pen_health import examine_pen
+from lightpen.verification.history.led_file import improve_pen
+from lightpen.verification.history.pen_health import examine_pen
+from lightpen.verification.reports.records import pen_health_entries
+from lightpen.verification.reports.summaries import improved_pen_text, pen_health_text
+from lightpen.verification.tasks.length import Scale
 
 N_IMAGES, SIGMA = 40, 0.02
 PEN_FILE = replace(paper_pen(), led_sigma=0.01)
@@ -60,9 +63,9 @@ def swing(tmp_path: Path) -> Swing:
         record = calibration_record(
             found, Inputs(file, file, (), None), "joint", SwingLimits()
         )
-        record["created"] = (when + timedelta(days=number)).isoformat()
+        created = when + timedelta(days=number)
         path = tmp_path / f"swing {number}.json"
-        path.write_bytes(with_checksum(json_bytes(record)))
+        path.write_bytes(record_bytes(structs.replace(record, created=created)))
         return read_calibration(path)
 
     return swung
@@ -112,12 +115,14 @@ def test_a_sound_pen_is_left_alone(swing: Swing) -> None:
 
 def test_one_swing_and_swings_of_two_pens_are_refused(swing: Swing) -> None:
     one, other = swing(true_pen(), 1), swing(true_pen(), 2)
-    with pytest.raises(CalibrationError, match="One swing tells nothing"):
+    with pytest.raises(CalibrationError, match="One swing does not show"):
         examine_pen([one], paper_camera(), PEN_FILE.leds)
+    pen = FileRecord("other.csv", "1" * 64)
+    inputs = structs.replace(other.calibration.inputs, pen=pen)
+    record = structs.replace(other.calibration, inputs=inputs)
+    of_other_pen = replace(other, calibration=record)
     with pytest.raises(UsageError, match=r"swing 2\.json was made with another"):
-        examine_pen(
-            [one, replace(other, pen_sha256="1" * 64)], paper_camera(), PEN_FILE.leds
-        )
+        examine_pen([one, of_other_pen], paper_camera(), PEN_FILE.leds)
 
 
 def test_pooled_swings_put_the_led_file_right(swing: Swing, tmp_path: Path) -> None:
@@ -183,3 +188,35 @@ def test_too_few_swings_are_refused(swing: Swing) -> None:
 
     with pytest.raises(CalibrationError, match="Swings given: 3"):
         improve_pen(swings, paper_camera(), PEN_FILE)
+
+
+def test_the_figures_of_a_pen_over_its_swings_are_as_before(swing: Swing) -> None:
+    pen = true_pen()
+    swings = [swing(pen, 1), swing(pen, 2), swing(with_moved_led(pen), 3)]
+    found = examine_pen(swings, paper_camera(), PEN_FILE.leds)
+
+    assert_as_before(
+        "pen-health",
+        {
+            **pen_health_entries(found),
+            "reason": {"code": found.assessment.reason.code},
+            "text": text_figures(pen_health_text(found)),
+        },
+    )
+
+
+@pytest.mark.parametrize("scale", [None, Scale(1.0001, 2e-5, 1e-4)])
+def test_the_figures_of_an_improved_pen_are_as_before(
+    swing: Swing, scale: Scale | None
+) -> None:
+    swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
+    found = improve_pen(swings, paper_camera(), PEN_FILE, scale)
+
+    assert_as_before(
+        f"improved-pen-{'by-length' if scale else 'by-swings'}",
+        {
+            **vars(found),
+            "pen": vars(found.pen),
+            "text": text_figures(improved_pen_text(found)),
+        },
+    )

@@ -9,7 +9,7 @@ from tests.accepted_tip import seen_by
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.rig_pose import fit_rig_poses
-from lightpen.estimation.instrument import (
+from lightpen.estimation.uncertainty.instrument import (
     Instrument,
     instrument_of_files,
     parameters_of,
@@ -17,7 +17,7 @@ from lightpen.estimation.instrument import (
 )
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.sample_rigs import beside
+from lightpen.simulator.samples import beside
 from lightpen.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
@@ -25,10 +25,10 @@ from lightpen.simulator.swings import (
     paper_pen,
     swing_poses,
 )
-from lightpen.verification.touch import (
+from lightpen.verification.tasks.probed_point import (
+    ProbedPoint,
+    ProbingFrame,
     StillFrames,
-    Touch,
-    TouchFrame,
     measure_touches,
     point_sensitivities,
 )
@@ -48,11 +48,11 @@ def by_two() -> Instrument:
 
 def touched(
     instrument: Instrument, pixels: Sequence[FloatArray], R: FloatArray, t: FloatArray
-) -> tuple[Touch, ...]:
+) -> tuple[ProbedPoint, ...]:
     frames = enumerate(np.stack(pixels, axis=1))
     return measure_touches(
         instrument,
-        [StillFrames((TouchFrame(str(i), seen, R[i], t[i]),)) for i, seen in frames],
+        [StillFrames((ProbingFrame(str(i), seen, R[i], t[i]),)) for i, seen in frames],
     )
 
 
@@ -66,10 +66,7 @@ def test_two_cameras_tell_the_depth_of_a_touch_far_better_than_one(
     alone = with_rig(by_two, rig_of(by_two.camera))
     depths = [
         np.std([touch.point_cam[2] for touch in touches])
-        for touches in (
-            touched(alone, seen[:1], *poses),
-            touched(by_two, seen, *poses),
-        )
+        for touches in (touched(alone, seen[:1], *poses), touched(by_two, seen, *poses))
     ]
     assert depths[0] > 2.5 * depths[1]
 

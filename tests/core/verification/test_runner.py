@@ -12,41 +12,41 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from tests.accepted_tip import (
-    Holder,
-    accept_tip,
-    leant,
-    round_a_ring,
-)
-from tests.verifying import BAR, CHOICES, NOON, TIMEOUT, Verifier
+from tests.accepted_tip import Holder, accept_tip, leant, round_a_ring
+from tests.verifying import BAR, CHOICES, NOON, TIMEOUT, Verifier, found_by
 
 from lightpen.archive.check import check_archive
 from lightpen.archive.logbook import Logbook
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.detection.aim import Aim
-from lightpen.detection.sighting import look
-from lightpen.estimation.verdict import Grade
+from lightpen.detection.pen_detection import detect_pen
+from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import sha256
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
-from lightpen.record.folder_archive import SIMULATED
-from lightpen.record.journal import JOURNAL
-from lightpen.record.reading import DISCARDED, Record, RecordedImage, open_record
-from lightpen.record.supervision import Signature, set_password
-from lightpen.record.verifications import TOUCHES, VERIFICATIONS
+from lightpen.record.folder.verifications import TOUCHES, VERIFICATIONS
+from lightpen.record.library.supervision import Signature, set_password
+from lightpen.record.results.result_folder import SIMULATED
+from lightpen.record.swings.journal import JOURNAL
+from lightpen.record.swings.reading import DISCARDED, Record, RecordedImage, open_record
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP
-from lightpen.simulator.toucher import Toucher
+from lightpen.simulator.toucher import ProbingOperator
 from lightpen.swing.preparation import Preparation
-from lightpen.verification.choices import WHOLE, Surface, TaskKind, VerificationChoices
-from lightpen.verification.read_back import read_fixed_point, read_scale
-from lightpen.verification.status import SessionHappening, VerificationStatus
-from lightpen.verification.touch_images import CONCLUDED
-from lightpen.verification.under_way import find_interrupted
+from lightpen.verification.history.recorded_tasks import read_fixed_point, read_scale
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.session.status import SessionEventKind, VerificationStatus
+from lightpen.verification.storage.checkpoint import find_interrupted
+from lightpen.verification.storage.point_images import CONCLUDED
+from lightpen.verification.tasks.circle import CIRCLE, CircleOptions
+from lightpen.verification.tasks.drift import DRIFT
+from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
+from lightpen.verification.tasks.length import LENGTH
+from lightpen.verification.tasks.task import Surface
 
 EVE = Signature("Eve", "correct horse")
 
@@ -55,11 +55,11 @@ def test_a_tip_is_verified_from_the_first_touch_to_the_verdict(at_it: Verifier) 
     at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
 
     assert at_it.status.is_done
-    assert at_it.ear.events.count(SessionHappening.FINISHED) == 2
-    assert at_it.ear.events[-1] is SessionHappening.DONE
-    assert at_it.ear.troubles == []
+    assert at_it.ear.events.count(SessionEventKind.FINISHED) == 2
+    assert at_it.ear.events[-1] is SessionEventKind.DONE
+    assert at_it.ear.faults == []
     point, circle, length = at_it.records
-    assert [each["verification"] for each in at_it.records] == list(WHOLE)
+    assert [each["verification"] for each in at_it.records] == list(CHOICES.kinds)
     assert {each["session"] for each in at_it.records} == {NOON.isoformat()}
     for record in at_it.records:
         assert record["verdict"]["grade"] == "pass"
@@ -79,13 +79,13 @@ def test_two_cameras_verify_a_tip_together(
     verifier.holder = Holder(rig, verifier.holder.pen)
     accept_tip(verifier.folder, prepared_by_two)
     verifier.come()
-    aim = verifier.status.aim
-    assert aim is not None
-    assert len(aim.aims) == 2
+    region = verifier.status.region
+    assert region is not None
+    assert len(region.regions) == 2
     verifier.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
 
-    assert verifier.ear.troubles == []
-    assert verifier.ear.events[-1] is SessionHappening.DONE
+    assert verifier.ear.faults == []
+    assert verifier.ear.events[-1] is SessionEventKind.DONE
     point, circle, length = verifier.records
     depths = [each["noise_covariance"][2][2] for each in point["touches"]]
     assert max(depths) ** 0.5 < 0.008  # 0.02 by one camera alone
@@ -116,44 +116,44 @@ def test_what_cannot_be_kept_is_told_and_kept_later(
 ) -> None:
     in_the_way = at_it.folder / SIMULATED / VERIFICATIONS
     in_the_way.write_text("A file where the folder should be.")
-    at_it.read(TaskKind.FIXED_POINT, recorded)
-    assert at_it.ear.troubles == ["results.no-folder"]
+    at_it.read(FIXED_POINT, recorded)
+    assert at_it.ear.faults == ["results.no-folder"]
     assert at_it.status.state is not None
-    assert at_it.status.state.fixed_point is not None
+    assert FIXED_POINT.kind in at_it.status.state.found
 
     in_the_way.unlink()
-    at_it.runner.come()
+    at_it.runner.ask(lambda workflow: workflow.come())
     at_it.ear.wait_until(lambda: at_it.ear.reliefs == ["results.no-folder"])
     assert len(at_it.records) == 1
 
 
 def test_nothing_is_taken_while_nobody_is_there(at_it: Verifier) -> None:
-    aim = at_it.status.aim
+    region = at_it.status.region
     at_it.touch(leant(4)[0])
-    at_it.runner.leave()
+    at_it.runner.ask(lambda workflow: workflow.leave())
     for hold in leant(4)[1:]:
-        at_it.see(at_it.holder.still(hold), aim)
+        at_it.see(at_it.holder.still(hold), region)
     assert at_it.status.state is not None
     assert len(at_it.status.state.touches) == 1
 
     at_it.come()
     assert len(at_it.status.state.touches) == 1
     at_it.touch(*leant(4)[1:])
-    assert at_it.status.state.fixed_point is not None
+    assert FIXED_POINT.kind in at_it.status.state.found
 
 
 def test_nothing_is_taken_while_it_is_paused(at_it: Verifier) -> None:
-    at_it.runner.pause()
+    at_it.runner.ask(lambda workflow: workflow.toggle_pause())
     at_it.touch(leant(4)[0])
     assert at_it.status.state is not None
     assert not at_it.status.state.touches
-    at_it.runner.resume()
+    at_it.runner.ask(lambda workflow: workflow.toggle_pause())
     at_it.touch(leant(4)[0])
     assert len(at_it.status.state.touches) == 1
 
 
 def test_images_looked_at_for_something_else_are_not_taken(at_it: Verifier) -> None:
-    at_it.see(at_it.holder.still(leant(4)[0]), Aim())
+    at_it.see(at_it.holder.still(leant(4)[0]), RegionOfInterest())
     assert at_it.status.state is not None
     assert not at_it.status.state.touches
 
@@ -190,10 +190,12 @@ def test_a_tip_of_another_pen_is_refused(verifier: Verifier) -> None:
     ("choices", "code"),
     [
         (VerificationChoices(()), "verification.no-task"),
-        (VerificationChoices((TaskKind.CIRCLE,)), "verification.no-radius"),
-        (VerificationChoices((TaskKind.LENGTH,)), "verification.no-length"),
+        (VerificationChoices((CIRCLE.kind,)), "verification.no-radius"),
+        (VerificationChoices((LENGTH.kind,)), "verification.no-length"),
         (
-            VerificationChoices((TaskKind.CIRCLE,), radius=30.0, surface=Surface.BORE),
+            VerificationChoices(
+                (CIRCLE.kind,), (CircleOptions(radius=30.0, surface=Surface.BORE),)
+            ),
             "verification.no-ball",
         ),
     ],
@@ -213,23 +215,22 @@ def test_another_artefact_forgets_what_was_found_of_the_one_before(
     at_it: Verifier,
 ) -> None:
     at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10])
-    assert at_it.status.task is TaskKind.LENGTH
-    at_it.runner.choose(at_it.preparation, replace(CHOICES, radius=20.0))
-    at_it.ear.wait_until(lambda: at_it.status.task is TaskKind.CIRCLE)
+    assert at_it.status.task is LENGTH
+    other = CHOICES.with_options(CircleOptions(radius=20.0))
+    at_it.runner.ask(lambda workflow: workflow.choose(at_it.preparation, other))
+    at_it.ear.wait_until(lambda: at_it.status.task is CIRCLE)
 
     assert at_it.status.state is not None
-    assert at_it.status.state.fixed_point is not None
+    assert FIXED_POINT.kind in at_it.status.state.found
 
 
-def test_a_tip_that_came_into_force_meanwhile_is_verified_anew(
-    at_it: Verifier,
-) -> None:
+def test_a_tip_that_came_into_force_meanwhile_is_verified_anew(at_it: Verifier) -> None:
     at_it.touch(*leant(4))
-    at_it.runner.leave()
+    at_it.runner.ask(lambda workflow: workflow.leave())
     accept_tip(at_it.folder, at_it.preparation, seed=4)
     at_it.come()
 
-    assert at_it.status.task is TaskKind.FIXED_POINT
+    assert at_it.status.task is FIXED_POINT
     assert at_it.status.files == ()
     assert len(at_it.records) == 1
 
@@ -247,10 +248,10 @@ def recorded(prepared: Preparation, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 def test_recorded_images_do_a_task(at_it: Verifier, recorded: Path) -> None:
-    at_it.read(TaskKind.FIXED_POINT, recorded)
+    at_it.read(FIXED_POINT, recorded)
 
     assert at_it.status.state is not None
-    assert at_it.status.state.fixed_point is not None
+    assert FIXED_POINT.kind in at_it.status.state.found
     (record,) = at_it.records
     assert len(record["inputs"]["images"]) == 5
     assert len(record["touches"]) == 5
@@ -270,25 +271,25 @@ def bumped(recorded: Path, tmp_path: Path) -> Path:
     return tmp_path / "visits"
 
 
-WITNESSED = replace(CHOICES, kinds=(TaskKind.FIXED_POINT, TaskKind.DRIFT))
+WITNESSED = replace(CHOICES, kinds=(FIXED_POINT.kind, DRIFT.kind))
 
 
 def test_a_task_read_before_its_witness_is_kept_with_the_drift_in_its_budget(
     at_it: Verifier, recorded: Path, bumped: Path
 ) -> None:
     at_it.come(WITNESSED)
-    at_it.read(TaskKind.FIXED_POINT, recorded)
+    at_it.read(FIXED_POINT, recorded)
     assert at_it.status.state is not None
-    assert at_it.status.state.fixed_point is not None
-    before = at_it.status.state.fixed_point.uncertainty
+    assert FIXED_POINT.kind in at_it.status.state.found
+    before = found_by(at_it.status.state, FIXED_POINT).uncertainty
     assert at_it.records == []  # its witness will tell more of it
 
-    at_it.read(TaskKind.DRIFT, bumped)
+    at_it.read(DRIFT, bumped)
     assert at_it.status.is_done
-    assert at_it.status.state.drift is not None
-    share = at_it.status.state.drift.share
+    assert DRIFT.kind in at_it.status.state.found
+    share = found_by(at_it.status.state, DRIFT).share
     found = {each["verification"]: each for each in at_it.records}
-    after = np.array(found[TaskKind.FIXED_POINT]["expanded_uncertainty_mm"])
+    after = np.array(found[FIXED_POINT.kind]["expanded_uncertainty_mm"])
     assert len(at_it.records) == len(found) == 2
     assert share[0] > 0.1  # a pixel where the pen is, over the root of 3
     assert after == pytest.approx(np.hypot(before, 2 * share), rel=1e-3)
@@ -299,22 +300,22 @@ def test_a_task_read_before_a_kill_still_waits_for_its_witness(
     at_it: Verifier, recorded: Path, bumped: Path
 ) -> None:
     at_it.come(WITNESSED)
-    at_it.read(TaskKind.FIXED_POINT, recorded)
+    at_it.read(FIXED_POINT, recorded)
     folder = at_it.folder.parent / "killed"
     shutil.copytree(at_it.folder, folder)  # what a kill would have left
     again = Verifier(folder, at_it.preparation)
-    again.runner.choose(again.preparation, WITNESSED)
+    again.runner.ask(lambda workflow: workflow.choose(again.preparation, WITNESSED))
     (interrupted,) = find_interrupted(folder)
-    again.runner.go_on(interrupted)
+    again.runner.ask(lambda workflow: workflow.go_on(interrupted))
     again.ear.wait_until(lambda: again.status.began is not None)
     assert again.records == []
 
-    again.read(TaskKind.DRIFT, bumped)
+    again.read(DRIFT, bumped)
     point, drift = again.records
-    assert again.ear.troubles == []
+    assert again.ear.faults == []
     again.runner.shut_down()
     assert again.runner.await_end(TIMEOUT)
-    assert point["verification"] == TaskKind.FIXED_POINT
+    assert point["verification"] == FIXED_POINT.kind
     assert len(point["inputs"]["images"]) == 5
     assert point["expanded_uncertainty_mm"][0] > (
         2 * drift["standard_uncertainty_share_mm"][0]
@@ -324,9 +325,9 @@ def test_a_task_read_before_a_kill_still_waits_for_its_witness(
 def test_a_folder_without_images_is_told(at_it: Verifier, tmp_path: Path) -> None:
     empty = tmp_path / "empty"
     empty.mkdir()
-    at_it.read(TaskKind.FIXED_POINT, empty)
+    at_it.read(FIXED_POINT, empty)
 
-    assert at_it.ear.troubles == ["images.empty-folder"]
+    assert at_it.ear.faults == ["images.empty-folder"]
     assert at_it.status.is_touching
 
 
@@ -337,7 +338,7 @@ def test_a_bug_pauses_it_and_loses_nothing(
     at_it.touch(leant(4)[0])
     monkeypatch.setattr("threading.excepthook", lambda args: crashes.put(args.exc_type))
     at_it.see(["no sighting"])  # type: ignore[list-item]
-    at_it.ear.wait_until(lambda: at_it.ear.troubles == ["verification.bug"])
+    at_it.ear.wait_until(lambda: at_it.ear.faults == ["verification.bug"])
 
     assert crashes.get(timeout=TIMEOUT) is AttributeError
     assert at_it.status.is_paused
@@ -389,13 +390,13 @@ def test_of_a_touch_that_was_broken_off_no_image_counts(at_it: Verifier) -> None
 
 def test_an_image_that_cannot_be_kept_does_not_count(at_it: Verifier) -> None:
     at_it.touch(leant(4)[0])
-    at_it.runner.touch_anew(TaskKind.FIXED_POINT)
+    at_it.runner.ask(lambda workflow: workflow.touch_anew(FIXED_POINT))
     (first,) = at_it.runs
     at_it.ear.wait_until(lambda: open_record(first).verdict == DISCARDED)
     (at_it.kept / TOUCHES).rename(at_it.folder / "elsewhere")
     (at_it.kept / TOUCHES).write_text("A file where the folder should be.")
     at_it.touch(leant(4)[1])
-    assert set(at_it.ear.troubles) == {"record.unwritable"}
+    assert set(at_it.ear.faults) == {"record.unwritable"}
     assert at_it.status.state is not None
     assert not at_it.status.state.touches
 
@@ -408,35 +409,37 @@ def test_an_image_that_cannot_be_kept_does_not_count(at_it: Verifier) -> None:
 # A camera that moves
 
 
-WITH_LAMP = replace(CHOICES, kinds=(TaskKind.FIXED_POINT,), n_touches=3, n_frames=8)
+WITH_LAMP = VerificationChoices(
+    (FIXED_POINT.kind,), (FixedPointOptions(n_touches=3),), n_frames=8
+)
 
 
 def touch_before_lamp(
     verifier: Verifier, camera: SimulatedCamera, n_touches: int = 3
 ) -> VerificationStatus:
     """Have the simulated operator touch a cone, as often as said."""
-    toucher, seen = Toucher(camera.operator), None
+    probing_operator, seen = ProbingOperator(camera.operator), None
     while verifier.status.task is not None:
         status = verifier.status
         assert status.setup is not None
         assert status.state is not None
-        assert status.aim is not None
-        assert status.aim.camera is not None
-        assert status.aim.pen is not None
+        assert status.region is not None
+        assert status.region.camera is not None
+        assert status.region.pen is not None
         if len(status.state.touches) == n_touches:
             break
-        toucher.follow(status.setup, status.state)
+        probing_operator.follow(status.setup, status.state)
         frame = camera.read(1.0)
         assert frame.seq < 1000  # of which the touches take a tenth
-        seen = look(frame.image, status.aim.camera, status.aim.pen, None, seen)
-        verifier.runner.take(frame, seen, status.aim)
+        seen = detect_pen(
+            frame.image, status.region.camera, status.region.pen, None, seen
+        )
+        verifier.runner.take(frame, seen, status.region)
     return verifier.status
 
 
 @pytest.fixture
-def lit_by(
-    verifier: Verifier,
-) -> Iterator[Callable[[float], SimulatedCamera]]:
+def lit_by(verifier: Verifier) -> Iterator[Callable[[float], SimulatedCamera]]:
     """Return a function that makes a camera with a lamp in view, which turns.
 
     It turns by so many px a minute, of which the touches take a tenth or so.
@@ -466,21 +469,21 @@ def test_a_rendered_lamp_tells_whether_the_camera_turns_slowly(
     verifier.come(WITH_LAMP)
     status = touch_before_lamp(verifier, lit_by(turn))
     (run,) = verifier.runs
-    verifier.runner.touch_anew(TaskKind.FIXED_POINT)
-    verifier.read(TaskKind.FIXED_POINT, run)
+    verifier.runner.ask(lambda workflow: workflow.touch_anew(FIXED_POINT))
+    verifier.read(FIXED_POINT, run)
 
-    witness = status.witness
+    witness = status.lamp_drift
     assert witness is not None
     assert status.assessment is not None
     assert status.state is not None
-    assert status.state.fixed_point is not None
+    assert FIXED_POINT.kind in status.state.found
     record, again = verifier.records
     assert record["witness"]["moved_mm"] == witness.moved
     # Live, images in which the pen comes to rest are looked at, too; none is kept.
     moved = again["witness"]["moved_mm"]
     assert moved == pytest.approx(witness.moved, rel=0.4, abs=0.006)
     assert again["verdict"]["grade"] == status.assessment.grade
-    U = status.state.fixed_point.uncertainty
+    U = found_by(status.state, FIXED_POINT).uncertainty
     assert U[0] >= 2 * witness.share[0]
     assert again["expanded_uncertainty_mm"][0] == pytest.approx(U[0], rel=0.4)
     if turn:
@@ -501,24 +504,24 @@ def test_a_lamp_is_watched_on_after_an_interruption(
     accept_tip(verifier.folder, verifier.preparation)
     verifier.come(WITH_LAMP)
     camera = lit_by(3.0)
-    assert touch_before_lamp(verifier, camera, 2).witness is None
+    assert touch_before_lamp(verifier, camera, 2).lamp_drift is None
     copy = tmp_path_factory.mktemp("killed") / "data"
     shutil.copytree(verifier.folder, copy)
     second = Verifier(copy, verifier.preparation)
-    second.runner.choose(second.preparation, WITH_LAMP)
-    second.runner.go_on(*find_interrupted(copy))
-    second.runner.come()
+    second.runner.ask(lambda workflow: workflow.choose(second.preparation, WITH_LAMP))
+    second.runner.ask(lambda workflow: workflow.go_on(*find_interrupted(copy)))
+    second.runner.ask(lambda workflow: workflow.come())
     second.ear.wait_until(lambda: second.status.began is not None)
     status = touch_before_lamp(second, camera)
     second.runner.shut_down()
     assert second.runner.await_end(TIMEOUT)
 
     # The images of the last touch alone are too few to tell.
-    assert status.witness is not None
+    assert status.lamp_drift is not None
     assert status.assessment is not None
     assert status.assessment.reason.code == "witness.moved"
     (record,) = second.records
-    assert record["witness"]["moved_mm"] == status.witness.moved
+    assert record["witness"]["moved_mm"] == status.lamp_drift.moved
 
 
 # What became of it
@@ -543,7 +546,7 @@ def test_a_tip_that_keeps_the_limits_is_accepted_with_all_its_records(
 
 def test_what_is_given_up_is_abandoned(at_it: Verifier) -> None:
     at_it.touch(*leant(4), round_a_ring(11, 31.751)[0])
-    at_it.runner.start_over()
+    at_it.runner.ask(lambda workflow: workflow.start_over())
     at_it.ear.wait_until(
         lambda: at_it.status.tip is not None and not at_it.status.began
     )
@@ -565,30 +568,26 @@ def doubted(verifier: Verifier) -> Verifier:
         *(verifier.holder.rig, verifier.holder.pen),
         PAPER_TIP + np.array([0.3, 0.0, 0.0]),
     )
-    verifier.come(replace(CHOICES, kinds=(TaskKind.FIXED_POINT,)))
+    verifier.come(replace(CHOICES, kinds=(FIXED_POINT.kind,)))
     verifier.touch(*leant(4))
-    assert verifier.ear.events[-1] is SessionHappening.FAILED
+    assert verifier.ear.events[-1] is SessionEventKind.FAILED
     return verifier
 
 
 def test_beyond_the_limits_a_tip_is_accepted_by_no_operator(doubted: Verifier) -> None:
-    doubted.runner.accept("It will do.")
-    doubted.ear.wait_until(
-        lambda: doubted.ear.troubles == ["verification.no-supervisor"]
-    )
-    doubted.runner.accept("It will do.", EVE)
-    doubted.ear.wait_until(lambda: len(doubted.ear.troubles) == 2)
+    doubted.runner.ask(lambda workflow: workflow.accept("It will do."))
+    doubted.ear.wait_until(lambda: doubted.ear.faults == ["verification.no-supervisor"])
+    doubted.runner.ask(lambda workflow: workflow.accept("It will do.", EVE))
+    doubted.ear.wait_until(lambda: len(doubted.ear.faults) == 2)
 
-    assert doubted.ear.troubles[-1] == "supervisor.no-password"
+    assert doubted.ear.faults[-1] == "supervisor.no-password"
     assert doubted.status.accepted_by == ""
     assert len(doubted.records) == 1
 
 
-def test_a_supervisor_accepts_it_with_a_reason_which_is_kept(
-    doubted: Verifier,
-) -> None:
+def test_a_supervisor_accepts_it_with_a_reason_which_is_kept(doubted: Verifier) -> None:
     set_password(doubted.folder, EVE, EVE.password, NOON)
-    doubted.runner.accept("Only roughing today.", EVE)
+    doubted.runner.ask(lambda workflow: workflow.accept("Only roughing today.", EVE))
     doubted.ear.wait_until(lambda: doubted.status.accepted_by == "Eve")
     (point,) = doubted.records
     refusal, acceptance = doubted.conclusions
@@ -607,10 +606,9 @@ def test_a_supervisor_accepts_it_with_a_reason_which_is_kept(
 
 def test_a_wrong_password_accepts_nothing(doubted: Verifier) -> None:
     set_password(doubted.folder, EVE, EVE.password, NOON)
-    doubted.runner.accept("It will do.", replace(EVE, password="wrong horse"))
-    doubted.ear.wait_until(
-        lambda: doubted.ear.troubles == ["supervisor.wrong-password"]
-    )
+    wrong = replace(EVE, password="wrong horse")
+    doubted.runner.ask(lambda workflow: workflow.accept("It will do.", wrong))
+    doubted.ear.wait_until(lambda: doubted.ear.faults == ["supervisor.wrong-password"])
     assert len(doubted.records) == 1
 
 

@@ -37,7 +37,7 @@ class ExposureBar(Translated, QWidget):
         """Return what the bar says, in words."""
         value = self._value
         if not value.peaks:
-            return self.tr("No LED is seen")
+            return self.tr("No LED detected")
         of_leds = value.are_leds
         if value.n_saturated:
             n_meant, meant = value.n_saturated, value.saturated_leds
@@ -55,7 +55,7 @@ class ExposureBar(Translated, QWidget):
             )
         else:
             n_meant, meant = value.n_good, ()
-            words = self.tr("Good: {0} LEDs") if of_leds else self.tr("Good: {0} spots")
+            words = self.tr("OK: {0} LEDs") if of_leds else self.tr("OK: {0} spots")
         told = words.format(n_meant, len(value.peaks))
         if not meant or len(meant) == len(value.peaks):
             return told
@@ -111,7 +111,7 @@ class ExposureBar(Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         self.update()
-        self.setAccessibleName(self.tr("Exposure of the LEDs"))
+        self.setAccessibleName(self.tr("LED exposure"))
         self.setAccessibleDescription(self.verdict())
         self.setToolTip(self.levels())
 
@@ -124,7 +124,7 @@ class ExposureBar(Translated, QWidget):
         good_left = whole.adjusted(bar.width() * DARK_PEAK, 0, 0, 0)
         left, right = Qt.AlignmentFlag.AlignLeft, Qt.AlignmentFlag.AlignRight
         painter.drawText(whole, left, self.tr("dark"))
-        painter.drawText(good_left, left, self.tr("good"))
+        painter.drawText(good_left, left, self.tr("OK"))
         painter.drawText(whole, right, self.tr("saturated"))
 
     def _mark(self) -> tuple[Sign, Tone]:

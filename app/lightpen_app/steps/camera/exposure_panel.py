@@ -3,18 +3,13 @@
 from collections import deque
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QFrame,
-    QHBoxLayout,
-    QLabel,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFrame, QLabel, QWidget
 
-from lightpen.cameras.protocol import CameraSettings, Caps, Range
-from lightpen.detection.auto_exposure import AutoExposure, Standing
+from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Range
+from lightpen.detection.auto_exposure import AutoExposure, ExposureState
 from lightpen.detection.exposure_advice import Advice, advise
 from lightpen.detection.inspection import Exposure, Inspection
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
 from lightpen_app.steps.camera.focus_meter import N_TRACED, FocusMeter
@@ -47,7 +42,7 @@ class ExposurePanel(Translated, QFrame):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("area", "panel")
-        self._caps: Caps | None = None
+        self._capabilities: CameraCapabilities | None = None
         self._settings = CameraSettings()
         self._adjustment: AutoExposure | None = None
 
@@ -67,23 +62,16 @@ class ExposurePanel(Translated, QFrame):
         self._why_fixed.setMinimumHeight(5 * GRID)  # that of the fields it stands for
 
         # Layout
-        fields = QHBoxLayout()
-        fields.setSpacing(GRID)
-        fields.addWidget(self._exposure_name)
-        fields.addWidget(self._exposure, 1)
-        fields.addWidget(self._gain_name)
-        fields.addWidget(self._gain, 1)
-        fields.addWidget(self._why_fixed, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(PADDING, PADDING, PADDING, PADDING)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._bar)
-        layout.addLayout(fields)
-        foot = QHBoxLayout()
-        foot.setSpacing(GRID)
-        foot.addWidget(self._advice, 1)
-        foot.addWidget(self._adjust)
-        layout.addLayout(foot)
+        layout = vertical_layout(self, self._bar, margins=PADDING)
+        horizontal_layout(
+            layout,
+            self._exposure_name,
+            (self._exposure, 1),
+            self._gain_name,
+            (self._gain, 1),
+            (self._why_fixed, 1),
+        )
+        horizontal_layout(layout, (self._advice, 1), self._adjust)
 
         # Connections
         self._exposure.valueChanged.connect(self._on_exposure_edited)
@@ -98,9 +86,11 @@ class ExposurePanel(Translated, QFrame):
         self._bar.set_value(value)
         self._refresh()
 
-    def set_camera(self, caps: Caps | None, settings: CameraSettings) -> None:
+    def set_camera(
+        self, caps: CameraCapabilities | None, settings: CameraSettings
+    ) -> None:
         """Show what a camera offers and has in force; None where none is open."""
-        self._caps, self._settings = caps, settings
+        self._capabilities, self._settings = caps, settings
         exposures = None if caps is None else caps.exposure_us
         gains = None if caps is None else caps.gain_db
         exposure_us, gain_db = settings.exposure_us, settings.gain_db
@@ -137,7 +127,7 @@ class ExposurePanel(Translated, QFrame):
     @property
     def _is_adjusting(self) -> bool:
         adjustment = self._adjustment
-        return adjustment is not None and adjustment.outcome is Standing.ADJUSTING
+        return adjustment is not None and adjustment.outcome is ExposureState.ADJUSTING
 
     def _retranslate(self) -> None:
         self._exposure_name.setText(self.tr("E&xposure"))
@@ -146,95 +136,100 @@ class ExposurePanel(Translated, QFrame):
         self._gain.setAccessibleName(self.tr("Gain"))
         for field in (self._exposure, self._gain):
             field.setToolTip(
-                self.tr("Up and Down change it; Enter takes a typed number.")
+                self.tr(
+                    "Up and Down keys change the value; Enter applies a typed number."
+                )
             )
         self._refresh()
 
     def _refresh(self) -> None:
         self._adjust.setText(
-            self.tr("Stop") if self._is_adjusting else self.tr("Set by the LEDs")
+            self.tr("Stop") if self._is_adjusting else self.tr("Auto exposure (LEDs)")
         )
         self._adjust.setToolTip(
-            self.tr("Exposure and gain for 80 % of full scale at the brightest LED.")
+            self.tr(
+                "Sets exposure and gain so that the brightest LED reaches 80 % of "
+                "full scale."
+            )
         )
-        if self._caps is None:
-            self._why_fixed.setText(self.tr("No images come."))
+        if self._capabilities is None:
+            self._why_fixed.setText(self.tr("No images are received."))
             self._advice.setText("")
             return
         self._why_fixed.setText(
-            self.tr("Recorded: exposure and gain are as they were taken.")
+            self.tr("Recorded images: exposure and gain are fixed.")
         )
         adjustment = self._adjustment
         if adjustment is not None and _holds(adjustment, self._bar.value()):
             self._advice.setText(self._outcome_words(adjustment))
             return
-        advice = advise(self._bar.value(), self._settings, self._caps)
-        self._advice.setText(self._words(advice, self._caps))
+        advice = advise(self._bar.value(), self._settings, self._capabilities)
+        self._advice.setText(self._words(advice, self._capabilities))
 
     def _outcome_words(self, adjustment: AutoExposure) -> str:
         level = f"{100 * adjustment.level:.0f} %"
         match adjustment.outcome:
-            case Standing.ADJUSTING:
+            case ExposureState.ADJUSTING:
                 words = self.tr("Hold the pen still. Brightest LED: {0}")
-            case Standing.DONE:
-                words = self.tr("Set. Brightest LED: {0}, none is saturated.")
-            case Standing.NO_LEDS:
-                words = self.tr("No LEDs are seen. Hold the pen before the camera.")
-            case Standing.TOO_BRIGHT:
+            case ExposureState.DONE:
+                words = self.tr("Exposure set. Brightest LED: {0}; none saturated.")
+            case ExposureState.NO_LEDS:
+                words = self.tr("No LEDs detected. Hold the pen in view of the camera.")
+            case ExposureState.TOO_BRIGHT:
                 words = self.tr(
-                    "The least exposure and gain are too bright ({0}). Close the "
-                    "aperture of the lens."
+                    "Image too bright at minimum exposure and gain ({0}). Close the "
+                    "aperture."
                 )
-            case Standing.TOO_DARK:
+            case ExposureState.TOO_DARK:
                 words = self.tr(
-                    "The LEDs reach {0} only: a longer exposure would smear the moving "
-                    "pen. Open the aperture of the lens."
+                    "LEDs reach only {0}; a longer exposure would blur the moving "
+                    "pen. Open the aperture."
                 )
-            case Standing.UNSTEADY:
+            case ExposureState.UNSTEADY:
                 words = self.tr(
-                    "The light changes from image to image ({0}). Hold the pen still, "
-                    "and check the supply of its LEDs."
+                    "Brightness varies from image to image ({0}). Hold the pen "
+                    "still and check the LED power supply."
                 )
         return words.format(level)
 
-    def _words(self, advice: Advice, caps: Caps) -> str:
+    def _words(self, advice: Advice, caps: CameraCapabilities) -> str:
         is_recorded = caps.exposure_us is None and caps.gain_db is None
         match advice:
             case Advice.SHOW_PEN:
-                return self.tr("Hold the pen so that the camera sees its LEDs.")
+                return self.tr("Hold the pen with its LEDs facing the camera.")
             case Advice.LEAVE:
-                return self.tr("All lie in the good part of the scale.")
+                return self.tr("All LEDs are correctly exposed.")
             case Advice.LOWER_GAIN:
                 return self.tr("Lower the gain until no LED is saturated.")
             case Advice.SHORTEN_EXPOSURE:
                 return self.tr("Shorten the exposure until no LED is saturated.")
             case Advice.LENGTHEN_EXPOSURE:
-                return self.tr("Lengthen the exposure until all LEDs are good.")
+                return self.tr("Lengthen the exposure until all LEDs are OK.")
             case Advice.RAISE_GAIN:
                 return self.tr(
-                    "Raise the gain: a longer exposure would smear the moving pen."
+                    "Raise the gain: a longer exposure would blur the moving pen."
                 )
             case Advice.EVEN_OUT:
                 return self.tr(
-                    "The LEDs differ too much in brightness. Clean them, and check "
-                    "their supply."
+                    "LED brightness differs too much. Clean the LEDs and check "
+                    "their power supply."
                 )
             case Advice.CLOSE_APERTURE if is_recorded:
-                return self.tr("Take the images again with a shorter exposure.")
+                return self.tr("Record the images again with a shorter exposure.")
             case Advice.OPEN_APERTURE if is_recorded:
-                return self.tr("Take the images again with a longer exposure.")
+                return self.tr("Record the images again with a longer exposure.")
             case Advice.CLOSE_APERTURE:
-                return self.tr("Close the aperture of the lens a little.")
+                return self.tr("Close the aperture slightly.")
             case Advice.OPEN_APERTURE:
-                return self.tr("Open the aperture of the lens a little.")
+                return self.tr("Open the aperture slightly.")
 
 
 def _holds(adjustment: AutoExposure, exposure: Exposure) -> bool:
     """Return whether the outcome of an adjustment is still true of the last image."""
     match adjustment.outcome:
-        case Standing.DONE:
+        case ExposureState.DONE:
             return not exposure.n_saturated
-        case Standing.NO_LEDS:
+        case ExposureState.NO_LEDS:
             return not exposure.peaks
     return True
 
@@ -254,11 +249,7 @@ class FocusPanel(Translated, QFrame):
         self._hint.setAlignment(Qt.AlignmentFlag.AlignTop)
 
         # Layout
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(PADDING, PADDING, PADDING, PADDING)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._meter)
-        layout.addWidget(self._hint, 1)
+        vertical_layout(self, self._meter, (self._hint, 1), margins=PADDING)
 
         self._retranslate()
 
@@ -287,15 +278,17 @@ class FocusPanel(Translated, QFrame):
 
     def _refresh(self) -> None:
         if self._is_recorded:
-            words = self.tr("Recorded: the focus is as it was.")
+            words = self.tr("Recorded images: focus is fixed.")
         elif self._is_saturated:
-            words = self.tr("Lower the exposure first: now this tells nothing.")
+            words = self.tr(
+                "Reduce the exposure first: saturated LEDs give no edge width."
+            )
         else:
-            words = self.tr("Turn the focus ring until the rims are narrowest.")
+            words = self.tr("Turn the focus ring until the edge width is smallest.")
         self._hint.setText(words)
 
     def _retranslate(self) -> None:
         self._refresh()
         self._meter.setToolTip(
-            self.tr("Width of the LEDs' rims from dark to bright. Hold the pen still.")
+            self.tr("Edge width of the LEDs from dark to bright. Hold the pen still.")
         )

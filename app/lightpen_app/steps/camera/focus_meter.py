@@ -52,10 +52,12 @@ class FocusMeter(Translated, QWidget):
     def verdict(self) -> str:
         """Return what is shown, in words."""
         if not np.isfinite(self._present):
-            return self.tr("No LED is seen")
+            return self.tr("No LED detected")
         if self._is_saturated:
             return self.tr("Saturated")
-        return self.tr("Sharp") if is_sharp(self._present) else self.tr("Soft")
+        return (
+            self.tr("In focus") if is_sharp(self._present) else self.tr("Out of focus")
+        )
 
     def number(self) -> str:
         """Return the present width as it is shown, with its unit."""
@@ -141,5 +143,5 @@ class FocusMeter(Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         self.update()
-        self.setAccessibleName(self.tr("Width of the LEDs' rims"))
+        self.setAccessibleName(self.tr("Edge width of the LEDs"))
         self.setAccessibleDescription(f"{self.verdict()} {self.number()}".strip())

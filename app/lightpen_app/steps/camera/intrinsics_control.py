@@ -8,6 +8,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from lightpen.formats.opened_files import CameraFile
+from lightpen.record.folder.camera_calibrations import CameraTrial
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.work.job import Job
 from lightpen_app.work.workbench import Workbench
@@ -29,14 +30,15 @@ class IntrinsicsControl(QObject):
         self, workbench: Workbench, panel: IntrinsicsPanel, page: QWidget
     ) -> None:
         super().__init__(page)
-        self._workbench = workbench
+        self._archive_writer = workbench.archive_writer
+        self._selection, self._live = workbench.selection, workbench.live
         self._panel = panel
         self._page = page
         self._reading: Job | None = None
         self._board: BoardWindow | None = None  # made when it is asked for
 
         # Connections
-        workbench.station_left.connect(self._forget_file)
+        workbench.selection.station_changed.connect(self._forget_file)
         panel.path_chosen.connect(self._on_path_chosen)
         panel.calibration_requested.connect(self._on_calibration_requested)
 
@@ -69,18 +71,22 @@ class IntrinsicsControl(QObject):
             # A camera is calibrated once a year; it is not waited for at each start.
             from lightpen_app.steps.camera.board_window import BoardWindow
 
-            self._board = BoardWindow(self._workbench.live, self._page)
+            self._board = BoardWindow(self._live, self._page)
 
             # Connections
             self._board.saved.connect(self._on_path_chosen)
-            self._board.concluded.connect(self._workbench.keep_camera_trial)
+            self._board.concluded.connect(self._on_calibrated)
         self._board.show()
         self._board.raise_()
 
+    def _on_calibrated(self, trial: CameraTrial) -> None:
+        names = self._selection.preparation.names
+        self._archive_writer.keep_camera_trial(trial, names)
+
     def _on_file_read(self, camera_file: CameraFile) -> None:
         self._reading = None
-        now = self._workbench.preparation
-        self._workbench.set_preparation(replace(now, camera_file=camera_file))
+        now = self._selection.preparation
+        self._selection.set_preparation(replace(now, camera_file=camera_file))
 
     def _on_file_refused(self, sentence: str) -> None:
         self._reading = None

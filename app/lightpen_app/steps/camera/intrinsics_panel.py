@@ -2,27 +2,21 @@
 
 import numpy as np
 from PySide6.QtCore import QDate, QLocale, Qt, Signal
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QGridLayout,
-    QGroupBox,
-    QLabel,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QGroupBox, QLabel, QWidget
 
 from lightpen.formats.opened_files import CameraFile
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
-from lightpen.model.camera_validity import doubts_about
-from lightpen.record.solving import Solution
+from lightpen.model.camera_validity import unmodelled_effects_of
+from lightpen.record.swings.solving import Solution
+from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 FILES = "*.yaml *.yml *.json *.xml"
@@ -64,24 +58,21 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._facts = [text_label(TextSize.SMALL) for _ in range(N_FACTS)]
 
         # Layout
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(2 * GRID)
-        grid.setVerticalSpacing(GRID // 2)
+        layout = vertical_layout(
+            self,
+            self._path,
+            self._problem,
+            self._check,
+            self._doubt,
+            self._by_pen,
+            self._calibrate,
+        )
+        grid = grid_layout(layout, spacing=(2 * GRID, GRID // 2))
         grid.setColumnStretch(1, 1)
         for row, (name, fact) in enumerate(zip(self._names, self._facts, strict=True)):
             name.setWordWrap(False)
             grid.addWidget(name, row, 0, Qt.AlignmentFlag.AlignTop)
             grid.addWidget(fact, row, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._path)
-        layout.addWidget(self._problem)
-        layout.addWidget(self._check)
-        layout.addWidget(self._doubt)
-        layout.addWidget(self._by_pen)
-        layout.addWidget(self._calibrate)
-        layout.addLayout(grid)
 
         # Connections
         self._path.path_chosen.connect(self.path_chosen)
@@ -128,7 +119,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
     def set_problem(self, sentence: str) -> None:
         """Say why the file that was chosen is not used, or nothing."""
         self._path.set_faulty(bool(sentence))
-        self._problem.set_value(Remark(sentence, Sign.CROSS, Tone.BAD))
+        self._problem.set_value(StatusMessage(sentence, Sign.CROSS, Tone.BAD))
         self._refresh()
 
     def _on_open_clicked(self) -> None:
@@ -144,7 +135,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         edit.setAccessibleName(self.tr("Intrinsics file"))
         edit.setPlaceholderText(self.tr("Intrinsics file"))
         self._open.setText(self.tr("Open..."))
-        self._calibrate.setText(self.tr("Calibrate this camera..."))
+        self._calibrate.setText(self.tr("Calibrate camera..."))
         for label, name in zip(
             self._names,
             (
@@ -171,49 +162,48 @@ class IntrinsicsPanel(Translated, QGroupBox):
             label.setVisible(bool(fact))
             name.setVisible(bool(fact))
 
-    def _checked(self, camera: Camera | None) -> Remark:
+    def _checked(self, camera: Camera | None) -> StatusMessage:
         """Return whether the file goes with the live images."""
         if camera is None:
-            return Remark(
-                self.tr("Open the file with the calibration of camera and lens."),
+            return StatusMessage(
+                self.tr("Open the intrinsics file of this camera and lens."),
                 Sign.WARNING,
                 Tone.WARN,
             )
         made_for = self._size_text(*camera.image_size)
         if self._image_size is None:
-            words = self.tr("Made for images of {0}")
-            return Remark(words.format(made_for), Sign.WAIT, Tone.QUIET)
+            words = self.tr("Image size of the file: {0}")
+            return StatusMessage(words.format(made_for), Sign.WAIT, Tone.QUIET)
         if self._image_size == camera.image_size:
-            words = self.tr("Fits the live images: {0}")
-            return Remark(words.format(made_for), Sign.CHECK, Tone.GOOD)
+            words = self.tr("Matches the live images: {0}")
+            return StatusMessage(words.format(made_for), Sign.CHECK, Tone.GOOD)
         words = self.tr(
-            "The camera sends {0}, the calibration file was made for {1}. Choose the "
-            "file for this camera, set the region to the whole sensor, or switch off "
-            "binning."
+            "Image size is {0}; the intrinsics file is for {1}. Choose the file of "
+            "this camera, set the region to the whole sensor, or turn off binning."
         )
         sent = self._size_text(*self._image_size)
-        return Remark(words.format(sent, made_for), Sign.WARNING, Tone.BAD)
+        return StatusMessage(words.format(sent, made_for), Sign.WARNING, Tone.BAD)
 
-    def _doubted(self, camera: Camera | None) -> Remark:
+    def _doubted(self, camera: Camera | None) -> StatusMessage:
         """Return why the file may not hold any more."""
         if camera is None:
-            return Remark()
-        doubts = doubts_about(camera, local_now().date(), serial=self._serial)
+            return StatusMessage()
+        doubts = unmodelled_effects_of(camera, local_now().date(), serial=self._serial)
         words = " ".join(map(worded, doubts))
-        return Remark(words, Sign.WARNING, Tone.WARN)
+        return StatusMessage(words, Sign.WARNING, Tone.WARN)
 
-    def _checked_by_pen(self, camera: Camera | None) -> Remark:
+    def _checked_by_pen(self, camera: Camera | None) -> StatusMessage:
         """Return whether the swing still agrees with the file that it was taken by."""
         if camera is None or self._swing is None or self._swing.source.rig is not None:
-            return Remark()
+            return StatusMessage()
         used = self._swing.source.camera
         if not np.array_equal(camera.intrinsics, used.intrinsics):
-            return Remark()
+            return StatusMessage()
         for denied in self._swing.calibration.contradictions:
             if not denied.of_pen:
-                return Remark(worded(denied.sentence), Sign.WARNING, Tone.WARN)
-        words = self.tr("Checked by the swing: file and camera agree.")
-        return Remark(words, Sign.CHECK, Tone.GOOD)
+                return StatusMessage(worded(denied.message), Sign.WARNING, Tone.WARN)
+        words = self.tr("Checked by a swing: file and camera agree.")
+        return StatusMessage(words, Sign.CHECK, Tone.GOOD)
 
     def _told(self, camera: Camera) -> list[str]:
         """Return what is in the file, a text for each name."""
@@ -231,7 +221,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         )
         day = camera.calibrated_on
         if day is None:
-            date = self.tr("no date")
+            date = self.tr("No date")
         else:
             form = QLocale.FormatType.LongFormat
             date = QLocale().toString(QDate(day.year, day.month, day.day), form)

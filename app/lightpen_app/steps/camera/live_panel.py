@@ -6,15 +6,16 @@ from math import hypot
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen.cameras.protocol import Stats
 from lightpen.cameras.worker_events import Connection
 from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import Spots
-from lightpen.live.looking import LiveImage
+from lightpen.live.pipeline import LiveImage
 from lightpen.model.origin import Origin
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -22,10 +23,10 @@ from lightpen_app.look.words import PARTED
 from lightpen_app.widgets.camera_switch import CameraSwitch
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.live_markers import led_numbers, live_markers
-from lightpen_app.widgets.origin_mark import origin_remark
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.origin_mark import origin_message
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.live_view import Shown
+from lightpen_app.work.live_view import DisplayedImage
 
 HEAD_GAP = 3 * GRID  # px, between the words above the image
 N_TIMED = 40  # images of which the rate is the mean: two seconds
@@ -69,15 +70,8 @@ class LivePanel(Translated, QWidget):
         self._view = ImageView()
 
         # Layout
-        head = QHBoxLayout()
-        head.setSpacing(HEAD_GAP)
-        head.addWidget(self._state)
-        head.addWidget(self._figures, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._switch, 0, Qt.AlignmentFlag.AlignLeft)
-        layout.addLayout(head)
+        layout = vertical_layout(self, (self._switch, 0, Qt.AlignmentFlag.AlignLeft))
+        horizontal_layout(layout, self._state, (self._figures, 1), spacing=HEAD_GAP)
         layout.addWidget(self._view, 1)
 
         # Connections
@@ -94,7 +88,7 @@ class LivePanel(Translated, QWidget):
         self._shown = shown
         self._switch.set_value(shown)
 
-    def state(self) -> Remark:
+    def state(self) -> StatusMessage:
         """Return how the camera is."""
         return self._state.value()
 
@@ -110,7 +104,7 @@ class LivePanel(Translated, QWidget):
         """Return what is bright in the image and not masked; None without one."""
         return None if self._seen is None else self._seen.spots
 
-    def set_image(self, shown: Shown, stats: Stats) -> None:
+    def set_image(self, shown: DisplayedImage, stats: Stats) -> None:
         """Show another image, and what became of those before."""
         self._seen = shown.seen
         frame = shown.seen.frame
@@ -166,7 +160,9 @@ class LivePanel(Translated, QWidget):
 
     def _retranslate(self) -> None:
         self._view.setToolTip(
-            self.tr("Wheel or + and - enlarge, arrow keys move, 0 shows all.")
+            self.tr(
+                "Wheel or + and - to zoom, arrow keys to move, 0 for the whole image."
+            )
         )
         self._refresh()
 
@@ -176,35 +172,34 @@ class LivePanel(Translated, QWidget):
         if self._seen is not None:
             self._tell()
 
-    def _remark(self) -> Remark:
+    def _remark(self) -> StatusMessage:
         match self._connection:
             case Connection.OPENING:
-                return Remark(self.tr("Connecting"), Sign.WAIT, Tone.ACTIVE)
+                return StatusMessage(self.tr("Connecting"), Sign.WAIT, Tone.ACTIVE)
             case Connection.STREAMING if self._recorded is not None:
-                return origin_remark(self._recorded)
+                return origin_message(self._recorded)
             case Connection.STREAMING:
-                return Remark(self.tr("Live"), Sign.PLAY, Tone.GOOD)
+                return StatusMessage(self.tr("Live"), Sign.PLAY, Tone.GOOD)
             case Connection.SILENT:
-                return Remark(self.tr("Silent"), Sign.PAUSE, Tone.WARN)
+                return StatusMessage(self.tr("No images"), Sign.PAUSE, Tone.WARN)
             case Connection.LOST:
                 words = self.tr("Lost, reconnecting")
-                return Remark(words, Sign.WARNING, Tone.BAD)
+                return StatusMessage(words, Sign.WARNING, Tone.BAD)
             case Connection.CLOSED:
-                return Remark(self.tr("Not connected"), Sign.CROSS, Tone.WARN)
+                return StatusMessage(self.tr("Not connected"), Sign.CROSS, Tone.WARN)
 
     def _message(self) -> str:
         match self._connection:
             case Connection.OPENING:
-                return self.tr("The camera is being opened.")
+                return self.tr("Opening the camera")
             case Connection.STREAMING:
-                return self.tr("The first image is on its way.")
+                return self.tr("Waiting for the first image")
             case Connection.SILENT:
                 return self.tr(
-                    "The camera answers but sends no images. Check its trigger and "
-                    "its cable."
+                    "The camera responds but sends no images. Check trigger and cable."
                 )
             case Connection.LOST:
-                words = self.tr("{0} It is looked for until it is back.")
+                words = self.tr("{0} Reconnecting automatically.")
                 return words.format(self._sentence)
             case Connection.CLOSED:
                 return self._sentence
@@ -216,23 +211,23 @@ class LivePanel(Translated, QWidget):
         height, width = seen.frame.image.shape
         parts = [
             self._leds_told(seen),
-            self.tr("{0} images/s").format(f"{self._rate():.0f}"),
+            self.tr("{0} fps").format(f"{self._rate():.0f}"),
         ]
         n_lost = self._n_lost[-1] - self._n_lost[0]
         if n_lost > 0:
-            parts.append(self.tr("lost: {0}").format(n_lost))
+            parts.append(self.tr("Lost: {0}").format(n_lost))
         parts.append(self.tr("{0} x {1} px").format(width, height))
         self._told = tuple(parts)
         self._fit_figures()
 
     def _leds_told(self, seen: LiveImage) -> str:
-        sighting = seen.sighting
-        if sighting is None:
-            return self.tr("bright spots: {0}").format(len(seen.spots))
-        if sighting.reason is not Reason.NONE:
-            return reason_text(sighting.reason)
+        detection = seen.detection
+        if detection is None:
+            return self.tr("Bright spots: {0}").format(len(seen.spots))
+        if detection.reason is not Reason.NONE:
+            return reason_text(detection.reason)
         n_labelled = len(led_numbers(seen))
-        words = self.tr("{0} of {1} LEDs").format(n_labelled, len(sighting.pixels))
+        words = self.tr("{0} of {1} LEDs").format(n_labelled, len(detection.pixels))
         n_others = len(seen.spots) - n_labelled
         if n_others:
             words += self.tr(", other spots: {0}").format(n_others)

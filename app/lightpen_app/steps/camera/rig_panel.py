@@ -2,18 +2,19 @@
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QGroupBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QGroupBox, QWidget
 
 from lightpen.formats.rig_files import RigFile
+from lightpen.messages import Message
 from lightpen.model.rig import Rig
-from lightpen.sentences import Sentence
+from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 FILES = "*.json *.yaml *.yml"
@@ -36,7 +37,7 @@ class RigPanel(Translated, QGroupBox):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._file: RigFile | None = None
-        self._late: Sentence | None = None
+        self._late: Message | None = None
         self._n_unpaired: int | None = None
 
         # Widgets
@@ -49,17 +50,9 @@ class RigPanel(Translated, QGroupBox):
         self._step = SignLabel()
 
         # Layout
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        for widget in (
-            self._second,
-            self._path,
-            self._problem,
-            self._told,
-            self._step,
-        ):
-            layout.addWidget(widget)
+        vertical_layout(
+            self, self._second, self._path, self._problem, self._told, self._step
+        )
 
         # Connections
         self._second.toggled.connect(self._on_toggled)
@@ -69,15 +62,15 @@ class RigPanel(Translated, QGroupBox):
 
         self._retranslate()
 
-    def remark(self) -> Remark:
+    def remark(self) -> StatusMessage:
         """Return what is told of the file in use."""
         return self._told.value()
 
-    def problem(self) -> Remark:
+    def problem(self) -> StatusMessage:
         """Return why the file that was chosen last is not the one in use."""
         return self._problem.value()
 
-    def step(self) -> Remark:
+    def step(self) -> StatusMessage:
         """Return whether the cameras keep step."""
         return self._step.value()
 
@@ -99,10 +92,10 @@ class RigPanel(Translated, QGroupBox):
     def set_problem(self, why: str) -> None:
         """Say why the file that was chosen is not used, or nothing."""
         self._path.set_faulty(bool(why))
-        self._problem.set_value(Remark(why, Sign.CROSS, Tone.BAD))
+        self._problem.set_value(StatusMessage(why, Sign.CROSS, Tone.BAD))
         self._refresh()
 
-    def set_step(self, late: Sentence | None, n_unpaired: int | None) -> None:
+    def set_step(self, late: Message | None, n_unpaired: int | None) -> None:
         """Show by how much the cameras are apart, and how many images found no partner.
 
         Nothing is known yet of None of these.
@@ -122,8 +115,8 @@ class RigPanel(Translated, QGroupBox):
         )
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Two cameras at once"))
-        asked = self.tr("A second camera looks at the pen, too")
+        self.setTitle(self.tr("Two cameras"))
+        asked = self.tr("Use a second camera")
         self._second.setText(asked)
         self._second.setAccessibleName(asked)
         edit = self._path.edit()
@@ -136,37 +129,39 @@ class RigPanel(Translated, QGroupBox):
         is_wanted = self._second.isChecked()
         for widget in (self._path, self._open):
             widget.setVisible(is_wanted)
-        self._told.set_value(self._checked() if is_wanted else Remark())
+        self._told.set_value(self._checked() if is_wanted else StatusMessage())
         self._refresh_step()
 
-    def _checked(self) -> Remark:
+    def _checked(self) -> StatusMessage:
         if self._file is None:
             words = self.tr(
-                'Open the file that says where both cameras stand. "lightpen '
-                'extrinsics LEFT RIGHT --board BOARD --out rig.json" makes it from '
-                "images of one board."
+                "Open the file with the extrinsics of both cameras. Create it from "
+                'board images with "lightpen extrinsics LEFT RIGHT --board BOARD '
+                '--out rig.json".'
             )
-            return Remark(words, Sign.WARNING, Tone.WARN)
+            return StatusMessage(words, Sign.WARNING, Tone.WARN)
         rig = self._file.rig
-        words = self.tr("{0} and {1} stand {2} mm apart").format(
+        words = self.tr("Baseline {2} mm ({0}-{1})").format(
             rig.names[0], rig.names[1], _baseline(rig)
         )
         if self._problem.value().text:
-            words = self.tr("{0} stays in use: {1}").format(self._file.path.name, words)
-        return Remark(words, Sign.CHECK, Tone.GOOD)
+            words = self.tr("{0} remains in use: {1}").format(
+                self._file.path.name, words
+            )
+        return StatusMessage(words, Sign.CHECK, Tone.GOOD)
 
     def _refresh_step(self) -> None:
-        remark = Remark()
+        remark = StatusMessage()
         if self._second.isChecked() and self._n_unpaired is not None:
             if self._late is not None:
-                remark = Remark(worded(self._late), Sign.WARNING, Tone.WARN)
+                remark = StatusMessage(worded(self._late), Sign.WARNING, Tone.WARN)
             else:
-                words = self.tr("Both take their images at the same moment.")
-                remark = Remark(words, Sign.CHECK, Tone.GOOD)
+                words = self.tr("The cameras are synchronised.")
+                remark = StatusMessage(words, Sign.CHECK, Tone.GOOD)
             if self._n_unpaired:
-                words = self.tr("{0} Images without a partner: {1}.")
+                words = self.tr("{0} Unpaired images: {1}.")
                 text = words.format(remark.text, self._n_unpaired)
-                remark = Remark(text, Sign.WARNING, Tone.WARN)
+                remark = StatusMessage(text, Sign.WARNING, Tone.WARN)
         self._step.set_value(remark)
 
 

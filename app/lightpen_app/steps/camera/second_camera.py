@@ -2,37 +2,35 @@
 
 from pathlib import Path
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from lightpen.cameras.pairing import not_synchronised
 from lightpen.formats.rig_files import RigFile, read_rig
-from lightpen.live.looking import LiveImage
+from lightpen.live.pipeline import LiveImage
 from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.camera.rig_panel import RigPanel
 from lightpen_app.steps.camera.source_panel import SourcePanel
+from lightpen_app.work.camera_setup import CameraSetup
+from lightpen_app.work.chosen_files import ChosenFiles
 from lightpen_app.work.job import Job
-from lightpen_app.work.workbench import Workbench
+from lightpen_app.work.selection import Selection
 
 
 class SecondCameraChoice(QWidget):
-    """Shows and changes the second camera of the preparation.
+    """Shows and changes the second camera of the preparation."""
 
-    Signals
-    -------
-    chosen()
-        Another one is wanted, or none any more.
-    search_requested()
-        The cameras of its source are to be looked for.
-    """
-
-    chosen = Signal()
-    search_requested = Signal()
-
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        selection: Selection,
+        camera: CameraSetup,
+        files: ChosenFiles,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
-        self._workbench = workbench
+        self._selection, self._chosen_files = selection, files
+        self._live = camera.live
         self._reading: Job | None = None
 
         # Widgets
@@ -40,20 +38,15 @@ class SecondCameraChoice(QWidget):
         self._source = SourcePanel(is_second=True)
 
         # Layout
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(2 * GRID)
-        layout.addWidget(self._rig)
-        layout.addWidget(self._source)
+        vertical_layout(self, self._rig, self._source, spacing=2 * GRID)
 
         # Connections
         self._rig.wanted.connect(self._on_wanted)
         self._rig.path_chosen.connect(self._on_path_chosen)
         self._source.value_changed.connect(self._on_source_chosen)
-        self._source.retry_requested.connect(workbench.open_camera)
-        self._source.search_requested.connect(self.search_requested)
-        workbench.changed.connect(self._on_workbench_changed)
-        workbench.station_left.connect(self.shut_down)
+        self._source.retry_requested.connect(camera.open)
+        selection.changed.connect(self._on_workbench_changed)
+        selection.station_changed.connect(self.shut_down)
 
         self._on_workbench_changed()
 
@@ -69,13 +62,17 @@ class SecondCameraChoice(QWidget):
         seen : LiveImage
             The newest image, which tells how far away the pen is.
         """
-        live = self._workbench.live
+        live = self._live
         if live.n_cameras == 1:
             return
         lag_ms, px_per_mm = live.lag_ms, None
-        camera = self._workbench.preparation.camera
-        if camera is not None and seen.sighting is not None and seen.sighting.has_pose:
-            px_per_mm = camera.fx / float(seen.sighting.translation[2])
+        camera = self._selection.preparation.camera
+        if (
+            camera is not None
+            and seen.detection is not None
+            and seen.detection.has_pose
+        ):
+            px_per_mm = camera.fx / float(seen.detection.translation[2])
         n_unpaired = None if lag_ms is None else live.stats.unpaired
         self._rig.set_step(not_synchronised(lag_ms, px_per_mm), n_unpaired)
 
@@ -89,23 +86,22 @@ class SecondCameraChoice(QWidget):
             self._reading.cancel()
 
     def _on_workbench_changed(self) -> None:
-        now = self._workbench.preparation
+        now = self._selection.preparation
         self._rig.set_value(now.second is not None, now.rig_file)
         self._source.setVisible(now.second is not None)
         if now.second is not None:
             self._source.set_value(now.second.source)
 
     def _on_wanted(self, is_wanted: bool) -> None:
-        now = self._workbench.preparation
+        now = self._selection.preparation
         self._on_source_chosen(SourceChoice(now.source.kind) if is_wanted else None)
 
     def _on_source_chosen(self, source: SourceChoice | None) -> None:
-        self.chosen.emit()
-        chosen = self._workbench.preparation.with_second(source)
-        self._workbench.set_preparation(chosen)
+        chosen = self._selection.preparation.with_second(source)
+        self._selection.set_preparation(chosen)
         is_simulated = source is not None and source.kind == SourceKind.SIMULATED
         if is_simulated and chosen.rig_file is None:
-            self._workbench.use_sample_files()
+            self._chosen_files.use_samples()
 
     def _on_path_chosen(self, path: str) -> None:
         self.shut_down()
@@ -118,8 +114,8 @@ class SecondCameraChoice(QWidget):
 
     def _on_rig_read(self, rig_file: RigFile) -> None:
         self._reading = None
-        now = self._workbench.preparation
-        self._workbench.set_preparation(now.with_rig(rig_file))
+        now = self._selection.preparation
+        self._selection.set_preparation(now.with_rig(rig_file))
 
     def _on_rig_refused(self, why: str) -> None:
         self._reading = None

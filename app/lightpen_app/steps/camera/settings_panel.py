@@ -1,30 +1,25 @@
 """What else of a camera can be set: rate, region, pixel format, trigger, packets."""
 
 from PySide6.QtCore import QSignalBlocker, Signal
-from PySide6.QtWidgets import (
-    QGridLayout,
-    QGroupBox,
-    QLabel,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QGroupBox, QLabel, QWidget
 
 from lightpen.cameras.pixel_formats import pixel_format_named
 from lightpen.cameras.protocol import (
+    CameraCapabilities,
     CameraSettings,
-    Caps,
     Range,
     Region,
     Stats,
     TriggerMode,
 )
+from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED
 from lightpen_app.steps.camera.setting_field import SettingField
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 LARGEST = 100_000  # px or bytes, of a field before the camera told its range
@@ -43,7 +38,7 @@ class SettingsPanel(Translated, QGroupBox):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._caps: Caps | None = None
+        self._capabilities: CameraCapabilities | None = None
         self._settings = CameraSettings()
         self._stats = Stats()
 
@@ -67,8 +62,6 @@ class SettingsPanel(Translated, QGroupBox):
         self._counts = text_label(TextSize.SMALL, Tone.QUIET)
 
         # Layout
-        grid = QGridLayout()
-        grid.setSpacing(GRID)
         rows: tuple[tuple[QWidget, ...], ...] = (
             (self._rate_name, self._rate),
             (self._format_name, self._format),
@@ -77,6 +70,8 @@ class SettingsPanel(Translated, QGroupBox):
             (self._size_name, self._width, self._height),
             (self._place_name, self._x, self._y),
         )
+        layout = vertical_layout(self)
+        grid = grid_layout(layout)
         for row, (name, *fields) in enumerate(rows):
             grid.addWidget(name, row, 0)
             span = 2 // len(fields)
@@ -85,12 +80,7 @@ class SettingsPanel(Translated, QGroupBox):
         grid.addWidget(self._whole, len(rows), 1, 1, 2)
         grid.setColumnStretch(1, 1)
         grid.setColumnStretch(2, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addLayout(grid)
-        layout.addWidget(self._hint)
-        layout.addWidget(self._counts)
+        fill(layout, self._hint, self._counts)
 
         # Connections
         self._rate.valueChanged.connect(self._on_rate_edited)
@@ -104,7 +94,7 @@ class SettingsPanel(Translated, QGroupBox):
         self._retranslate()
         self.set_camera(None, CameraSettings())
 
-    def hint(self) -> Remark:
+    def hint(self) -> StatusMessage:
         """Return what to know about the pixel format."""
         return self._hint.value()
 
@@ -117,9 +107,11 @@ class SettingsPanel(Translated, QGroupBox):
         self._stats = stats
         self._retranslate_counts()
 
-    def set_camera(self, caps: Caps | None, settings: CameraSettings) -> None:
+    def set_camera(
+        self, caps: CameraCapabilities | None, settings: CameraSettings
+    ) -> None:
         """Show what a camera offers and has in force; hidden where nothing can be."""
-        self._caps, self._settings = caps, settings
+        self._capabilities, self._settings = caps, settings
         is_live = caps is not None and caps.n_images is None
         self.setVisible(is_live)
         if caps is None or not is_live:
@@ -163,7 +155,7 @@ class SettingsPanel(Translated, QGroupBox):
                     field.addItem(each, each)
             field.setCurrentIndex(field.findData(chosen))
 
-    def _offer_region(self, caps: Caps, region: Region | None) -> None:
+    def _offer_region(self, caps: CameraCapabilities, region: Region | None) -> None:
         limits = caps.regions
         is_there = limits is not None and region is not None
         can_move = limits is not None and min(limits.x_step, limits.y_step) > 0
@@ -179,7 +171,7 @@ class SettingsPanel(Translated, QGroupBox):
         self._y.set_offered(Range(0, limits.height.high - region.height), region.y)
         is_whole = region == limits.whole
         self._whole.set_why_not(
-            self.tr("The whole sensor is read out.") if is_whole else ""
+            self.tr("The whole sensor is already in use.") if is_whole else ""
         )
 
     def _on_rate_edited(self, rate: float) -> None:
@@ -202,41 +194,41 @@ class SettingsPanel(Translated, QGroupBox):
         self.settings_changed.emit(CameraSettings(region=region))
 
     def _on_whole_clicked(self) -> None:
-        if self._caps is not None and self._caps.regions is not None:
-            whole = CameraSettings(region=self._caps.regions.whole)
+        if self._capabilities is not None and self._capabilities.regions is not None:
+            whole = CameraSettings(region=self._capabilities.regions.whole)
             self.settings_changed.emit(whole)
 
-    def _format_hint(self) -> Remark:
+    def _format_hint(self) -> StatusMessage:
         pixel_format = pixel_format_named(self._settings.pixel_format or "")
         if pixel_format is None or pixel_format.is_mono:
-            return Remark()
+            return StatusMessage()
         words = self.tr(
-            "Colours are made grey, which costs sharpness. A grey format such as "
-            "Mono8 gives better centres, a monochrome camera the best."
+            "Colour images are converted to grey, which reduces accuracy. Use a "
+            "grey format such as Mono8, or better a monochrome camera."
         )
-        return Remark(words, Sign.WARNING, Tone.WARN)
+        return StatusMessage(words, Sign.WARNING, Tone.WARN)
 
     def _retranslate_counts(self) -> None:
         stats = self._stats
         told = (
-            self.tr("delivered: {0}").format(stats.delivered),
-            self.tr("incomplete: {0}").format(stats.incomplete),
-            self.tr("missed: {0}").format(stats.missed),
-            self.tr("skipped: {0}").format(stats.skipped),
+            self.tr("Received: {0}").format(stats.delivered),
+            self.tr("Incomplete: {0}").format(stats.incomplete),
+            self.tr("Lost: {0}").format(stats.missed),
+            self.tr("Not processed: {0}").format(stats.skipped),
         )
         self._counts.setText(PARTED.join(told))
 
     def _retranslate_triggers(self) -> None:
         words = {
             TriggerMode.FREE: self.tr("Free running"),
-            TriggerMode.SOFTWARE: self.tr("By software"),
+            TriggerMode.SOFTWARE: self.tr("Software trigger"),
         }
         for index in range(self._trigger.count()):
             mode = TriggerMode(self._trigger.itemData(index))
             self._trigger.setItemText(index, words[mode])
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Settings of the camera"))
+        self.setTitle(self.tr("Camera settings"))
         named: tuple[tuple[QLabel, QWidget, str], ...] = (
             (self._rate_name, self._rate, self.tr("Frame rate")),
             (self._format_name, self._format, self.tr("Pixel format")),
@@ -256,15 +248,15 @@ class SettingsPanel(Translated, QGroupBox):
         self._whole.setText(self.tr("Whole sensor"))
         self._counts.setToolTip(
             self.tr(
-                "Of this camera's images: came whole; came in part and were left out; "
-                "never came; were not measured, as the computer was too slow."
+                "Images of this camera: received; incomplete and discarded; lost; "
+                "not processed because the computer was too slow."
             )
         )
         self._retranslate_counts()
         self._packet.setToolTip(
             self.tr(
-                "Larger packets cost the computer less. The network card and every "
-                "switch must let them pass (jumbo frames)."
+                "Larger packets reduce the computer load. Network card and switches "
+                "must support them (jumbo frames)."
             )
         )
         self._retranslate_triggers()

@@ -5,30 +5,24 @@ from dataclasses import replace
 from functools import partial
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QGroupBox,
-    QHBoxLayout,
-    QMenu,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QGroupBox, QMenu, QWidget
 
-from lightpen.cameras.source import FoundDevice, Needs
+from lightpen.cameras.source import FoundDevice, SourceNeeds
 from lightpen.cameras.sources import SOURCES
 from lightpen.formats.images import SUFFIXES, VIDEO_SUFFIXES
-from lightpen.record.recordings import FilesBeside
-from lightpen.sentences import Sentence
+from lightpen.messages import Message
+from lightpen.record.swings.recordings import FilesBeside
 from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.look.theme import Tone
 from lightpen_app.steps.camera.device_field import DeviceField
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 
@@ -65,9 +59,9 @@ class SourcePanel(Translated, QGroupBox):
         super().__init__(parent)
         self._is_second = is_second
         self._value = SourceChoice()
-        self._absent: Mapping[str, Sentence] = {}
+        self._absent: Mapping[str, Message] = {}
         self._is_searching = False
-        self._outcome: Callable[[], Remark] = Remark
+        self._outcome: Callable[[], StatusMessage] = StatusMessage
 
         # Widgets
         self._kind = ChoiceField()
@@ -98,25 +92,11 @@ class SourcePanel(Translated, QGroupBox):
         self._use_found = PushButton()
 
         # Layout
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        first = QHBoxLayout()
-        first.setSpacing(GRID)
-        first.addWidget(self._kind, 1)
-        first.addWidget(self._samples)
-        layout.addLayout(first)
-        layout.addWidget(self._place)
-        layout.addWidget(self._producer)
-        second = QHBoxLayout()
-        second.setSpacing(GRID)
-        second.addWidget(self._device, 1)
-        second.addWidget(self._search)
-        layout.addLayout(second)
-        layout.addWidget(self._told)
-        layout.addWidget(self._found)
-        layout.addWidget(self._use_found)
-        layout.addWidget(self._retry)
+        layout = vertical_layout(self)
+        horizontal_layout(layout, (self._kind, 1), self._samples)
+        fill(layout, self._place, self._producer)
+        horizontal_layout(layout, (self._device, 1), self._search)
+        fill(layout, self._told, self._found, self._use_found, self._retry)
 
         # Connections
         self._kind.activated.connect(self._on_kind_chosen)
@@ -146,17 +126,17 @@ class SourcePanel(Translated, QGroupBox):
             return
         if value.kind != self._value.kind:
             self._device.set_found(())
-            self._outcome = Remark
+            self._outcome = StatusMessage
             self._is_searching = False
         self._value = value
-        if self._needs is Needs.FILES:
+        if self._needs is SourceNeeds.FILES:
             self._place.set_value(value.place)
         elif self._has_device:
             self._device.set_value(value.place)
             self._producer.set_value(value.producer)
         self._refresh()
 
-    def set_absent(self, absent: Mapping[str, Sentence]) -> None:
+    def set_absent(self, absent: Mapping[str, Message]) -> None:
         """Say what has to be installed for sources, by their keys."""
         self._absent = absent
         self._retranslate()
@@ -174,14 +154,14 @@ class SourcePanel(Translated, QGroupBox):
     def set_found(self, found: tuple[FoundDevice, ...]) -> None:
         """Offer the cameras that were found; the first if none is chosen yet."""
         self._device.set_found(found)
-        self._outcome = partial(self._found_remark, len(found))
+        self._outcome = partial(self._found_message, len(found))
         self._refresh()
         if found and not self._value.place:
             self._choose(replace(self._value, place=found[0].place))
 
     def set_search_problem(self, why: str) -> None:
         """Say why no cameras can be looked for."""
-        self._outcome = partial(Remark, why, Sign.CROSS, Tone.BAD)
+        self._outcome = partial(StatusMessage, why, Sign.CROSS, Tone.BAD)
         self._refresh()
 
     def set_beside(self, files: FilesBeside) -> None:
@@ -196,18 +176,18 @@ class SourcePanel(Translated, QGroupBox):
         self._retry.setVisible(faulty)
 
     @property
-    def _needs(self) -> Needs:
+    def _needs(self) -> SourceNeeds:
         return self._value.source.needs
 
     @property
     def _has_device(self) -> bool:
-        return self._needs in (Needs.DEVICE, Needs.DEVICE_AND_PRODUCER)
+        return self._needs in (SourceNeeds.DEVICE, SourceNeeds.DEVICE_AND_PRODUCER)
 
     def _on_kind_chosen(self, index: int) -> None:
         source = SOURCES[index]
-        place = self._place.value() if source.needs is Needs.FILES else ""
+        place = self._place.value() if source.needs is SourceNeeds.FILES else ""
         self._choose(SourceChoice(source.key, place))
-        if source.needs is Needs.FILES and not place:
+        if source.needs is SourceNeeds.FILES and not place:
             self._place.setFocus()
         elif self._has_device and source.key not in self._absent:
             self.search_requested.emit()
@@ -259,54 +239,56 @@ class SourcePanel(Translated, QGroupBox):
     def _refresh(self) -> None:
         needs, absent = self._needs, self._absent.get(self._value.source.key)
         self._kind.setCurrentIndex(SOURCES.index(self._value.source))
-        self._place.setVisible(needs is Needs.FILES)
+        self._place.setVisible(needs is SourceNeeds.FILES)
         is_usable = self._has_device and absent is None
-        self._producer.setVisible(is_usable and needs is Needs.DEVICE_AND_PRODUCER)
+        self._producer.setVisible(
+            is_usable and needs is SourceNeeds.DEVICE_AND_PRODUCER
+        )
         self._device.setVisible(is_usable)
         self._search.setVisible(is_usable)
         self._search.set_why_not(
-            self.tr("The search is on.") if self._is_searching else ""
+            self.tr("Search in progress") if self._is_searching else ""
         )
         is_simulated = self._value.kind == SourceKind.SIMULATED
         self._samples.setVisible(is_simulated and not self._is_second)
         self._told.set_value(self._remark(absent))
         self._refresh_beside()
 
-    def _remark(self, absent: Sentence | None) -> Remark:
+    def _remark(self, absent: Message | None) -> StatusMessage:
         if not self._has_device:
-            return Remark()
+            return StatusMessage()
         if absent is not None:
-            return Remark(worded(absent), Sign.WARNING, Tone.WARN)
+            return StatusMessage(worded(absent), Sign.WARNING, Tone.WARN)
         if self._is_searching:
-            words = self.tr("Cameras are being looked for.")
-            return Remark(words, Sign.WAIT, Tone.ACTIVE)
+            words = self.tr("Searching for cameras")
+            return StatusMessage(words, Sign.WAIT, Tone.ACTIVE)
         return self._outcome()
 
-    def _found_remark(self, n_found: int) -> Remark:
+    def _found_message(self, n_found: int) -> StatusMessage:
         if n_found:
             words = self.tr("Cameras found: {0}").format(n_found)
-            return Remark(words, Sign.CHECK, Tone.GOOD)
+            return StatusMessage(words, Sign.CHECK, Tone.GOOD)
         words = self.tr(
-            "No camera was found. Check its power and its cable, or enter its serial "
-            "number or its address."
+            "No camera found. Check power and cable, or enter its serial number or "
+            "address."
         )
-        return Remark(words, Sign.WARNING, Tone.WARN)
+        return StatusMessage(words, Sign.WARNING, Tone.WARN)
 
     def _refresh_beside(self) -> None:
         files = [f for f in (self._beside.camera, self._beside.pen) if f is not None]
-        is_offered = bool(files) and self._needs is Needs.FILES
+        is_offered = bool(files) and self._needs is SourceNeeds.FILES
         names = self.tr(" and ").join(file.name for file in files)
-        text = self.tr("Beside the images: {0}").format(names) if is_offered else ""
-        self._found.set_value(Remark(text, Sign.RING, Tone.ACTIVE))
-        use = self.tr("Use both") if len(files) > 1 else self.tr("Use it")
+        text = self.tr("Found with the images: {0}").format(names) if is_offered else ""
+        self._found.set_value(StatusMessage(text, Sign.RING, Tone.ACTIVE))
+        use = self.tr("Use both files") if len(files) > 1 else self.tr("Use file")
         self._use_found.setText(use)
         self._use_found.setVisible(is_offered)
 
     def _retranslate(self) -> None:
         self._refresh_beside()
-        title = self.tr("Source of the images")
+        title = self.tr("Image source")
         if self._is_second:
-            title = self.tr("Source of the second camera")
+            title = self.tr("Image source of the second camera")
         self.setTitle(title)
         for index, source in enumerate(SOURCES):
             name = worded(source.name)
@@ -330,7 +312,7 @@ class SourcePanel(Translated, QGroupBox):
         self._search.setText(self.tr("Search"))
         self._samples.setText(self.tr("Use its files"))
         self._samples.setToolTip(
-            self.tr("Use the intrinsics and the LED file of the simulated pen.")
+            self.tr("Use the intrinsics file and the LED file of the simulated pen.")
         )
         self._retry.setText(self.tr("Try again"))
         self._refresh()

@@ -2,15 +2,16 @@
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGridLayout, QGroupBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox, QWidget
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.inspection import SEARCHED_IMAGES, StraySearch
-from lightpen.live.looking import LiveImage
+from lightpen.live.pipeline import LiveImage
+from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import TextSize, Tone, text_label
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 
@@ -47,18 +48,16 @@ class StrayLightPanel(Translated, QGroupBox):
 
         # Widgets
         self._task = text_label(TextSize.BODY)
-        self._cover = PushButton()
-        self._cover.setCheckable(True)
+        self._cover = PushButton(checkable=True)
         self._start = PushButton()
         self._mask = PushButton()
         self._clear = PushButton()
-        self._draw = PushButton()
-        self._draw.setCheckable(True)
+        self._draw = PushButton(checkable=True)
         self._outcome = SignLabel()
 
         # Layout
-        buttons = QGridLayout()
-        buttons.setSpacing(GRID)
+        layout = vertical_layout(self, self._task)
+        buttons = grid_layout(layout)
         buttons.addWidget(self._start, 0, 0)
         buttons.addWidget(self._cover, 0, 1)
         buttons.addWidget(self._mask, 1, 0)
@@ -66,11 +65,6 @@ class StrayLightPanel(Translated, QGroupBox):
         buttons.addWidget(self._draw, 2, 0, 1, 2)
         buttons.setColumnStretch(0, 1)
         buttons.setColumnStretch(1, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._task)
-        layout.addLayout(buttons)
         layout.addWidget(self._outcome)
 
         # Connections
@@ -127,9 +121,9 @@ class StrayLightPanel(Translated, QGroupBox):
         search = self._search
         if search is None or search.is_over:
             return
-        sighting = seen.sighting
-        self._knows_pen = sighting is not None
-        shows_pen = sighting is not None and sighting.has_pose
+        detection = seen.detection
+        self._knows_pen = detection is not None
+        shows_pen = detection is not None and detection.has_pose
         self._search = search.after(seen.spots, shows_pen=shows_pen)
         if self._search.is_over:
             self._set_found(self._search.circles())
@@ -162,14 +156,14 @@ class StrayLightPanel(Translated, QGroupBox):
 
     def _retranslate(self) -> None:
         self.setTitle(self.tr("Stray light"))
-        self._task.setText(self.tr("Cover the pen, then search for what still shines."))
+        self._task.setText(self.tr("Cover the pen, then search for stray light."))
         self._start.setText(self.tr("Search"))
-        self._clear.setText(self.tr("Clear the mask"))
-        self._draw.setText(self.tr("Draw the mask on the image"))
+        self._clear.setText(self.tr("Clear mask"))
+        self._draw.setText(self.tr("Draw mask on the image"))
         self._draw.setToolTip(
             self.tr(
-                "Click a spot to mask it, draw a circle with the button held down, or "
-                "click into a circle to take it away."
+                "Click a spot to mask it, drag to draw a circle, or click a circle "
+                "to remove it."
             )
         )
         self._refresh()
@@ -180,7 +174,7 @@ class StrayLightPanel(Translated, QGroupBox):
         self._cover.setText(
             self.tr("Uncover the LEDs") if covers else self.tr("Cover the LEDs")
         )
-        self._cover.setToolTip(self.tr("The simulated operator does it."))
+        self._cover.setToolTip(self.tr("Done by the simulated operator"))
         self._mask.setText(
             self.tr("Mask the spots: {0}").format(n_found)
             if n_found
@@ -189,47 +183,47 @@ class StrayLightPanel(Translated, QGroupBox):
         is_searching = self._search is not None and not self._search.is_over
         why_not_start = ""
         if not self._is_live:
-            why_not_start = self.tr("No images come.")
+            why_not_start = self.tr("No images are received.")
         elif is_searching:
-            why_not_start = self.tr("The search is on.")
+            why_not_start = self.tr("Search in progress")
         self._start.set_why_not(why_not_start)
-        self._mask.set_why_not("" if n_found else self.tr("Nothing was found to mask."))
-        self._clear.set_why_not("" if self._n_masked else self.tr("Nothing is masked."))
+        self._mask.set_why_not("" if n_found else self.tr("No spots to mask"))
+        self._clear.set_why_not("" if self._n_masked else self.tr("No mask is set."))
         self._outcome.set_value(self._told())
 
-    def _told(self) -> Remark:
+    def _told(self) -> StatusMessage:
         search, n_found = self._search, len(self._found)
         if search is None:
             if not self._n_masked:
-                return Remark()
-            words = self.tr("Masked places: {0}").format(self._n_masked)
-            return Remark(words, Sign.CHECK, Tone.GOOD)
+                return StatusMessage()
+            words = self.tr("Masked areas: {0}").format(self._n_masked)
+            return StatusMessage(words, Sign.CHECK, Tone.GOOD)
         if not search.is_over:
             words = self.tr("Searching: image {0} of {1}")
             n_images = len(search.images)
-            return Remark(
+            return StatusMessage(
                 words.format(n_images, SEARCHED_IMAGES), Sign.WAIT, Tone.ACTIVE
             )
         if search.shows_pen:
             words = self.tr(
-                "The pen is still seen. Cover all of its LEDs, then search again. "
-                "Nothing is masked."
-            )
-            return Remark(words, Sign.WARNING, Tone.WARN)
-        if not n_found and not search.is_dark:
-            words = self.tr(
-                "What shines moves, so it is no stray light. Cover the pen, then "
+                "The pen is still visible; nothing was masked. Cover all LEDs, then "
                 "search again."
             )
-            return Remark(words, Sign.WARNING, Tone.WARN)
+            return StatusMessage(words, Sign.WARNING, Tone.WARN)
+        if not n_found and not search.is_dark:
+            words = self.tr(
+                "The bright spots move and are not stray light. Cover the pen, then "
+                "search again."
+            )
+            return StatusMessage(words, Sign.WARNING, Tone.WARN)
         if not n_found:
-            words = self.tr("No stray light: nothing bright is left.")
-            return Remark(words, Sign.CHECK, Tone.GOOD)
+            words = self.tr("No stray light found.")
+            return StatusMessage(words, Sign.CHECK, Tone.GOOD)
         if self._knows_pen:
-            words = self.tr("Stray spots: {0}. Mask them, or take their cause away.")
+            words = self.tr("Stray spots: {0}. Mask them or remove their source.")
         else:
             words = self.tr(
-                "Bright spots: {0}. Is the pen covered? Without its LED file it cannot "
-                "be told from stray light."
+                "Bright spots: {0}. Is the pen covered? Without its LED file, LEDs "
+                "cannot be distinguished from stray light."
             )
-        return Remark(words.format(n_found), Sign.WARNING, Tone.WARN)
+        return StatusMessage(words.format(n_found), Sign.WARNING, Tone.WARN)

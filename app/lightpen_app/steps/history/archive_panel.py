@@ -5,21 +5,22 @@ from enum import Enum, auto
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QMenu, QProgressBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QMenu, QProgressBar, QWidget
 
-from lightpen.archive.check import Checked
-from lightpen.archive.logbook import Delivered
+from lightpen.archive.check import ArchiveCheckResult
+from lightpen.archive.logbook import ReplicationState
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 MOST_TOLD = 100  # findings; the rest is counted
 
 
-class Saving(Enum):
+class SaveFormat(Enum):
     """What is saved."""
 
     TABLE = auto()
@@ -29,9 +30,11 @@ class Saving(Enum):
     @property
     def suffix(self) -> str:
         """Of the file."""
-        return {Saving.TABLE: ".csv", Saving.JSON: ".json", Saving.WHOLE: ".jsonl"}[
-            self
-        ]
+        return {
+            SaveFormat.TABLE: ".csv",
+            SaveFormat.JSON: ".json",
+            SaveFormat.WHOLE: ".jsonl",
+        }[self]
 
 
 class ArchivePanel(Translated, QWidget):
@@ -51,8 +54,8 @@ class ArchivePanel(Translated, QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._checked: Checked | None = None
-        self._delivery: Delivered | None = None
+        self._checked: ArchiveCheckResult | None = None
+        self._delivery: ReplicationState | None = None
 
         # Widgets
         self._check = PushButton()
@@ -60,8 +63,8 @@ class ArchivePanel(Translated, QWidget):
         self._save = PushButton()
         self._save.setProperty("menu", True)
         menu = QMenu(self._save)
-        self._savings: dict[Saving, QAction] = {
-            saving: menu.addAction("") for saving in Saving
+        self._savings: dict[SaveFormat, QAction] = {
+            saving: menu.addAction("") for saving in SaveFormat
         }
         self._save.setMenu(menu)
         self._progress = QProgressBar()
@@ -73,24 +76,12 @@ class ArchivePanel(Translated, QWidget):
         self._findings: list[SignLabel] = []
 
         # Layout
-        buttons = QHBoxLayout()
-        buttons.setSpacing(GRID)
-        for button in (self._check, self._save, self._import):
-            buttons.addWidget(button)
-        buttons.addStretch(1)
-        working = QHBoxLayout(self._working)
-        working.setContentsMargins(0, 0, 0, 0)
-        working.setSpacing(2 * GRID)
-        working.addWidget(self._progress, 1)
-        working.addWidget(self._cancel)
-        self._layout = layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, GRID, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addLayout(buttons)
-        layout.addWidget(self._working)
-        layout.addWidget(self._delivered)
-        layout.addWidget(self._outcome)
-        layout.addStretch(1)
+        self._layout = layout = vertical_layout(self, margins=(0, GRID, 0, 0))
+        horizontal_layout(layout, self._check, self._save, self._import, 1)
+        fill(layout, self._working, self._delivered, self._outcome, 1)
+        horizontal_layout(
+            self._working, (self._progress, 1), self._cancel, spacing=2 * GRID
+        )
         self._working.hide()
 
         # Connections
@@ -114,30 +105,34 @@ class ArchivePanel(Translated, QWidget):
         """Show how far it is, 0 to 1."""
         self._progress.setValue(round(100 * fraction))
 
-    def set_checked(self, checked: Checked | None) -> None:
+    def checked(self) -> ArchiveCheckResult | None:
+        """Return what the last check found; None as long as there was none."""
+        return self._checked
+
+    def set_checked(self, checked: ArchiveCheckResult | None) -> None:
         """Show what a check came to; None as long as there was none."""
         self._checked = checked
         self._retranslate()
 
-    def set_delivery(self, delivery: Delivered | None) -> None:
+    def set_delivery(self, delivery: ReplicationState | None) -> None:
         """Show how far the server has what was entered; None without a server."""
         self._delivery = delivery
         self._show_delivery()
 
-    def told(self) -> Sequence[Remark]:
+    def told(self) -> Sequence[StatusMessage]:
         """Return what is said of the server and of the check."""
         labels = (self._delivered, self._outcome, *self._findings)
         return [label.value() for label in labels if label.value().text]
 
     def _retranslate(self) -> None:
         self._check.setText(self.tr("Check the archive"))
-        self._import.setText(self.tr("Take up another station's..."))
+        self._import.setText(self.tr("Import from another station..."))
         self._save.setText(self.tr("Save..."))
         self._cancel.setText(self.tr("Cancel"))
         for saving, text in (
-            (Saving.TABLE, self.tr("Entries shown (CSV)...")),
-            (Saving.JSON, self.tr("Entries shown (JSON)...")),
-            (Saving.WHOLE, self.tr("All, for another station...")),
+            (SaveFormat.TABLE, self.tr("Listed entries (CSV)...")),
+            (SaveFormat.JSON, self.tr("Listed entries (JSON)...")),
+            (SaveFormat.WHOLE, self.tr("All entries for another station...")),
         ):
             self._savings[saving].setText(text)
         self._refresh_buttons()
@@ -146,11 +141,11 @@ class ArchivePanel(Translated, QWidget):
 
     def _refresh_buttons(self) -> None:
         is_working = not self._working.isHidden()
-        why_not = self.tr("Something else is under way.") if is_working else ""
+        why_not = self.tr("Another operation is in progress.") if is_working else ""
         told = (
-            self.tr("Read every entry, record, result and image, and compare"),
-            self.tr("For other programs, or for another station"),
-            self.tr("Copy the entries of a file that was saved at another station"),
+            self.tr("Read and compare every entry, record, result and image"),
+            self.tr("For other programs or another station"),
+            self.tr("Import the entries from a file saved at another station"),
         )
         buttons = (self._check, self._save, self._import)
         for button, words in zip(buttons, told, strict=True):
@@ -158,20 +153,22 @@ class ArchivePanel(Translated, QWidget):
 
     def _show_delivery(self) -> None:
         delivery = self._delivery
-        remark = Remark("") if delivery is None else self._remark_on(delivery)
+        remark = StatusMessage("") if delivery is None else self._message_on(delivery)
         self._delivered.set_value(remark)
 
-    def _remark_on(self, delivery: Delivered) -> Remark:
+    def _message_on(self, delivery: ReplicationState) -> StatusMessage:
         n_waiting, trouble = delivery.n_waiting, delivery.trouble
         if trouble is not None:
             text = self.tr(
-                "The server does not have all entries. They stay here, and are "
-                "delivered when it answers. {0}"
+                "Entries not yet on the server; they are stored here and delivered "
+                "when it responds. {0}"
             )
-            return Remark(text.format(worded(trouble)), Sign.WARNING, Tone.WARN)
+            return StatusMessage(text.format(worded(trouble)), Sign.WARNING, Tone.WARN)
         if n_waiting == 0:
-            return Remark(self.tr("The server has all entries."), Sign.CHECK, Tone.GOOD)
-        return Remark(self.tr("Entries are being delivered to the server."))
+            return StatusMessage(
+                self.tr("The server has all entries."), Sign.CHECK, Tone.GOOD
+            )
+        return StatusMessage(self.tr("Delivering entries to the server"))
 
     def _show_outcome(self) -> None:
         checked = self._checked
@@ -179,24 +176,22 @@ class ArchivePanel(Translated, QWidget):
         texts = list(map(worded, findings[:MOST_TOLD]))
         if len(findings) > MOST_TOLD:
             n_more = len(findings) - MOST_TOLD
-            texts.append(self.tr("{0} more were found.").format(n_more))
+            texts.append(self.tr("{0} more findings").format(n_more))
         while len(self._findings) < len(texts):
             label = SignLabel()
             self._findings.append(label)
             self._layout.insertWidget(self._layout.count() - 1, label)
         for i, label in enumerate(self._findings):
             text = texts[i] if i < len(texts) else ""
-            label.set_value(Remark(text, Sign.CROSS, Tone.BAD))
+            label.set_value(StatusMessage(text, Sign.CROSS, Tone.BAD))
         self._outcome.set_value(self._outcome_of(checked))
 
-    def _outcome_of(self, checked: Checked | None) -> Remark:
+    def _outcome_of(self, checked: ArchiveCheckResult | None) -> StatusMessage:
         if checked is None:
-            return Remark(self.tr("Not checked since the program was started."))
+            return StatusMessage(self.tr("Not checked since program start"))
         told = (checked.n_entries, checked.n_files)
         if checked.findings:
-            text = self.tr(
-                "Something was changed. {0} entries and {1} files were read."
-            )
-            return Remark(text.format(*told), Sign.WARNING, Tone.WARN)
-        text = self.tr("No change was found in {0} entries and {1} files.")
-        return Remark(text.format(*told), Sign.CHECK, Tone.GOOD)
+            text = self.tr("Changes detected. {0} entries and {1} files checked.")
+            return StatusMessage(text.format(*told), Sign.WARNING, Tone.WARN)
+        text = self.tr("No changes in {0} entries and {1} files")
+        return StatusMessage(text.format(*told), Sign.CHECK, Tone.GOOD)

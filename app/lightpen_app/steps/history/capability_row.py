@@ -2,16 +2,17 @@
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.verification.repeatability import CAPABLE, STUDY, Capability
+from lightpen.verification.tasks.repeatability import CAPABLE, STUDY, Capability
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import AXES, number_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 WIDEST, REACH = 10.0, 1000.0  # mm
@@ -41,23 +42,10 @@ class CapabilityRow(Translated, QWidget):
         self._told = SignLabel()
 
         # Layout
-        width = QHBoxLayout()
-        width.setSpacing(GRID)
-        width.addWidget(self._label)
-        width.addWidget(self._tolerance)
-        width.addWidget(self._has_reference)
-        width.addStretch(1)
-        point = QHBoxLayout()
-        point.setSpacing(GRID)
-        for field in self._reference:
-            point.addWidget(field)
-        point.addStretch(1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID // 2)
-        layout.addLayout(width)
-        layout.addLayout(point)
-        layout.addWidget(self._told)
+        layout = vertical_layout(self, spacing=GRID // 2)
+        horizontal_layout(layout, self._label, self._tolerance, self._has_reference, 1)
+        horizontal_layout(layout, *self._reference, 1)
+        fill(layout, self._told)
 
         # Connections
         self._has_reference.toggled.connect(self._on_changed)
@@ -94,8 +82,10 @@ class CapabilityRow(Translated, QWidget):
     def _retranslate(self) -> None:
         self._label.setText(self.tr("Capability: tolerance"))
         self._tolerance.setAccessibleName(self.tr("Tolerance of a coordinate"))
-        self._tolerance.setSpecialValueText(self.tr("no study"))
-        self._has_reference.setText(self.tr("Tip by a better instrument"))
+        self._tolerance.setSpecialValueText(self.tr("No study"))
+        self._has_reference.setText(
+            self.tr("Reference tip (from a more accurate instrument)")
+        )
         for axis, field in zip(AXES, self._reference, strict=True):
             field.setAccessibleName(self.tr("{0} of the reference").format(axis))
         self._refresh()
@@ -106,24 +96,24 @@ class CapabilityRow(Translated, QWidget):
         self._has_reference.setVisible(self.tolerance() is not None)
         found, n_tips = self._shown
         if found is None:
-            self._told.set_value(Remark())
+            self._told.set_value(StatusMessage())
             return
         words = [self._of_each("Cg", found.cg)]
         if found.cgk is not None:
             words.append(self._of_each("Cgk", found.cgk))
         least = number_text(CAPABLE, 2)
         words.append(
-            self.tr("Capable: all are {0} or more.").format(least)
+            self.tr("Capable: all values are {0} or more.").format(least)
             if found.is_capable
-            else self.tr("Not capable: {0} is asked for.").format(least)
+            else self.tr("Not capable: {0} is required.").format(least)
         )
         if n_tips < STUDY:
-            text = self.tr("A study takes {0} to 50 repeats; these are {1}.")
+            text = self.tr("A study needs {0} to 50 repeats; {1} are available.")
             words.append(text.format(STUDY, n_tips))
         mark = (
             (Sign.CHECK, Tone.GOOD) if found.is_capable else (Sign.WARNING, Tone.WARN)
         )
-        self._told.set_value(Remark(" ".join(words), *mark))
+        self._told.set_value(StatusMessage(" ".join(words), *mark))
 
     def _of_each(self, name: str, values: FloatArray) -> str:
         each = zip(AXES, values.tolist(), strict=True)

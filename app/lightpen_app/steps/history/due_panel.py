@@ -4,13 +4,14 @@ from collections.abc import Callable, Sequence
 from datetime import datetime
 
 from PySide6.QtCore import QSignalBlocker, Signal
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.due import DueTip
-from lightpen.model.due_rule import MOST_DAYS, MOST_SWINGS, DueRule
+from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.look.words import PARTED, moment_text, shortened
-from lightpen_app.widgets.labelled import field_label, stacked
+from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.translated import Translated
@@ -37,9 +38,7 @@ class DuePanel(Translated, QWidget):
     rule_changed = Signal(object)
 
     def __init__(
-        self,
-        now: Callable[[], datetime],
-        parent: QWidget | None = None,
+        self, now: Callable[[], datetime], parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
         self._now = now
@@ -55,20 +54,14 @@ class DuePanel(Translated, QWidget):
         self._table = NumberTable()
 
         # Layout
-        fields = QHBoxLayout()
-        fields.setSpacing(2 * GRID)
+        layout = vertical_layout(self, margins=(0, GRID, 0, 0))
+        fields = horizontal_layout(layout, spacing=2 * GRID)
         for label, field in zip(self._labels, self._fields, strict=True):
             field.setKeyboardTracking(False)
             field.setFixedWidth(FIELD_WIDTH)
-            fields.addLayout(stacked(label, field))
-        fields.addStretch(1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, GRID, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addLayout(fields)
-        layout.addWidget(self._head)
-        layout.addWidget(self._table)
-        layout.addStretch(1)
+            add_labelled(fields, label, field)
+        fill(fields, 1)
+        fill(layout, self._head, self._table, 1)
 
         # Connections
         for field in self._fields:
@@ -105,24 +98,24 @@ class DuePanel(Translated, QWidget):
 
     def _retranslate(self) -> None:
         words = (
-            self.tr("Days in force at most"),
-            self.tr("Swings of its pen at most"),
+            self.tr("Calibration interval (days)"),
+            self.tr("Max. swings of the pen"),
         )
         for label, field, text in zip(self._labels, self._fields, words, strict=True):
             label.setText(text)
             field.setAccessibleName(text)
-        self._swings.setSpecialValueText(self.tr("any number"))
+        self._swings.setSpecialValueText(self.tr("No limit"))
         self._refresh()
 
     def _refresh(self) -> None:
-        laid_down = self.tr("A supervisor lays it down, at Start: All limits...")
-        swings = self.tr("Each swing, with whatever tip, wears the seat of all tips.")
+        laid_down = self.tr("Set by a supervisor at Start: All limits...")
+        swings = self.tr("Each swing, with any tip, wears the common tip seat.")
         self._days.setToolTip(laid_down if self._is_guarded else "")
         self._swings.setToolTip(laid_down if self._is_guarded else swings)
         now = self._now()
         n_due = sum(tip.is_due(now) for tip in self._tips)
         self._head.setText(
-            self.tr("{0} of {1} tips in force at this station are due.").format(
+            self.tr("{0} of {1} tips in use at this station are due.").format(
                 n_due, len(self._tips)
             )
         )
@@ -140,8 +133,8 @@ class DuePanel(Translated, QWidget):
         return (
             *(moment_text(day, "yyyy-MM-dd") for day in days),
             f"{tip.n_swings}",
-            self.tr("any number") if tip.n_left is None else f"{max(0, tip.n_left)}",
-            self.tr("DUE") if tip.is_due(now) else self.tr("in time"),
+            self.tr("No limit") if tip.n_left is None else f"{max(0, tip.n_left)}",
+            self.tr("DUE") if tip.is_due(now) else self.tr("valid"),
         )
 
 

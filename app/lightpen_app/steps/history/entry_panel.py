@@ -3,10 +3,18 @@
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
-from lightpen.archive.entries import BESIDE_SWINGS, IN_FORCE_BY, Event, Kind, Written
+from lightpen.archive.entries import (
+    BESIDE_SWINGS,
+    IN_FORCE_BY,
+    Event,
+    Kind,
+    StoredEntry,
+)
 from lightpen.archive.history import Line, TipState
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, breakable, moment_text
@@ -18,7 +26,7 @@ from lightpen_app.steps.history.texts import (
 )
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.reason_bar import ReasonBar
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 SHORT = 12  # characters of a hash
@@ -44,10 +52,10 @@ class EntryPanel(Translated, QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._line: Line | None = None
-        self._asked: Written | None = None
+        self._asked: StoredEntry | None = None
         self._home = ""
         self._restores = False
-        self._remarks: tuple[Written, ...] = ()
+        self._messages: tuple[StoredEntry, ...] = ()
 
         # Widgets
         self._what = text_label(TextSize.LEAD)
@@ -63,23 +71,16 @@ class EntryPanel(Translated, QWidget):
         self._reason = ReasonBar()
 
         # Layout
-        buttons = QHBoxLayout()
-        buttons.setSpacing(GRID)
-        for button in (self._note, self._restore, self._paper):
-            buttons.addWidget(button)
-        buttons.addStretch(1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, GRID, 0, 0)
-        layout.setSpacing(GRID // 2)
-        layout.addWidget(self._changed)
+        flags = Qt.TextInteractionFlag.TextSelectableByMouse
         for text in self._texts:
-            flags = Qt.TextInteractionFlag.TextSelectableByMouse
             text.setTextInteractionFlags(flags)
-            layout.addWidget(text)
+        margins = (0, GRID, 0, 0)
+        layout = vertical_layout(
+            *(self, self._changed, *self._texts), spacing=GRID // 2, margins=margins
+        )
         layout.addSpacing(GRID)
-        layout.addLayout(buttons)
-        layout.addWidget(self._reason)
-        layout.addStretch(1)
+        horizontal_layout(layout, self._note, self._restore, self._paper, 1)
+        fill(layout, self._reason, 1)
 
         # Connections
         self._note.clicked.connect(lambda: self._ask(restores=False))
@@ -97,7 +98,7 @@ class EntryPanel(Translated, QWidget):
         """Show the entry of another line; its remarks are not known yet."""
         if line == self._line:
             return
-        self._line, self._remarks = line, ()
+        self._line, self._messages = line, ()
         self._reason.hide()
         self._retranslate()
 
@@ -105,9 +106,9 @@ class EntryPanel(Translated, QWidget):
         """Take over which chain is at home here: the files of its results are here."""
         self._home = chain
 
-    def set_remarks(self, remarks: Sequence[Written]) -> None:
+    def set_messages(self, remarks: Sequence[StoredEntry]) -> None:
         """Show what concerns the entry."""
-        self._remarks = tuple(remarks)
+        self._messages = tuple(remarks)
         self._retranslate()
 
     def words(self) -> tuple[str, ...]:
@@ -127,19 +128,19 @@ class EntryPanel(Translated, QWidget):
         if self._restores:
             self._reason.set_words(
                 self.tr(
-                    "Put this tip in force again? It becomes a new entry; the tip in "
-                    "force now is kept."
+                    "Reinstate this tip? A new entry is added; the current tip "
+                    "stays in the archive."
                 ),
                 self.tr("Reason"),
-                self.tr("Put in force"),
-                self.tr("Leave it"),
+                self.tr("Reinstate"),
+                self.tr("Cancel"),
             )
         else:
             self._reason.set_words(
-                self.tr("A note on this entry; it cannot be changed later."),
-                self.tr("Note"),
-                self.tr("Enter"),
-                self.tr("Leave it"),
+                self.tr("Comment on this entry. It cannot be changed later."),
+                self.tr("Comment"),
+                self.tr("Add"),
+                self.tr("Cancel"),
             )
 
     def _ask_paper(self) -> None:
@@ -154,34 +155,34 @@ class EntryPanel(Translated, QWidget):
         line, entry = self._line, None if self._line is None else self._line.entry
         is_changed = line is not None and entry is None
         self._word_question()
-        self._changed.set_value(Remark())
+        self._changed.set_value(StatusMessage())
         if is_changed:
             assert line is not None
             text = self.tr(
-                "Entry {0} was changed since it was entered. Nothing that it says now "
-                "can be trusted; restore the archive from a copy."
+                "Entry {0} was modified after it was entered and is not reliable. "
+                "Restore the archive from a copy."
             ).format(line.number)
-            self._changed.set_value(Remark(text, Sign.CROSS, Tone.BAD))
+            self._changed.set_value(StatusMessage(text, Sign.CROSS, Tone.BAD))
         for label, text in zip(self._texts, self._told(line), strict=True):
             label.setText(breakable(text))
             label.setVisible(bool(text))
-        self._note.setText(self.tr("Add a note..."))
-        self._restore.setText(self.tr("Put in force again..."))
-        nothing = "" if entry is not None else self.tr("Choose an entry.")
-        self._note.set_why_not(nothing, self.tr("Say something of this entry"))
+        self._note.setText(self.tr("Add comment..."))
+        self._restore.setText(self.tr("Reinstate..."))
+        nothing = "" if entry is not None else self.tr("Select an entry.")
+        self._note.set_why_not(nothing, self.tr("Add a comment"))
         self._restore.set_why_not(
-            nothing or self._why_not_restored(line), self.tr("As a new entry")
+            nothing or self._why_not_restored(line), self.tr("Adds a new entry")
         )
-        self._paper.setText(self.tr("Record on paper..."))
+        self._paper.setText(self.tr("Calibration report..."))
         self._paper.set_why_not(
             nothing or self._why_not_on_paper(line),
-            self.tr("Look at it, save it as PDF or print it"),
+            self.tr("Preview, save as PDF, or print"),
         )
 
     def _told(self, line: Line | None) -> tuple[str, ...]:
         """Return the words of each label."""
         if line is None:
-            return (self.tr("No entry is chosen."), *[""] * (len(self._texts) - 1))
+            return (self.tr("No entry selected"), *[""] * (len(self._texts) - 1))
         if line.entry is None:
             return ("",) * len(self._texts)
         entry, event = line.entry.entry, line.entry.entry.event
@@ -196,7 +197,7 @@ class EntryPanel(Translated, QWidget):
         names = event.names
         pairs = (
             (self.tr("Station {0}"), names.station),
-            (self.tr("by {0}"), names.operator),
+            (self.tr("Operator {0}"), names.operator),
             (self.tr("Pen {0}"), names.pen),
             (self.tr("Tip {0}"), names.tip),
             (self.tr("Cone {0}"), names.cone),
@@ -205,7 +206,7 @@ class EntryPanel(Translated, QWidget):
 
     def _notes_text(self) -> str:
         lines = []
-        for each in self._remarks:
+        for each in self._messages:
             event = each.entry.event
             when = moment_text(event.at, "yyyy-MM-dd hh:mm")
             head = [kind_text(event.kind), when, event.names.operator]
@@ -217,18 +218,18 @@ class EntryPanel(Translated, QWidget):
         if line is None or line.entry is None:
             return ""
         if line.entry.entry.event.kind not in IN_FORCE_BY:
-            return self.tr("Only a tip that was accepted can be put in force.")
+            return self.tr("Only an accepted tip can be reinstated.")
         if line.state is TipState.IN_FORCE:
-            return self.tr("It is in force.")
+            return self.tr("This tip is current.")
         return ""
 
     def _why_not_on_paper(self, line: Line | None) -> str:
         if line is None or line.entry is None:
             return ""
         if line.entry.entry.event.kind not in IN_FORCE_BY:
-            return self.tr("Only a tip that was accepted has a record on paper.")
+            return self.tr("Only an accepted tip has a calibration report.")
         if line.chain != self._home:
-            return self.tr("Its result is at the station that it is of.")
+            return self.tr("The result is stored at its own station.")
         return ""
 
 
@@ -238,7 +239,7 @@ def _why_of(event: Event) -> str:
         return event.reason
     if event.kind is Kind.LIBRARY:
         return PARTED.join(filter(None, (item_text(event), event.reason)))
-    why = "" if event.why is None else event.why.text
+    why = worded(event.why)
     settings = event.settings.items() if event.kind in BESIDE_SWINGS else ()
     said = (f"{name} {value}" for name, value in settings)
     words = (verdict_text(event.grade), why, event.reason, *said)

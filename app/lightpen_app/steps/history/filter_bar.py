@@ -4,18 +4,19 @@ from collections.abc import Sequence
 from datetime import date, datetime, time, timedelta
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.entries import Kind
 from lightpen.archive.history import KnownNames
-from lightpen.archive.queries import Wanted
+from lightpen.archive.queries import EntryFilter
 from lightpen.local_time import local_time
+from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import shortened
 from lightpen_app.steps.history.texts import kind_text
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.date_field import DateField
-from lightpen_app.widgets.labelled import field_label, stacked
+from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.translated import Translated
 
 DATE_WIDTH = 17 * GRID
@@ -48,11 +49,9 @@ class FilterBar(Translated, QWidget):
         self._labels = tuple(map(field_label, self._fields))
 
         # Layout
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
+        layout = horizontal_layout(self)
         for label, field in zip(self._labels, self._fields, strict=True):
-            layout.addLayout(stacked(label, field), 1)
+            add_labelled(layout, label, field, stretch=1)
         for day in (self._begin, self._end):
             day.setMaximumWidth(DATE_WIDTH)
 
@@ -65,13 +64,13 @@ class FilterBar(Translated, QWidget):
 
         self._retranslate()
 
-    def value(self) -> Wanted:
+    def value(self) -> EntryFilter:
         """Return what is looked for; the last day is one of its own."""
         end = self._end.value()
         named = (self._pen, self._tip, self._station)
         pen, tip, station = (choice.currentData() or "" for choice in named)
         kind = self._kind.currentData()
-        return Wanted(
+        return EntryFilter(
             *(pen, tip, station),
             kinds=(Kind(kind),) if kind else (),
             begin=_midnight(self._begin.value()),
@@ -97,7 +96,7 @@ class FilterBar(Translated, QWidget):
     def _retranslate(self) -> None:
         words = (
             *(self.tr("Pen"), self.tr("Tip"), self.tr("Station")),
-            *(self.tr("What"), self.tr("From"), self.tr("To")),
+            *(self.tr("Entry type"), self.tr("From"), self.tr("To")),
         )
         for label, field, text in zip(self._labels, self._fields, words, strict=True):
             label.setText(text)

@@ -14,12 +14,12 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import QFontMetrics, QPalette, QResizeEvent
+from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QWidget
 from typing_extensions import override
 
 from lightpen.archive.history import Line
-from lightpen.estimation.verdict import Grade
+from lightpen.estimation.reports.verdict import Grade
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.quantities import decimals_for, number_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font, set_size
@@ -134,11 +134,6 @@ class HistoryModel(QAbstractTableModel):
             )
         return None
 
-    def _palette(self) -> QPalette:
-        widget = self.parent()
-        assert isinstance(widget, QWidget)
-        return widget.palette()
-
     @override
     def headerData(
         self,
@@ -157,9 +152,9 @@ class HistoryModel(QAbstractTableModel):
             return None
         return (
             *(self.tr("When"), self.tr("Station"), self.tr("Pen"), self.tr("Tip")),
-            *(self.tr("What"), self.tr("Verdict")),
+            *(self.tr("Entry type"), self.tr("Verdict")),
             *(self.tr("x / mm"), self.tr("y / mm"), self.tr("z / mm")),
-            *(self.tr("U / mm"), self.tr("By"), self.tr("Words")),
+            *(self.tr("U / mm"), self.tr("Operator"), self.tr("Remarks")),
         )[section]
 
 
@@ -311,7 +306,7 @@ class HistoryTable(Translated, RowTable):
     def _retranslate(self) -> None:
         self._share_width()
         self.show_other_words()
-        self.setAccessibleName(self.tr("Entries of the archive, the newest first"))
+        self.setAccessibleName(self.tr("Archive entries (newest first)"))
 
 
 def _text(line: Line, column: int) -> str:

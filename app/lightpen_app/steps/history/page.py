@@ -2,16 +2,17 @@
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
+from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.widgets.late import Late
-from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
+from lightpen_app.widgets.lazy import LazyWidget
+from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
-    from lightpen.archive.check import Checked
+    from lightpen.archive.check import ArchiveCheckResult
     from lightpen_app.steps.history.content import HistoryContent
 
 
@@ -23,17 +24,15 @@ class HistoryPage(Page):
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workbench = workbench
-        self._checked: Checked | None = None
+        self._run = workbench.run
 
         # Widgets
-        self._content: Late[HistoryContent] = Late(self._make_content)
+        self._content: LazyWidget[HistoryContent] = LazyWidget(self._make_content)
         scroll = PageScroll()
-        scroll.setWidget(Squeezed(self._content))
+        scroll.setWidget(ShrinkingScrollContent(self._content))
 
         # Layout
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scroll)
+        vertical_layout(self, scroll)
 
         self._retranslate()
 
@@ -43,18 +42,17 @@ class HistoryPage(Page):
 
     @override
     def lead(self) -> str:
-        return self.tr("All that ever became of a tip. Nothing here is ever changed.")
+        return self.tr("Complete, tamper-evident history of every tip")
 
     @override
     def is_complete(self) -> bool:
         """Return whether the present swing is in the archive, or that was checked."""
-        return self._workbench.run.status.result is not None or (
-            self._checked is not None
-        )
+        return self._run.status.result is not None or self._check_result() is not None
 
     @override
     def is_doubtful(self) -> bool:
-        return self._checked is not None and bool(self._checked.findings)
+        checked = self._check_result()
+        return checked is not None and bool(checked.findings)
 
     @override
     def main_action(self) -> MainAction:
@@ -89,11 +87,9 @@ class HistoryPage(Page):
         content = HistoryContent(self._workbench)
 
         # Connections
-        content.checked.connect(self._on_checked)
-        content.status_changed.connect(self.status_changed)
-        content.notice_raised.connect(self.notice_raised)
+        content.checked.connect(self.changed)
         return content
 
-    def _on_checked(self, checked: "Checked") -> None:
-        self._checked = checked
-        self.changed.emit()
+    def _check_result(self) -> "ArchiveCheckResult | None":
+        content = self._content.content_so_far()
+        return None if content is None else content.check_result()

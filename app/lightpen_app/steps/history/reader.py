@@ -8,14 +8,14 @@ from typing import TypeVar
 from PySide6.QtCore import QObject, Signal
 
 from lightpen.archive.due import DueTip, due_tips
-from lightpen.archive.entries import Written
-from lightpen.archive.history import KnownNames, Line, known_names, lines, remarks_on
-from lightpen.archive.late_logbook import LateLogbook
-from lightpen.archive.logbook import Delivered
-from lightpen.archive.queries import Wanted, n_wanted
-from lightpen.model.due_rule import DueRule
-from lightpen.record.tip_library import Library
-from lightpen.verification.trend import trend_of
+from lightpen.archive.entries import StoredEntry
+from lightpen.archive.history import KnownNames, Line, known_names, lines, messages_on
+from lightpen.archive.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook import ReplicationState
+from lightpen.archive.queries import EntryFilter, n_wanted
+from lightpen.model.limits import DueRule
+from lightpen.record.library.tip_library import Library
+from lightpen.verification.history.trend import trend_of
 from lightpen_app.work.job import Job, Report
 
 T = TypeVar("T")
@@ -24,7 +24,7 @@ MOST_WAITING = 3  # blocks; of those that were scrolled past, none is read
 
 
 @dataclass(frozen=True)
-class Opening:
+class FirstEntries:
     """What is read at once for entries that are looked for.
 
     Attributes
@@ -33,16 +33,16 @@ class Opening:
         Chain that is at home here.
     first : tuple of Line
         The newest.
-    delivery : Delivered or None
+    delivery : ReplicationState or None
         How far the server has what was entered here; None if there is no server.
     """
 
-    wanted: Wanted
+    wanted: EntryFilter
     home: str
     n_lines: int
     first: tuple[Line, ...]
     names: KnownNames
-    delivery: Delivered | None = None
+    delivery: ReplicationState | None = None
 
 
 class HistoryReader(QObject):
@@ -68,18 +68,18 @@ class HistoryReader(QObject):
     block_read = Signal(int, object)
     block_passed = Signal(int)
     trend_read = Signal(object)
-    remarks_read = Signal(object)
+    messages_read = Signal(object)
     due_read = Signal(object)
     failed = Signal(str)
 
-    def __init__(self, logbook: LateLogbook, parent: QObject | None = None) -> None:
+    def __init__(self, logbook: LazyLogbook, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._logbook = logbook
-        self._wanted = Wanted()
+        self._wanted = EntryFilter()
         self._jobs: dict[str, Job] = {}
         self._waiting: list[int] = []
 
-    def open(self, wanted: Wanted) -> None:
+    def open(self, wanted: EntryFilter) -> None:
         """Read how many entries there are, and the newest."""
         self._wanted = wanted
         self._waiting.clear()
@@ -87,10 +87,10 @@ class HistoryReader(QObject):
             self._drop(what)
         logbook = self._logbook
 
-        def read(_: Report) -> Opening:
+        def read(_: Report) -> FirstEntries:
             opened = logbook.opened()
             database = opened.database
-            return Opening(
+            return FirstEntries(
                 wanted,
                 opened.chain,
                 n_wanted(database, wanted),
@@ -111,7 +111,7 @@ class HistoryReader(QObject):
         if "block" not in self._jobs:
             self._read_next_block()
 
-    def read_trend(self, wanted: Wanted) -> None:
+    def read_trend(self, wanted: EntryFilter) -> None:
         """Read the calibrations of a pen and tip."""
         logbook = self._logbook
         self._start(
@@ -120,13 +120,13 @@ class HistoryReader(QObject):
             self.trend_read.emit,
         )
 
-    def read_remarks(self, entry: Written) -> None:
+    def read_messages(self, entry: StoredEntry) -> None:
         """Read what concerns an entry."""
         logbook = self._logbook
         self._start(
             "remarks",
-            lambda _: remarks_on(logbook.opened().database, entry),
-            self.remarks_read.emit,
+            lambda _: messages_on(logbook.opened().database, entry),
+            self.messages_read.emit,
         )
 
     def read_due(self, rule: DueRule, library: Library) -> None:

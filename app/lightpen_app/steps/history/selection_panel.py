@@ -3,20 +3,21 @@
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
-from lightpen.archive.entries import Written
-from lightpen.estimation.verdict import Grade
+from lightpen.archive.entries import StoredEntry
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import VerificationLimits
-from lightpen.verification.repeatability import Repeatability, TouchedPoint
-from lightpen.verification.trend import (
+from lightpen.verification.history.trend import (
     Comparison,
     Trend,
     compare,
     has_tip,
     repeatability_of,
 )
+from lightpen.verification.tasks.repeatability import Repeatability, RepeatedPoint
 from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.quantities import AXES, decimals_for, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
@@ -24,7 +25,7 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import moment_text
 from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.widgets.number_table import Figures, NumberTable
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 PAIR = 2
@@ -39,7 +40,7 @@ class SelectionPanel(Translated, QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._selected: tuple[Written, ...] = ()
+        self._selected: tuple[StoredEntry, ...] = ()
         self._trend = Trend()
 
         # Widgets
@@ -52,10 +53,9 @@ class SelectionPanel(Translated, QWidget):
         self._study = CapabilityRow()
 
         # Layout
-        layout = QGridLayout(self)
-        layout.setContentsMargins(0, GRID, 0, 0)
-        layout.setHorizontalSpacing(4 * GRID)
-        layout.setVerticalSpacing(GRID // 2)
+        layout = grid_layout(
+            self, spacing=(4 * GRID, GRID // 2), margins=(0, GRID, 0, 0)
+        )
         sides = zip(
             self._heads,
             (self._compared, self._scattered),
@@ -83,7 +83,7 @@ class SelectionPanel(Translated, QWidget):
             self._limits = limits
             self._retranslate()
 
-    def set_value(self, selected: Sequence[Written], trend: Trend) -> None:
+    def set_value(self, selected: Sequence[StoredEntry], trend: Trend) -> None:
         """Show other entries: those that are selected, and those of the trend."""
         self._selected = tuple(filter(has_tip, selected))
         self._trend = trend
@@ -118,7 +118,7 @@ class SelectionPanel(Translated, QWidget):
 
     def _show_comparison(self, found: Comparison | None) -> None:
         self._compared.setVisible(found is not None)
-        self._change.set_value(Remark())
+        self._change.set_value(StatusMessage())
         if found is None:
             self._heads[0].setText(
                 self.tr("Select two entries with a tip to compare them.")
@@ -136,14 +136,14 @@ class SelectionPanel(Translated, QWidget):
         cells = tuple(_compared_row(found, axis) for axis in range(3))
         self._compared.set_value(Figures(columns, AXES, cells))
         if not found.is_same_tip:
-            text = self.tr("They are not of the same pen and tip.")
-            self._change.set_value(Remark(text, Sign.WARNING, Tone.WARN))
+            text = self.tr("The entries belong to different pens or tips.")
+            self._change.set_value(StatusMessage(text, Sign.WARNING, Tone.WARN))
         elif found.change.is_unexplained:
             told = worded(found.change.told(dates[0].partition(" ")[0]))
-            self._change.set_value(Remark(told, Sign.WARNING, Tone.WARN))
+            self._change.set_value(StatusMessage(told, Sign.WARNING, Tone.WARN))
         else:
-            text = self.tr("The change is no more than both uncertainties explain.")
-            self._change.set_value(Remark(text, Sign.CHECK, Tone.GOOD))
+            text = self.tr("The change is within the combined uncertainty.")
+            self._change.set_value(StatusMessage(text, Sign.CHECK, Tone.GOOD))
 
     def _show_repeatability(self, found: Repeatability | None) -> None:
         self._scattered.setVisible(found is not None)
@@ -151,7 +151,7 @@ class SelectionPanel(Translated, QWidget):
         self._show_touched(None if found is None else found.touched)
         n_repeats = 0 if found is None else len(found.tips)
         self._study.set_value(None if found is None else found.capability, n_repeats)
-        self._verdict.set_value(Remark())
+        self._verdict.set_value(StatusMessage())
         if found is None:
             self._heads[1].setText(
                 self.tr("Repeatability needs two calibrations of one tip.")
@@ -160,12 +160,14 @@ class SelectionPanel(Translated, QWidget):
         n_tips = len(found.tips)
         is_selected = len(self._selected) >= PAIR
         self._heads[1].setText(
-            self.tr("Repeatability of the {0} that are selected").format(n_tips)
+            self.tr("Repeatability of the {0} selected calibrations").format(n_tips)
             if is_selected
-            else self.tr("Repeatability of all {0} of the trend").format(n_tips)
+            else self.tr("Repeatability of all {0} calibrations of the trend").format(
+                n_tips
+            )
         )
         columns = (
-            *(self.tr("Mean / mm"), self.tr("Scatter / mm"), self.tr("Range / mm")),
+            *(self.tr("Mean / mm"), self.tr("Std. dev. / mm"), self.tr("Range / mm")),
             self.tr("Stated U / mm"),
         )
         cells = tuple(_scattered_row(found, axis) for axis in range(3))
@@ -175,17 +177,17 @@ class SelectionPanel(Translated, QWidget):
         if not assessment.is_accepted:
             told += " " + worded(assessment.next_step)
         mark = GRADE_MARKS[Grade(assessment.grade)]
-        self._verdict.set_value(Remark(told, *mark))
+        self._verdict.set_value(StatusMessage(told, *mark))
 
-    def _show_touched(self, touched: TouchedPoint | None) -> None:
+    def _show_touched(self, touched: RepeatedPoint | None) -> None:
         """Show the scatter of a fixed point beside that of the tips."""
         self._touched.setVisible(touched is not None)
         if touched is None:
             self._touched.clear()
             return
         words = self.tr(
-            "A fixed point touched {0} times with the tip, {1}: scatter along u, v, w "
-            "{2} mm, {3} mm to be expected."
+            "Fixed point probed {0} times with this tip ({1}): std. deviation along "
+            "u, v, w {2} mm, expected {3} mm."
         )
         self._touched.setText(
             words.format(

@@ -1,37 +1,29 @@
 """The words for what entries of the archive tell of."""
 
-from typing import TYPE_CHECKING
-
 from PySide6.QtCore import QCoreApplication
 
 from lightpen.archive.entries import Event, Kind
 from lightpen.archive.history import Line, TipState
-from lightpen.estimation.verdict import Grade
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.origin import Origin
-from lightpen.record.outcome import TrialOutcome
+from lightpen.record.folder.outcome import TrialOutcome
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.theme import Tone
+from lightpen_app.look.translatable import QT_TRANSLATE_NOOP
 from lightpen_app.look.words import PARTED, listed
 
 CONTEXT = "history"
 MARKED = (Origin.SIMULATED, Origin.RECORDED)
 
 
-if TYPE_CHECKING:
-
-    def QT_TRANSLATE_NOOP(context: str, text: str) -> str:  # noqa: N802 - Qt's
-        """Return the text; PySide6 gives it the type of any object."""
-else:
-    from PySide6.QtCore import QT_TRANSLATE_NOOP
-
 _KINDS: dict[Kind, str] = {
     Kind.ACCEPTED: QT_TRANSLATE_NOOP("history", "Calibration"),
-    Kind.RESTORED: QT_TRANSLATE_NOOP("history", "Restored"),
-    Kind.REFUSED: QT_TRANSLATE_NOOP("history", "Refused"),
-    Kind.ABANDONED: QT_TRANSLATE_NOOP("history", "Set aside"),
-    Kind.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "Taking back"),
-    Kind.NOTE: QT_TRANSLATE_NOOP("history", "Note"),
+    Kind.RESTORED: QT_TRANSLATE_NOOP("history", "Reinstated"),
+    Kind.REFUSED: QT_TRANSLATE_NOOP("history", "Rejected"),
+    Kind.ABANDONED: QT_TRANSLATE_NOOP("history", "Abandoned"),
+    Kind.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "Revocation"),
+    Kind.NOTE: QT_TRANSLATE_NOOP("history", "Comment"),
     Kind.LIBRARY: QT_TRANSLATE_NOOP("history", "Tip library"),
     Kind.VERIFICATION: QT_TRANSLATE_NOOP("history", "Verification"),
     Kind.CAMERA: QT_TRANSLATE_NOOP("history", "Camera calibration"),
@@ -39,29 +31,29 @@ _KINDS: dict[Kind, str] = {
 }
 _OUTCOMES: dict[TrialOutcome, str] = {
     TrialOutcome.ACCEPTED: QT_TRANSLATE_NOOP("history", "accepted"),
-    TrialOutcome.REFUSED: QT_TRANSLATE_NOOP("history", "refused"),
+    TrialOutcome.REFUSED: QT_TRANSLATE_NOOP("history", "rejected"),
     TrialOutcome.ABANDONED: QT_TRANSLATE_NOOP("history", "abandoned"),
 }
 _STATES: dict[TipState, str] = {
-    TipState.IN_FORCE: QT_TRANSLATE_NOOP("history", "in force"),
+    TipState.IN_FORCE: QT_TRANSLATE_NOOP("history", "current"),
     TipState.REPLACED: QT_TRANSLATE_NOOP("history", "replaced"),
-    TipState.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "taken back"),
+    TipState.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "revoked"),
 }
 _SAID: dict[str, str] = {  # of an item of the tip library, by its settings
     "id": "{0}",
-    "due": QT_TRANSLATE_NOOP("history", "to be used until {0}"),
+    "due": QT_TRANSLATE_NOOP("history", "expiry date {0}"),
     "ball_diameter_mm": QT_TRANSLATE_NOOP("history", "ball {0} mm"),
     "nominal_tip_mm": QT_TRANSLATE_NOOP("history", "nominal centre {0} mm"),
     "stylus_axis": QT_TRANSLATE_NOOP("history", "axis {0}"),
-    "max_change_mm": QT_TRANSLATE_NOOP("history", "change at most {0} mm"),
-    "max_days": QT_TRANSLATE_NOOP("history", "{0} days at most"),
-    "max_swings": QT_TRANSLATE_NOOP("history", "{0} swings at most"),
+    "max_change_mm": QT_TRANSLATE_NOOP("history", "max. change {0} mm"),
+    "max_days": QT_TRANSLATE_NOOP("history", "calibration interval {0} days"),
+    "max_swings": QT_TRANSLATE_NOOP("history", "max. {0} swings"),
     "note": "{0}",
     "supervisor": QT_TRANSLATE_NOOP("history", "signed by {0}"),
 }
 _RETIRED = QT_TRANSLATE_NOOP("history", "retired")
-_CHANGED = QT_TRANSLATE_NOOP("history", "Changed since it was entered")
-_KEPT = QT_TRANSLATE_NOOP("history", "kept")  # and in force for no pen
+_CHANGED = QT_TRANSLATE_NOOP("history", "Modified after entry")
+_KEPT = QT_TRANSLATE_NOOP("history", "saved")  # and in force for no pen
 
 
 def kind_text(kind: Kind) -> str:

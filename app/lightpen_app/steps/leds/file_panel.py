@@ -5,15 +5,10 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QHBoxLayout,
-    QLabel,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QLabel, QWidget
 
 from lightpen.formats.pen_content import UNITS
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.widgets.choice_field import ChoiceField
@@ -22,7 +17,7 @@ from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import Question, QuestionBar
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job
 
@@ -73,22 +68,17 @@ class LedFilePanel(Translated, QWidget):
         self._question = QuestionBar()
 
         # Layout
-        row = QHBoxLayout()
-        row.setSpacing(GRID)
-        row.addWidget(self._label)
-        row.addWidget(self._path, 1)
-        row.addWidget(self._save)
-        row.addWidget(self._samples)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addLayout(row)
+        layout = vertical_layout(self)
+        horizontal_layout(
+            layout, self._label, (self._path, 1), self._save, self._samples
+        )
         layout.addWidget(self._units)
-        told = QHBoxLayout()
-        told.setSpacing(2 * GRID)
-        told.addWidget(self._problem, 1)
-        told.addWidget(self._exchange, 0, Qt.AlignmentFlag.AlignTop)
-        layout.addLayout(told)
+        horizontal_layout(
+            layout,
+            (self._problem, 1),
+            (self._exchange, 0, Qt.AlignmentFlag.AlignTop),
+            spacing=2 * GRID,
+        )
         layout.addWidget(self._question)
 
         # Connections
@@ -120,14 +110,14 @@ class LedFilePanel(Translated, QWidget):
     def set_problem(self, sentence: str) -> None:
         """Say what is wrong, or nothing."""
         self._path.set_faulty(bool(sentence))
-        self._problem.set_value(Remark(sentence, Sign.CROSS, Tone.BAD))
+        self._problem.set_value(StatusMessage(sentence, Sign.CROSS, Tone.BAD))
 
     def set_exchange(self, pair: tuple[int, int] | None) -> None:
         """Offer to exchange two LEDs, by number, or nothing."""
         self._pair = pair
         self._exchange.setVisible(pair is not None)
         if pair is not None:
-            self._exchange.setText(self.tr("Exchange {0} and {1}").format(*pair))
+            self._exchange.setText(self.tr("Swap {0} and {1}").format(*pair))
 
     def ask_units(self, name: str) -> None:
         """Ask for the units of a file that does not say them; empty asks no more."""
@@ -181,7 +171,7 @@ class LedFilePanel(Translated, QWidget):
         self.units_chosen.emit(self._path.value(), units)
 
     def _on_save_clicked(self) -> None:
-        dialog = QFileDialog(self, self.tr("Save the LEDs"))
+        dialog = QFileDialog(self, self.tr("Save LEDs"))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)
@@ -215,7 +205,7 @@ class LedFilePanel(Translated, QWidget):
         )
 
     def _replacing(self, name: str) -> tuple[str, str]:
-        text = self.tr("{0} exists already. Replace it by these LEDs?")
+        text = self.tr("{0} already exists. Replace it with these LEDs?")
         return text.format(name), self.tr("Replace")
 
     def _on_agreed(self) -> None:
@@ -234,12 +224,12 @@ class LedFilePanel(Translated, QWidget):
         self._path.edit().setPlaceholderText(self.tr("Table (CSV) or JSON file"))
         self._open.setText(self.tr("Open..."))
         self._save.setText(self.tr("Save as..."))
-        self._samples.setText(self.tr("Use the simulated pen's file"))
+        self._samples.setText(self.tr("Use file of the simulated pen"))
         self.set_exchange(self._pair)
         self._refresh_save_words()
 
     def _refresh_save_words(self) -> None:
-        told = self.tr("Save the LEDs and use that file.")
+        told = self.tr("Save the LEDs and use the saved file")
         self._save.set_why_not(self._why_no_save, told)
 
 
@@ -258,12 +248,7 @@ class _UnitsRow(Translated, QWidget):
         self._choice.addItems(["", *UNITS])
 
         # Layout
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(2 * GRID)
-        layout.addWidget(self._words)
-        layout.addWidget(self._choice)
-        layout.addStretch(1)
+        horizontal_layout(self, self._words, self._choice, 1, spacing=2 * GRID)
 
         # Connections
         self._choice.textActivated.connect(self._on_activated)
@@ -284,7 +269,7 @@ class _UnitsRow(Translated, QWidget):
             self.value_changed.emit(units)
 
     def _retranslate(self) -> None:
-        words = self.tr("{0} does not say the units of its coordinates. Choose them:")
+        words = self.tr("{0} does not state the unit of its coordinates. Choose it:")
         text = words.format(self._file_name)
-        self._words.set_value(Remark(text, Sign.WARNING, Tone.WARN))
-        self._choice.setAccessibleName(self.tr("Units of the file"))
+        self._words.set_value(StatusMessage(text, Sign.WARNING, Tone.WARN))
+        self._choice.setAccessibleName(self.tr("Unit of the file"))

@@ -3,20 +3,16 @@
 import math
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QGridLayout,
-    QGroupBox,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QGroupBox, QWidget
 
 from lightpen.pen_check.frame import FrameCheck, Rule, RuleCheck, RuleStatus
+from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.leds.pen_view import PenPicture, PenView
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 SIGNS = {
@@ -52,9 +48,8 @@ class FramePanel(Translated, QGroupBox):
         self._move = PushButton()
 
         # Layout
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(GRID)
-        grid.setVerticalSpacing(GRID // 4)
+        layout = vertical_layout(self, (self._view, 1))
+        grid = grid_layout(layout, spacing=(GRID, GRID // 4))
         grid.setColumnStretch(0, 1)
         for row, rule in enumerate(Rule):
             grid.addWidget(self._rules[rule], row, 0, 1, 1 if rule in LONG else 2)
@@ -62,13 +57,7 @@ class FramePanel(Translated, QGroupBox):
                 self._amounts[rule].setWordWrap(False)
                 right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
                 grid.addWidget(self._amounts[rule], row, 1, right)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._view, 1)
-        layout.addLayout(grid)
-        layout.addWidget(self._layout_note)
-        layout.addWidget(self._move)
+        fill(layout, self._layout_note, self._move)
 
         # Connections
         self._view.led_chosen.connect(self.led_chosen)
@@ -94,11 +83,12 @@ class FramePanel(Translated, QGroupBox):
         self._refresh()
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Pen and its frame"))
-        self._move.setText(self.tr("Put into the pen frame"))
+        self.setTitle(self.tr("Pen and pen frame"))
+        self._move.setText(self.tr("Transform to pen frame"))
         self._move.setToolTip(
             self.tr(
-                "These are coordinates in another frame, such as a measuring machine's."
+                "The coordinates are in another frame, for example of a measuring "
+                "machine."
             )
         )
         self._refresh()
@@ -109,13 +99,13 @@ class FramePanel(Translated, QGroupBox):
         for rule in Rule:
             self._show(rule, checks.get(rule))
         self._move.setVisible(value is not None and value.can_be_moved)
-        note = Remark()
+        note = StatusMessage()
         if value is not None and value.remark:
             words = self.tr(
-                "Not the layout of the ten-LED pen: the frame of the file is taken as "
-                "it is."
+                "Other layout than the ten-LED pen; the frame of the file is used "
+                "as is."
             )
-            note = Remark(words, Sign.WARNING, Tone.QUIET)
+            note = StatusMessage(words, Sign.WARNING, Tone.QUIET)
             self._layout_note.setToolTip(worded(value.remark))
         self._layout_note.set_value(note)
 
@@ -126,9 +116,9 @@ class FramePanel(Translated, QGroupBox):
             amount.setVisible(known)
             amount.setText(_length(check.amount) if check is not None else "")
         if check is None or check.outcome is RuleStatus.OPEN:
-            label.set_value(Remark())
+            label.set_value(StatusMessage())
             return
-        label.set_value(Remark(self._words(rule), *SIGNS[check.outcome]))
+        label.set_value(StatusMessage(self._words(rule), *SIGNS[check.outcome]))
         met = check.outcome is RuleStatus.MET
         outcome = self.tr("fulfilled") if met else self.tr("not fulfilled")
         label.setAccessibleDescription(outcome)
@@ -137,21 +127,21 @@ class FramePanel(Translated, QGroupBox):
     def _words(self, rule: Rule) -> str:
         match rule:
             case Rule.LEDS:
-                return self.tr("LEDs well apart")
+                return self.tr("LED spacing")
             case Rule.NUMBERS:
-                return self.tr("Numbers in order")
+                return self.tr("LED numbering")
             case Rule.LINE:
-                return self.tr("LEDs 1 to 4 in a line")
+                return self.tr("LEDs 1-4 on a line")
             case Rule.ORIGIN:
-                return self.tr("LED 1 over the origin")
+                return self.tr("LED 1 on the origin axis")
             case Rule.AXIS:
-                return self.tr("y along LEDs 1 to 4")
+                return self.tr("y axis along LEDs 1-4")
             case Rule.PLANE:
-                return self.tr("LEDs 5 to 10 at z = 0")
+                return self.tr("LEDs 5-10 at z = 0")
             case Rule.HANDED:
-                return self.tr("Axes right-handed")
+                return self.tr("Right-handed axes")
             case Rule.NORMALS:
-                return self.tr("Discs face the viewer")
+                return self.tr("Discs facing the viewer")
 
 
 def _length(amount: float) -> str:

@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen.pen_check.draft import COLUMNS, CellFlaw, PenDraft
+from lightpen.pen_check.draft import COLUMNS, CellError, PenDraft
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign, draw_sign
@@ -40,7 +40,7 @@ N_COLUMNS = MISFIT + 1
 ROW_HEIGHT = 27
 LEAST_HEIGHT = 22 * GRID  # px; the head and five rows
 SHOWN_DECIMALS = 3
-NUMBER_WIDTH, MISFIT_WIDTH = 6 * GRID, 8 * GRID
+NUMBER_WIDTH, MISFIT_WIDTH = 6 * GRID, 10 * GRID
 SIGN_SIDE = 14
 SIGN_ROLE = Qt.ItemDataRole.UserRole
 ANYWHERE = QModelIndex()
@@ -158,7 +158,7 @@ class LedTable(Translated, QTableView):
     @override
     def _retranslate(self) -> None:
         self._model.retranslate()
-        self.setAccessibleName(self.tr("LEDs of the pen, in mm"))
+        self.setAccessibleName(self.tr("LED coordinates / mm"))
 
 
 class _DraftModel(QAbstractTableModel):
@@ -169,7 +169,7 @@ class _DraftModel(QAbstractTableModel):
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self.draft = PenDraft()
-        self._flaws: dict[tuple[int, int], CellFlaw] = {}
+        self._flaws: dict[tuple[int, int], CellError] = {}
         self._misfits: Mapping[int, float] = {}
         self._reasons: Mapping[int, str] = {}
 
@@ -230,8 +230,8 @@ class _DraftModel(QAbstractTableModel):
             return self._header(section)
         if role == Qt.ItemDataRole.ToolTipRole and section == MISFIT:
             return self.tr(
-                "How far the LED is seen from where this table puts it, in px of the "
-                "live images."
+                "Distance between the detected LED and its table position in the "
+                "live image / px"
             )
         return None
 
@@ -272,7 +272,7 @@ class _DraftModel(QAbstractTableModel):
         if section == 0:
             return self.tr("LED")
         if section == MISFIT:
-            return self.tr("off, px")
+            return self.tr("Error / px")
         return COLUMNS[section - 1]
 
     def _text(self, row: int, column: int) -> str:
@@ -295,7 +295,7 @@ class _DraftModel(QAbstractTableModel):
         if column in (0, MISFIT):
             return self._reasons.get(row + 1, "") if column == 0 else ""
         flaw = self._flaws.get((row, column - 1))
-        return "" if flaw is None else worded(flaw.sentence)
+        return "" if flaw is None else worded(flaw.message)
 
     def _tell(self, first: int, last: int) -> None:
         """Have columns shown anew; a cell among them that is typed in starts over."""

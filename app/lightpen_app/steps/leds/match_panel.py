@@ -7,26 +7,84 @@ from collections.abc import Iterable
 import numpy as np
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QGroupBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox, QWidget
 from typing_extensions import override
 
+from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import Sighting
-from lightpen.estimation.single_images import USUAL_SIGMA
-from lightpen.pen_check.match import Finding, PenMatch, What
+from lightpen.estimation.contact.single_images import USUAL_SIGMA
+from lightpen.pen_check.match import Finding, MatchFinding, PenMatch
 from lightpen.pen_check.shifts import MIN_SHIFT
+from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone
-from lightpen_app.steps.leds.mendable_remark import MendableRemark
+from lightpen_app.look.theme import TextSize, Tone
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.live_markers import live_markers
-from lightpen_app.widgets.sign_label import Remark
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.state_banner import State, StateBanner
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.live_view import Shown
+from lightpen_app.work.live_view import DisplayedImage
+
+
+class FixableMessage(Translated, QWidget):
+    """Shows a remark; hidden while there is none.
+
+    Signals
+    -------
+    mend_requested(Finding)
+        The button was pressed.
+    """
+
+    mend_requested = Signal(object)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._finding: Finding | None = None
+
+        # Widgets
+        self._remark = SignLabel()
+        self._mend = PushButton()
+
+        # Layout
+        vertical_layout(self, self._remark, self._mend)
+
+        # Connections
+        self._mend.clicked.connect(self._on_mend_clicked)
+
+        self.hide()
+        self._retranslate()
+
+    def text(self) -> str:
+        """Return what is said."""
+        return self._remark.value().text
+
+    def set_value(self, remark: StatusMessage) -> None:
+        """Show another remark."""
+        self._remark.set_value(remark)
+        self.setVisible(bool(remark.text))
+
+    def set_mendable(self, finding: Finding | None) -> None:
+        """Offer to mend what was found, or nothing."""
+        self._finding = finding
+        self._mend.setVisible(finding is not None)
+        if finding is not None:
+            self._mend.setText(self._verb(finding))
+
+    def _verb(self, finding: Finding) -> str:
+        if finding.what is MatchFinding.EXCHANGED:
+            return self.tr("Swap {0} and {1}").format(*finding.leds)
+        return self.tr("Use measured position")
+
+    def _on_mend_clicked(self) -> None:
+        self.mend_requested.emit(self._finding)
+
+    def _retranslate(self) -> None:
+        self.set_mendable(self._finding)
+
 
 N_SMOOTHED = 20  # images that are told of together: one second
 N_FINDINGS = 4
@@ -52,7 +110,7 @@ class MatchPanel(Translated, QGroupBox):
     def __init__(self, foot: QWidget, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._match: PenMatch | None = None
-        self._sighting: Sighting | None = None
+        self._detection: PenDetection | None = None
         self._sigmas: deque[float] = deque(maxlen=N_SMOOTHED)
         self._counts: deque[int] = deque(maxlen=N_SMOOTHED)
         self._why_none = ""
@@ -63,21 +121,13 @@ class MatchPanel(Translated, QGroupBox):
         # Widgets
         self._view = ImageView()
         self._banner = StateBanner(TextSize.TITLE)
-        self._remarks = tuple(MendableRemark() for _ in range(N_FINDINGS))
+        self._messages = tuple(FixableMessage() for _ in range(N_FINDINGS))
 
         # Layout
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._view, 1)
-        layout.addWidget(self._banner)
-        for remark in self._remarks:
-            layout.addWidget(remark)
-        layout.addStretch(0)
-        layout.addWidget(foot)
+        vertical_layout(self, (self._view, 1), self._banner, *self._messages, 0, foot)
 
         # Connections
-        for remark in self._remarks:
+        for remark in self._messages:
             remark.mend_requested.connect(self.mend_requested)
 
         self._retranslate()
@@ -92,25 +142,25 @@ class MatchPanel(Translated, QGroupBox):
 
     def remarks(self) -> tuple[str, ...]:
         """Return what is said about the views so far."""
-        texts = (remark.text() for remark in self._remarks)
+        texts = (remark.text() for remark in self._messages)
         return tuple(filter(None, texts))
 
-    def set_image(self, shown: Shown) -> None:
+    def set_image(self, shown: DisplayedImage) -> None:
         """Show another image."""
-        sighting = shown.seen.sighting
-        if sighting is None or not sighting.has_pose:
+        detection = shown.seen.detection
+        if detection is None or not detection.has_pose:
             self._forget()
         else:
-            self._sigmas.append(sighting.sigma)
-            self._counts.append(sighting.n_leds)
-        self._sighting = sighting
+            self._sigmas.append(detection.sigma)
+            self._counts.append(detection.n_leds)
+        self._detection = detection
         markers = self._toned(live_markers(shown.seen))
         self._view.set_half(shown.half, shown.size, tuple(markers))
         self._refresh_state()
 
     def clear(self) -> None:
         """Show no image."""
-        self._sighting = None
+        self._detection = None
         self._forget()
         self._view.set_image(None)
         self._refresh_state()
@@ -166,16 +216,18 @@ class MatchPanel(Translated, QGroupBox):
     def _retranslate(self) -> None:
         self.setTitle(self.tr("Live match"))
         self._view.setToolTip(
-            self.tr("Wheel or + and - enlarge, arrow keys move, 0 shows all.")
+            self.tr(
+                "Wheel or + and - to zoom, arrow keys to move, 0 for the whole image."
+            )
         )
-        self._view.set_message(self.tr("No image comes yet."))
+        self._view.set_message(self.tr("No image yet"))
         self._refresh()
 
     def _refresh(self) -> None:
         found = self._found()
         mendable = self._mendable()
-        for i, remark in enumerate(self._remarks):
-            remark.set_value(found[i] if i < len(found) else Remark())
+        for i, remark in enumerate(self._messages):
+            remark.set_value(found[i] if i < len(found) else StatusMessage())
             remark.set_mendable(mendable[i] if i < len(mendable) else None)
         self._refresh_state()
 
@@ -193,54 +245,54 @@ class MatchPanel(Translated, QGroupBox):
                 yield marker
 
     def _state(self) -> State:
-        sighting = self._sighting
-        if sighting is None or self._why_none:
+        detection = self._detection
+        if detection is None or self._why_none:
             return State(self.tr("No match yet"), "", Sign.WAIT, Tone.QUIET)
         if self._is_aside:
-            word = self.tr("Swing under way")
-            text = self.tr("Rings: by its LED file")
+            word = self.tr("Swing in progress")
+            text = self.tr("Rings: expected from the LED file")
             return State(word, text, Sign.WAIT, Tone.QUIET)
-        if sighting.reason is not Reason.NONE:
+        if detection.reason is not Reason.NONE:
             word = self.tr("Pen not found")
-            text = reason_text(sighting.reason)
+            text = reason_text(detection.reason)
             return State(word, text[:1].upper() + text[1:], Sign.WARNING, Tone.WARN)
-        n_leds = len(sighting.pixels)
+        n_leds = len(detection.pixels)
         sigma = float(np.median(self._sigmas))
         n_seen = max(self._counts)  # two that meet in one image are no matter
         word = self.tr("{0} of {1} LEDs").format(n_seen, n_leds)
-        detail = self.tr("misfit {0} px").format(_pixels(sigma))
+        detail = self.tr("RMS residual {0} px").format(_pixels(sigma))
         good = n_seen == n_leds and sigma <= USUAL_SIGMA
         is_doubtful = self._match is not None and bool(self._match.findings)
         if good and self._has_frame and not is_doubtful:
             return State(word, detail, Sign.CHECK, Tone.GOOD)
         return State(word, detail, Sign.WARNING, Tone.WARN)
 
-    def _found(self) -> list[Remark]:
+    def _found(self) -> list[StatusMessage]:
         match = self._match
         if self._why_none:
-            return [Remark(self._why_none, Sign.WARNING, Tone.WARN)]
+            return [StatusMessage(self._why_none, Sign.WARNING, Tone.WARN)]
         if match is None:
             return []
         if match.findings:
             remarks = [
-                Remark(self._words(each), Sign.WARNING, Tone.WARN)
+                StatusMessage(self._words(each), Sign.WARNING, Tone.WARN)
                 for each in match.findings[:N_FINDINGS]
             ]
         elif not match.fits:
-            words = self.tr("Lean and turn the pen, so that it is seen from all sides.")
-            remarks = [Remark(words, Sign.WAIT, Tone.QUIET)]
+            words = self.tr("Tilt and turn the pen so that it is seen from all sides.")
+            remarks = [StatusMessage(words, Sign.WAIT, Tone.QUIET)]
         elif not self._has_frame:
             words = self.tr(
-                "The LEDs fit the images, but not the pen frame: see what is told of "
-                "the file."
+                "The LEDs agree with the images but not with the pen frame. See the "
+                "message about the file."
             )
-            remarks = [Remark(words, Sign.WARNING, Tone.WARN)]
+            remarks = [StatusMessage(words, Sign.WARNING, Tone.WARN)]
         else:
             words = self.tr(
-                "Every LED is within {0} mm of its place in the table, in {1} views."
+                "All LEDs are within {0} mm of their table positions, in {1} views."
             )
             text = words.format(f"{MIN_SHIFT:g}", match.n_views)
-            remarks = [Remark(text, Sign.CHECK, Tone.GOOD)]
+            remarks = [StatusMessage(text, Sign.CHECK, Tone.GOOD)]
         return remarks
 
     def _mendable(self) -> list[Finding | None]:
@@ -259,40 +311,44 @@ class MatchPanel(Translated, QGroupBox):
         ]
         length = f"{math.hypot(*finding.by):.2f}"
         match finding.what:
-            case What.ADVICE:
+            case MatchFinding.ADVICE:
                 return worded(finding.advice)
-            case What.EXCHANGED:
-                words = self.tr("{0} of LEDs {1} and {2} are exchanged in the table.")
+            case MatchFinding.EXCHANGED:
+                words = self.tr("{0} of LEDs {1} and {2} are swapped in the table.")
                 return words.format(finding.axes, *finding.leds)
-            case What.SHIFTED if finding.is_sure:
-                words = self.tr("LED {0} sits {1} mm off its place: {2}, {3}, {4} mm.")
+            case MatchFinding.SHIFTED if finding.is_sure:
+                words = self.tr(
+                    "LED {0} is {1} mm from its file position. Measured: {2}, {3}, "
+                    "{4} mm."
+                )
                 return words.format(finding.leds[0], length, *place)
-            case What.SHIFTED:
+            case MatchFinding.SHIFTED:
                 words = self.tr(
-                    "LED {0} sits off its place. Lean and turn the pen to see by how "
-                    "much."
+                    "LED {0} is not at its file position. Tilt and turn the pen to "
+                    "measure the deviation."
                 )
                 return words.format(finding.leds[0])
-            case What.SHIFTED_EITHER:
-                words = self.tr("LED {0} or {1} sits off its place, by {2} mm.")
+            case MatchFinding.SHIFTED_EITHER:
+                words = self.tr("LED {0} or {1} is {2} mm from its file position.")
                 return words.format(*finding.leds, length)
-            case What.UNSEEN:
+            case MatchFinding.UNSEEN:
                 words = self.tr(
-                    "LED {0} is not seen where the table has it. A finger may cover "
-                    "it, it is off, or its place is wrong."
+                    "LED {0} is not detected at its table position. It is covered, "
+                    "off, or its position is wrong."
                 )
                 return words.format(finding.leds[0])
-            case What.UNKNOWN_LED:
+            case MatchFinding.UNKNOWN_LED:
                 words = self.tr(
                     "A light at {0}, {1}, {2} mm moves with the pen. Is an LED "
                     "missing in the table?"
                 )
                 return words.format(*place)
-            case What.MISFIT:
+            case MatchFinding.MISFIT:
                 assert self._match is not None
                 words = self.tr(
-                    "The LEDs fit to {0} px, {1} px or less is usual. Is this the LED "
-                    "file of this pen, and the intrinsics file of this camera and lens?"
+                    "RMS residual {0} px; usual is {1} px or less. Check that the "
+                    "LED file belongs to this pen and the intrinsics file to this "
+                    "camera and lens."
                 )
                 return words.format(_pixels(self._match.sigma), USUAL_SIGMA)
 

@@ -207,7 +207,7 @@ class PenView(Translated, QWidget):
             painter.setFont(font(TextSize.BODY))
             box = self.rect().adjusted(MARGIN, MARGIN, -MARGIN, -MARGIN)
             flags = int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap)
-            painter.drawText(box, flags, self.tr("The LEDs appear here."))
+            painter.drawText(box, flags, self.tr("LED layout"))
             return
         sight = self._sight(pen)
         if sight.shows_origin:
@@ -349,9 +349,7 @@ class PenView(Translated, QWidget):
         pen = self._value.pen
         n_leds = 0 if pen is None else pen.n_leds
         self.setAccessibleDescription(self.tr("{0} LEDs").format(n_leds))
-        self.setToolTip(
-            self.tr("Drag the mouse or press the arrow keys to turn it, 0 to reset.")
-        )
+        self.setToolTip(self.tr("Drag or press the arrow keys to rotate, 0 to reset."))
 
 
 def _turn_matrix(yaw: float, pitch: float) -> FloatArray:

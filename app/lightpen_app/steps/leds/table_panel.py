@@ -5,25 +5,18 @@ from dataclasses import replace
 from enum import Enum, auto
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QGridLayout,
-    QGroupBox,
-    QLabel,
-    QLineEdit,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QCheckBox, QGroupBox, QLabel, QLineEdit, QWidget
 
 from lightpen.model.pen import MAX_LEDS, MIN_LEDS
 from lightpen.pen_check.draft import PenDraft
+from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.quantities import AXES
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import TextSize, Tone, text_label
 from lightpen_app.steps.leds.led_table import LedTable
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 
@@ -78,16 +71,15 @@ class LedTablePanel(Translated, QGroupBox):
         self._override_label = text_label(TextSize.SMALL, Tone.QUIET)
 
         # Layout
-        buttons = QGridLayout()
-        buttons.setSpacing(GRID)
+        layout = vertical_layout(self, (self._table, 1), self._flaw)
+        buttons = grid_layout(layout)
         buttons.addWidget(self._add, 0, 0)
         buttons.addWidget(self._remove, 0, 1)
         buttons.addWidget(self._discard, 0, 2)
         buttons.addWidget(undo, 1, 0, 1, 3)
         for column in range(3):
             buttons.setColumnStretch(column, 1)
-        fields = QGridLayout()
-        fields.setSpacing(GRID)
+        fields = grid_layout(layout)
         fields.addWidget(self._diameter_label, 0, 0)
         fields.addWidget(self._diameter, 0, 1)
         fields.addWidget(self._normals, 0, 2, 1, 2)
@@ -95,13 +87,6 @@ class LedTablePanel(Translated, QGroupBox):
         for column, edit in enumerate(self._tip, 1):
             fields.addWidget(edit, 1, column)
             fields.setColumnStretch(column, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._table, 1)
-        layout.addWidget(self._flaw)
-        layout.addLayout(buttons)
-        layout.addLayout(fields)
         layout.addWidget(self._override_label)
 
         # Connections
@@ -135,7 +120,7 @@ class LedTablePanel(Translated, QGroupBox):
 
     def set_flaw(self, sentence: str) -> None:
         """Say which cell is wrong, or nothing."""
-        self._flaw.set_value(Remark(sentence, Sign.WARNING, Tone.BAD))
+        self._flaw.set_value(StatusMessage(sentence, Sign.WARNING, Tone.BAD))
 
     def flaw(self) -> str:
         """Return what is said about the cells."""
@@ -186,30 +171,32 @@ class LedTablePanel(Translated, QGroupBox):
 
     def _refresh(self) -> None:
         self.setTitle(
-            self.tr("Places of the LEDs in mm, changed")
+            self.tr("LED coordinates / mm (modified)")
             if self._changes is Changes.EDITED
-            else self.tr("Places of the LEDs in mm")
+            else self.tr("LED coordinates / mm")
         )
         n_leds, chosen = self._value.n_leds, self._table.chosen()
         self._add.setEnabled(n_leds < MAX_LEDS)
-        self._add.setToolTip(self.tr("Add an LED after the last."))
+        self._add.setToolTip(self.tr("Add an LED at the end"))
         if not chosen:
-            why_not = self.tr("Choose an LED in the table first.")
+            why_not = self.tr("Select an LED in the table.")
         elif n_leds <= MIN_LEDS:
             why_not = self.tr("A pen needs at least {0} LEDs.").format(MIN_LEDS)
         else:
             why_not = ""
-        told = self.tr("Remove LED {0}; later ones get lower numbers.").format(chosen)
+        told = self.tr("Remove LED {0}; the following LEDs are renumbered.").format(
+            chosen
+        )
         self._remove.set_why_not(why_not, told)
         unchanged = self._changes is Changes.NONE
-        why_not = self.tr("Nothing is changed.") if unchanged else ""
+        why_not = self.tr("No changes") if unchanged else ""
         told = (
-            self.tr("Go back to what the file has.")
+            self.tr("Restore the coordinates of the file")
             if self._changes is Changes.EDITED
-            else self.tr("Go back to the file in use.")
+            else self.tr("Restore the file in use")
         )
         self._discard.set_why_not(why_not, told)
-        text = self.tr("In force is the nominal tip of the step Start: {0} mm.")
+        text = self.tr("Nominal tip in use (step Start): {0} mm")
         self._override_label.setText(text.format(self._override))
         self._override_label.setVisible(bool(self._override))
 
@@ -222,7 +209,7 @@ class LedTablePanel(Translated, QGroupBox):
         self._diameter.setAccessibleName(self.tr("Diameter of the LED discs, mm"))
         self._tip_label.setText(self.tr("&Tip x y z, mm"))
         for axis, edit in zip(AXES, self._tip, strict=True):
-            name = self.tr("Nominal centre of the tip, {0}, mm").format(axis)
+            name = self.tr("Nominal tip centre, {0}, mm").format(axis)
             edit.setAccessibleName(name)
             edit.setToolTip(name)
             edit.setPlaceholderText(axis)

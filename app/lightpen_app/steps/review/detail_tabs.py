@@ -6,14 +6,8 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QTabWidget, QWidget
 
-from lightpen_app.steps.review.late_panels import (
-    make_images_panel,
-    make_methods_panel,
-    make_residuals_panel,
-    make_uncertainty_panel,
-)
-from lightpen_app.widgets.late import Late
-from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
+from lightpen_app.widgets.lazy import LazyWidget
+from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.swing_run import SwingRun
 
@@ -51,16 +45,16 @@ class DetailTabs(QTabWidget):
         super().__init__(parent)
         self._run = run
         self._place = place
-        self._images = Late(make_images_panel)
-        self._panels: tuple[Late[ImagesPanel] | Late[PlotsPanel], ...] = (
+        self._images = LazyWidget(_make_images_panel)
+        self._panels: tuple[LazyWidget[ImagesPanel] | LazyWidget[PlotsPanel], ...] = (
             self._images,
-            Late(make_residuals_panel),
-            Late(make_uncertainty_panel),
-            Late(make_methods_panel),
+            LazyWidget(_make_residuals_panel),
+            LazyWidget(_make_uncertainty_panel),
+            LazyWidget(_make_methods_panel),
         )
         self._tab_of = {panel: PageScroll() for panel in self._panels}
         for panel, tab in self._tab_of.items():
-            tab.setWidget(Squeezed(panel))
+            tab.setWidget(ShrinkingScrollContent(panel))
             self.addTab(tab, "")
 
         # Connections
@@ -109,3 +103,30 @@ class DetailTabs(QTabWidget):
             card.set_place(self._place)
         panel.saved.connect(self.saved)
         panel.failed.connect(self.failed)
+
+
+# What draws plots takes a fifth of the time to the first window, which has none.
+
+
+def _make_images_panel() -> "ImagesPanel":
+    from lightpen_app.steps.review.images_panel import ImagesPanel
+
+    return ImagesPanel()
+
+
+def _make_residuals_panel() -> "PlotsPanel":
+    from lightpen_app.steps.review.plots_panel import ResidualsPanel
+
+    return ResidualsPanel()
+
+
+def _make_uncertainty_panel() -> "PlotsPanel":
+    from lightpen_app.steps.review.plots_panel import UncertaintyPanel
+
+    return UncertaintyPanel()
+
+
+def _make_methods_panel() -> "PlotsPanel":
+    from lightpen_app.steps.review.plots_panel import MethodsPanel
+
+    return MethodsPanel()

@@ -15,7 +15,7 @@ from PySide6.QtCore import (
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.record.image_rows import ImageRow
+from lightpen.record.swings.image_list import ImageRow
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.quantities import decimals_for, number_text
 from lightpen_app.look.theme import GRID
@@ -83,7 +83,7 @@ class ImageModel(QAbstractTableModel):
             return None
         return (
             self.tr("Image"),
-            self.tr("Misfit / px"),
+            self.tr("RMS / px"),
             self.tr("LEDs"),
             self.tr("State"),
         )[section]
@@ -94,7 +94,7 @@ class ImageModel(QAbstractTableModel):
         if column == LEDS:
             return str(row.n_leds)
         if column == STATE:
-            return self.tr("used") if row.is_used else reason_text(row.reason)
+            return self.tr("included") if row.is_used else reason_text(row.reason)
         known = row.misfit == row.misfit
         return number_text(row.misfit, self._decimals) if known else ""
 
@@ -183,7 +183,7 @@ class ImageTable(Translated, RowTable):
     @override
     def _retranslate(self) -> None:
         self.show_other_words()
-        self.setAccessibleName(self.tr("Images, the worst first"))
+        self.setAccessibleName(self.tr("Images (worst first)"))
 
     def _on_current_row_changed(self, now: QModelIndex, _before: QModelIndex) -> None:
         if now.isValid():

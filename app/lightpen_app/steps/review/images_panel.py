@@ -7,13 +7,14 @@ from functools import partial
 import numpy as np
 from PySide6.QtCore import QSize, Qt, Signal, SignalInstance
 from PySide6.QtGui import QKeySequence, QShortcut, QUndoStack
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
 from lightpen.arrays import Image
-from lightpen.record.image_rows import ImageRow, count_left_out, worst_first
-from lightpen.record.recorded_source import RecordSource
-from lightpen.record.solving import Solution, load_image
+from lightpen.record.swings.image_list import ImageRow, count_left_out, worst_first
+from lightpen.record.swings.recorded_source import RecordSource
+from lightpen.record.swings.solving import Solution, load_image
 from lightpen_app.look.arrows import arrow_scale
+from lightpen_app.look.layouts import grid_layout, horizontal_layout
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.sentences import worded
@@ -90,23 +91,13 @@ class ImagesPanel(Translated, QWidget):
         self._card = PlotCard(self._misfits, "misfit-of-images")
 
         # Layout
-        buttons = QHBoxLayout()
-        buttons.setSpacing(GRID)
-        buttons.addWidget(self._take_out, 1)
-        buttons.addWidget(self._put_back, 1)
-        below = QHBoxLayout()
-        below.setSpacing(GRID)
-        below.addWidget(self._caption, 1)
-        below.addWidget(self._switch)
-        layout = QGridLayout(self)
-        layout.setContentsMargins(0, GRID, 0, 0)
-        layout.setSpacing(GRID)
+        layout = grid_layout(self, margins=(0, GRID, 0, 0))
         layout.addWidget(self._table, 0, 0, 3, 1)
         layout.addWidget(self._count, 3, 0)
-        layout.addLayout(buttons, 4, 0)
+        horizontal_layout(layout, (self._take_out, 1), (self._put_back, 1), at=(4, 0))
         layout.addWidget(self._undo, 5, 0)
         layout.addWidget(self._view, 0, 1)
-        layout.addLayout(below, 1, 1)
+        horizontal_layout(layout, (self._caption, 1), self._switch, at=(1, 1))
         layout.addWidget(self._card, 2, 1, 4, 1)
         layout.setColumnMinimumWidth(0, TABLE_WIDTH)
         layout.setColumnStretch(1, 1)
@@ -190,13 +181,13 @@ class ImagesPanel(Translated, QWidget):
         shortcut.activated.connect(act)
 
     def _retranslate(self) -> None:
-        self._take_out.setText(self.tr("Take out"))
-        self._put_back.setText(self.tr("Put back"))
+        self._take_out.setText(self.tr("Exclude"))
+        self._put_back.setText(self.tr("Include"))
         self._misfits.set_axes(
-            Axes(self.tr("Misfit / px (x: left out)"), self.tr("image"))
+            Axes(self.tr("RMS residual / px (x: excluded)"), self.tr("image"))
         )
         self._misfits.set_limit_words(
-            self.tr("drag down to take out"), self.tr("take out {0} above {1} px")
+            self.tr("drag down to exclude"), self.tr("Exclude {0} above {1} px")
         )
         self._refresh_texts()
         self._refresh_buttons()
@@ -217,7 +208,7 @@ class ImagesPanel(Translated, QWidget):
             self._count.clear()
             return
         used = solution.calibration.used
-        counted = self.tr("{0} of {1} used").format(int(used.sum()), len(used))
+        counted = self.tr("{0} of {1} included").format(int(used.sum()), len(used))
         reasons = count_left_out(solution).items()
         each = self.tr("{0} {1}")
         parts = [each.format(count, reason_text(reason)) for reason, count in reasons]
@@ -229,22 +220,20 @@ class ImagesPanel(Translated, QWidget):
         if not rows:
             why_not_out = why_not_back = why_not_out or self.tr("No image is selected.")
         elif not any(row.is_used for row in rows):
-            why_not_out = why_not_out or self.tr("It does not take part already.")
+            why_not_out = why_not_out or self.tr("Already excluded")
         if not why_not_back and not any(row.is_taken_out for row in rows):
             why_not_back = self._why_not_back(rows[0])
         self._take_out.set_why_not(
-            why_not_out,
-            self.tr("Leave the selected images out and solve again (Delete)"),
+            why_not_out, self.tr("Exclude the selected images and recompute (Delete)")
         )
         self._put_back.set_why_not(
-            why_not_back,
-            self.tr("Let the selected images take part again (Insert)"),
+            why_not_back, self.tr("Include the selected images and recompute (Insert)")
         )
 
     def _why_not_back(self, row: ImageRow) -> str:
         if row.is_used:
-            return self.tr("It takes part already.")
-        text = self.tr("It would be left out again: {0}.")
+            return self.tr("Already included")
+        text = self.tr("Excluded automatically: {0}")
         return text.format(reason_text(row.reason))
 
     def _mark(self) -> None:
@@ -280,7 +269,7 @@ class ImagesPanel(Translated, QWidget):
             text = self.tr("Image {0}; arrows: residuals \xd7 {1}")
             self._caption.setText(text.format(number, f"{scale:g}"))
         else:
-            text = self.tr("Image {0}: the pen is not found. {1}")
+            text = self.tr("Image {0}: pen not found. {1}")
             self._caption.setText(text.format(number, worded(detail)))
 
     def _on_number_changed(self, number: int) -> None:
@@ -327,7 +316,7 @@ class ImagesPanel(Translated, QWidget):
         self._view.set_message(sentence)
 
     def _on_crashed(self) -> None:
-        self._on_undecoded(self.tr("The image cannot be shown."))
+        self._on_undecoded(self.tr("Image not available"))
 
     def _wanted(self) -> tuple[RecordSource, int, int] | None:
         """Return whose image is chosen, its number and its camera."""

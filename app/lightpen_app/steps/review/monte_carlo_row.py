@@ -2,13 +2,14 @@
 
 import os
 
-from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QProgressBar, QWidget
 from typing_extensions import override
 
 from lightpen.estimation.monte_carlo import MIN_TRIALS, MonteCarlo, run_monte_carlo
-from lightpen.estimation.uncertainty import COVERAGE_FACTOR
-from lightpen.estimation.workers import local_workers
-from lightpen.record.solving import Solution
+from lightpen.estimation.statistics.workers import local_workers
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.record.swings.solving import Solution
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -16,7 +17,7 @@ from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job, Report
 
@@ -31,7 +32,7 @@ class MonteCarloRow(Translated, QWidget):
         super().__init__(parent)
         self._solution: Solution | None = None
         self._found: MonteCarlo | None = None
-        self._trouble = ""
+        self._fault = ""
         self._job: Job | None = None
 
         # Widgets
@@ -48,18 +49,16 @@ class MonteCarloRow(Translated, QWidget):
         self._table = NumberTable()
 
         # Layout
-        line = QHBoxLayout()
-        line.setSpacing(GRID)
-        line.addWidget(self._start)
-        line.addWidget(self._cancel)
-        line.addWidget(self._label)
-        line.addWidget(self._trials)
-        line.addWidget(self._progress, 1)
-        line.addWidget(self._told, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID // 2)
-        layout.addLayout(line)
+        layout = vertical_layout(self, spacing=GRID // 2)
+        horizontal_layout(
+            layout,
+            self._start,
+            self._cancel,
+            self._label,
+            self._trials,
+            (self._progress, 1),
+            (self._told, 1),
+        )
         layout.addWidget(self._table)
 
         # Connections
@@ -73,7 +72,7 @@ class MonteCarloRow(Translated, QWidget):
         if solution is self._solution:
             return
         self.stop()
-        self._solution, self._found, self._trouble = solution, None, ""
+        self._solution, self._found, self._fault = solution, None, ""
         self._refresh()
 
     def stop(self) -> None:
@@ -93,7 +92,7 @@ class MonteCarloRow(Translated, QWidget):
                 return run_monte_carlo(calibration, n_trials, in_workers, report)
 
         self.stop()
-        self._found, self._trouble = None, ""
+        self._found, self._fault = None, ""
         self._progress.setValue(0)
         self._job = job = Job(compute, self)
 
@@ -114,7 +113,7 @@ class MonteCarloRow(Translated, QWidget):
         self._refresh()
 
     def _on_failed(self, why: str) -> None:
-        self._job, self._trouble = None, why
+        self._job, self._fault = None, why
         self._refresh()
 
     def _on_cancel_clicked(self) -> None:
@@ -124,18 +123,21 @@ class MonteCarloRow(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        self._start.setText(self.tr("Check by Monte Carlo"))
+        self._start.setText(self.tr("Monte Carlo check"))
         self._start.setToolTip(
             self.tr(
-                "Draw files, seat and noise as U counts them, and calibrate from each "
-                "(JCGM 101). It takes all cores but one for some seconds to minutes."
+                "Propagates the distributions of files, seating and noise by the "
+                "Monte Carlo method (JCGM 101). Uses all processor cores but one "
+                "for seconds to minutes."
             )
         )
         self._cancel.setText(self.tr("Cancel"))
         self._label.setText(self.tr("Trials"))
         self._trials.setAccessibleName(self.tr("Trials"))
         self._progress.setAccessibleName(self.tr("Progress"))
-        self._table.setAccessibleName(self.tr("U by Monte Carlo beside the budget"))
+        self._table.setAccessibleName(
+            self.tr("U by Monte Carlo and by uncertainty budget")
+        )
         self._refresh()
 
     def _refresh(self) -> None:
@@ -146,7 +148,7 @@ class MonteCarloRow(Translated, QWidget):
             field.setVisible(not is_busy)
         self._cancel.setVisible(is_busy)
         self._progress.setVisible(is_busy)
-        self._told.set_value(self._told_remark())
+        self._told.set_value(self._told_message())
         self._told.setVisible(not is_busy)
         self._table.setVisible(self._found is not None)
         if self._found is not None:
@@ -154,17 +156,17 @@ class MonteCarloRow(Translated, QWidget):
 
     def _why_not(self) -> str:
         if self._solution is not None and self._solution.source.rig is not None:
-            return self.tr("It is for the swing of one camera.")
+            return self.tr("Available for swings with one camera only.")
         return ""
 
-    def _told_remark(self) -> Remark:
-        if self._trouble:
-            return Remark(self._trouble, Sign.CROSS, Tone.BAD)
+    def _told_message(self) -> StatusMessage:
+        if self._fault:
+            return StatusMessage(self._fault, Sign.CROSS, Tone.BAD)
         if self._found is None:
-            return Remark()
-        text = self.tr("{0} trials gave a tip, {1} did not.")
+            return StatusMessage()
+        text = self.tr("{0} trials successful, {1} failed.")
         n_solved = len(self._found.errors)
-        return Remark(text.format(n_solved, self._found.n_failed), Sign.RING)
+        return StatusMessage(text.format(n_solved, self._found.n_failed), Sign.RING)
 
     def _figures(self, found: MonteCarlo) -> Figures:
         """Return U by both, and their difference by what so many trials know."""
@@ -173,8 +175,8 @@ class MonteCarloRow(Translated, QWidget):
         by_budget = COVERAGE_FACTOR * found.linear * MICROMETRES
         rows = (
             (self.tr("U (k = 2) by Monte Carlo / \xb5m"), by_trials, within),
-            (self.tr("known to (k = 1) / \xb5m"), within, within),
-            (self.tr("U (k = 2) by the budget / \xb5m"), by_budget, within),
+            (self.tr("its standard error / µm"), within, within),
+            (self.tr("U (k = 2) by uncertainty budget / µm"), by_budget, within),
         )
         cells = [
             tuple(
@@ -184,8 +186,5 @@ class MonteCarloRow(Translated, QWidget):
             for _, values, digits in rows
         ]
         cells.append(tuple(number_text(x, 1) for x in found.difference.tolist()))
-        names = (
-            *(name for name, *_ in rows),
-            self.tr("budget less Monte Carlo, in what so many trials know"),
-        )
+        names = (*(name for name, *_ in rows), self.tr("Difference / standard error"))
         return Figures(AXES, names, tuple(cells))

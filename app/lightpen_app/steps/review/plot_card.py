@@ -6,17 +6,11 @@ from typing import NamedTuple
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QMouseEvent
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QFrame,
-    QGridLayout,
-    QMenu,
-    QToolButton,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QFrame, QMenu, QToolButton, QWidget
 from typing_extensions import override
 
 from lightpen.formats.files import write_whole
+from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.plots import Plot
 from lightpen_app.widgets.translated import Translated
@@ -76,9 +70,7 @@ class PlotCard(Translated, QFrame):
         self._button.setMenu(self._menu)
 
         # Layout
-        layout = QGridLayout(self)
-        margin = GRID // 2
-        layout.setContentsMargins(margin, margin, margin, margin)
+        layout = grid_layout(self, margins=GRID // 2)
         layout.addWidget(plot, 0, 0)
         corner = Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignRight
         layout.addWidget(self._button, 0, 0, corner)
@@ -176,9 +168,7 @@ class PlotGrid(QWidget):
         self._cards = tuple(cards)
 
         # Layout
-        layout = QGridLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
+        layout = grid_layout(self)
         for i, card in enumerate(self._cards):
             layout.addWidget(card, *divmod(i, n_columns))
 

@@ -4,23 +4,20 @@ from collections.abc import Sequence
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.methods import result_of
-from lightpen.estimation.uncertainty import COVERAGE_FACTOR
-from lightpen.record.solving import Solution
+from lightpen.estimation.reports.methods import result_of
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.record.swings.solving import Solution
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import share_text
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.plot_card import PlotCard, PlotGrid
-from lightpen_app.steps.review.residual_plots import (
-    ArrowPlot,
-    DotPlot,
-    Histogram,
-)
+from lightpen_app.steps.review.residual_plots import ArrowPlot, DotPlot, Histogram
 from lightpen_app.steps.review.series_plots import BarPlot, LinePlot, PosturePlot
 from lightpen_app.widgets.camera_switch import CameraSwitch
 from lightpen_app.widgets.number_table import Figures, NumberTable
@@ -52,10 +49,7 @@ class PlotsPanel(Translated, QWidget):
         self._grid = PlotGrid(cards)
 
         # Layout
-        self._layout = QVBoxLayout(self)
-        self._layout.setContentsMargins(0, GRID, 0, 0)
-        self._layout.setSpacing(GRID)
-        self._layout.addWidget(self._grid, 1)
+        self._layout = vertical_layout(self, (self._grid, 1), margins=(0, GRID, 0, 0))
 
         # Connections
         self._grid.saved.connect(self.saved)
@@ -109,10 +103,7 @@ class ResidualsPanel(PlotsPanel):
         self._switch = CameraSwitch()
 
         # Layout
-        below = QHBoxLayout()
-        below.addWidget(self._advice, 1)
-        below.addWidget(self._switch)
-        self._layout.addLayout(below)
+        horizontal_layout(self._layout, (self._advice, 1), self._switch, spacing=-1)
 
         # Connections
         self._switch.value_changed.connect(self._on_camera_changed)
@@ -150,20 +141,20 @@ class ResidualsPanel(PlotsPanel):
         x, y = self.tr("x / px"), self.tr("y / px")
         scale = f"{self._arrows.scale():g}"
         self._arrows.set_axes(Axes(enlarged.format(scale), x, y))
-        self._dots.set_axes(Axes(self.tr("By axis / px"), x, y))
-        self._leds.set_axes(Axes(self.tr("By LED / px"), self.tr("LED")))
-        self._leds.set_names([self.tr("rms"), self.tr("mean x"), self.tr("mean y")])
+        self._dots.set_axes(Axes(self.tr("Residuals by axis / px"), x, y))
+        self._leds.set_axes(Axes(self.tr("Residuals by LED / px"), self.tr("LED")))
+        self._leds.set_names([self.tr("RMS"), self.tr("mean x"), self.tr("mean y")])
         self._histogram.set_axes(
             Axes(
-                self.tr("Beside the normal curve"),
+                self.tr("Histogram with normal fit"),
                 self.tr("residual / px"),
                 self.tr("count"),
             )
         )
         self._advice.setText(
             self.tr(
-                "The arrows should look random. A pattern points to the intrinsics "
-                "file, one LED that stands out to the LED file."
+                "The arrows should look random. A pattern indicates an error of the "
+                "intrinsics file; a single outlying LED, of the LED file."
             )
         )
 
@@ -206,7 +197,7 @@ class UncertaintyPanel(PlotsPanel):
 
     @override
     def _retranslate(self) -> None:
-        self._budget.set_axes(Axes(self.tr("Parts of U (k = 2) / \xb5m")))
+        self._budget.set_axes(Axes(self.tr("Uncertainty budget U (k = 2) / µm")))
         self._postures.set_axes(
             Axes(
                 self.tr("Postures: tilt / \xb0"),
@@ -223,20 +214,18 @@ class UncertaintyPanel(PlotsPanel):
             share_text(share.name) + (" *" if share.assumed else ""): share.covariance
             for share in budget.shares
         }
-        parts[self.tr("all")] = budget.covariance
+        parts[self.tr("combined")] = budget.covariance
         expanded = np.array([_expanded(part) for part in parts.values()]) * MICROMETRES
         self._budget.set_data(list(parts), *expanded.T)
-        weakest = self.tr("Weakest direction ({0}): U = {1} \xb5m.").format(
+        weakest = self.tr("Weakest direction ({0}): U = {1} µm").format(
             ", ".join(f"{share:.2f}" for share in budget.weakest_direction.tolist()),
             _digits(budget.weakest_uncertainty * MICROMETRES),
         )
         texts = [weakest]
         if any(share.assumed for share in budget.shares):
-            texts.append(self.tr("* assumed: the file tells no uncertainty."))
+            texts.append(self.tr("* Assumed: not stated in file"))
         if budget.correlation_factor > 1:
-            text = self.tr(
-                "Images hang together: their noise counts {0} times (variance)."
-            )
+            text = self.tr("Images are correlated: noise variance \u00d7 {0}")
             texts.append(text.format(f"{budget.correlation_factor:.2f}"))
         self._remark.setText(" ".join(texts))
 
@@ -280,12 +269,9 @@ class MethodsPanel(PlotsPanel):
             Axes(self.tr("Objective / mm\xb2"), self.tr("iteration"))
         )
         self._change.set_axes(
-            Axes(
-                self.tr("Tip minus its end / \xb5m"),
-                self.tr("iteration"),
-            )
+            Axes(self.tr("Difference from final value / µm"), self.tr("iteration"))
         )
-        self._table.setAccessibleName(self.tr("Two-stage method beside the joint fit"))
+        self._table.setAccessibleName(self.tr("Two-stage method and joint fit"))
         if self._solution is not None:
             self._table.set_value(self._figures(self._solution))
 
@@ -296,12 +282,12 @@ class MethodsPanel(PlotsPanel):
         within = np.hypot(joint_u, paper_u)
         rows = (
             (self.tr("Joint fit"), joint.tip_pen, joint_u, joint.rms_mm),
-            (self.tr("its U (k = 2)"), joint_u, joint_u, None),
+            (self.tr("U (k = 2)"), joint_u, joint_u, None),
             (self.tr("Two-stage (paper)"), paper.tip_pen, paper_u, paper.rms_mm),
-            (self.tr("its U, of noise alone"), paper_u, paper_u, None),
-            (self.tr("difference"), paper.tip_pen - joint.tip_pen, within, None),
+            (self.tr("U (k = 2), noise only"), paper_u, paper_u, None),
+            (self.tr("Difference"), paper.tip_pen - joint.tip_pen, within, None),
         )
-        columns = (*(f"{axis} / mm" for axis in AXES), self.tr("rms / mm"))
+        columns = (*(f"{axis} / mm" for axis in AXES), self.tr("RMS / mm"))
         cells = tuple(
             (*_rounded(values[:3], u[:3]), "" if rms is None else f"{rms:.4f}")
             for _, values, u, rms in rows

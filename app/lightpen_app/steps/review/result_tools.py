@@ -1,23 +1,28 @@
-"""What can be done with a tip besides: look at its files, copy it, save it."""
+"""Buttons for the result: open its folder, copy the tip, save it."""
 
-from enum import Enum, auto
+from dataclasses import dataclass
 
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QMenu, QWidget
+from PySide6.QtWidgets import QMenu, QWidget
 
-from lightpen_app.look.theme import GRID
+from lightpen.record.exports.formats import FORMATS, ExportFormat
+from lightpen_app.look.layouts import horizontal_layout
+from lightpen_app.look.sentences import worded
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 
-class Export(Enum):
+@dataclass(frozen=True)
+class Export:
     """What is saved."""
 
-    ALL = auto()
-    JSON = auto()
-    CSV = auto()
-    PLOTS = auto()
+    formats: tuple[ExportFormat, ...]
+    has_plots: bool = False
+
+
+TABLES = tuple(each for each in FORMATS if each.name in ("json", "csv", "images"))
+ALL, PLOTS = Export(TABLES, has_plots=True), Export((), has_plots=True)
+EXPORTS = (ALL, *(Export((each,)) for each in FORMATS), PLOTS)
 
 
 class ResultTools(Translated, QWidget):
@@ -48,9 +53,7 @@ class ResultTools(Translated, QWidget):
         self._save = PushButton()
         self._save.setProperty("menu", True)
         menu = QMenu(self._save)
-        self._exports: dict[Export, QAction] = {
-            export: menu.addAction("") for export in Export
-        }
+        self._actions = [(export, menu.addAction("")) for export in EXPORTS]
         menu.addSeparator()
         menu.setToolTipsVisible(True)
         self._paper = menu.addAction("")
@@ -58,16 +61,12 @@ class ResultTools(Translated, QWidget):
         self._buttons = (self._folder, self._copy, self._save)
 
         # Layout
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        for button in self._buttons:
-            layout.addWidget(button, 1)
+        horizontal_layout(self, *((button, 1) for button in self._buttons))
 
         # Connections
         self._folder.clicked.connect(self.folder_requested)
         self._copy.clicked.connect(self.copy_requested)
-        for export, action in self._exports.items():
+        for export, action in self._actions:
             action.triggered.connect(
                 lambda _=False, export=export: self.save_requested.emit(export)
             )
@@ -79,8 +78,8 @@ class ResultTools(Translated, QWidget):
         """Disable all and say why not, or enable them."""
         told = (
             self.tr("Open the folder of the swing"),
-            self.tr("Copy x, y, z in mm, parted by tabs"),
-            self.tr("Save results and plots under the name of pen, tip and date"),
+            self.tr("Copy x, y, z in mm, separated by tabs"),
+            self.tr("Save results and plots, named by pen, tip and date"),
         )
         for button, words in zip(self._buttons, told, strict=True):
             button.set_why_not(why_not, words)
@@ -88,18 +87,21 @@ class ResultTools(Translated, QWidget):
     def set_paper_why_not(self, why_not: str) -> None:
         """Offer no record on paper and say why not, or offer it."""
         self._paper.setEnabled(not why_not)
-        told = self.tr("Look at it, save it as PDF, or print it")
+        told = self.tr("Preview, save as PDF, or print")
         self._paper.setToolTip(why_not or told)
 
     def _retranslate(self) -> None:
-        self._paper.setText(self.tr("Record on paper..."))
+        self._paper.setText(self.tr("Calibration report..."))
         self._folder.setText(self.tr("Open folder"))
-        self._copy.setText(self.tr("Copy the tip"))
+        self._copy.setText(self.tr("Copy tip"))
         self._save.setText(self.tr("Save..."))
-        for export, text in (
-            (Export.ALL, self.tr("All at once...")),
-            (Export.JSON, self.tr("Record (JSON)...")),
-            (Export.CSV, self.tr("Tip and images (CSV)...")),
-            (Export.PLOTS, self.tr("All plots (PNG)...")),
-        ):
-            self._exports[export].setText(text)
+        for export, action in self._actions:
+            action.setText(self._name(export) + "...")
+            action.setToolTip(", ".join(worded(f.description) for f in export.formats))
+
+    def _name(self, export: Export) -> str:
+        if export == ALL:
+            return self.tr("Record, tables and plots")
+        if export == PLOTS:
+            return self.tr("All plots (PNG)")
+        return worded(export.formats[0].label)

@@ -14,13 +14,7 @@ from lightpen.arrays import FloatArray
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
 from lightpen_app.steps.review.residual_plots import SquarePlot
-from lightpen_app.widgets.plots import (
-    TONES,
-    Axes,
-    Column,
-    Curve,
-    Plot,
-)
+from lightpen_app.widgets.plots import TONES, Axes, Column, Curve, Plot
 
 MOST_LINES = 4  # of labels below the bars
 GROUP = 0.8  # of the room for a label, that its bars fill
@@ -103,10 +97,7 @@ class BarPlot(NamedPlot):
             )
         self._labels = tuple(labels)
         self._show_labels()
-        self._columns = {
-            self._label_column: tuple(labels),
-            **self._named(*values),
-        }
+        self._columns = {self._label_column: tuple(labels), **self._named(*values)}
         edges = np.array([-0.5, len(labels) - 0.5])
         self._fit(edges, np.concatenate(values), y_zero=True)
 

@@ -3,15 +3,17 @@
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox, QWidget
 
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import breakable
 from lightpen_app.widgets.opened_folder import open_folder
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.notifications import Notifications
 
 
 class DataFolderPanel(Translated, QGroupBox):
@@ -26,18 +28,18 @@ class DataFolderPanel(Translated, QGroupBox):
     -------
     change_requested()
         Another one is to be chosen.
-    told(str)
-        Why the folder is not shown; empty once it is.
     """
 
     change_requested = Signal()
-    told = Signal(str)
 
-    def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, folder: Path, notifications: Notifications, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
         self._folder = folder
+        self._notices = notifications
         self._n_others = 0
-        self._trouble = ""
+        self._fault = ""
 
         # Widgets
         self._path = text_label(TextSize.SMALL, Tone.QUIET)
@@ -48,17 +50,11 @@ class DataFolderPanel(Translated, QGroupBox):
         self._doubt = SignLabel()
 
         # Layout
-        row = QHBoxLayout()
-        row.setSpacing(2 * GRID)
-        row.addWidget(self._path, 1)
-        row.addWidget(self._open)
-        row.addWidget(self._change)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addLayout(row)
-        layout.addWidget(self._doubt)
-        layout.addWidget(self._others)
+        layout = vertical_layout(self)
+        horizontal_layout(
+            layout, (self._path, 1), self._open, self._change, spacing=2 * GRID
+        )
+        fill(layout, self._doubt, self._others)
 
         # Connections
         self._open.clicked.connect(self._on_open_clicked)
@@ -71,33 +67,33 @@ class DataFolderPanel(Translated, QGroupBox):
         self._n_others = n_others
         self._retranslate()
 
-    def set_trouble(self, trouble: str) -> None:
+    def set_fault(self, trouble: str) -> None:
         """Tell why nothing can be kept in the folder; empty where it can."""
-        self._trouble = trouble
+        self._fault = trouble
         self._retranslate()
 
     def _on_open_clicked(self) -> None:
-        self.told.emit(open_folder(self._folder))
+        self._notices.show_status(open_folder(self._folder))
 
     def _retranslate(self) -> None:
         self.setTitle(self.tr("Data folder"))
         self._open.setText(self.tr("Open folder"))
         self._open.setAccessibleName(self.tr("Open the data folder"))
-        self._open.setToolTip(self.tr("Swings and results are kept here."))
+        self._open.setToolTip(self.tr("Location of swings and results"))
         self._change.setText(self.tr("Change..."))
         self._change.setAccessibleName(self.tr("Choose another data folder"))
         self._change.setToolTip(
-            self.tr("Keep swings and results elsewhere from the next start on.")
+            self.tr("Save swings and results in another folder from the next start.")
         )
-        self._change.setProperty("inviting", bool(self._trouble))
+        self._change.setProperty("inviting", bool(self._fault))
         self._change.style().polish(self._change)
-        doubt = Remark(breakable(self._trouble), Sign.CROSS, Tone.BAD)
-        self._doubt.set_value(doubt if self._trouble else Remark())
-        remark = Remark()
+        doubt = StatusMessage(breakable(self._fault), Sign.CROSS, Tone.BAD)
+        self._doubt.set_value(doubt if self._fault else StatusMessage())
+        remark = StatusMessage()
         if self._n_others:
             text = self.tr(
-                "Other windows of the program that use this folder: {0}. All of them "
-                "put their tips in force here."
+                "The program is open in other windows using the same data folder "
+                "({0}). Results are shared."
             ).format(self._n_others)
-            remark = Remark(text, Sign.WARNING, Tone.WARN)
+            remark = StatusMessage(text, Sign.WARNING, Tone.WARN)
         self._others.set_value(remark)

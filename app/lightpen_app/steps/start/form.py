@@ -12,27 +12,35 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QLineEdit,
-    QVBoxLayout,
     QWidget,
 )
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.model.limits import SwingLimits
-from lightpen.record.names import Names
-from lightpen.record.tip_library import ItemKind
-from lightpen.swing.preparation import Lack
+from lightpen.model.limits import LEAST_IMAGES, MOST_IMAGES, SwingLimits
+from lightpen.record.library.tip_library import ItemKind
+from lightpen.record.swings.names import Names
+from lightpen.swing.preparation import MissingInput
+from lightpen_app.look.layouts import (
+    GridPlace,
+    grid_layout,
+    horizontal_layout,
+    vertical_layout,
+)
 from lightpen_app.look.theme import GRID
-from lightpen_app.steps.start.item_button import ItemButton, ItemChoice
-from lightpen_app.steps.start.point_field import PointField
-from lightpen_app.steps.start.station_field import LONGEST_NAME, StationField
-from lightpen_app.widgets.labelled import field_label, stacked
+from lightpen_app.steps.start.fields import (
+    LONGEST_NAME,
+    ItemButton,
+    ItemChoice,
+    PointField,
+    StationField,
+)
+from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 LARGEST_BALL = 100.0  # mm
-LEAST_IMAGES, MOST_IMAGES = 10, 2000
 
 
 class NamesForm(Translated, QWidget):
@@ -86,23 +94,20 @@ class NamesForm(Translated, QWidget):
         }
 
         # Layout
+        vertical_layout(self, self._place, self._probe, spacing=2 * GRID)
         place = _panel(self._place)
-        place.addLayout(self._labelled(self._station), 0, 0)
-        place.addLayout(self._labelled(self._operator), 0, 1)
+        self._add(place, self._station, at=(0, 0))
+        self._add(place, self._operator, at=(0, 1))
         probe = _panel(self._probe)
-        rows = {kind: QHBoxLayout() for kind in ItemKind}
-        probe.addLayout(self._beside(self._pen, rows[ItemKind.PEN]), 0, 0)
-        probe.addLayout(self._beside(self._cone, rows[ItemKind.CONE]), 0, 1)
-        probe.addLayout(self._beside(self._tip, rows[ItemKind.TIP]), 1, 0)
-        probe.addLayout(self._labelled(self._ball), 1, 1)
-        probe.addLayout(self._labelled(self._nominal_tip), 2, 0, 1, 2)
-        for kind, row in rows.items():  # the Tab key leads through all names first
-            row.addWidget(self._lists[kind])
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(2 * GRID)
-        layout.addWidget(self._place)
-        layout.addWidget(self._probe)
+        rows = {
+            ItemKind.PEN: self._add_row(probe, self._pen, at=(0, 0)),
+            ItemKind.CONE: self._add_row(probe, self._cone, at=(0, 1)),
+            ItemKind.TIP: self._add_row(probe, self._tip, at=(1, 0)),
+        }
+        self._add(probe, self._ball, at=(1, 1))
+        self._add(probe, self._nominal_tip, at=(2, 0, 1, 2))
+        for kind in ItemKind:  # the Tab key leads through all names first
+            rows[kind].addWidget(self._lists[kind])
 
         # Connections
         self._station.value_edited.connect(self.value_edited)
@@ -137,13 +142,15 @@ class NamesForm(Translated, QWidget):
         )
 
     def set_value(self, names: Names) -> None:
-        """Show other names."""
+        """Show other names; a field that shows its own already stays as it is."""
         blocked = self.blockSignals(True)
-        self._station.set_value(names.station)
+        if names.station != self._station.value():
+            self._station.set_value(names.station)
         texts = (names.operator, names.pen, names.tip, names.cone)
         for edit, text in zip(self._edits, texts, strict=True):
-            edit.setText(text)
-            edit.setCursorPosition(0)
+            if text != edit.text().strip():
+                edit.setText(text)
+                edit.setCursorPosition(0)
         self._ball.setValue(names.ball_diameter or 0.0)
         self.blockSignals(blocked)
 
@@ -159,12 +166,6 @@ class NamesForm(Translated, QWidget):
         """Return the button that lists pens, tips or cones."""
         return self._lists[kind]
 
-    def set_ball(self, diameter: float | None) -> None:
-        """Show another diameter of the ball, mm; None where it is not known."""
-        blocked = self.blockSignals(True)
-        self._ball.setValue(diameter or 0.0)
-        self.blockSignals(blocked)
-
     def nominal_tip(self) -> FloatArray | None:
         """Return the nominal centre of the tip (3,), mm; None for the LED file's."""
         return self._nominal_tip.value()
@@ -177,14 +178,14 @@ class NamesForm(Translated, QWidget):
         """Show the nominal centre that the LED file has."""
         self._nominal_tip.set_point_of_file(point)
 
-    def focus_lack(self, lack: Lack) -> None:
+    def focus_missing_input(self, lack: MissingInput) -> None:
         """Put the focus on the field of a name that is missing."""
-        fields: dict[Lack, QWidget] = {
-            Lack.STATION: self._station,
-            Lack.OPERATOR: self._operator,
-            Lack.PEN: self._pen,
-            Lack.TIP: self._tip,
-            Lack.CONE: self._cone,
+        fields: dict[MissingInput, QWidget] = {
+            MissingInput.STATION: self._station,
+            MissingInput.OPERATOR: self._operator,
+            MissingInput.PEN: self._pen,
+            MissingInput.TIP: self._tip,
+            MissingInput.CONE: self._cone,
         }
         fields[lack].setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -193,18 +194,13 @@ class NamesForm(Translated, QWidget):
         self._ball.interpretText()
         self._nominal_tip.settle()
 
-    def _labelled(self, field: QWidget) -> QVBoxLayout:
-        return stacked(self._labels[field], field)
+    def _add(self, grid: QGridLayout, field: QWidget, at: GridPlace) -> None:
+        add_labelled(grid, self._labels[field], field, at=at)
 
-    def _beside(self, field: QWidget, row: QHBoxLayout) -> QVBoxLayout:
-        """Return a name with its label above, in a row with room for its list."""
-        row.setSpacing(GRID // 2)
-        row.addWidget(field, 1)
-        layout = QVBoxLayout()
-        layout.setSpacing(GRID // 2)
-        layout.addWidget(self._labels[field])
-        layout.addLayout(row)
-        return layout
+    def _add_row(self, grid: QGridLayout, field: QWidget, at: GridPlace) -> QHBoxLayout:
+        """Add a name with its label above, and return its row, with room for a list."""
+        column = vertical_layout(grid, self._labels[field], spacing=GRID // 2, at=at)
+        return horizontal_layout(column, (field, 1), spacing=GRID // 2)
 
     def _retranslate(self) -> None:
         lists = {
@@ -215,28 +211,25 @@ class NamesForm(Translated, QWidget):
         for kind, name in lists.items():
             self._lists[kind].setAccessibleName(name)
             self._lists[kind].setToolTip(
-                self.tr("Choose from the tip library, or open it. Key: arrow down")
+                self.tr("Choose from the tip library, or open it (arrow down)")
             )
-        self._place.setTitle(self.tr("Where and who"))
-        self._probe.setTitle(self.tr("What is calibrated"))
+        self._place.setTitle(self.tr("Station and operator"))
+        self._probe.setTitle(self.tr("Item under calibration"))
         for field, text in (
             (self._station, self.tr("Station")),
             (self._operator, self.tr("Operator")),
-            (self._pen, self.tr("Pen, serial number")),
+            (self._pen, self.tr("Pen serial number")),
             (self._cone, self.tr("Cone")),
             (self._tip, self.tr("Probe tip")),
             (self._ball, self.tr("Ball diameter")),
-            (self._nominal_tip, self.tr("Nominal centre of the tip")),
+            (self._nominal_tip, self.tr("Nominal tip centre")),
         ):
             self._labels[field].setText(text)
             field.setAccessibleName(text)
         self._station.setToolTip(
-            self.tr(
-                "Choose a station to bring back all that was chosen there, or type the "
-                "name of a new one."
-            )
+            self.tr("Choose a station to restore its settings, or enter a new name.")
         )
-        self._ball.setSpecialValueText(self.tr("not known"))
+        self._ball.setSpecialValueText(self.tr("Not specified"))
 
 
 class LimitsForm(Translated, QGroupBox):
@@ -270,7 +263,7 @@ class LimitsForm(Translated, QGroupBox):
         layout = _panel(self)
         layout.setColumnStretch(2, 1)
         for column, field in enumerate(self._fields):
-            layout.addLayout(stacked(self._labels[column], field), 0, column)
+            add_labelled(layout, self._labels[column], field, at=(0, column))
         layout.addWidget(self._all, 0, 3, Qt.AlignmentFlag.AlignBottom)
 
         # Connections
@@ -323,28 +316,30 @@ class LimitsForm(Translated, QGroupBox):
         self.value_changed.emit()
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Limits of the swing"))
+        self.setTitle(self.tr("Acceptance limits"))
         self._all.setText(self.tr("All limits..."))
         self._all.setToolTip(
-            self.tr("Those of verifications, too; a supervisor lays them down.")
+            self.tr(
+                "Acceptance limits of swings and verifications; set by a supervisor."
+            )
         )
         texts = (
-            self.tr("U (k = 2) at most"),
-            self.tr("Images at least"),
-            self.tr("Images at most"),
+            self.tr("Max. expanded uncertainty U (k = 2)"),
+            self.tr("Min. images"),
+            self.tr("Max. images"),
         )
         tips = (
             self.tr(
-                "The swing ends when the tip is as certain as this along its weakest "
-                "direction. Usual: {0} mm."
+                "The swing ends when U of the tip along its weakest direction is "
+                "within this limit. Default: {0} mm."
             ).format(f"{SwingLimits.max_uncertainty:g}"),
             self.tr(
-                "The swing does not end with fewer; no more than the images at most. "
-                "Usual: {0}."
+                "The swing does not end with fewer images. Not above the maximum. "
+                "Default: {0}."
             ).format(SwingLimits.min_images),
             self.tr(
-                "The swing ends with so many in any case; no fewer than the images at "
-                "least. Usual: {0}."
+                "The swing ends at this number of images. Not below the minimum. "
+                "Default: {0}."
             ).format(SwingLimits.max_images),
         )
         for field, label, text, tip in zip(
@@ -379,10 +374,7 @@ def _name_edit() -> QLineEdit:
 
 
 def _panel(group: QGroupBox) -> QGridLayout:
-    layout = QGridLayout(group)
-    layout.setContentsMargins(0, 0, 0, 0)
-    layout.setHorizontalSpacing(2 * GRID)
-    layout.setVerticalSpacing(3 * GRID // 2)
+    layout = grid_layout(group, spacing=(2 * GRID, 3 * GRID // 2))
     layout.setColumnStretch(0, 1)
     layout.setColumnStretch(1, 1)
     return layout

@@ -9,23 +9,23 @@ from typing import TypeVar
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from lightpen.formats.files import printable
-from lightpen.record.acceptance import conclude_accepted
-from lightpen.record.opening import swing_folder
-from lightpen.record.reading import recorded_names, recorded_origin
-from lightpen.record.unfinished import (
-    Unfinished,
+from lightpen.record.results.acceptance import conclude_accepted
+from lightpen.record.results.opening import swing_folder
+from lightpen.record.swings.interrupted import (
+    InterruptedSwings,
     discard_damaged,
     discard_swing,
     find_unfinished,
 )
+from lightpen.record.swings.reading import recorded_names, recorded_origin
 from lightpen.swing.resuming import Resumable, read_resumable
-from lightpen.verification.going_on import abandon_interrupted
-from lightpen.verification.under_way import (
+from lightpen.verification.storage.checkpoint import (
     InterruptedVerification,
-    UnderWay,
+    VerificationCheckpoint,
     find_interrupted,
 )
-from lightpen_app.look.phrases import lack_text, origin_text
+from lightpen.verification.storage.resuming import abandon_interrupted
+from lightpen_app.look.phrases import missing_input_text, origin_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.words import listed
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
@@ -33,6 +33,7 @@ from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
+NOTICE = "start"  # cause of what is to be read
 
 
 class InterruptedControl(QObject):
@@ -47,16 +48,10 @@ class InterruptedControl(QObject):
 
     Signals
     -------
-    notice_raised(str)
-        Why something cannot be gone on with.
-    told(str)
-        What became of what was closed or discarded.
     step_requested(str)
         Key of the step that what is gone on with shows at.
     """
 
-    notice_raised = Signal(str)
-    told = Signal(str)
     step_requested = Signal(str)
 
     def __init__(
@@ -67,14 +62,18 @@ class InterruptedControl(QObject):
         parent: QObject,
     ) -> None:
         super().__init__(parent)
-        self._workbench = workbench
+        self._selection, self._camera = workbench.selection, workbench.camera
+        self._run, self._verification = workbench.run, workbench.verification
+        self._notices = workbench.notifications
+        self._live, self._archive_writer = workbench.live, workbench.archive_writer
+        self._data_folder, self._clock = workbench.folder, workbench.around.now
         self._panel = panel
         self._settle = settle
         self._search: Job | None = None
         self._work: Job | None = None
         self._resumed: Path | None = None
         self._reviewed: Path | None = None
-        self._continued: UnderWay | None = None
+        self._continued: VerificationCheckpoint | None = None
         self._searching = QTimer(self)
         self._searching.setSingleShot(True)
 
@@ -85,11 +84,11 @@ class InterruptedControl(QObject):
         panel.search_requested.connect(self._search_now)
         panel.continue_requested.connect(self._on_continue_requested)
         panel.close_requested.connect(self._on_close_requested)
-        workbench.swing_wanted.connect(self._on_swing_wanted)
+        workbench.run.open_requested.connect(self._on_swing_wanted)
         workbench.run.changed.connect(self._on_run_changed)
-        workbench.run.troubled.connect(self._on_run_troubled)
+        workbench.run.refused.connect(self._on_run_troubled)
         workbench.verification.changed.connect(self._on_verification_changed)
-        workbench.verification.troubled.connect(self._on_verification_troubled)
+        workbench.verification.refused.connect(self._on_verification_troubled)
 
     def search(self) -> None:
         """Look for what has no end, once the window is on the screen."""
@@ -105,7 +104,7 @@ class InterruptedControl(QObject):
     def _search_now(self) -> None:
         if self._search is not None:
             self._search.cancel()
-        run, data = self._workbench.run, self._workbench.folder
+        run, data = self._run, self._data_folder
         archive, folder = run.archive, run.records_folder
 
         def search(_: Report) -> Interrupted:
@@ -114,13 +113,13 @@ class InterruptedControl(QObject):
 
         self._search = Job(search, self)
         self._search.succeeded.connect(self._on_found)
-        self._search.failed.connect(self.notice_raised)
+        self._search.failed.connect(self._tell)
         self._search.start()
 
     def _on_found(self, found: "Interrupted") -> None:
         swings = found.swings
-        present = self._workbench.run.status.record_folder
-        others = Unfinished(
+        present = self._run.status.record_folder
+        others = InterruptedSwings(
             tuple(r for r in swings.interrupted if r.folder != present),
             tuple(r for r in swings.under_way if r.folder != present),
             swings.damaged,
@@ -146,8 +145,11 @@ class InterruptedControl(QObject):
         self._work.ended.connect(partial(self._on_work_ended, self._work))
         self._work.start()
 
+    def _tell(self, sentence: str) -> None:
+        self._notices.tell(NOTICE, sentence)
+
     def _on_work_failed(self, sentence: str) -> None:
-        self.notice_raised.emit(sentence)
+        self._tell(sentence)
         self._on_work_crashed()
 
     def _on_work_crashed(self) -> None:
@@ -162,14 +164,14 @@ class InterruptedControl(QObject):
 
     def _on_resume_requested(self, folder: Path) -> None:
         self._work_on(
-            self.tr("The swing is being read."),
+            self.tr("Reading the swing"),
             lambda _: read_resumable(folder),
             self._on_swing_read,
         )
 
     def _on_swing_wanted(self, path: Path) -> None:
         self._work_on(
-            self.tr("The swing is being read."),
+            self.tr("Reading the swing"),
             lambda _: read_resumable(swing_folder(path)),
             self._on_wanted_read,
         )
@@ -182,64 +184,67 @@ class InterruptedControl(QObject):
         self._panel.set_waiting("")
         self._take_over(swing)
         self._reviewed = swing.record.folder
-        runner = self._workbench.run.runner
+        runner = self._run.runner
         runner.go_on(swing)
         runner.finish()
 
     def _on_swing_read(self, swing: Resumable) -> None:
         self._panel.set_waiting("")
         self._take_over(swing)
-        live = self._workbench.live
+        live = self._live
         if not live.is_open:
-            self._workbench.open_camera()
-        size = self._workbench.preparation.image_size
+            self._camera.open()
+        size = self._selection.preparation.image_size
         if not live.is_open:
-            self.notice_raised.emit(
+            self._notices.tell(
+                self,
                 self.tr(
-                    "No camera is open. Choose the source of the images of this swing "
-                    "at the step Camera: {0}. Then resume the swing here."
-                ).format(_source_text(swing))
+                    "No camera is open. Choose the image source of this swing at "
+                    "the step Camera: {0}. Then resume the swing here."
+                ).format(_source_text(swing)),
             )
-        elif not swing.is_of(self._workbench.preparation.sources):
-            self.notice_raised.emit(
+        elif not swing.is_of(self._selection.preparation.sources):
+            self._notices.tell(
+                self,
                 self.tr(
-                    "The swing was captured with another source of images: {0}. Choose "
+                    "The swing was captured with another image source: {0}. Choose "
                     "that source at the step Camera, then resume the swing here."
-                ).format(_source_text(swing))
+                ).format(_source_text(swing)),
             )
         elif size is not None and not swing.fits(size):
             camera = swing.setup.camera
-            self.notice_raised.emit(
+            self._notices.tell(
+                self,
                 self.tr(
-                    "The camera sends {0} x {1}, the swing was captured with {2} x "
-                    "{3}. Choose its camera at the step Camera, then resume the swing "
-                    "here."
-                ).format(*size, *camera.image_size)
+                    "The image size is {0} x {1} px; the swing was captured with "
+                    "{2} x {3} px. Choose its camera at the step Camera, then "
+                    "resume the swing here."
+                ).format(*size, *camera.image_size),
             )
         else:
             self._resumed = swing.record.folder
-            self._workbench.run.runner.go_on(swing)
+            self._run.runner.go_on(swing)
 
     def _take_over(self, swing: Resumable) -> None:
         """Choose what the swing was captured for, and the camera of its station."""
-        workbench, header = self._workbench, swing.record.header
-        station = workbench.preparation.names.station
+        selection, header = self._selection, swing.record.header
+        station = selection.preparation.names.station
         self._go_to_station(header.station)
         names = recorded_names(swing.record)
         names = replace(names, station=names.station or station)
-        workbench.set_preparation(
-            replace(workbench.preparation, names=names, nominal_tip=header.nominal_tip)
+        selection.set_preparation(
+            replace(selection.preparation, names=names, nominal_tip=header.nominal_tip)
         )
 
     def _go_to_station(self, name: str) -> None:
         """Bring back what was chosen last at a station that is known."""
-        workbench = self._workbench
-        is_other = name != workbench.preparation.names.station
-        if is_other and name in workbench.stations():
-            workbench.choose_station(name)
+        selection = self._selection
+        is_other = name != selection.preparation.names.station
+        if is_other and name in selection.stations():
+            selection.choose_station(name)
 
     def _on_run_changed(self) -> None:
-        status = self._workbench.run.status
+        status = self._run.status
         if status.solution is not None and status.record_folder == self._reviewed:
             self._reviewed = None
             self.step_requested.emit("review")
@@ -258,36 +263,38 @@ class InterruptedControl(QObject):
             discard(folder)
             return folder
 
-        waiting = self.tr("The swing is being discarded.")
+        waiting = self.tr("Discarding the swing")
         self._work_on(waiting, leave, self._on_discarded)
 
     def _on_discarded(self, folder: Path) -> None:
-        self.told.emit(self.tr("Discarded. The images stay in {0}.").format(folder))
+        self._notices.show_status(
+            self.tr("Swing discarded. The images remain in {0}.").format(folder)
+        )
         self._search_now()
 
     # Verifications
 
     def _on_continue_requested(self, found: InterruptedVerification) -> None:
         """Choose what the verification was of, and go on with it."""
-        under_way, workbench = found.under_way, self._workbench
+        under_way, selection = found.under_way, self._selection
         if under_way is None:
             return
         self._settle()
         self._go_to_station(under_way.names.station)
-        workbench.set_preparation(replace(workbench.preparation, names=under_way.names))
-        limits = workbench.choices.limits
-        workbench.set_choices(replace(under_way.choices, limits=limits))
-        lacks = workbench.preparation.lacks()
-        if lacks:
-            self.notice_raised.emit(lack_text(lacks[0]))
+        selection.set_preparation(replace(selection.preparation, names=under_way.names))
+        limits = selection.choices.limits
+        selection.set_choices(replace(under_way.choices, limits=limits))
+        missing_inputs = selection.preparation.missing_inputs()
+        if missing_inputs:
+            self._notices.tell(NOTICE, missing_input_text(missing_inputs[0]))
             return
         self._continued = under_way
-        self._panel.set_waiting(self.tr("The verification is being read."))
-        workbench.verification.runner.go_on(found)
+        self._panel.set_waiting(self.tr("Reading the verification"))
+        self._verification.runner.ask(lambda workflow: workflow.go_on(found))
 
     def _on_verification_changed(self) -> None:
         continued = self._continued
-        status = self._workbench.verification.status
+        status = self._verification.status
         if continued is not None and status.began == continued.began:
             self._continued = None
             self._panel.set_waiting("")
@@ -299,16 +306,18 @@ class InterruptedControl(QObject):
             self._panel.set_waiting("")
 
     def _on_close_requested(self, found: InterruptedVerification) -> None:
-        folder, now = self._workbench.folder, self._workbench.around.now
+        folder, now = self._data_folder, self._clock
         self._work_on(
-            self.tr("The verification is being closed."),
+            self.tr("Closing the verification"),
             lambda _: abandon_interrupted(folder, found, now()),
             self._on_closed,
         )
 
     def _on_closed(self, _: object) -> None:
-        self._workbench.enter_owed()
-        self.told.emit(self.tr("Closed as abandoned; see History."))
+        self._archive_writer.enter_owed()
+        self._notices.show_status(
+            self.tr("Verification closed as abandoned. See History.")
+        )
         self._search_now()
 
 
@@ -316,7 +325,7 @@ class InterruptedControl(QObject):
 class Interrupted:
     """What was found that has no end."""
 
-    swings: Unfinished
+    swings: InterruptedSwings
     verifications: tuple[InterruptedVerification, ...]
 
 

@@ -5,17 +5,18 @@ One that another program captures, or that is damaged, is told of and not offere
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QGroupBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox, QWidget
 from typing_extensions import override
 
-from lightpen.record.reading import Record, recorded_names
-from lightpen.record.unfinished import DamagedSwing, Unfinished
-from lightpen.verification.under_way import InterruptedVerification
+from lightpen.record.swings.interrupted import DamagedSwing, InterruptedSwings
+from lightpen.record.swings.reading import Record, recorded_names
+from lightpen.verification.storage.checkpoint import InterruptedVerification
+from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import n_images_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, breakable, moment_text, shortened
-from lightpen_app.steps.start.waiting_row import RowKind, RowWords, WaitingRow
+from lightpen_app.steps.start.interrupted_item import InterruptedItem, RowKind, RowWords
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
@@ -25,7 +26,7 @@ N_ROWS_SEEN = 2  # the others are scrolled to
 NEVER = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
 
 
-class InterruptedRow(WaitingRow):
+class InterruptedRow(InterruptedItem):
     """One swing without a verdict.
 
     Parameters
@@ -51,7 +52,7 @@ class InterruptedRow(WaitingRow):
         return RowWords(
             self._heading(),
             self._description(),
-            self.tr("Discard it? Its images stay on the disk."),
+            self.tr("Discard this swing? Its images remain on the disk."),
             (self.tr("Resume"), self.tr("Resume the swing of {0}")),
             (self.tr("Discard"), self.tr("Discard the swing of {0}")),
             (self.tr("Keep"), self.tr("Keep the swing of {0}")),
@@ -66,16 +67,16 @@ class InterruptedRow(WaitingRow):
 
     def _description(self) -> str:
         if isinstance(self._swing, DamagedSwing):
-            return breakable(worded(self._swing.sentence))
+            return breakable(worded(self._swing.message))
         if self._kind is RowKind.UNDER_WAY:
-            return self.tr("Another program is capturing it.")
+            return self.tr("In use by another program")
         names, n_images = recorded_names(self._swing), len(self._swing.images)
         called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
         told = (*called, n_images_text(n_images))
         return PARTED.join(filter(None, told))
 
 
-class VerificationRow(WaitingRow):
+class VerificationRow(InterruptedItem):
     """One verification that was interrupted."""
 
     def __init__(
@@ -90,9 +91,9 @@ class VerificationRow(WaitingRow):
         return RowWords(
             self._heading(),
             self._description(),
-            self.tr("Close it as abandoned? All that is kept of it stays."),
+            self.tr("Close this verification as abandoned? Its recorded data remains."),
             (self.tr("Continue"), self.tr("Continue the verification of {0}")),
-            (self.tr("Close it"), self.tr("Close the verification of {0}")),
+            (self.tr("Close verification"), self.tr("Close the verification of {0}")),
             (self.tr("Keep"), self.tr("Keep the verification of {0}")),
         )
 
@@ -135,9 +136,9 @@ class InterruptedPanel(Translated, QGroupBox):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._value = Unfinished()
+        self._value = InterruptedSwings()
         self._verifications: tuple[InterruptedVerification, ...] = ()
-        self._rows: list[WaitingRow] = []
+        self._rows: list[InterruptedItem] = []
         self._why_waiting = ""
 
         # Widgets
@@ -147,12 +148,8 @@ class InterruptedPanel(Translated, QGroupBox):
         self._again = PushButton()
 
         # Layout
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._hint)
-        layout.addWidget(self._scroll)
-        layout.addWidget(self._again, 0, Qt.AlignmentFlag.AlignLeft)
+        left = Qt.AlignmentFlag.AlignLeft
+        vertical_layout(self, self._hint, self._scroll, (self._again, 0, left))
 
         # Connections
         self._again.clicked.connect(self.search_requested)
@@ -160,13 +157,13 @@ class InterruptedPanel(Translated, QGroupBox):
         self.hide()
         self._retranslate()
 
-    def value(self) -> Unfinished:
+    def value(self) -> InterruptedSwings:
         """Return the swings that are listed."""
         return self._value
 
     def set_value(
         self,
-        swings: Unfinished,
+        swings: InterruptedSwings,
         verifications: tuple[InterruptedVerification, ...] = (),
     ) -> None:
         """List these swings and verifications."""
@@ -180,12 +177,7 @@ class InterruptedPanel(Translated, QGroupBox):
         for row in self._rows:
             row.set_waiting(self._why_waiting)
         content = QWidget()
-        layout = QVBoxLayout(content)
-        layout.setContentsMargins(0, 0, GRID, 0)
-        layout.setSpacing(GRID)
-        for row in self._rows:
-            layout.addWidget(row)
-        layout.addStretch(1)
+        vertical_layout(content, *self._rows, 1, margins=(0, 0, GRID, 0))
         self._scroll.setWidget(content)
         can_go_on = any(each.under_way is not None for each in verifications)
         self._hint.setVisible(bool(swings.interrupted) or can_go_on)
@@ -199,7 +191,7 @@ class InterruptedPanel(Translated, QGroupBox):
         super().resizeEvent(event)
         self._hold_rows()
 
-    def rows(self) -> tuple[WaitingRow, ...]:
+    def rows(self) -> tuple[InterruptedItem, ...]:
         """Return the rows: what is offered, under way, and damaged."""
         return tuple(self._rows)
 
@@ -232,10 +224,8 @@ class InterruptedPanel(Translated, QGroupBox):
 
     def _retranslate(self) -> None:
         self.setTitle(self._title())
-        self._hint.setText(
-            self.tr("Resumed, it has all its images and the files it began with.")
-        )
-        self._again.setText(self.tr("Look again"))
+        self._hint.setText(self.tr("A resumed swing keeps its images and its files."))
+        self._again.setText(self.tr("Search again"))
 
     def _title(self) -> str:
         n_rows, n_verifications = len(self._rows), len(self._verifications)

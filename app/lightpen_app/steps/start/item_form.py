@@ -11,20 +11,17 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
     QGridLayout,
-    QHBoxLayout,
     QLabel,
     QLineEdit,
-    QVBoxLayout,
     QWidget,
 )
 
-from lightpen.record.library_changes import read_kept_picture, read_picture
-from lightpen.record.tip_library import (
+from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
+from lightpen.record.library.library_changes import read_kept_picture, read_picture
+from lightpen.record.library.tip_library import (
     LARGEST_BALL,
     LARGEST_CHANGE,
     LONGEST_ID,
-    MOST_DAYS,
-    MOST_SWINGS,
     AnyItem,
     AxisOrigin,
     ItemKind,
@@ -32,11 +29,12 @@ from lightpen.record.tip_library import (
     ListedPen,
     ListedTip,
 )
+from lightpen_app.look.layouts import GridPlace, fill, grid_layout, horizontal_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.steps.start.point_field import AXES, PointField
+from lightpen_app.steps.start.fields import AXES, PointField
 from lightpen_app.steps.start.tip_picture import ReadPicture, TipPicture
 from lightpen_app.widgets.date_field import DateField
-from lightpen_app.widgets.labelled import field_label, stacked
+from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
@@ -105,33 +103,24 @@ class ItemForm(Translated, QWidget):
         }
 
         # Layout
-        axis = QHBoxLayout(self._axis_row)
-        axis.setContentsMargins(0, 0, 0, 0)
-        axis.setSpacing(GRID)
-        for name, field in zip(AXES, self._axis, strict=True):
-            axis.addWidget(QLabel(name))
-            axis.addWidget(field, 1)
-        axis.addWidget(self._spin)
+        grid = grid_layout(self, spacing=(2 * GRID, GRID))
+        self._add(grid, self._id, at=(0, 0))
+        self._add(grid, self._due, at=(0, 1))
+        self._add(grid, self._note, at=(0, 2, 1, 2))
         self._tip_only = QWidget()
-        grid = QGridLayout(self)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setHorizontalSpacing(2 * GRID)
-        grid.setVerticalSpacing(GRID)
-        grid.addLayout(self._stacked(self._id), 0, 0)
-        grid.addLayout(self._stacked(self._due), 0, 1)
-        grid.addLayout(self._stacked(self._note), 0, 2, 1, 2)
         grid.addWidget(self._tip_only, 1, 0, 1, 4)
-        inner = QGridLayout(self._tip_only)
-        inner.setContentsMargins(0, 0, 0, 0)
-        inner.setHorizontalSpacing(2 * GRID)
-        inner.setVerticalSpacing(GRID)
+        inner = grid_layout(self._tip_only, spacing=(2 * GRID, GRID))
         for column, field in enumerate(own):
-            inner.addLayout(self._stacked(field), 0, column)
-        inner.addLayout(self._stacked(self._nominal), 1, 0, 1, 3)
+            self._add(inner, field, at=(0, column))
+        self._add(inner, self._nominal, at=(1, 0, 1, 3))
         inner.addWidget(self._has_axis, 2, 0, 1, 3)
         inner.addWidget(self._axis_row, 3, 0, 1, 3)
+        axis = horizontal_layout(self._axis_row)
+        for name, field in zip(AXES, self._axis, strict=True):
+            fill(axis, QLabel(name), (field, 1))
+        fill(axis, self._spin)
         inner.addWidget(self._spin_told, 4, 0, 1, 3)
-        inner.addLayout(self._stacked(self._picture), 5, 0, 1, 3)
+        self._add(inner, self._picture, at=(5, 0, 1, 3))
         inner.addWidget(self._preview, 1, 3, 5, 1, Qt.AlignmentFlag.AlignCenter)
         for layout in (grid, inner):
             for column in range(4):
@@ -249,7 +238,9 @@ class ItemForm(Translated, QWidget):
 
     def _name_spin(self) -> None:
         spins = self._spin.isChecked()
-        self._spin.setText(self.tr("End the spin") if spins else self.tr("By a spin"))
+        self._spin.setText(
+            self.tr("Stop rotation") if spins else self.tr("Determine by rotation")
+        )
 
     def _on_browse_clicked(self) -> None:
         self._picture.pick(
@@ -266,38 +257,38 @@ class ItemForm(Translated, QWidget):
         given = partial(read_picture, Path(path)) if path else None
         self._preview.set_value(given or kept)
 
-    def _stacked(self, field: QWidget) -> QVBoxLayout:
-        return stacked(self._labels[field], field)
+    def _add(self, grid: QGridLayout, field: QWidget, at: GridPlace) -> None:
+        add_labelled(grid, self._labels[field], field, at=at)
 
     def _retranslate(self) -> None:
-        nothing = self.tr("not known")
-        usual = self.tr("as the station")
+        nothing = self.tr("Not specified")
+        usual = self.tr("As for the station")
         texts: dict[QWidget, str] = {
-            self._id: self.tr("Id, as on its label"),
-            self._due: self.tr("To be used until"),
+            self._id: self.tr("ID (as on label)"),
+            self._due: self.tr("Expiry date"),
             self._ball: self.tr("Ball diameter"),
-            self._change: self.tr("Change at most"),
-            self._days: self.tr("Days in force at most"),
-            self._swings: self.tr("Swings of its pen at most"),
-            self._nominal: self.tr("Nominal centre of the tip"),
+            self._change: self.tr("Max. change since last calibration"),
+            self._days: self.tr("Calibration interval (days)"),
+            self._swings: self.tr("Max. swings of the pen"),
+            self._nominal: self.tr("Nominal tip centre"),
             self._picture: self.tr("Picture"),
-            self._note: self.tr("Note"),
+            self._note: self.tr("Comment"),
         }
         for field, text in texts.items():
             self._labels[field].setText(text)
             named = self._picture.edit() if field is self._picture else field
             named.setAccessibleName(text)
         self._due.setToolTip(
-            self.tr("The last day, such as {0}; empty for no end.").format(
+            self.tr("Last day of use, for example {0}; empty for none").format(
                 date(2026, 8, 14)
             )
         )
         self._ball.setSpecialValueText(nothing)
-        self._change.setSpecialValueText(self.tr("no limit"))
+        self._change.setSpecialValueText(self.tr("No limit"))
         self._change.setToolTip(
             self.tr(
-                "How far a calibration may find the tip from where it was. Beyond it, "
-                "the tip is to be checked."
+                "Max. distance of the tip from its previous calibration. Beyond it, "
+                "the result needs checking."
             )
         )
         for field in (self._days, self._swings):
@@ -310,8 +301,8 @@ class ItemForm(Translated, QWidget):
         self._name_spin()
         self._spin.setToolTip(
             self.tr(
-                "Find the axis: the tip rests in the cone, and the pen is turned about "
-                "its stylus before the camera."
+                "Determine the axis: turn the pen about its stylus in view of the "
+                "camera, with the tip in the cone."
             )
         )
         self._browse.setText(self.tr("Browse..."))

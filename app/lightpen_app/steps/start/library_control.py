@@ -10,22 +10,22 @@ from PySide6.QtWidgets import QWidget
 
 from lightpen.errors import CalibrationError
 from lightpen.model.origin import Origin
-from lightpen.record.library_changes import (
+from lightpen.record.library.library_changes import (
     Author,
     add_item,
     change_item,
     keep_picture,
 )
-from lightpen.record.tip_library import AnyItem, ItemKind, Library, ListedTip
+from lightpen.record.library.tip_library import AnyItem, ItemKind, Library, ListedTip
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.words import shortened
 from lightpen_app.steps.start.barcode import BarcodeListener
+from lightpen_app.steps.start.fields import ItemChoice
 from lightpen_app.steps.start.form import NamesForm
-from lightpen_app.steps.start.item_button import ItemChoice
-from lightpen_app.steps.start.library_dialog import Asked, LibraryDialog
+from lightpen_app.steps.start.library_dialog import LibraryDialog, RequestedChange
 from lightpen_app.steps.start.spin_recorder import SpinRecorder
 from lightpen_app.widgets.question_bar import Question, QuestionBar
-from lightpen_app.widgets.standing_mark import standing_remark
+from lightpen_app.widgets.status_mark import status_message
 from lightpen_app.work.workbench import Workbench
 
 
@@ -45,12 +45,9 @@ class LibraryControl(QObject):
     -------
     chosen(ItemKind, str)
         An item was chosen, in a list, in the dialog or by its barcode.
-    told(str)
-        What a barcode came to.
     """
 
     chosen = Signal(object, str)
-    told = Signal(str)
 
     def __init__(
         self,
@@ -61,7 +58,9 @@ class LibraryControl(QObject):
     ) -> None:
         super().__init__(page)
         self._page = page
-        self._workbench = workbench
+        self._selection = workbench.selection
+        self._notices = workbench.notifications
+        self._folder, self._clock = workbench.folder, workbench.around.now
         self._watch = workbench.library
         self._names = names
         self._question = question
@@ -81,14 +80,14 @@ class LibraryControl(QObject):
 
     def refresh(self) -> None:
         """Show the library as it is now, for the pen that is chosen."""
-        standings, pen = self._watch.standings, self._workbench.preparation.names.pen
+        statuses, pen = self._watch.statuses, self._selection.preparation.names.pen
         for kind in ItemKind:
             self._names.set_choices(kind, self._choices(kind, pen))
         if self._watch.library.tip_of_code(self._unknown) is not None:
             self._question.hide()
-        is_guarded = self._workbench.supervision.is_guarded
+        is_guarded = self._selection.supervision.is_guarded
         if self._dialog is not None:
-            self._dialog.set_value(standings, pen, is_guarded=is_guarded)
+            self._dialog.set_value(statuses, pen, is_guarded=is_guarded)
 
     def open(self, kind: ItemKind = ItemKind.TIP) -> LibraryDialog:
         """Show the dialog."""
@@ -104,7 +103,7 @@ class LibraryControl(QObject):
         return self._watch.library.tips.get(name)
 
     def _made_dialog(self) -> LibraryDialog:
-        dialog = LibraryDialog(self._workbench.folder, self._page)
+        dialog = LibraryDialog(self._folder, self._page)
 
         # Connections
         self._watch.change_kept.connect(dialog.tell_kept)
@@ -126,21 +125,21 @@ class LibraryControl(QObject):
             x, y, z = self._spin.fit().axis_pen.tolist()
         except CalibrationError as error:
             if form is not None:
-                form.tell_spin(worded(error.sentence))
+                form.tell_spin(worded(error.message))
         else:
             if form is not None:
                 form.set_spun_axis((x, y, z))
 
     def _choices(self, kind: ItemKind, pen: str) -> tuple[ItemChoice, ...]:
         """Return the items that can be chosen; a simulated tip is never due."""
-        found, standings = [], self._watch.standings
-        is_simulated = self._workbench.preparation.origin is Origin.SIMULATED
+        found, statuses = [], self._watch.statuses
+        is_simulated = self._selection.preparation.origin is Origin.SIMULATED
         for item in self._watch.library.items(kind).values():
-            standing = standings.of_item(kind, item.id)
+            standing = statuses.of_item(kind, item.id)
             if kind is ItemKind.TIP and not is_simulated:
-                standing = standings.of_tip(pen, item.id) or standing
+                standing = statuses.of_tip(pen, item.id) or standing
             if not item.is_retired:
-                found.append(ItemChoice(item.id, standing_remark(standing)))
+                found.append(ItemChoice(item.id, status_message(standing)))
         return tuple(found)
 
     def _on_scanned(self, code: str) -> None:
@@ -153,36 +152,40 @@ class LibraryControl(QObject):
             return
         self._question.hide()
         if tip.is_retired:
-            self.told.emit(
+            self._notices.show_status(
                 self.tr("Tip {0} is retired: {1}").format(
-                    tip.id, tip.note or self.tr("choose another one.")
+                    tip.id, tip.note or self.tr("choose another tip.")
                 )
             )
             return
         self.chosen.emit(ItemKind.TIP, tip.id)
-        self.told.emit(self.tr("Tip {0}, by its barcode.").format(tip.id))
+        self._notices.show_status(
+            self.tr("Tip {0} selected by barcode.").format(tip.id)
+        )
 
     def _asking(self) -> Question:
-        words = self.tr("There is no tip {0} in the library. Add it?")
+        words = self.tr("Tip {0} is not in the tip library. Add it?")
         asked = words.format(shortened(self._unknown))
-        return Question(asked, self.tr("Add it"), self.tr("Not now"))
+        return Question(asked, self.tr("Add tip"), self.tr("Not now"))
 
     def _on_agreed(self) -> None:
         self.open().add(self._unknown, ItemKind.TIP)
 
-    def _on_change_asked(self, asked: Asked) -> None:
-        names = self._workbench.preparation.names
+    def _on_change_asked(self, asked: RequestedChange) -> None:
+        names = self._selection.preparation.names
         by = Author(names.station, names.operator, asked.reason, asked.signature)
-        folder, now = self._workbench.folder, self._workbench.around.now
+        folder, now = self._folder, self._clock
         self._watch.change(asked, lambda: _changed(folder, asked, by, now()))
 
-    def _on_change_failed(self, asked: Asked, why: str) -> None:
+    def _on_change_failed(self, asked: RequestedChange, why: str) -> None:
         """Say it in the dialog, or on the page if that was left meanwhile."""
         if self._dialog is None or not self._dialog.tell_refused(asked, why):
-            self.told.emit(why)
+            self._notices.show_status(why)
 
 
-def _changed(folder: Path, asked: Asked, by: Author, now: datetime) -> Library:
+def _changed(
+    folder: Path, asked: RequestedChange, by: Author, now: datetime
+) -> Library:
     """Make a change; its picture first."""
     item: AnyItem = asked.item
     if asked.picture and isinstance(item, ListedTip):

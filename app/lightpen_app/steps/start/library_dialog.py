@@ -11,16 +11,15 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
     QFrame,
-    QHBoxLayout,
     QTabBar,
-    QVBoxLayout,
     QWidget,
 )
 from typing_extensions import override
 
-from lightpen.record.standing import Standings, TipStanding
-from lightpen.record.supervision import Signature
-from lightpen.record.tip_library import AnyItem, ItemKind, ListedTip
+from lightpen.record.library.calibration_status import StationStatus, TipStatus
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.tip_library import AnyItem, ItemKind, ListedTip
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.words import PARTED
@@ -29,8 +28,8 @@ from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.row_table import ROW_HEIGHT, RowTable
-from lightpen_app.widgets.sign_label import Remark, SignLabel
-from lightpen_app.widgets.standing_mark import standing_remark
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
+from lightpen_app.widgets.status_mark import status_message
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
 from lightpen_app.widgets.translated import Translated
 
@@ -44,7 +43,7 @@ LONGEST_REASON = 200  # characters
 
 
 @dataclass(frozen=True)
-class Asked:
+class RequestedChange:
     """A change that is asked for.
 
     Attributes
@@ -86,12 +85,14 @@ class LibraryDialog(Translated, QDialog):
         super().__init__(parent)
         self._folder = folder
         self._pictured: ListedTip | None = None
-        self._standings = Standings()
+        self._statuses = StationStatus()
         self._pen = ""
         self._is_guarded = False
         self._item: AnyItem | None = None  # that is being added or changed
         self._is_new = False
-        self._asked: Asked | None = None  # of which it is not known if it is kept
+        self._asked: RequestedChange | None = (
+            None  # of which it is not known if it is kept
+        )
 
         # Widgets
         self._lead = text_label(TextSize.BODY)
@@ -115,47 +116,30 @@ class LibraryDialog(Translated, QDialog):
         self._reason = EnterEdit()
         self._reason.setMaxLength(LONGEST_REASON)
         self._supervisor = SupervisorFields()
-        self._trouble = SignLabel()
+        self._fault = SignLabel()
         self._save, self._leave = PushButton(), PushButton()
         self._save.setDefault(True)
 
         # Layout
         self._list = QWidget()
-        top = QHBoxLayout()
-        top.addWidget(self._tabs, 1)
-        top.addWidget(self._retired)
-        buttons = QHBoxLayout()
-        buttons.setSpacing(GRID)
-        for button in (self._use, self._add, self._edit, self._retire):
-            buttons.addWidget(button)
-        buttons.addStretch(1)
-        buttons.addWidget(self._close)
-        ends = QHBoxLayout()
-        ends.setSpacing(GRID)
-        ends.addWidget(self._reason, 1)
-        ends.addWidget(self._leave)
-        ends.addWidget(self._save)
-        panel = QVBoxLayout(self._panel)
-        panel.setContentsMargins(2 * GRID, GRID, 2 * GRID, GRID)
-        panel.setSpacing(GRID)
-        for widget in (self._what, self._form, self._supervisor, self._trouble):
-            panel.addWidget(widget)
-        panel.addLayout(ends)
-        listed = QVBoxLayout(self._list)
-        listed.setContentsMargins(0, 0, 0, 0)
-        listed.setSpacing(GRID)
-        listed.addWidget(self._lead)
-        listed.addLayout(top)
-        shown = QHBoxLayout()
-        shown.setSpacing(2 * GRID)
-        shown.addWidget(self._table, 1)
-        shown.addWidget(self._picture, 0, Qt.AlignmentFlag.AlignTop)
-        listed.addLayout(shown, 1)
-        listed.addLayout(buttons)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(2 * GRID, GRID, 2 * GRID, GRID)
-        layout.addWidget(self._list, 1)
-        layout.addWidget(self._panel)
+        margins = (2 * GRID, GRID, 2 * GRID, GRID)
+        vertical_layout(
+            *(self, (self._list, 1), self._panel), spacing=-1, margins=margins
+        )
+        listed = vertical_layout(self._list, self._lead)
+        horizontal_layout(listed, (self._tabs, 1), self._retired, spacing=-1)
+        top = Qt.AlignmentFlag.AlignTop
+        horizontal_layout(
+            *(listed, (self._table, 1), (self._picture, 0, top)),
+            spacing=2 * GRID,
+            stretch=1,
+        )
+        horizontal_layout(
+            *(listed, self._use, self._add, self._edit, self._retire, 1, self._close)
+        )
+        parts = (self._what, self._form, self._supervisor, self._fault)
+        panel = vertical_layout(self._panel, *parts, margins=margins)
+        horizontal_layout(panel, (self._reason, 1), self._leave, self._save)
         self.setMinimumWidth(112 * GRID)
 
         # Connections
@@ -194,7 +178,7 @@ class LibraryDialog(Translated, QDialog):
         """Show the items of another kind."""
         self._tabs.setCurrentIndex(KINDS.index(kind))
 
-    def set_value(self, standings: Standings, pen: str, *, is_guarded: bool) -> None:
+    def set_value(self, statuses: StationStatus, pen: str, *, is_guarded: bool) -> None:
         """Show how all items stand; tips on a pen, if one is named.
 
         Parameters
@@ -202,26 +186,26 @@ class LibraryDialog(Translated, QDialog):
         is_guarded : bool
             Whether a supervisor has to sign each change.
         """
-        self._standings, self._pen, self._is_guarded = standings, pen, is_guarded
+        self._statuses, self._pen, self._is_guarded = statuses, pen, is_guarded
         self._fill()
 
     def add(self, name: str, kind: ItemKind | None = None) -> None:
         """Ask for a new item, with an id that may be known already."""
         self.set_kind(kind or self.kind())
         made = structs.replace(MADE[self.kind()](id="?"), id=name)
-        self._start_editing(made, self.tr("A new one"), is_new=True)
+        self._start_editing(made, self.tr("New item"), is_new=True)
 
-    def tell_kept(self, asked: Asked) -> None:
+    def tell_kept(self, asked: RequestedChange) -> None:
         """Show that what was asked for is done, if that is still waited for."""
         if asked is self._asked:
             self._stop_editing()
 
-    def tell_refused(self, asked: Asked, trouble: str) -> bool:
+    def tell_refused(self, asked: RequestedChange, trouble: str) -> bool:
         """Say why it was not; return whether that is still waited for."""
         if asked is not self._asked:
             return False
         self._asked = None
-        self._trouble.set_value(Remark(trouble, Sign.CROSS, Tone.BAD))
+        self._fault.set_value(StatusMessage(trouble, Sign.CROSS, Tone.BAD))
         self._refresh()
         return True
 
@@ -239,10 +223,10 @@ class LibraryDialog(Translated, QDialog):
         if not at.isValid():
             return None
         name = self._model.item(at.row(), 0).text()
-        return self._standings.library.item(self.kind(), name)
+        return self._statuses.library.item(self.kind(), name)
 
     def _fill(self) -> None:
-        present, library = self.current(), self._standings.library
+        present, library = self.current(), self._statuses.library
         self._model.removeRows(0, self._model.rowCount())
         for item in library.items(self.kind()).values():
             if self._retired.isChecked() or not item.is_retired:
@@ -260,16 +244,16 @@ class LibraryDialog(Translated, QDialog):
         )
 
     def _row(self, item: AnyItem) -> list[QStandardItem]:
-        standing, due = self._standings.of_item(item.kind, item.id), item.due
+        standing, due = self._statuses.of_item(item.kind, item.id), item.due
         ball, change, pens = "", "", ""
         if isinstance(item, ListedTip):
             ball = "" if item.ball_diameter_mm is None else f"{item.ball_diameter_mm:g}"
             change = "" if item.max_change_mm is None else f"{item.max_change_mm:g}"
-            pens = PARTED.join(self._standings.pens_of(item.id))
-            if self._pen and standing is not TipStanding.RETIRED:
-                standing = self._standings.of_tip(self._pen, item.id)
-                due = self._standings.due(self._pen, item.id) or due
-        remark = standing_remark(standing)
+            pens = PARTED.join(self._statuses.pens_of(item.id))
+            if self._pen and standing is not TipStatus.RETIRED:
+                standing = self._statuses.of_tip(self._pen, item.id)
+                due = self._statuses.due(self._pen, item.id) or due
+        remark = status_message(standing)
         texts = (
             *(item.id, remark.text, "" if due is None else f"{due}"),
             *(ball, change, pens, item.note),
@@ -292,7 +276,7 @@ class LibraryDialog(Translated, QDialog):
         self._reason.clear()
         self._supervisor.clear()
         self._supervisor.setVisible(self._is_guarded)
-        self._trouble.set_value(Remark())
+        self._fault.set_value(StatusMessage())
         self._list.hide()  # both are too high for a low screen
         self._panel.show()
         self._refresh()
@@ -324,7 +308,7 @@ class LibraryDialog(Translated, QDialog):
         back = item.is_retired
         self._item = structs.replace(item, is_retired=not back)
         self._is_new = False
-        words = self.tr("Bring {0} back") if back else self.tr("Retire {0}")
+        words = self.tr("Reactivate {0}") if back else self.tr("Retire {0}")
         self._what.setText(words.format(item.id))
         self._form.hide()
         self._open_panel()
@@ -345,10 +329,10 @@ class LibraryDialog(Translated, QDialog):
         self._form.stop_spin()
         item = self._form.value() if is_typed else self._item
         signature = self._supervisor.value() if self._is_guarded else None
-        self._trouble.set_value(Remark())
+        self._fault.set_value(StatusMessage())
         picture = self._form.picture() if is_typed else ""
         reason = self._reason.text().strip()
-        self._asked = Asked(item, picture, self._is_new, reason, signature)
+        self._asked = RequestedChange(item, picture, self._is_new, reason, signature)
         self._refresh()
         self.change_asked.emit(self._asked)
 
@@ -363,26 +347,28 @@ class LibraryDialog(Translated, QDialog):
     def _refresh(self) -> None:
         item = self.current()
         self._show_picture(item)
-        nothing = "" if item is not None else self.tr("Choose one in the table.")
+        nothing = "" if item is not None else self.tr("Select an item in the table.")
         is_retired = item is not None and item.is_retired
-        why_not = self.tr("It is retired.") if is_retired else nothing
-        self._use.set_why_not(why_not, self.tr("Calibrate with it"))
-        self._edit.set_why_not(nothing, self.tr("Change what is said of it"))
-        self._retire.set_why_not(nothing, self.tr("It stays known either way"))
+        why_not = self.tr("This item is retired.") if is_retired else nothing
+        self._use.set_why_not(why_not, self.tr("Use this item for calibration"))
+        self._edit.set_why_not(nothing, self.tr("Edit this item"))
+        self._retire.set_why_not(nothing, self.tr("Retired items stay in the archive"))
         self._retire.setText(
-            self.tr("Bring back...") if is_retired else self.tr("Retire...")
+            self.tr("Reactivate...") if is_retired else self.tr("Retire...")
         )
         is_typed = not self._form.isHidden()
-        lacks = ""
+        missing_inputs = ""
         if is_typed and not self._form.has_id():
-            lacks = self.tr("Enter an id.")
+            missing_inputs = self.tr("Enter an ID.")
         elif is_typed and not self._form.has_day():
-            lacks = self.tr("Enter a day such as 2026-08-14, or none.")
-        if not lacks and self._is_guarded and not self._supervisor.is_filled():
-            lacks = self.tr("A supervisor signs each change.")
-        is_asked = self.tr("It is being kept.") if self._asked is not None else ""
+            missing_inputs = self.tr(
+                "Enter a date such as 2026-08-14, or leave it empty."
+            )
+        if not missing_inputs and self._is_guarded and not self._supervisor.is_filled():
+            missing_inputs = self.tr("Changes need a supervisor's signature.")
+        is_asked = self.tr("Saving") if self._asked is not None else ""
         self._save.set_why_not(
-            is_asked or lacks, self.tr("With your name and the time")
+            is_asked or missing_inputs, self.tr("Saved with your name and the time")
         )
         self._leave.set_why_not(is_asked)
 
@@ -391,8 +377,8 @@ class LibraryDialog(Translated, QDialog):
         self.setWindowTitle(self.tr("Tip library"))
         self._lead.setText(
             self.tr(
-                "Pens, tips and cones with their limits. Each change is kept with name "
-                "and time, and entered in the archive."
+                "Pens, tips and cones with their limits. Each change is recorded in "
+                "the archive with name and time."
             )
         )
         names = {
@@ -404,9 +390,9 @@ class LibraryDialog(Translated, QDialog):
             self._tabs.setTabText(index, names[kind])
         self._model.setHorizontalHeaderLabels(
             [
-                *(self.tr("Id"), self.tr("State"), self.tr("Until")),
+                *(self.tr("ID"), self.tr("State"), self.tr("Expiry date")),
                 *(self.tr("Ball / mm"), self.tr("Change / mm")),
-                *(self.tr("Calibrated on pens"), self.tr("Note")),
+                *(self.tr("Calibrated on pens"), self.tr("Comment")),
             ]
         )
         for column in NUMBERS:
@@ -416,14 +402,14 @@ class LibraryDialog(Translated, QDialog):
             self._table.setColumnWidth(column, width * GRID)
             self._table.setColumnHidden(column, 3 <= column <= 5 and not is_tips)
         self._table.setAccessibleName(names[self.kind()])
-        self._retired.setText(self.tr("Show retired ones"))
+        self._retired.setText(self.tr("Show retired items"))
         self._use.setText(self.tr("Choose"))
         self._add.setText(self.tr("Add..."))
         self._edit.setText(self.tr("Change..."))
         self._close.setText(self.tr("Close"))
-        self._save.setText(self.tr("Keep"))
-        self._leave.setText(self.tr("Leave it"))
-        reason = self.tr("Why, for the archive")
+        self._save.setText(self.tr("Save"))
+        self._leave.setText(self.tr("Cancel"))
+        reason = self.tr("Reason for change")
         self._reason.setPlaceholderText(reason)
         self._reason.setAccessibleName(reason)
         self._fill()

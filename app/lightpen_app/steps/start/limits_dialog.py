@@ -1,33 +1,21 @@
 """The limits of a station, laid down by a supervisor."""
 
-from dataclasses import fields, replace
-
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import (
-    QDialog,
-    QDialogButtonBox,
-    QGridLayout,
-    QLabel,
-    QLineEdit,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLineEdit, QWidget
 from typing_extensions import override
 
-from lightpen.model.due_rule import MOST_DAYS, MOST_SWINGS, DueRule
-from lightpen.model.limits import StationLimits, VerificationLimits
+from lightpen.model.limits import LIMITS, StationLimits
+from lightpen.record.library.supervision import Signature, Supervision, save_limits
+from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.steps.start.form import LEAST_IMAGES, MOST_IMAGES
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
 from lightpen_app.widgets.translated import Translated
-
-SMALLEST, LARGEST = 0.0001, 10.0  # mm
-SWING = ("max_uncertainty", "min_images", "max_images")
-VERIFICATION = tuple(item.name for item in fields(VerificationLimits))
-DUE = {"max_days": (1, MOST_DAYS), "max_swings": (0, MOST_SWINGS)}
+from lightpen_app.work.job import Job
+from lightpen_app.work.workbench import Workbench
 
 
 class LimitsDialog(Translated, QDialog):
@@ -49,51 +37,35 @@ class LimitsDialog(Translated, QDialog):
 
         # Widgets
         self._lead = text_label(TextSize.BODY)
-        counts = (LEAST_IMAGES, MOST_IMAGES)
         self._fields = {
-            name: NumberField("", counts, 0)
-            if name.endswith("images")
-            else NumberField("mm", (SMALLEST, LARGEST), 4)
-            for name in (*SWING, *VERIFICATION)
+            limit.key: NumberField(limit.unit, limit.range, 4 if limit.unit else 0)
+            for limit in LIMITS
         }
-        self._fields |= {name: NumberField("", most, 0) for name, most in DUE.items()}
-        self._labels: dict[str, QLabel] = {}
-        for name, field in self._fields.items():
-            label = text_label(TextSize.SMALL, Tone.QUIET)
+        self._labels = [text_label(TextSize.SMALL, Tone.QUIET) for _ in LIMITS]
+        for label, field in zip(self._labels, self._fields.values(), strict=True):
             label.setBuddy(field)
-            self._labels[name] = label
         self._signing = text_label(TextSize.SMALL, Tone.QUIET)
         self._supervisor = SupervisorFields()
         self._new_password = QLineEdit()
         self._new_password.setEchoMode(QLineEdit.EchoMode.Password)
-        self._trouble = SignLabel()
+        self._fault = SignLabel()
         standard = QDialogButtonBox.StandardButton
         self._buttons = QDialogButtonBox(standard.Save | standard.Close)
         self._save = self._buttons.button(standard.Save)
 
         # Layout
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(2 * GRID)
-        grid.setVerticalSpacing(GRID // 2)
+        layout = vertical_layout(self, self._lead, spacing=2 * GRID, margins=3 * GRID)
+        grid = grid_layout(layout, spacing=(2 * GRID, GRID // 2))
         for column in (0, 2):
             grid.setColumnStretch(column, 1)
         n_rows = (len(self._fields) + 1) // 2
-        for index, (name, field) in enumerate(self._fields.items()):
+        for index, field in enumerate(self._fields.values()):
             column, row = divmod(index, n_rows)
-            grid.addWidget(self._labels[name], row, 2 * column)
+            grid.addWidget(self._labels[index], row, 2 * column)
             grid.addWidget(field, row, 2 * column + 1)
-        layout = QVBoxLayout(self)
-        margin = 3 * GRID
-        layout.setContentsMargins(margin, margin, margin, margin)
-        layout.setSpacing(2 * GRID)
-        layout.addWidget(self._lead)
-        layout.addLayout(grid)
-        layout.addWidget(self._signing)
-        layout.addWidget(self._supervisor)
-        layout.addWidget(self._new_password)
-        layout.addWidget(self._trouble)
-        layout.addWidget(self._buttons)
-        self.setMinimumWidth(96 * GRID)
+        fill(layout, self._signing, self._supervisor, self._new_password)
+        fill(layout, self._fault, self._buttons)
+        self.setMinimumWidth(112 * GRID)
 
         # Connections
         self._supervisor.value_edited.connect(self._refresh)
@@ -107,40 +79,28 @@ class LimitsDialog(Translated, QDialog):
 
     def value(self) -> StationLimits:
         """Return the limits as they are typed."""
-        typed = {name: field.value() for name, field in self._fields.items()}
-        least, most = sorted(round(typed[name]) for name in SWING[1:])
-        swing = replace(
-            self._value.swing,
-            max_uncertainty=typed["max_uncertainty"],
-            min_images=least,
-            max_images=most,
-        )
-        own = {name: typed[name] for name in VERIFICATION}
-        due = DueRule(*(round(typed[name]) for name in DUE))
-        return StationLimits(swing, VerificationLimits(**own), due)
+        typed = {key: field.value() for key, field in self._fields.items()}
+        counts = sorted((typed["min_images"], typed["max_images"]))
+        typed["min_images"], typed["max_images"] = counts
+        return self._value.with_values(typed)
 
     def set_value(self, limits: StationLimits, *, is_guarded: bool) -> None:
         """Show limits, and whether there is a password already."""
         self._value, self._is_guarded = limits, is_guarded
-        for part, names in (
-            (limits.swing, SWING),
-            (limits.verification, VERIFICATION),
-            (limits.due, DUE),
-        ):
-            for name in names:
-                self._fields[name].setValue(getattr(part, name))
+        for limit in LIMITS:
+            self._fields[limit.key].setValue(limits.value(limit))
         self._supervisor.clear()
         self._new_password.clear()
         self._new_password.setVisible(is_guarded)
         self._is_signed = False
-        self._trouble.set_value(Remark())
+        self._fault.set_value(StatusMessage())
         self._retranslate()
         self._refresh()
 
     def tell(self, trouble: str) -> None:
         """Say why nothing was laid down."""
         self._is_signed = False
-        self._trouble.set_value(Remark(trouble, Sign.CROSS, Tone.BAD))
+        self._fault.set_value(StatusMessage(trouble, Sign.CROSS, Tone.BAD))
         self._supervisor.clear_password()
 
     def _refresh(self) -> None:
@@ -158,52 +118,83 @@ class LimitsDialog(Translated, QDialog):
 
     @override
     def _retranslate(self) -> None:
-        self.setWindowTitle(self.tr("Limits of the station"))
+        self.setWindowTitle(self.tr("Acceptance limits of the station"))
         self._lead.setText(
             self.tr(
-                "What lies beyond them, only a supervisor can accept, with a reason. "
-                "Each change is kept with name and time."
+                "Results outside these limits need a supervisor's approval and a "
+                "reason. Each change is recorded with name and time."
             )
         )
         self._signing.setText(
-            self.tr("Sign with the supervisor's password.")
+            self.tr("Sign with the supervisor password.")
             if self._is_guarded
             else self.tr(
-                "There is no password yet: the one that you type becomes the "
-                "supervisor's. From then on it is asked for."
+                "No password is set. The one you enter becomes the supervisor password."
             )
         )
-        self._save.setText(self.tr("Lay down"))
+        self._save.setText(self.tr("Save limits"))
         close = QDialogButtonBox.StandardButton.Close
         self._buttons.button(close).setText(self.tr("Close"))
-        new = self.tr("New password, or nothing to keep it")
+        new = self.tr("New password; empty to keep the current one")
         self._new_password.setPlaceholderText(new)
         self._new_password.setAccessibleName(new)
-        texts = {
-            "max_uncertainty": self.tr("Swing: U (k = 2) at most"),
-            "min_images": self.tr("Swing: images at least"),
-            "max_images": self.tr("Swing: images at most"),
-            "across": self.tr("Fixed point: std across the view"),
-            "along": self.tr("Fixed point: std along the view"),
-            "radius": self.tr("Ring: error of the radius"),
-            "form": self.tr("Ring: roundness, and off its plane"),
-            "length": self.tr("Length: error"),
-            "location": self.tr("Location error"),
-            "repeatability": self.tr("Repeatability: std of the tip"),
-            "drift": self.tr("Drift of a witness"),
-            "max_days": self.tr("Tips: days in force at most"),
-            "max_swings": self.tr("Tips: swings of their pen at most"),
-        }
-        self._fields["max_swings"].setSpecialValueText(self.tr("any number"))
-        usual = StationLimits()
-        parts = {
-            **dict.fromkeys(SWING, usual.swing),
-            **dict.fromkeys(VERIFICATION, usual.verification),
-            **dict.fromkeys(DUE, usual.due),
-        }
-        for name, field in self._fields.items():
-            self._labels[name].setText(texts[name])
-            field.setAccessibleName(texts[name])
-            number = getattr(parts[name], name)
-            usually = f"{number:g}" if number else self.tr("any number")
-            field.setToolTip(self.tr("Usual: {0}.").format(usually))
+        no_limit = self.tr("No limit")
+        for limit, label in zip(LIMITS, self._labels, strict=True):
+            field, text = self._fields[limit.key], worded(limit.label)
+            label.setText(text)
+            field.setAccessibleName(text)
+            if not limit.range[0]:
+                field.setSpecialValueText(no_limit)
+            usually = f"{limit.default:g}" if limit.default else no_limit
+            field.setToolTip(self.tr("Default: {0}.").format(usually))
+
+
+class LimitsControl(QObject):
+    """Shows the limits of the station in a dialog, and saves what is signed there."""
+
+    def __init__(self, workbench: Workbench, page: QWidget) -> None:
+        super().__init__(page)
+        self._selection = workbench.selection
+        self._archive_writer = workbench.archive_writer
+        self._folder, self._clock = workbench.folder, workbench.around.now
+        self._dialog = LimitsDialog(page)
+        self._saving: Job | None = None
+
+        # Connections
+        self._dialog.signed.connect(self._on_signed)
+
+    def open(self) -> None:
+        """Show the dialog."""
+        now, choices = self._selection.preparation, self._selection.choices
+        due = self._selection.limits.due
+        limits = StationLimits(now.limits, choices.limits, due)
+        is_guarded = self._selection.supervision.is_guarded
+        self._dialog.set_value(limits, is_guarded=is_guarded)
+        self._dialog.open()
+
+    def shut_down(self) -> None:
+        """Save nothing more."""
+        if self._saving is not None:
+            self._saving.cancel()
+
+    def _on_signed(
+        self, limits: StationLimits, signature: Signature, new_password: str
+    ) -> None:
+        folder, now = self._folder, self._clock
+        station = self._selection.preparation.names.station
+        self._saving = job = Job(
+            lambda _: save_limits(
+                *(folder, station, limits, signature, new_password, now())
+            ),
+            self,
+        )
+
+        # Connections
+        job.succeeded.connect(self._on_saved)
+        job.failed.connect(self._dialog.tell)
+        job.start()
+
+    def _on_saved(self, supervision: Supervision) -> None:
+        self._dialog.close()
+        self._selection.set_supervision(supervision)
+        self._archive_writer.enter_owed()

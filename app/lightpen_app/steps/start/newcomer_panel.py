@@ -2,13 +2,56 @@
 
 import sys
 
-from PySide6.QtCore import QProcess, Signal
-from PySide6.QtWidgets import QGridLayout, QGroupBox, QWidget
+from PySide6.QtCore import QProcess, Qt, Signal
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QGroupBox, QWidget
 
+from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.steps.start.introduction import Introduction
+from lightpen_app.steps.start.pictures import Pictures
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
+
+WIDTH = 112 * GRID  # px
+
+
+class Introduction(QDialog):
+    """Shows what is calibrated, how, and in which steps.
+
+    Signals
+    -------
+    trial_requested()
+        A simulated pen is to be calibrated.
+    """
+
+    trial_requested = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setWindowTitle(self.tr("What is this?"))
+
+        # Widgets
+        pictures = Pictures()
+        buttons = QDialogButtonBox()
+        close = PushButton()
+        close.setText(self.tr("Close"))
+        trial = PushButton()
+        trial.setText(self.tr("Try it with a simulated pen"))
+        buttons.addButton(close, QDialogButtonBox.ButtonRole.RejectRole)
+        buttons.addButton(trial, QDialogButtonBox.ButtonRole.AcceptRole)
+        trial.setDefault(True)
+
+        # Layout
+        layout = vertical_layout(
+            *(self, pictures, buttons), spacing=2 * GRID, margins=3 * GRID
+        )
+        self.setFixedSize(WIDTH, layout.totalHeightForWidth(WIDTH))
+
+        # Connections
+        buttons.rejected.connect(self.reject)
+        buttons.accepted.connect(self.accept)
+        self.accepted.connect(self.trial_requested)
+
 
 DEMO = (sys.executable, ["-m", "lightpen_app", "--demo"])
 
@@ -34,10 +77,8 @@ class NewcomerPanel(Translated, QGroupBox):
         self._play = PushButton()
 
         # Layout
-        layout = self._layout = QGridLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._words, 0, 0, 1, 2)
+        self._layout = grid_layout(self)
+        self._layout.addWidget(self._words, 0, 0, 1, 2)
         self.set_wide(False)
 
         # Connections
@@ -76,13 +117,13 @@ class NewcomerPanel(Translated, QGroupBox):
         self.setTitle(self.tr("New here?"))
         self._words.setText(
             self.tr(
-                "No pen and no camera are needed to see how it goes. What is simulated "
-                "is kept apart from real tips."
+                "Try the whole procedure without a pen or a camera. Simulated "
+                "results are stored apart from real tips."
             )
         )
         self._try.setText(self.tr("Try it with a simulated pen"))
         self._explain.setText(self.tr("What is this?"))
         self._play.setText(self.tr("Play the demo"))
         self._play.setToolTip(
-            self.tr("In another window, which goes through all steps by itself.")
+            self.tr("Opens another window that runs through all steps automatically.")
         )

@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 from PySide6.QtCore import QCoreApplication, Qt
-from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from lightpen.model.posture import Posture
 from lightpen.simulator.swings import PAPER_TIP, paper_pen
+from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.theme import GRID, TextSize, set_size, text_label
-from lightpen_app.widgets.pen_in_space import PenInSpace, PenStand
+from lightpen_app.widgets.pen_in_space import DisplayedPosture, PenInSpace
 from lightpen_app.widgets.translated import Translated
 
 LEAST_SIDE = 16 * GRID  # px, of a picture; with its words all fits 940 x 500
@@ -36,9 +37,7 @@ class Pictures(Translated, QWidget):
         self._steps.setTextFormat(Qt.TextFormat.RichText)
 
         # Layout
-        layout = self._layout = QGridLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(2 * GRID)
+        layout = self._layout = grid_layout(self, spacing=2 * GRID)
         layout.addWidget(self._heading, 0, 0, 1, 2)
         for column, words in enumerate(self._words):
             layout.addWidget(self._pictures[column], 1, column)
@@ -64,15 +63,14 @@ class Pictures(Translated, QWidget):
         told = (
             translate(
                 "Introduction",
-                "The pen carries LEDs that a camera sees. What it touches with its "
-                "tip can be measured, once it is known where the tip is from the "
-                "LEDs. That is what is calibrated.",
+                "The pen carries LEDs that a camera observes. To measure points "
+                "with the tip, the position of the tip relative to the LEDs must be "
+                "known. The calibration determines this position.",
             ),
             translate(
                 "Introduction",
-                "The tip rests in a cone and stays there while the pen is leaned "
-                "to all sides. The only point of the pen that does not move is "
-                "the centre of its tip.",
+                "The tip rests in a cone while the pen is tilted to all sides. The "
+                "only point of the pen that does not move is the tip centre.",
             ),
         )
         for label, text in zip(self._words, told, strict=True):
@@ -88,27 +86,27 @@ def _steps() -> tuple[tuple[str, str], ...]:
     return (
         (
             translate("Introduction", "Start"),
-            translate("Introduction", "say which pen and which tip."),
+            translate("Introduction", "select the pen and the tip."),
         ),
         (
             translate("Introduction", "Camera"),
-            translate("Introduction", "see that the images are bright and sharp."),
+            translate("Introduction", "check exposure and focus of the images."),
         ),
         (
             translate("Introduction", "LEDs"),
-            translate(
-                "Introduction", "see that the file of the LEDs is that of this pen."
-            ),
+            translate("Introduction", "check that the LED file belongs to this pen."),
         ),
         (
             translate("Introduction", "Swing"),
             translate(
-                "Introduction", "lean the pen as the arrow shows; no key is needed."
+                "Introduction", "tilt the pen as the arrow shows; no key is needed."
             ),
         ),
         (
             translate("Introduction", "Review"),
-            translate("Introduction", "see how certain the tip is, and accept it."),
+            translate(
+                "Introduction", "check the uncertainty of the tip, and accept it."
+            ),
         ),
     )
 
@@ -118,5 +116,7 @@ def _picture(posture: Posture, target: Posture | None) -> PenInSpace:
     expanding = QSizePolicy.Policy.Expanding
     picture.setSizePolicy(expanding, expanding)
     picture.setFixedHeight(LEAST_SIDE)
-    picture.set_value(PenStand(paper_pen(), np.array(PAPER_TIP), posture, target))
+    picture.set_value(
+        DisplayedPosture(paper_pen(), np.array(PAPER_TIP), posture, target)
+    )
     return picture

@@ -1,36 +1,34 @@
 """The tip in force for a pen and probe tip, and its age."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from datetime import datetime
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QGridLayout,
-    QGroupBox,
-    QHBoxLayout,
-    QLabel,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QGroupBox, QLabel, QWidget
 
-from lightpen.estimation.verdict import Grade
 from lightpen.local_time import local_time
-from lightpen.model.due_rule import DueRule
-from lightpen.record.results import Result
-from lightpen.record.standing import TipStanding
+from lightpen.model.limits import DueRule
+from lightpen.record.library.calibration_status import TipStatus
+from lightpen.record.results.results import Result
 from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.layouts import (
+    fill,
+    grid_layout,
+    horizontal_layout,
+    vertical_layout,
+)
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.quantities import AXES, decimals_for, number_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.look.words import PARTED, moment_text, shortened
-from lightpen_app.widgets.origin_mark import origin_remark
+from lightpen_app.widgets.origin_mark import origin_message
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import Question, QuestionBar
-from lightpen_app.widgets.rearranged import Room
-from lightpen_app.widgets.sign_label import Remark, SignLabel
-from lightpen_app.widgets.standing_mark import standing_remark
+from lightpen_app.widgets.responsive_layout import SizeClass
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
+from lightpen_app.widgets.status_mark import status_message
 from lightpen_app.widgets.translated import Translated
 
 DAYS_IN_MONTH, DAYS_IN_YEAR = 30, 365
@@ -55,15 +53,12 @@ class LastResult:
         Why it cannot be told; else empty.
     is_simulated : bool
         Whether it is asked for a simulated pen.
-    rule : DueRule
-        How long a tip may be in force.
     """
 
     result: Result | None = None
     is_named: bool = True
     trouble: str = ""
     is_simulated: bool = False
-    rule: DueRule = field(default_factory=DueRule)
 
 
 class LastResultPanel(Translated, QGroupBox):
@@ -91,7 +86,8 @@ class LastResultPanel(Translated, QGroupBox):
         super().__init__(parent)
         self._now = now
         self._value = LastResult()
-        self._marked: TipStanding | None = None
+        self._rule = DueRule()
+        self._marked: TipStatus | None = None
 
         # Widgets
         self._age = text_label(TextSize.TITLE)
@@ -113,10 +109,14 @@ class LastResultPanel(Translated, QGroupBox):
         self._question.set_words(self._taking_back)
 
         # Layout
-        table = QGridLayout(self._table)
-        table.setContentsMargins(0, GRID // 2, 0, GRID // 2)
-        table.setHorizontalSpacing(4 * GRID)
-        table.setVerticalSpacing(GRID // 2)
+        layout = vertical_layout(self, spacing=GRID // 2)
+        middle = Qt.AlignmentFlag.AlignVCenter
+        marks = ((each, 0, middle) for each in (self._grade, self._standing))
+        horizontal_layout(layout, self._age, *marks, 1, spacing=2 * GRID)
+        fill(layout, self._when, self._table, self._origin, self._reason)
+        fill(layout, self._warning)
+        margins = (0, GRID // 2, 0, GRID // 2)
+        table = grid_layout(self._table, spacing=(4 * GRID, GRID // 2), margins=margins)
         for column, head in enumerate(self._heads):
             table.addWidget(head, 0, column)
         for row, axis in enumerate(AXES, start=1):
@@ -125,28 +125,8 @@ class LastResultPanel(Translated, QGroupBox):
             table.addWidget(self._tip[row - 1], row, 1)
             table.addWidget(self._uncertainty[row - 1], row, 2)
         table.setColumnStretch(3, 1)
-        first = QHBoxLayout()
-        first.setSpacing(2 * GRID)
-        first.addWidget(self._age)
-        first.addWidget(self._grade, 0, Qt.AlignmentFlag.AlignVCenter)
-        first.addWidget(self._standing, 0, Qt.AlignmentFlag.AlignVCenter)
-        first.addStretch(1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID // 2)
-        layout.addLayout(first)
-        layout.addWidget(self._when)
-        layout.addWidget(self._table)
-        layout.addWidget(self._origin)
-        layout.addWidget(self._reason)
-        layout.addWidget(self._warning)
-        buttons = QHBoxLayout()
-        buttons.setSpacing(GRID)
-        buttons.addWidget(self._verify)
-        buttons.addWidget(self._take_back)
-        buttons.addStretch(1)
-        layout.addLayout(buttons)
-        layout.addWidget(self._question)
+        horizontal_layout(layout, self._verify, self._take_back, 1)
+        fill(layout, self._question)
 
         # Connections
         self._verify.clicked.connect(self.verification_requested)
@@ -156,7 +136,7 @@ class LastResultPanel(Translated, QGroupBox):
 
         self._retranslate()
 
-    def set_room(self, room: Room) -> None:
+    def set_room(self, room: SizeClass) -> None:
         """Show its figures the larger, the more room there is."""
         age, words, figures = SIZES[room.is_large + room.is_vast]
         set_size(self._age, age)
@@ -177,18 +157,18 @@ class LastResultPanel(Translated, QGroupBox):
 
     def set_rule(self, rule: DueRule) -> None:
         """Go by another rule of how long a tip may be in force."""
-        if rule != self._value.rule:
-            self._value = replace(self._value, rule=rule)
+        if rule != self._rule:
+            self._rule = rule
             self._retranslate()
 
-    def set_standing(self, standing: TipStanding | None) -> None:
+    def set_status(self, status: TipStatus | None) -> None:
         """Mark a tip that must not be measured with; None where that is not known."""
-        self._marked = None if standing is TipStanding.VALID else standing
-        self._standing.set_value(standing_remark(self._marked))
+        self._marked = None if status is TipStatus.VALID else status
+        self._standing.set_value(status_message(self._marked))
 
     def set_why_unverified(self, why_not: str) -> None:
         """Say why the tip cannot be verified now, or let it."""
-        told = self.tr("Prove the tip in minutes by touching what is known.")
+        told = self.tr("Verify the tip on reference artefacts within minutes.")
         self._verify.set_why_not(why_not, told)
 
     def words(self) -> tuple[str, ...]:
@@ -213,11 +193,11 @@ class LastResultPanel(Translated, QGroupBox):
             if value.is_simulated
             else self.tr("Last calibration of this pen and tip")
         )
-        self._standing.set_value(standing_remark(self._marked))
-        self._verify.setText(self.tr("Verify it"))
-        self._take_back.setText(self.tr("Take back..."))
+        self._standing.set_value(status_message(self._marked))
+        self._verify.setText(self.tr("Verify tip"))
+        self._take_back.setText(self.tr("Revoke acceptance..."))
         self._take_back.setToolTip(
-            self.tr("Put the result before in force again; both are kept.")
+            self.tr("Reinstate the previous result. Both results stay in the archive.")
         )
         for button in (self._verify, self._take_back):
             button.setVisible(value.result is not None)
@@ -227,39 +207,45 @@ class LastResultPanel(Translated, QGroupBox):
             self._say(trouble=value.trouble)
         elif value.is_named:
             self._say(
-                self.tr("None yet"),
-                self.tr("What you accept is kept apart from the tips of real pens.")
+                self.tr("No result yet"),
+                self.tr("Accepted practice results are stored apart from real pens.")
                 if value.is_simulated
-                else self.tr("The tip that you accept will be the first in force."),
+                else self.tr("The first accepted result becomes the current tip."),
             )
         else:
-            self._say(hint=self.tr("It is shown when the pen and its tip are named."))
+            self._say(
+                hint=self.tr("Select a pen and a tip to see the last calibration.")
+            )
 
     def _taking_back(self) -> Question:
         return Question(
-            self.tr("Take this acceptance back? The result before is in force again."),
-            self.tr("Take back"),
-            self.tr("Leave it in force"),
+            self.tr(
+                "Revoke this acceptance? The previous result becomes current again."
+            ),
+            self.tr("Revoke acceptance"),
+            self.tr("Keep acceptance"),
         )
 
     def _say(self, short: str = "", hint: str = "", trouble: str = "") -> None:
         """Say why there is no result."""
         self._age.setText(short)
         self._age.setVisible(bool(short))
-        self._grade.set_value(Remark())
+        self._grade.set_value(StatusMessage())
         self._when.setText(hint)
         self._when.setVisible(bool(hint))
         self._table.hide()
         for remark in (self._origin, self._reason):
-            remark.set_value(Remark())
-        self._warning.set_value(Remark(trouble, Sign.CROSS, Tone.BAD))
+            remark.set_value(StatusMessage())
+        self._warning.set_value(StatusMessage(trouble, Sign.CROSS, Tone.BAD))
 
     def _show(self, result: Result) -> None:
         now = self._now()
         for widget in (self._age, self._when, self._table):
             widget.show()
         self._age.setText(self._age_text(result, now))
-        self._grade.set_value(_grade_remark(result.grade))
+        self._grade.set_value(
+            StatusMessage(grade_text(result.grade), *GRADE_MARKS[result.grade])
+        )
         when = moment_text(result.accepted, self.tr("d MMMM yyyy, hh:mm"))
         by = shortened(result.names.operator)
         self._when.setText(PARTED.join(filter(None, (when, by))))
@@ -272,33 +258,35 @@ class LastResultPanel(Translated, QGroupBox):
             tip = number_text(float(result.tip_pen[axis]), decimals)
             self._tip[axis].setText(tip)
             self._uncertainty[axis].setText(number_text(uncertainty, decimals))
-        self._origin.set_value(origin_remark(result.origin))
+        self._origin.set_value(origin_message(result.origin))
         self._reason.set_value(self._reason_of(result))
         self._warning.set_value(self._warning_of(result, now))
 
-    def _reason_of(self, result: Result) -> Remark:
+    def _reason_of(self, result: Result) -> StatusMessage:
         """Return why it was accepted though it was to be checked."""
         if not result.reason:
-            return Remark()
-        text = self.tr("Accepted with the reason: {0}").format(result.reason)
+            return StatusMessage()
+        text = self.tr("Accepted. Reason: {0}").format(result.reason)
         if result.supervisor:
-            text = self.tr("Accepted by the supervisor {0} with the reason: {1}")
+            text = self.tr("Accepted by supervisor {0}. Reason: {1}")
             text = text.format(shortened(result.supervisor), result.reason)
-        return Remark(text, Sign.WARNING, Tone.WARN)
+        return StatusMessage(text, Sign.WARNING, Tone.WARN)
 
     def _on_agreed(self) -> None:
         self.take_back_requested.emit(self._value.result)
 
-    def _warning_of(self, result: Result, now: datetime) -> Remark:
+    def _warning_of(self, result: Result, now: datetime) -> StatusMessage:
         if result.accepted > now:
-            text = self.tr("It is dated later than now. Check the clock here.")
-        elif now > self._value.rule.due(result.accepted):
             text = self.tr(
-                "It is older than {0} days. Calibrate before you measure."
-            ).format(self._value.rule.max_days)
+                "Calibration date is in the future. Check the clock of this computer."
+            )
+        elif now > self._rule.due(result.accepted):
+            text = self.tr(
+                "Calibration is older than {0} days. Calibrate before you measure."
+            ).format(self._rule.max_days)
         else:
-            return Remark()
-        return Remark(text, Sign.WARNING, Tone.WARN)
+            return StatusMessage()
+        return StatusMessage(text, Sign.WARNING, Tone.WARN)
 
     def _age_text(self, result: Result, now: datetime) -> str:
         days = (now.date() - local_time(result.accepted).date()).days
@@ -313,14 +301,6 @@ class LastResultPanel(Translated, QGroupBox):
         if days < 2 * DAYS_IN_YEAR:
             return self.tr("{0} months ago").format(days // DAYS_IN_MONTH)
         return self.tr("{0} years ago").format(days // DAYS_IN_YEAR)
-
-
-def _grade_remark(grade: str) -> Remark:
-    try:
-        known = Grade(grade)
-    except ValueError:  # of a later version
-        return Remark(grade)
-    return Remark(grade_text(known), *GRADE_MARKS[known])
 
 
 def _cell(size: TextSize = TextSize.BODY, tone: Tone = Tone.PLAIN) -> QLabel:

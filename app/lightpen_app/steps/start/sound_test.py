@@ -1,13 +1,14 @@
 """A button that plays all sounds, each with its word."""
 
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.sounds import Mute, Sound, Sounds
+from lightpen_app.look.sounds import MutedSounds, Sound, Sounds
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 FIXED = QSizePolicy.Policy.Fixed
@@ -40,12 +41,7 @@ class SoundTest(Translated, QWidget):
         self._timer.setInterval(step_ms)
 
         # Layout
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(2 * GRID)
-        layout.addWidget(self._button)
-        layout.addWidget(self._words, 1)
-        layout.addStretch()
+        horizontal_layout(self, self._button, (self._words, 1), 0, spacing=2 * GRID)
 
         # Connections
         self._button.clicked.connect(self._on_clicked)
@@ -62,7 +58,7 @@ class SoundTest(Translated, QWidget):
         self._timer.stop()
         self._waiting.clear()
         self._is_silent = False
-        self._words.set_value(Remark())
+        self._words.set_value(StatusMessage())
 
     def _on_clicked(self) -> None:
         self.stop()
@@ -76,7 +72,9 @@ class SoundTest(Translated, QWidget):
     def _tell_silence(self) -> None:
         """Say why nothing can be heard, as long as that is so."""
         silence = self._silence()
-        self._words.set_value(Remark(silence, Sign.WARNING) if silence else Remark())
+        self._words.set_value(
+            StatusMessage(silence, Sign.WARNING) if silence else StatusMessage()
+        )
         self._is_silent = bool(silence)
         if silence:
             self._timer.start()
@@ -86,10 +84,10 @@ class SoundTest(Translated, QWidget):
             self._tell_silence()
             return
         if not self._waiting:
-            self._words.set_value(Remark())
+            self._words.set_value(StatusMessage())
             return
         sound = self._waiting.pop(0)
-        self._words.set_value(Remark(self._word(sound), Sign.PLAY))
+        self._words.set_value(StatusMessage(self._word(sound), Sign.PLAY))
         self._sounds.play(sound)
         self._timer.start()
 
@@ -98,19 +96,20 @@ class SoundTest(Translated, QWidget):
         reason = self._sounds.why_silent()
         if reason:
             return self.tr(
-                "No sound here: {0}. All is shown in words and signs, too."
+                "No sound available: {0}. All information is also shown as text and "
+                "icons."
             ).format(reason)
-        if isinstance(self._sounds, Mute) and self._sounds.muted:
-            return self.tr("Sounds are off. Press B to switch them on.")
+        if isinstance(self._sounds, MutedSounds) and self._sounds.muted:
+            return self.tr("Sounds are off. Press B to turn them on.")
         return ""
 
     def _word(self, sound: Sound) -> str:
         return {
             Sound.SEATED: self.tr("Tip seated"),
-            Sound.KEPT: self.tr("Image kept"),
-            Sound.FIELD_FULL: self.tr("Field full"),
-            Sound.LOST: self.tr("Tip slipped, or pen lost"),
-            Sound.CAPTURED: self.tr("All captured"),
+            Sound.KEPT: self.tr("Image captured"),
+            Sound.FIELD_FULL: self.tr("Posture complete"),
+            Sound.LOST: self.tr("Tip slipped or pen lost"),
+            Sound.CAPTURED: self.tr("Capture complete"),
             Sound.DONE: self.tr("Done"),
             Sound.FAILED: self.tr("Failed"),
         }[sound]
@@ -118,5 +117,5 @@ class SoundTest(Translated, QWidget):
     def _retranslate(self) -> None:
         self._button.setText(self.tr("Test the sounds"))
         self._button.setToolTip(
-            self.tr("Plays what you will hear during the swing, one after the other.")
+            self.tr("Plays the sounds of a swing one after the other")
         )

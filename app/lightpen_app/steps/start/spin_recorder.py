@@ -8,7 +8,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.spin import SpinFit, fit_spin
 from lightpen.model.posture import angles_between
 from lightpen_app.look.sentences import worded
-from lightpen_app.work.live_view import LiveView, Shown
+from lightpen_app.work.live_view import DisplayedImage, LiveView
 
 STEP = np.radians(1.0)  # from one posture that is kept to the next
 MOST = 500  # postures
@@ -38,7 +38,7 @@ class SpinRecorder(QObject):
         self._is_on = True
         self._live.image_shown.connect(self._on_image_shown)
         self.told.emit(
-            self.tr("Press the tip into the cone, and turn the pen about its stylus.")
+            self.tr("Press the tip into the cone and turn the pen about its stylus.")
         )
 
     def stop(self) -> None:
@@ -57,11 +57,13 @@ class SpinRecorder(QObject):
         """
         return fit_spin(np.array(self._rotations).reshape(-1, 3, 3))
 
-    def _on_image_shown(self, shown: Shown) -> None:
-        sighting = shown.seen.sighting
-        is_seen = sighting is not None and sighting.has_pose and not sighting.is_blurred
-        if sighting is not None and is_seen and shown.seen.camera == 0:
-            self.keep(sighting.rotation)
+    def _on_image_shown(self, shown: DisplayedImage) -> None:
+        detection = shown.seen.detection
+        is_seen = (
+            detection is not None and detection.has_pose and not detection.is_blurred
+        )
+        if detection is not None and is_seen and shown.seen.camera == 0:
+            self.keep(detection.rotation)
 
     def keep(self, rotation: FloatArray) -> None:
         """Keep a posture, (3, 3) of cam_from_pen, unless the pen has hardly moved."""
@@ -73,9 +75,9 @@ class SpinRecorder(QObject):
         try:
             found = self.fit()
         except CalibrationError as error:
-            self.told.emit(worded(error.sentence))
+            self.told.emit(worded(error.message))
         else:
-            told = self.tr("Turned by {0} degrees; U (k = 2) of the axis {1} degrees.")
+            told = self.tr("Rotation {0}°; U (k = 2) of the axis {1}°")
             self.told.emit(
                 told.format(
                     f"{np.degrees(found.turn):.0f}",

@@ -131,8 +131,8 @@ class LeaningDial(PostureDial):
         super()._retranslate()
         self.setToolTip(
             self.tr(
-                "Drag to lean the simulated pen, or use the arrow keys. The wheel, or "
-                "the keys , and . turn it about its own axis."
+                "Drag or use the arrow keys to tilt the simulated pen. Wheel or "
+                "keys , and . turn it about its own axis."
             )
             if self._is_interactive
             else ""

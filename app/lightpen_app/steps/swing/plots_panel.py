@@ -3,12 +3,13 @@
 from collections import deque
 
 import numpy as np
-from PySide6.QtWidgets import QGridLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from lightpen.arrays import FloatArray
-from lightpen.swing.kept_images import KeptImages
+from lightpen.swing.kept_images import AcceptedImages
 from lightpen.swing.seat import tip_offsets
 from lightpen.swing.state import SwingState
+from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.quantities import MICROMETRES
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.plots import Axes, Curve, TracePlot
@@ -37,15 +38,11 @@ class SwingPlots(Translated, QWidget):
             tail=TAIL,
         )
         self._uncertainty = TracePlot(
-            Axes(""),
-            [Curve("expanded_uncertainty_um"), Curve("floor_um")],
-            y_log=True,
+            Axes(""), [Curve("expanded_uncertainty_um"), Curve("floor_um")], y_log=True
         )
 
         # Layout
-        layout = QGridLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
+        layout = grid_layout(self)
         layout.addWidget(self._misfit, 0, 0)
         layout.addWidget(self._scatter, 0, 1)
         layout.addWidget(self._estimate, 1, 0)
@@ -122,14 +119,14 @@ class SwingPlots(Translated, QWidget):
 
     def _retranslate(self) -> None:
         """Set the titles anew."""
-        self._misfit.set_axes(Axes(self.tr("Misfit of each image / px")))
-        self._scatter.set_axes(Axes(self.tr("Tip of each image / µm")))
+        self._misfit.set_axes(Axes(self.tr("RMS residual per image / px")))
+        self._scatter.set_axes(Axes(self.tr("Tip per image / µm")))
         self._estimate.set_axes(Axes(self.tr("Tip estimate / µm")))
         self._uncertainty.set_axes(Axes(self.tr("U (k = 2) of the tip / µm")))
-        self._uncertainty.set_names("U", self.tr("floor"))
+        self._uncertainty.set_names("U", self.tr("lowest achievable U"))
         self._show_limit()
 
 
-def _numbers(kept: KeptImages) -> FloatArray:
+def _numbers(kept: AcceptedImages) -> FloatArray:
     """Return the numbers (N,) of kept images."""
     return kept.numbers.astype(np.float64)

@@ -1,10 +1,10 @@
 """Touches from recorded images instead of live ones."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QGridLayout, QProgressBar, QWidget
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QProgressBar, QWidget
 from typing_extensions import override
 
-from lightpen_app.look.theme import GRID
+from lightpen_app.look.layouts import grid_layout
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
@@ -40,9 +40,7 @@ class ImagesRow(Translated, QWidget):
         self._cancel = PushButton()
 
         # Layout
-        layout = QGridLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
+        layout = grid_layout(self)
         layout.addWidget(self._place, 0, 0)
         layout.addWidget(self._is_still, 0, 1)
         layout.addWidget(self._read, 0, 2)

@@ -7,19 +7,20 @@ from pathlib import Path
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QProgressBar, QWidget
 from typing_extensions import override
 
 from lightpen.formats.opened_files import PenFile
-from lightpen.verification.length import Scale
-from lightpen.verification.pen_health import PenHealth
-from lightpen.verification.pen_over_time import (
+from lightpen.verification.history.pen_health import PenHealth
+from lightpen.verification.history.pen_over_time import (
     NewLedFile,
     PenOverTime,
     improve_led_file,
     read_pen_over_time,
 )
+from lightpen.verification.tasks.length import LENGTH, Scale
 from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import MICROMETRES, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
@@ -30,7 +31,7 @@ from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.plots import Axes
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job
 from lightpen_app.work.workbench import Workbench
@@ -46,11 +47,13 @@ class PenPanel(Translated, QWidget):
 
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workbench = workbench
+        self._selection, self._run = workbench.selection, workbench.run
+        self._verification = workbench.verification
+        self._folder, self._clock = workbench.folder, workbench.around.now
         self._shown: PenOverTime | None = None
         self._new: NewLedFile | None = None
-        self._trouble = ""  # why there is no better file
-        self._unread = ""  # why nothing is told of the swings
+        self._fault = ""  # why there is no better file
+        self._unread = ""  # why the swings cannot be read
         self._reading: Job | None = None
         self._improving: Job | None = None
         self._opening: Job | None = None  # the new file
@@ -73,28 +76,24 @@ class PenPanel(Translated, QWidget):
         self._use = PushButton()
 
         # Layout
-        actions = QHBoxLayout()
-        actions.setSpacing(GRID)
-        actions.addWidget(self._improve, 0, Qt.AlignmentFlag.AlignTop)
-        actions.addWidget(self._cancel, 0, Qt.AlignmentFlag.AlignTop)
-        actions.addWidget(self._progress, 1)
-        actions.addWidget(self._told, 1, Qt.AlignmentFlag.AlignTop)
-        actions.addWidget(self._use, 0, Qt.AlignmentFlag.AlignTop)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 2 * GRID, 0, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._verdict)
-        layout.addWidget(self._left_out)
-        layout.addLayout(actions)
-        layout.addWidget(self._head)
-        layout.addWidget(self._table)
-        layout.addWidget(self._plot, 1)
+        layout = vertical_layout(
+            self, self._verdict, self._left_out, margins=(0, 2 * GRID, 0, 0)
+        )
+        horizontal_layout(
+            layout,
+            (self._improve, 0, Qt.AlignmentFlag.AlignTop),
+            (self._cancel, 0, Qt.AlignmentFlag.AlignTop),
+            (self._progress, 1),
+            (self._told, 1, Qt.AlignmentFlag.AlignTop),
+            (self._use, 0, Qt.AlignmentFlag.AlignTop),
+        )
+        fill(layout, self._head, self._table, (self._plot, 1))
 
         # Connections
         self._improve.clicked.connect(self._on_improve_clicked)
         self._cancel.clicked.connect(self._on_cancel_clicked)
         self._use.clicked.connect(self._on_use_clicked)
-        workbench.changed.connect(self._on_workbench_changed)
+        workbench.selection.changed.connect(self._on_workbench_changed)
 
         self._retranslate()
 
@@ -114,8 +113,8 @@ class PenPanel(Translated, QWidget):
         self._improve.setText(self.tr("Improve the LED file"))
         self._improve.setToolTip(
             self.tr(
-                "Pool the newest swings; the last one has to confirm what comes of "
-                "them. The old file stays."
+                "Pools the newest swings; the last one is held out for "
+                "confirmation. The old file is retained."
             )
         )
         self._cancel.setText(self.tr("Cancel"))
@@ -135,18 +134,18 @@ class PenPanel(Translated, QWidget):
             self._read()
 
     def _chosen(self) -> tuple[object, ...]:
-        now = self._workbench.preparation
+        now = self._selection.preparation
         return now.names.pen, now.origin, now.pen_file, now.camera_file
 
     def _read(self) -> None:
         """Read the swings of the pen anew."""
-        now, archive = self._workbench.preparation, self._workbench.run.archive
+        now, archive = self._selection.preparation, self._run.archive
         is_other, self._read_of = self._chosen() != self._read_of, self._chosen()
         self._unread = ""
         if is_other:
             self.shut_down()  # what comes of it would be of the pen before
             self._improving = None
-            self._shown, self._new, self._trouble = None, None, ""
+            self._shown, self._new, self._fault = None, None, ""
         elif self._reading is not None:
             self._reading.cancel()
         if now.pen_file is None:
@@ -171,19 +170,19 @@ class PenPanel(Translated, QWidget):
         self._refresh()
 
     def _on_failed(self, why: str) -> None:
-        self._trouble = why
+        self._fault = why
         self._refresh()
 
     # A better LED file
 
     def _on_improve_clicked(self) -> None:
-        pen, workbench = self._shown, self._workbench
+        pen = self._shown
         if pen is None:
             return
-        self._new, self._trouble = None, ""
+        self._new, self._fault = None, ""
         self._progress.setValue(0)
-        now, scale = workbench.around.now(), self._scale()
-        work = partial(improve_led_file, workbench.folder, pen, scale, now)
+        now, scale = self._clock(), self._scale()
+        work = partial(improve_led_file, self._folder, pen, scale, now)
         self._improving = job = Job(work, self)
 
         # Connections
@@ -197,8 +196,8 @@ class PenPanel(Translated, QWidget):
 
     def _scale(self) -> Scale | None:
         """Return the scale by a certified length, where one was touched just now."""
-        state = self._workbench.verification.status.state
-        found = None if state is None else state.length
+        state = self._verification.status.state
+        found = None if state is None else state.found_by(LENGTH)
         return None if found is None else found.scale
 
     def _on_progressed(self, fraction: float) -> None:
@@ -234,17 +233,17 @@ class PenPanel(Translated, QWidget):
         job.start()
 
     def _on_new_read(self, made_for: tuple[object, ...], pen_file: PenFile) -> None:
-        now = self._workbench.preparation
+        now = self._selection.preparation
         if self._chosen() != made_for:
             return
-        self._workbench.set_preparation(replace(now, pen_file=pen_file))
+        self._selection.set_preparation(replace(now, pen_file=pen_file))
 
     # What is shown
 
     def _refresh(self) -> None:
         found, is_busy = self._shown, self._improving is not None
         health = None if found is None else found.health
-        self._verdict.set_value(self._health_remark(health))
+        self._verdict.set_value(self._health_message(health))
         self._left_out.setText(self._left_out_text())
         self._left_out.setVisible(bool(self._left_out.text()))
         for widget in (self._head, self._table):
@@ -258,26 +257,28 @@ class PenPanel(Translated, QWidget):
         self._improve.set_why_not(self._why_not_improve())
         self._cancel.setVisible(is_busy)
         self._progress.setVisible(is_busy)
-        self._told.set_value(self._told_remark())
+        self._told.set_value(self._told_message())
         self._told.setVisible(not is_busy)
         self._use.setVisible(self._new is not None and not is_busy)
 
-    def _health_remark(self, health: PenHealth | None) -> Remark:
+    def _health_message(self, health: PenHealth | None) -> StatusMessage:
         if self._unread:
-            return Remark(self._unread, Sign.CROSS, Tone.BAD)
+            return StatusMessage(self._unread, Sign.CROSS, Tone.BAD)
         if health is not None:
             told = health.assessment
-            return Remark(worded(told.reason), *GRADE_MARKS[told.grade])
+            return StatusMessage(worded(told.reason), *GRADE_MARKS[told.grade])
         if self._shown is None and self._reading is None:
-            return Remark()
+            return StatusMessage()
         if self._shown is None:
-            return Remark(self.tr("The swings of the pen are being read."), Sign.WAIT)
+            return StatusMessage(
+                self.tr("The swings of the pen are being read."), Sign.WAIT
+            )
         text = self.tr(
             "Two accepted swings with this LED file are needed to tell how pen {0} "
             "changes; there are {1}."
         )
         pen, n_swings = shortened(self._shown.names.pen), len(self._shown.swings)
-        return Remark(text.format(pen, n_swings), Sign.RING)
+        return StatusMessage(text.format(pen, n_swings), Sign.RING)
 
     def _left_out_text(self) -> str:
         if self._shown is None or not self._shown.n_left_out:
@@ -299,12 +300,12 @@ class PenPanel(Translated, QWidget):
             return self.tr("An LED has moved: no file is right for all swings.")
         return ""
 
-    def _told_remark(self) -> Remark:
+    def _told_message(self) -> StatusMessage:
         if self._new is None:
             return (
-                Remark(self._trouble, Sign.CROSS, Tone.BAD)
-                if self._trouble
-                else (Remark())
+                StatusMessage(self._fault, Sign.CROSS, Tone.BAD)
+                if self._fault
+                else (StatusMessage())
             )
         improved = self._new.improved
         text = self.tr(
@@ -313,7 +314,7 @@ class PenPanel(Translated, QWidget):
         )
         after, before = improved.sigma_after, improved.sigma_before
         words = (self._new.path.name, number_text(after, 4), number_text(before, 4))
-        return Remark(text.format(*words), Sign.CHECK, Tone.GOOD)
+        return StatusMessage(text.format(*words), Sign.CHECK, Tone.GOOD)
 
     def _figures(self, found: PenOverTime, health: PenHealth) -> Figures:
         """Return how far each LED moved and how much the pen grew, swing by swing."""

@@ -21,7 +21,7 @@ ALIKE_NORMALS = 0.9  # cosine
 
 @dataclass(frozen=True, eq=False)
 class Constellation:
-    """What the search for a pen needs to know about it, worked out once per pen.
+    """Properties of a pen for the search, computed once per pen.
 
     Attributes
     ----------

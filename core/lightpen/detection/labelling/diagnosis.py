@@ -8,9 +8,9 @@ import numpy as np
 from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.labelling.labels import MODERATE, label_images
 from lightpen.detection.spots import Spots
+from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.sentences import Sentence, sentence
 
 N_DIAGNOSED = 4  # images
 MOSTLY = 0.8  # of the spots that may be LEDs
@@ -19,7 +19,7 @@ DISC_FACTORS = (0.6, 1.6, 0.4, 2.5)
 FOCAL_FACTORS = (0.9, 1.1, 0.8, 1.25, 0.7, 1.4, 0.5, 2.0)
 
 
-def diagnose(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Sentence | None:
+def diagnose(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Message | None:
     """Name the likely cause why LEDs are not found where the pen file has them.
 
     Pens and cameras with one thing changed are tried on a few images; the first that
@@ -32,18 +32,14 @@ def diagnose(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Sentence | Non
 
     Returns
     -------
-    Sentence or None
+    Message or None
         What was found and what to do; None if most spots are LEDs of the pen.
     """
     needed = certain_leds(pen)
     counts = np.array([len(s) for s in spots])
     if 2 * np.sum(counts >= needed) < len(spots):
-        return sentence(
+        return message(
             "diagnosis.few-spots",
-            "Most images show fewer than {n_needed} spots (median "
-            "{median:.0f}); of the {n_leds} LEDs of the pen {n_needed} must be "
-            "seen. Check that the LEDs are lit and in the image, and the "
-            "exposure.",
             n_needed=needed,
             median=float(np.median(counts)),
             n_leds=pen.n_leds,
@@ -55,20 +51,11 @@ def diagnose(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Sentence | Non
         cause = wrong(camera, pen, sample.fits)
         if cause:
             return cause
-    return sentence(
-        "diagnosis.spots-do-not-fit",
-        "Most images show {n_needed} or more spots, but these do not fit the "
-        "pen file with its {n_leds} LEDs. Check that it is the file of this pen "
-        "and that the camera file belongs to these images.",
-        n_needed=needed,
-        n_leds=pen.n_leds,
-    )
+    return message("diagnosis.spots-do-not-fit", n_needed=needed, n_leds=pen.n_leds)
 
 
-def diagnose_mirror(
-    spots: Sequence[Spots], camera: Camera, pen: Pen
-) -> Sentence | None:
-    """Say so if the mirror image of the pen explains clearly more of the spots.
+def diagnose_mirror(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Message | None:
+    """Return a message if a mirrored pen explains clearly more of the spots.
 
     A pen that is symmetric but for a few LEDs lets most LEDs of its mirror image be
     labelled, so this is worth a look where some LEDs are missing in all images.
@@ -119,54 +106,30 @@ def _n_explained(spots: Sequence[Spots], camera: Camera, pen: Pen) -> int:
     return sum(int((label.spot >= 0).sum()) for label in labels)
 
 
-def _mirror(camera: Camera, pen: Pen, fits: _Fits) -> Sentence | None:
+def _mirror(camera: Camera, pen: Pen, fits: _Fits) -> Message | None:
     for sign, name in (([-1.0, 1.0, 1.0], "x"), ([1.0, 1.0, -1.0], "z")):
         if fits(camera, replace(pen, leds=pen.leds * np.array(sign))):
-            return sentence(
-                "diagnosis.mirror",
-                "The images fit the mirror image of the pen: with the opposite "
-                "sign of {axis} its LEDs match. Change the sign of {axis} in "
-                "the pen file.",
-                axis=name,
-            )
+            return message("diagnosis.mirror", axis=name)
     return None
 
 
-def _unit(camera: Camera, pen: Pen, fits: _Fits) -> Sentence | None:
+def _unit(camera: Camera, pen: Pen, fits: _Fits) -> Message | None:
     for factor in UNIT_FACTORS:
         if fits(camera, replace(pen, leds=pen.leds * factor)):
-            return sentence(
-                "diagnosis.unit",
-                "The images fit LED coordinates {factor:g} times those of the "
-                "pen file. Check its unit: millimetres are needed.",
-                factor=factor,
-            )
+            return message("diagnosis.unit", factor=factor)
     return None
 
 
-def _disc(camera: Camera, pen: Pen, fits: _Fits) -> Sentence | None:
+def _disc(camera: Camera, pen: Pen, fits: _Fits) -> Message | None:
     for factor in DISC_FACTORS:
         if fits(camera, replace(pen, diameter=pen.diameter * factor)):
-            return sentence(
-                "diagnosis.disc",
-                "The LEDs look about {factor:g} times as large as the pen file "
-                "says ({diameter:g} mm). Check the disc diameter and the unit "
-                "of the coordinates.",
-                factor=factor,
-                diameter=pen.diameter,
-            )
+            return message("diagnosis.disc", factor=factor, diameter=pen.diameter)
     return None
 
 
-def _focal_length(camera: Camera, pen: Pen, fits: _Fits) -> Sentence | None:
+def _focal_length(camera: Camera, pen: Pen, fits: _Fits) -> Message | None:
     for factor in FOCAL_FACTORS:
         changed = replace(camera, fx=camera.fx * factor, fy=camera.fy * factor)
         if fits(changed, pen):
-            return sentence(
-                "diagnosis.focal-length",
-                "The images fit the pen with about {factor:g} times the focal "
-                "length of the camera file. Choose the file of this camera and "
-                "lens, or calibrate the camera again.",
-                factor=factor,
-            )
+            return message("diagnosis.focal-length", factor=factor)
     return None

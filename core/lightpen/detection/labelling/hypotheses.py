@@ -42,7 +42,7 @@ SHIFT_TOLERANCE = 20.0  # px, once the shift common to all is taken off
 
 
 @dataclass(frozen=True)
-class Effort:
+class SearchEffort:
     """How hard to search an image.
 
     Attributes
@@ -67,7 +67,7 @@ class Effort:
 
 
 def poses_from_triples(
-    sight: SpotArrays, pen: Constellation, effort: Effort
+    sight: SpotArrays, pen: Constellation, effort: SearchEffort
 ) -> Candidates:
     """Return the most promising poses of each image, each with another labelling."""
     image, triple = _spot_triples(sight, pen, effort)
@@ -143,7 +143,7 @@ def shifted_poses(
 
 
 def _spot_triples(
-    sight: SpotArrays, pen: Constellation, effort: Effort
+    sight: SpotArrays, pen: Constellation, effort: SearchEffort
 ) -> tuple[IntArray, IntArray]:
     """Return images (G,) and triples (G, 3) of spots that may be triples of LEDs."""
     there = sight.rays * np.where(sight.usable, sight.ranges, 0.0)[..., None]
@@ -198,7 +198,7 @@ def _largest_area(pen: Constellation) -> float:
 def _led_triples(
     sight: SpotArrays,
     pen: Constellation,
-    effort: Effort,
+    effort: SearchEffort,
     image: IntArray,
     triple: IntArray,
 ) -> tuple[IntArray, IntArray]:

@@ -26,7 +26,7 @@ from lightpen.detection.labelling.constellation import (
     constellation_of,
 )
 from lightpen.detection.labelling.hypotheses import (
-    Effort,
+    SearchEffort,
     first_of_each,
     lookalike_poses,
     poses_from_triples,
@@ -72,7 +72,7 @@ MAX_PREDICTION_ERROR = 0.25  # rad
 
 
 class LabelStatus(StrEnum):
-    """What became of an image."""
+    """Outcome of labelling an image."""
 
     LABELLED = "labelled"
     NO_SPOTS = "no spots"
@@ -83,7 +83,7 @@ class LabelStatus(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """The spots of one image that are LEDs, and the pose they tell.
+    """The spots of one image that are LEDs, and the pose by them.
 
     Attributes
     ----------
@@ -111,17 +111,17 @@ class Labels:
 
 
 EFFORTS = (
-    Effort(n_triples=1, n_hypotheses=24, n_poses=8, n_settled=3),
-    Effort(n_triples=4, n_hypotheses=24, n_poses=16, n_settled=4),
-    Effort(n_triples=16, n_hypotheses=40, n_poses=32, n_settled=6),
-    Effort(n_triples=40, n_hypotheses=32, n_poses=60, n_settled=6),
-    Effort(n_triples=110, n_hypotheses=32, n_poses=100, n_settled=8),
-    Effort(n_triples=4, n_hypotheses=700, n_poses=100, n_settled=8, sized=False),
+    SearchEffort(n_triples=1, n_hypotheses=24, n_poses=8, n_settled=3),
+    SearchEffort(n_triples=4, n_hypotheses=24, n_poses=16, n_settled=4),
+    SearchEffort(n_triples=16, n_hypotheses=40, n_poses=32, n_settled=6),
+    SearchEffort(n_triples=40, n_hypotheses=32, n_poses=60, n_settled=6),
+    SearchEffort(n_triples=110, n_hypotheses=32, n_poses=100, n_settled=8),
+    SearchEffort(n_triples=4, n_hypotheses=700, n_poses=100, n_settled=8, sized=False),
 )
 MODERATE = EFFORTS[:3]
 # Every triple of LEDs for a few triples of spots: a second answer is among them.
 ALL_ANSWERS = (
-    Effort(n_triples=4, n_hypotheses=700, n_poses=300, n_settled=24, sized=False),
+    SearchEffort(n_triples=4, n_hypotheses=700, n_poses=300, n_settled=24, sized=False),
 )
 
 
@@ -129,7 +129,7 @@ def label_images(
     spots: Sequence[Spots],
     camera: Camera,
     pen: Pen,
-    efforts: Sequence[Effort] = EFFORTS,
+    efforts: Sequence[SearchEffort] = EFFORTS,
 ) -> list[Labels]:
     """Label the LEDs in images that have nothing to do with each other.
 
@@ -137,7 +137,7 @@ def label_images(
     ----------
     spots : sequence of Spots
         One per image.
-    efforts : sequence of Effort
+    efforts : sequence of SearchEffort
         How hard to search, one after the other, until an image is labelled.
 
     Returns
@@ -229,7 +229,7 @@ def _label_whole(
     spots: Sequence[Spots],
     camera: Camera,
     pen: Constellation,
-    efforts: Sequence[Effort],
+    efforts: Sequence[SearchEffort],
     use_unwhole: bool = False,
 ) -> list[Labels]:
     """Label images by their usable spots with growing effort."""
@@ -291,7 +291,7 @@ def _with_displaced(
 
 
 def _search(
-    sight: SpotArrays, pen: Constellation, effort: Effort, spots: Sequence[Spots]
+    sight: SpotArrays, pen: Constellation, effort: SearchEffort, spots: Sequence[Spots]
 ) -> list[Labels]:
     candidates = poses_from_triples(sight, pen, effort)
     settled, best = _with_lookalikes(sight, pen, settle(sight, pen, candidates))

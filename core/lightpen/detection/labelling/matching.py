@@ -7,7 +7,6 @@ the pinhole pixels of `lightpen.detection.labelling.spot_arrays`.
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from math import lgamma
 
 import numpy as np
 
@@ -22,9 +21,9 @@ MIN_FACING = 0.1  # cosine between a disc's normal and the direction to the came
 # Scale of the Cauchy weights of each refinement step, then reach of the pairing, px.
 SETTLING = ((3.0, 5.0), (0.5, 5.0))
 MAX_TURN = 0.5  # rad, of one step
-MIN_GATE = 0.3  # px, of a residual
-MAX_GATE = 1.0  # px
-GATE_SIGMAS = 5.0
+MIN_THRESHOLD = 0.3  # px, of a residual
+MAX_THRESHOLD = 1.0  # px
+OUTLIER_SIGMAS = 5.0
 UNSUSPICIOUS_RMS = 0.1  # px, at which no stray spot is looked for
 FLOOR_RMS = 0.03  # px, below which better fits count for nothing
 MAX_CHANCE = 1e-3  # that a pair dropped as stray was none
@@ -32,10 +31,6 @@ MAX_CHANCE = 1e-3  # that a pair dropped as stray was none
 SHAPE_TOLERANCE = 0.12  # difference of shapes over the trace of the predicted one
 MAX_COMMON_BROADENING = 0.5  # of all shapes alike, by defocus or motion
 AREA_RANGE = (0.5, 2.0)  # measured over predicted, all discs together
-
-# Of k / 2, for k up to 1023: a table, as lgamma takes one number at a time.
-LOG_FACTORIALS_OF_HALVES = np.array([lgamma(0.5 * k + 1) for k in range(1024)])
-LOG_FACTORIALS = LOG_FACTORIALS_OF_HALVES[::2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,15 +186,17 @@ def log_false_alarms(sight: SpotArrays, candidates: Candidates) -> FloatArray:
        matches between two images and estimate the fundamental matrix", International
        Journal of Computer Vision 57 (2004) 201-218.
     """
+    from scipy.special import gammaln  # takes 0.1 s
+
     n = candidates.n_explained
     n_leds = candidates.spot.shape[1]
     n_spots = sight.usable.sum(axis=1)[candidates.image]
-    choices = LOG_FACTORIALS[n_leds] - LOG_FACTORIALS[n] - LOG_FACTORIALS[n_leds - n]
-    choices += LOG_FACTORIALS[n_spots] - LOG_FACTORIALS[n_spots - n]
+    choices = gammaln(n_leds + 1) - gammaln(n + 1) - gammaln(n_leds - n + 1)
+    choices += gammaln(n_spots + 1) - gammaln(n_spots - n + 1)
     surplus = np.maximum(2 * n - 6, 0)
     squares = np.maximum(candidates.sum_squares, 1e-12)
     share = np.log(np.pi * squares / _covered_area(sight, candidates))
-    ball = 0.5 * surplus * share - LOG_FACTORIALS_OF_HALVES[surplus]
+    ball = 0.5 * surplus * share - gammaln(0.5 * surplus + 1)
     logs: FloatArray = (choices + np.minimum(ball, 0)) / np.log(10)
     return logs
 
@@ -318,15 +315,15 @@ def _drop_misshapen(
 def _out_of_gate(candidates: Candidates) -> BoolArray:
     """Return which pairs lie farther apart than the noise of the image allows, (C, L).
 
-    The noise is the median residual of the image. The gate is close because a stray
+    The noise is the median residual of the image. The threshold is low because a stray
     spot may lie near the place of a hidden LED by chance.
     """
     n = candidates.n_explained
     freedom = np.maximum(2 * n - 6, 1) / np.maximum(2 * n, 1)
     median = _median(candidates.residuals, candidates.spot >= 0)
     sigma = median / 1.177 / np.sqrt(freedom)  # the median of a Rayleigh distribution
-    gate = np.clip(GATE_SIGMAS * sigma, MIN_GATE, MAX_GATE)
-    return np.asarray(candidates.residuals > gate[:, None])
+    outlier_threshold = np.clip(OUTLIER_SIGMAS * sigma, MIN_THRESHOLD, MAX_THRESHOLD)
+    return np.asarray(candidates.residuals > outlier_threshold[:, None])
 
 
 def _drop_worst(
@@ -340,7 +337,7 @@ def _drop_worst(
     """
     n = candidates.n_explained
     suspect = (n >= pen.min_leds) & (candidates.rms > UNSUSPICIOUS_RMS)
-    suspect &= candidates.rms < MAX_GATE
+    suspect &= candidates.rms < MAX_THRESHOLD
     row, led = np.nonzero(suspect[:, None] & (candidates.spot >= 0))
     if not len(row):
         return candidates

@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.detection.spots import Flaw, Spots
+from lightpen.detection.spots import SpotFlaw, Spots
 from lightpen.model.camera import Camera
 
 FAR = 1e7  # px, where no spot is
-UNWHOLE = int(Flaw.MERGED | Flaw.CUT)
+UNWHOLE = int(SpotFlaw.MERGED | SpotFlaw.CUT)
 
 
 @dataclass(frozen=True, eq=False)

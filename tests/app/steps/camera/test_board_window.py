@@ -13,26 +13,25 @@ import pytest
 from PySide6.QtCore import QSize, QThreadPool
 from PySide6.QtWidgets import QApplication, QListWidget, QPushButton
 from pytestqt.qtbot import QtBot
+from tests.simulated_boards import expose_board, render_board, simulate_board_poses
 
 from lightpen.arrays import Image
 from lightpen.cameras.protocol import Frame, sealed
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import read_camera
 from lightpen.intrinsics.boards import parse_board
-from lightpen.live.looking import LiveImage
+from lightpen.live.pipeline import LiveImage
 from lightpen.model.camera import Camera
-from lightpen.record.camera_calibrations import CAMERA_CALIBRATIONS, CameraTrial
-from lightpen.record.outcome import TrialOutcome
-from lightpen.simulator.board_views import simulate_board_poses
-from lightpen.simulator.boards import expose_board, render_board
+from lightpen.record.folder.camera_calibrations import CAMERA_CALIBRATIONS, CameraTrial
+from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.simulator.sensor import Sensor
-from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.pooling import pooled
 from lightpen_app.steps.camera.board_view import BoardView
 from lightpen_app.steps.camera.board_window import BoardWindow
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.sign_label import SignLabel
-from lightpen_app.work.live_view import Shown
+from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -131,7 +130,7 @@ def test_a_view_that_is_left_out_takes_no_part(
     window.read_folder(written(tmp_path, images))
     qtbot.waitUntil(lambda: views_listed(window) == 7)
     window.findChildren(QListWidget)[0].setCurrentRow(0)
-    press(window, "Leave out and calibrate again")
+    press(window, "Exclude view and recalibrate")
 
     qtbot.waitUntil(lambda: views_listed(window) == 6)
 
@@ -140,7 +139,7 @@ def test_a_board_that_is_none_is_refused(window: BoardWindow) -> None:
     window.findChildren(EnterEdit)[0].setText("chess")
     press(window, "Start")
 
-    assert "chess is no board" in remark(window)
+    assert "chess is not a board" in remark(window)
 
 
 def test_images_without_a_board_are_refused_with_the_reason(
@@ -162,13 +161,13 @@ def test_a_board_held_still_is_kept_by_itself(
             count += 1
             shown = _shown(image, count)
             workbench.live.image_shown.emit(shown)
-            qtbot.waitUntil(lambda: window._searching is None)
+            qtbot.waitUntil(lambda: not window.is_searching)
 
     overlay = view.overlay()
     assert overlay.cells is not None
     assert overlay.cells.sum() == 2 * 35
     assert overlay.outline is not None
-    assert "Kept." in remark(window)
+    assert "View captured." in remark(window)
     press(window, "Stop")
 
 
@@ -180,11 +179,11 @@ def test_another_board_held_before_the_camera_is_named(
     told = []
     for count in range(6):  # in 4 s
         workbench.live.image_shown.emit(_shown(images[0], 2 * count))
-        qtbot.waitUntil(lambda: window._searching is None)
+        qtbot.waitUntil(lambda: not window.is_searching)
         told.append(remark(window))
 
-    assert "not seen" in told[0]
-    assert "of 8 x 6 inner corners, but one of 7 x 5" in told[-1]
+    assert "not detected" in told[0]
+    assert "No image shows a chessboard of 8 x 6 inner corners;" in told[-1]
     press(window, "Stop")
 
 
@@ -197,7 +196,10 @@ def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
 ) -> None:
     told: list[CameraTrial] = []
     window.concluded.connect(told.append)
-    window.concluded.connect(workbench.keep_camera_trial)
+    names = workbench.selection.preparation.names
+    window.concluded.connect(
+        lambda trial: workbench.archive_writer.keep_camera_trial(trial, names)
+    )
     folder = written(tmp_path, images)
     for _ in range(2):  # the first is not used
         window.read_folder(folder)
@@ -223,7 +225,7 @@ def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
 @pytest.fixture
 def slow_disk(hold_back: "HoldBack") -> Event:
     """Camera files are saved once this is set."""
-    return hold_back("lightpen_app.steps.camera.board_window.save_camera")
+    return hold_back("lightpen_app.steps.camera.board_calibration.save_camera")
 
 
 def test_a_camera_file_that_is_still_being_saved_is_that_of_its_attempt(
@@ -264,7 +266,7 @@ def test_views_that_were_kept_and_never_computed_are_abandoned(
     press(window, "Start")
     for count in range(1, 4):
         workbench.live.image_shown.emit(_shown(images[0], count))
-        qtbot.waitUntil(lambda: window._searching is None)
+        qtbot.waitUntil(lambda: not window.is_searching)
     window.close()
 
     (trial,) = told
@@ -272,11 +274,11 @@ def test_views_that_were_kept_and_never_computed_are_abandoned(
     assert (trial.outcome, trial.images) == (TrialOutcome.ABANDONED, {"1": pixels})
 
 
-def _shown(image: Image, seconds: int) -> Shown:
+def _shown(image: Image, seconds: int) -> DisplayedImage:
     frame = Frame(sealed(image), seconds, seconds * SECOND)
     height, width = image.shape
     seen = LiveImage(frame, detect_spots(image), None)
-    return Shown(pooled(image, 8), QSize(width, height), seen)
+    return DisplayedImage(pooled(image, 8), QSize(width, height), seen)
 
 
 def test_what_the_live_image_shows_is_said_no_more_once_it_is_stopped(
@@ -284,7 +286,7 @@ def test_what_the_live_image_shows_is_said_no_more_once_it_is_stopped(
 ) -> None:
     press(window, "Start")
     workbench.live.image_shown.emit(_shown(images[0], 1))
-    qtbot.waitUntil(lambda: window._searching is None)
+    qtbot.waitUntil(lambda: not window.is_searching)
     assert remark(window) != ""
     press(window, "Stop")
 
@@ -330,9 +332,9 @@ def test_what_was_calibrated_is_told_in_the_language_that_is_chosen(
     window.read_folder(written(tmp_path, images))
     qtbot.waitUntil(lambda: views_listed(window) == 7)
     english = window.findChildren(QListWidget)[0].item(0).text()
-    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    LanguageSwitch(qapp).set_language("zh_CN")
     QApplication.processEvents()
 
-    assert "by the others" in english
-    assert "by the others" not in window.findChildren(QListWidget)[0].item(0).text()
+    assert "cross-validated" in english
+    assert "cross-validated" not in window.findChildren(QListWidget)[0].item(0).text()
     assert not remark(window).isascii()

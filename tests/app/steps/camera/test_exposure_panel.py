@@ -4,26 +4,26 @@ from dataclasses import replace
 
 from pytestqt.qtbot import QtBot
 
-from lightpen.cameras.protocol import CameraSettings, Caps, Range
-from lightpen.detection.auto_exposure import AutoExposure, Standing
+from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Range
+from lightpen.detection.auto_exposure import AutoExposure, ExposureState
 from lightpen.detection.inspection import Exposure
 from lightpen_app.steps.camera.exposure_panel import ExposurePanel
 
 
-def test_what_an_adjustment_came_to_is_said_as_long_as_it_is_true(
-    qtbot: QtBot,
-) -> None:
+def test_what_an_adjustment_came_to_is_said_as_long_as_it_is_true(qtbot: QtBot) -> None:
     settings = CameraSettings(exposure_us=900.0)
     panel = ExposurePanel()
     qtbot.addWidget(panel)
-    panel.set_camera(Caps(200, 160, ("Mono8",), Range(10.0, 1e5)), settings)
+    panel.set_camera(
+        CameraCapabilities(200, 160, ("Mono8",), Range(10.0, 1e5)), settings
+    )
     begun = AutoExposure.begun(settings)
     panel.set_value(Exposure((0.8, 0.7)))
-    panel.set_adjustment(replace(begun, outcome=Standing.DONE, level=0.8))
-    assert panel.advice() == "Set. Brightest LED: 80 %, none is saturated."
+    panel.set_adjustment(replace(begun, outcome=ExposureState.DONE, level=0.8))
+    assert panel.advice() == "Exposure set. Brightest LED: 80 %; none saturated."
 
     panel.set_value(Exposure((1.0, 0.9)))
-    assert "none is saturated" not in panel.advice()
+    assert "none saturated" not in panel.advice()
 
-    panel.set_adjustment(replace(begun, outcome=Standing.NO_LEDS))
-    assert "No LEDs are seen" not in panel.advice()
+    panel.set_adjustment(replace(begun, outcome=ExposureState.NO_LEDS))
+    assert "No LEDs detected." not in panel.advice()

@@ -22,10 +22,10 @@ def meter(qtbot: QtBot) -> FocusMeter:
 @pytest.mark.parametrize(
     ("widths", "verdict", "number"),
     [
-        ((), "No LED is seen", ""),
-        ((2.0, math.nan), "No LED is seen", ""),
-        ((6.0, 2.14), "Sharp", "2.1 px"),
-        ((2.0, 3.6), "Soft", "3.6 px"),
+        ((), "No LED detected", ""),
+        ((2.0, math.nan), "No LED detected", ""),
+        ((6.0, 2.14), "In focus", "2.1 px"),
+        ((2.0, 3.6), "Out of focus", "3.6 px"),
     ],
 )
 def test_the_last_width_is_judged(

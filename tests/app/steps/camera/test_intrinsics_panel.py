@@ -8,10 +8,10 @@ import pytest
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
-from lightpen.estimation.contradictions import FOCAL_LENGTH, Contradiction
+from lightpen.estimation.bundle.consistency_findings import FOCAL_LENGTH, Contradiction
 from lightpen.formats.opened_files import CameraFile
-from lightpen.record.reading import open_record
-from lightpen.record.solving import Solution, solve_record
+from lightpen.record.swings.reading import open_record
+from lightpen.record.swings.solving import Solution, solve_record
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 
 
@@ -38,7 +38,7 @@ def test_a_swing_that_agrees_with_the_file_is_told(
 ) -> None:
     assert "agree" not in words(panel)
     panel.set_swing(solution)
-    assert "Checked by the swing: file and camera agree." in words(panel)
+    assert "Checked by a swing: file and camera agree." in words(panel)
     panel.set_swing(None)
     assert "agree" not in words(panel)
 
@@ -50,7 +50,7 @@ def test_what_a_swing_denies_of_the_file_is_told(
     calibration = replace(solution.calibration, contradictions=(denied,))
     panel.set_swing(replace(solution, calibration=calibration))
 
-    assert "they want the focal length to be 2326" in words(panel)
+    assert "focal length 2326 ±" in words(panel)
     assert "agree" not in words(panel)
 
 

@@ -31,6 +31,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 from tests.app.undressed import undressed
+from tests.faulty_camera import FaultyCamera
 from typing_extensions import override
 
 from lightpen.cameras.pairing import not_synchronised
@@ -40,19 +41,15 @@ from lightpen.cameras.worker_events import Connection
 from lightpen.detection.inspection import SEARCHED_IMAGES
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import write_camera
-from lightpen.live.looking import LiveImage
-from lightpen.record.names import Names
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.hand import Doing
+from lightpen.live.pipeline import LiveImage
+from lightpen.record.swings.names import Names
+from lightpen.simulator.hand import HandActivity
 from lightpen.simulator.scene_files import write_scene
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.view import Lamp
-from lightpen.swing.preparation import (
-    SourceChoice,
-    SourceKind,
-)
-from lightpen_app.look.languages import Language, LanguageSwitch
-from lightpen_app.look.sounds import Silence
+from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen_app.look.languages import LanguageSwitch
+from lightpen_app.look.sounds import SilentSounds
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
@@ -100,7 +97,7 @@ def exposure(seen: "Seen") -> str:
 @pytest.fixture
 def page(qtbot: QtBot, workbench: Workbench) -> Iterator[CameraPage]:
     with undressed():
-        page = CameraPage(workbench, Silence())
+        page = CameraPage(workbench, SilentSounds())
     qtbot.addWidget(page)
     page.resize(976, 600)
     page.show()
@@ -121,10 +118,10 @@ def live(seen: "Seen") -> "Seen":
     return seen
 
 
-def plugged(workbench: Workbench, scene: Scene, *lamps: Lamp) -> SimulatedCamera:
+def plugged(workbench: Workbench, scene: Scene, *lamps: Lamp) -> FaultyCamera:
     """Open a simulated camera in which things can go wrong."""
     clock = workbench.around.clock
-    camera = SimulatedCamera(scene, clock, lamps=lamps)
+    camera = FaultyCamera(scene, clock, lamps=lamps)
     workbench.live.open([camera], CameraSettings(), clock)
     return camera
 
@@ -144,7 +141,7 @@ def recording(
 
 def intrinsics(workbench: Workbench, folder: Path, **changes: object) -> Path:
     """Write a file like the one in use, with changes."""
-    camera = workbench.preparation.camera
+    camera = workbench.selection.preparation.camera
     assert camera is not None
     path = folder / "other.yaml"
     write_camera(replace(camera, **changes), path)  # type: ignore[arg-type]
@@ -168,7 +165,7 @@ def ask_for_second(seen: "Seen") -> None:
     (box,) = (
         each
         for each in seen.page.findChildren(QCheckBox)
-        if each.text().startswith("A second camera")
+        if each.text().startswith("Use a second camera")
     )
     box.click()
 
@@ -176,32 +173,31 @@ def ask_for_second(seen: "Seen") -> None:
 def test_a_second_camera_is_shown_set_and_masked_by_itself(
     live: "Seen", workbench: Workbench
 ) -> None:
-    assert workbench.preparation.second is None
+    assert workbench.selection.preparation.second is None
     ask_for_second(live)
-    live.wait("left and right stand 500.00")
+    live.wait("Baseline 500.00")
     live.until(lambda: len(places(live)) == N_LEDS)
     first = places(live)
     live.click("Camera 2")
     with live.qtbot.waitSignal(
-        workbench.live.image_shown,
-        check_params_cb=lambda shown: shown.seen.camera == 1,
+        workbench.live.image_shown, check_params_cb=lambda shown: shown.seen.camera == 1
     ):
         pass
     live.until(lambda: len(places(live)) == N_LEDS and are_apart(first, places(live)))
     workbench.live.set_exposure(400.0)
     live.until(lambda: workbench.live.connection is Connection.STREAMING)
 
-    workbench.set_preparation(
-        workbench.preparation.with_mask(1, np.array([[5.0, 5.0, 3.0]]))
+    workbench.selection.set_preparation(
+        workbench.selection.preparation.with_mask(1, np.array([[5.0, 5.0, 3.0]]))
     )
-    assert not len(workbench.preparation.mask)
-    live.until(lambda: not workbench.preparation.camera_lacks())
+    assert not len(workbench.selection.preparation.mask)
+    live.until(lambda: not workbench.selection.preparation.camera_missing_inputs())
     live.page.left()
     assert workbench.live.chosen == 0
 
     live.page.entered()
     ask_for_second(live)
-    assert workbench.preparation.second is None
+    assert workbench.selection.preparation.second is None
     live.until(lambda: workbench.live.n_cameras == 1)
 
 
@@ -209,17 +205,17 @@ def test_a_rig_file_that_cannot_be_read_is_told_where_it_was_chosen(
     live: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     ask_for_second(live)
-    live.wait("left and right stand")
+    live.wait("Baseline")
     (tmp_path / "rig.json").write_text("{}")
     panel = live.child(RigPanel)
     panel.path_chosen.emit(str(tmp_path / "rig.json"))
 
     live.until(lambda: "cameras" in panel.problem().text)
     assert panel.problem().tone is Tone.BAD
-    assert workbench.preparation.rig_file is not None
-    assert "stays in use: left and right stand" in panel.remark().text
+    assert workbench.selection.preparation.rig_file is not None
+    assert "remains in use: Baseline" in panel.remark().text
 
-    workbench.changed.emit()
+    workbench.selection.changed.emit(workbench.selection.preparation)
     assert "cameras" in panel.problem().text
 
     ask_for_second(live)
@@ -228,12 +224,12 @@ def test_a_rig_file_that_cannot_be_read_is_told_where_it_was_chosen(
 
 def test_cameras_out_of_step_are_told_with_what_that_costs(live: "Seen") -> None:
     ask_for_second(live)
-    live.wait("left and right stand")
+    live.wait("Baseline")
     panel = live.child(RigPanel)
     panel.set_step(not_synchronised(12.5, 2.0), 3)
 
     assert "12.5 ms apart" in panel.step().text
-    assert "Images without a partner: 3" in panel.step().text
+    assert "Unpaired images: 3" in panel.step().text
 
 
 # Live image
@@ -246,7 +242,7 @@ def test_each_led_has_a_ring_with_its_number(live: "Seen") -> None:
 
 def test_size_and_rate_of_the_images_are_told(live: "Seen") -> None:
     assert "1224 x 1024 px" in live.words
-    assert "images/s" in live.words
+    assert "fps" in live.words
     assert "Live" in live.words
 
 
@@ -266,7 +262,7 @@ def test_the_simulated_pen_comes_by_itself(seen: "Seen") -> None:
     seen.page.entered()
 
     seen.wait("10 of 10 LEDs")
-    assert exposure(seen) == "Good: 10 LEDs"
+    assert exposure(seen) == "OK: 10 LEDs"
 
 
 def test_spots_that_are_no_leds_are_dashed(
@@ -277,19 +273,21 @@ def test_spots_that_are_no_leds_are_dashed(
 
     seen.wait("10 of 10 LEDs, other spots: 2")
     assert len(others(seen)) == 2
-    assert exposure(seen) == "Good: 10 LEDs"
+    assert exposure(seen) == "OK: 10 LEDs"
 
 
 def test_without_a_pen_file_all_spots_are_equal(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
-    workbench.set_preparation(replace(workbench.preparation, pen_file=None))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, pen_file=None)
+    )
     plugged(workbench, small_scene, LAMPS[0])
     seen.page.entered()
 
-    seen.wait("bright spots: 11")
+    seen.wait("Bright spots: 11")
     assert {marker.tone for marker in seen.markers} == {Tone.ACTIVE}
-    assert exposure(seen) == "Good: 11 spots"
+    assert exposure(seen) == "OK: 11 spots"
 
 
 def test_images_are_taken_only_while_the_page_is_shown(
@@ -308,23 +306,23 @@ def test_a_sharp_image_has_narrow_rims(live: "Seen") -> None:
     meter = live.child(FocusMeter)
 
     live.until(lambda: 1 < float(meter.number().removesuffix(" px")) < 3)
-    assert meter.verdict() == "Sharp"
+    assert meter.verdict() == "In focus"
 
 
 # Exposure and gain
 
 
 def test_a_long_exposure_saturates_and_a_short_one_is_dark(live: "Seen") -> None:
-    assert "All lie in the good part of the scale." in live.words
+    assert "All LEDs are correctly exposed." in live.words
 
     live.enter("Exposure", "4")
     live.until(lambda: exposure(live) == "Saturated: 10 of 10 LEDs")
     assert "Shorten the exposure until no LED is saturated." in live.words
-    assert live.child(FocusPanel).hint().startswith("Lower the exposure first")
+    assert live.child(FocusPanel).hint().startswith("Reduce the exposure first:")
 
     live.enter("Exposure", "0.2")
     live.until(lambda: exposure(live) == "Too dark: 10 of 10 LEDs")
-    assert "Lengthen the exposure until all LEDs are good." in live.words
+    assert "Lengthen the exposure until all LEDs are OK." in live.words
     assert live.child(FocusPanel).hint().startswith("Turn the focus ring")
 
 
@@ -338,7 +336,7 @@ def test_gain_that_saturates_is_to_be_lowered(live: "Seen") -> None:
 def test_exposure_and_gain_in_force_are_shown(
     seen: "Seen", workbench: Workbench, qtbot: QtBot
 ) -> None:
-    workbench.open_camera()
+    workbench.camera.open()
     seen.page.entered()
     seen.wait("10 of 10 LEDs")
     with qtbot.waitSignal(workbench.live.settings_applied):
@@ -355,11 +353,13 @@ def test_recorded_images_have_no_exposure_to_set(
 ) -> None:
     place = str(recording(tmp_path / "swing"))
     source = SourceChoice(SourceKind.RECORDED, place)
-    workbench.set_preparation(replace(workbench.preparation, source=source))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, source=source)
+    )
     seen.page.entered()
 
-    seen.wait("Recorded: exposure and gain are as they were taken.")
-    seen.wait("Recorded: the focus is as it was.")
+    seen.wait("Recorded images: exposure and gain are fixed.")
+    seen.wait("Recorded images: focus is fixed.")
     seen.wait("SIMULATED")  # as the files in use are of the simulated pen
     assert "Live" not in seen.words
     with pytest.raises(AssertionError):
@@ -370,10 +370,10 @@ def test_recorded_images_have_no_exposure_to_set(
 
 
 def test_the_checks_of_the_intrinsics_are_shown(live: "Seen") -> None:
-    assert "Fits the live images: 1224 x 1024" in live.words
+    assert "Matches the live images: 1224 x 1024" in live.words
     assert "2319.10 \u00b1 0.26 and 2318.55 \u00b1 0.26 px" in live.words
     assert "k1 -0.082" in live.words
-    assert "no date" in live.words
+    assert "No date" in live.words
 
 
 def test_intrinsics_without_an_uncertainty_are_said_to_be_so(
@@ -382,7 +382,7 @@ def test_intrinsics_without_an_uncertainty_are_said_to_be_so(
     live.enter("Intrinsics file", str(intrinsics(workbench, tmp_path, covariance=None)))
 
     live.wait("2319.10 and 2318.55 px")
-    assert "no date, no uncertainty in the file" in live.words
+    assert "No date, no uncertainty in the file" in live.words
 
 
 def test_date_and_uncertainty_of_the_intrinsics_are_shown(
@@ -412,7 +412,7 @@ def test_intrinsics_of_another_camera_and_of_long_ago_are_doubted(
 
     live.enter("Intrinsics file", str(path))
 
-    live.wait("The camera file is of the camera DEV-99")
+    live.wait("The camera file belongs to camera DEV-99")
     assert "on 2020-01-02" in live.words
 
 
@@ -425,7 +425,9 @@ def test_facts_that_are_not_known_take_no_focus(
     assert len(told) == 4
     assert all(each.text() for each in told)
 
-    workbench.set_preparation(replace(workbench.preparation, camera_file=None))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, camera_file=None)
+    )
 
     focusable = [each for each in facts if each.focusPolicy() != Qt.FocusPolicy.NoFocus]
     assert focusable == []
@@ -439,12 +441,15 @@ def test_a_file_for_images_of_another_size_is_told_and_stops_the_step(
     live.enter("Intrinsics file", str(path))
 
     live.wait(
-        "The camera sends 1224 x 1024, the calibration file was made for 612 x 512. "
-        "Choose the file for this camera, set the region to the whole sensor, or "
-        "switch off binning."
+        "Image size is 1224 x 1024; the intrinsics file is for 612 x 512. Choose "
+        "the file of this camera, set the region to the whole sensor, or turn off "
+        "binning."
     )
     assert not live.page.is_complete()
-    assert "another size" in live.page.main_action().why_not
+    assert (
+        "The intrinsics file is for another image size."
+        in live.page.main_action().why_not
+    )
 
 
 @pytest.mark.parametrize(
@@ -452,7 +457,7 @@ def test_a_file_for_images_of_another_size_is_told_and_stops_the_step(
     [
         (None, "does not exist"),
         ("", "is empty"),
-        ("LED,x,y,z\n1,0,0,0\n", "Check that the right file is named."),
+        ("LED,x,y,z\n1,0,0,0\n", "Check that this is the right file."),
         ("image_width: 1224\nimage_height: [", "Line 3 of other.yaml is not valid"),
     ],
 )
@@ -466,18 +471,18 @@ def test_an_unfit_file_is_told_beside_the_field_and_the_one_before_stays(
     path = tmp_path / "other.yaml"
     if content is not None:
         path.write_text(content)
-    before = workbench.preparation.camera_file
+    before = workbench.selection.preparation.camera_file
 
     live.enter("Intrinsics file", str(path))
 
     live.wait(sentence)
     assert "In use\ncamera.yaml" in live.words
-    assert workbench.preparation.camera_file is before
+    assert workbench.selection.preparation.camera_file is before
     assert live.page.is_complete()
     field = live.named("Intrinsics file")
     assert isinstance(field, QLineEdit)
     assert field.text() == str(path)
-    assert "Fits the live images" in live.words
+    assert "Matches the live images:" in live.words
 
 
 def test_the_complaint_goes_with_a_fit_file(
@@ -489,8 +494,8 @@ def test_the_complaint_goes_with_a_fit_file(
     live.enter("Intrinsics file", f'"{intrinsics(workbench, tmp_path)}"')
 
     live.until(lambda: "does not exist" not in live.words)
-    assert workbench.preparation.camera_file is not None
-    assert workbench.preparation.camera_file.path.name == "other.yaml"
+    assert workbench.selection.preparation.camera_file is not None
+    assert workbench.selection.preparation.camera_file.path.name == "other.yaml"
 
 
 def test_what_is_wrong_with_a_file_is_told_in_the_language_of_the_wizard(
@@ -498,7 +503,7 @@ def test_what_is_wrong_with_a_file_is_told_in_the_language_of_the_wizard(
 ) -> None:
     broken = tmp_path / "broken.yaml"
     broken.write_text("image_width: 1224\ncamera_matrix: [1, 2\n")
-    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    LanguageSwitch(qapp).set_language("zh_CN")
     live.wait("遮住光笔")
 
     live.enter("内参文件", str(broken))
@@ -516,34 +521,34 @@ def test_a_file_is_opened_in_the_dialog(
     dialog.selectFile(str(path))
     dialog.accept()
 
-    live.until(lambda: workbench.preparation.camera_file.path == path)  # type: ignore[union-attr]
+    live.until(lambda: workbench.selection.preparation.camera_file.path == path)  # type: ignore[union-attr]
 
 
 def test_a_dialog_that_is_left_changes_nothing(
     live: "Seen", workbench: Workbench
 ) -> None:
-    before = workbench.preparation
+    before = workbench.selection.preparation
     live.click("Open...")
     live.child(QFileDialog).reject()
 
-    assert workbench.preparation is before
+    assert workbench.selection.preparation is before
 
 
 def test_the_files_of_the_simulated_pen_are_used_at_a_click(
     seen: "Seen", workbench: Workbench
 ) -> None:
-    workbench.set_preparation(
-        replace(workbench.preparation, camera_file=None, pen_file=None)
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, camera_file=None, pen_file=None)
     )
     seen.page.entered()
-    seen.wait("Open the file with the calibration of camera and lens.")
+    seen.wait("Open the intrinsics file of this camera and lens.")
     assert not seen.page.is_complete()
     assert seen.page.main_action().why_not
 
     seen.click("Use its files")
 
-    seen.wait("Fits the live images")
-    assert workbench.preparation.pen_file is not None
+    seen.wait("Matches the live images:")
+    assert workbench.selection.preparation.pen_file is not None
     assert seen.page.is_complete()
 
 
@@ -558,7 +563,7 @@ def test_a_recording_asks_where_it_is(live: "Seen", workbench: Workbench) -> Non
         "Choose the folder of the recorded images."
     )
     assert live.markers == ()
-    assert exposure(live) == "No LED is seen"
+    assert exposure(live) == "No LED detected"
     assert live.named("Folder, record or video").hasFocus()
 
     live.choose("GenICam with a vendor's GenTL producer")
@@ -572,10 +577,10 @@ def test_a_recorded_swing_is_played(
     live.choose("Recorded images")
 
     live.enter("Folder, record or video", str(tmp_path / "swing"))
-    live.wait("Beside the images: camera.yaml and leds.csv")
+    live.wait("Found with the images: camera.yaml and leds.csv")
     why_not = "Open the intrinsics file."
     live.until(lambda: live.page.main_action().why_not == why_not)
-    live.click("Use both")
+    live.click("Use both files")
 
     live.wait("10 of 10 LEDs")
     assert live.page.is_complete()
@@ -586,12 +591,12 @@ def test_files_of_the_simulated_pen_are_not_combined_with_a_recording(
 ) -> None:
     live.choose("Recorded images")
     live.enter("Folder, record or video", str(recording(tmp_path / "swing")))
-    assert workbench.preparation.camera_file is None
-    assert workbench.preparation.pen_file is None
+    assert workbench.selection.preparation.camera_file is None
+    assert workbench.selection.preparation.pen_file is None
 
     live.choose("Simulated pen")
-    live.wait("Fits the live images")
-    assert workbench.preparation.pen_file is not None
+    live.wait("Matches the live images:")
+    assert workbench.selection.preparation.pen_file is not None
 
 
 def test_a_folder_and_an_intrinsics_file_are_dropped_on_their_places(
@@ -599,10 +604,12 @@ def test_a_folder_and_an_intrinsics_file_are_dropped_on_their_places(
 ) -> None:
     write_scene(replace(small_scene, n_images=2), tmp_path / "swing")
     drop_on(live.child(SourcePanel), tmp_path / "swing")
-    live.until(lambda: workbench.preparation.source.place == str(tmp_path / "swing"))
+    live.until(
+        lambda: workbench.selection.preparation.source.place == str(tmp_path / "swing")
+    )
     drop_on(live.child(IntrinsicsPanel), tmp_path / "swing" / "camera.yaml")
 
-    live.wait("Fits the live images")
+    live.wait("Matches the live images:")
 
 
 def drop_on(panel: QWidget, path: Path) -> None:
@@ -629,7 +636,7 @@ def test_a_folder_is_picked_in_the_dialog(
     dialog.setDirectory(str(folder))
     dialog.accept()
 
-    live.until(lambda: workbench.preparation.source.place == str(folder))
+    live.until(lambda: workbench.selection.preparation.source.place == str(folder))
     live.wait("80 x 64 px")
 
 
@@ -654,7 +661,7 @@ def test_a_folder_without_images_is_told(live: "Seen", tmp_path: Path) -> None:
 
     live.enter("Folder, record or video", str(folder))
 
-    live.wait(f"The folder {folder} holds no images")
+    live.wait(f"The folder {folder} contains no images")
     assert not live.page.is_complete()
 
 
@@ -666,11 +673,12 @@ def test_a_damaged_image_is_counted_and_the_others_are_shown(
     damaged.write_bytes(damaged.read_bytes()[:-20])
     live.choose("Recorded images")
 
-    with qtbot.waitSignal(workbench.troubled) as trouble:
+    with qtbot.waitSignal(workbench.notifications.raised) as trouble:
         live.enter("Folder, record or video", str(folder))
 
-    assert trouble.args == ["frame_1.png is cut off. Capture or copy it again."]
-    live.wait("lost: ")
+    assert trouble.args is not None
+    assert trouble.args[0] == "frame_1.png is cut off. Capture or copy it again."
+    live.wait("Lost: ")
     assert "80 x 64 px" in live.words
 
 
@@ -695,7 +703,7 @@ def test_a_recording_that_begins_damaged_shows_the_others(
     live.enter("Folder, record or video", str(folder))
 
     live.wait("80 x 64 px")
-    live.wait("lost: 1")
+    live.wait("Lost: 1")
 
 
 def test_the_pen_is_back_after_a_recording(live: "Seen", tmp_path: Path) -> None:
@@ -710,31 +718,35 @@ def test_the_pen_is_back_after_a_recording(live: "Seen", tmp_path: Path) -> None
 
 
 def test_another_source_takes_the_notice_of_the_last_away(
-    live: "Seen", tmp_path: Path, qtbot: QtBot
+    live: "Seen", workbench: Workbench, tmp_path: Path, qtbot: QtBot
 ) -> None:
     live.choose("Recorded images")
     live.enter("Folder, record or video", str(tmp_path / "nowhere"))
     live.wait("There is no folder")
 
-    with qtbot.waitSignal(live.page.notice_raised) as notice:
+    with qtbot.waitSignal(workbench.notifications.withdrawn) as notice:
         live.choose("Simulated pen")
 
-    assert notice.args == [""]
+    assert str(notice.args).startswith("['There is no folder")
 
 
 def test_cameras_that_are_found_late_are_not_taken_for_another_source(
     seen: "Seen", workbench: Workbench
 ) -> None:
     panel = seen.child(SourcePanel)
-    workbench.set_preparation(workbench.preparation.with_source(SourceChoice("aravis")))
+    workbench.selection.set_preparation(
+        workbench.selection.preparation.with_source(SourceChoice("aravis"))
+    )
     panel.set_searching(True)
     recorded = SourceChoice(SourceKind.RECORDED)
-    workbench.set_preparation(workbench.preparation.with_source(recorded))
+    workbench.selection.set_preparation(
+        workbench.selection.preparation.with_source(recorded)
+    )
 
-    workbench.search.succeeded.emit((FoundDevice("LP02", "Aravis Fake (LP02)"),))
+    workbench.camera.cameras_found.emit((FoundDevice("LP02", "Aravis Fake (LP02)"),))
 
     assert panel.value() == recorded
-    assert workbench.preparation.source == recorded
+    assert workbench.selection.preparation.source == recorded
 
 
 # A camera that fails
@@ -747,14 +759,14 @@ def test_a_camera_that_is_unplugged_is_told_and_comes_back(
     seen.page.entered()
     seen.wait("10 of 10 LEDs")
 
-    camera.faults.unplug()
+    camera.unplug()
     seen.wait("Lost, reconnecting")
-    assert "no longer answers. Check its cable and its power." in seen.words
-    assert "It is looked for until it is back." in seen.words
+    assert "Check cable and power." in seen.words
+    assert "Reconnecting automatically." in seen.words
     assert seen.markers == ()
     assert not seen.named("Search").isEnabled()
 
-    camera.faults.plug_in()
+    camera.plug_in()
     seen.wait("10 of 10 LEDs")
     assert "Live" in seen.words
 
@@ -768,35 +780,35 @@ def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
     live.choose("Recorded images")
     live.enter("Folder, record or video", str(tmp_path / "swing"))
     why_not = "Open the intrinsics file."
-    live.wait("Beside the images: camera.yaml and leds.csv")
+    live.wait("Found with the images: camera.yaml and leds.csv")
     live.until(lambda: live.page.main_action().why_not == why_not)
-    live.click("Use both")
+    live.click("Use both files")
     live.wait("10 of 10 LEDs")
 
     gone.rename(tmp_path / "elsewhere")
     live.wait("Lost, reconnecting")
-    assert f"No image of {tmp_path / 'swing'} can be read any more." in live.words
-    assert "It is looked for until it is back." in live.words
-    for stale in ("of 10 LEDs", "images/s", "Live"):
+    assert f"Images of {tmp_path / 'swing'} are no longer readable." in live.words
+    assert "Reconnecting automatically." in live.words
+    for stale in ("of 10 LEDs", "fps", "Live"):
         assert stale not in live.words
     assert live.markers == ()
-    assert exposure(live) == "No LED is seen"
+    assert exposure(live) == "No LED detected"
 
     (tmp_path / "elsewhere").rename(gone)
     live.wait("10 of 10 LEDs")
-    assert "can be read any more" not in live.words
+    assert "are no longer readable." not in live.words
 
 
 def test_a_camera_that_is_not_there_is_told(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     clock = workbench.around.clock
-    camera = SimulatedCamera(small_scene, clock)
-    camera.faults.unplug()
+    camera = FaultyCamera(small_scene, clock)
+    camera.unplug()
     workbench.live.open([camera], CameraSettings(), clock)
     seen.page.entered()
 
-    seen.wait("is not plugged in. Plug it in.")
+    seen.wait("There is no camera SIM-1.")
     seen.click("Try again")
     seen.wait("10 of 10 LEDs")
 
@@ -808,10 +820,10 @@ def test_a_silent_camera_is_told(
     seen.page.entered()
     seen.wait("10 of 10 LEDs")
 
-    camera.faults.stall(4.0)
+    camera.stall(4.0)
 
-    seen.wait("The camera answers but sends no images.")
-    assert "Silent" in seen.words
+    seen.wait("The camera responds but sends no images.")
+    assert "No images" in seen.words
     seen.wait("10 of 10 LEDs")
 
 
@@ -821,10 +833,10 @@ def test_a_search_ends_with_the_images(
     camera = plugged(workbench, small_scene)
     seen.page.entered()
     seen.wait("10 of 10 LEDs")
-    camera.faults.stall(4.0)
+    camera.stall(4.0)
     seen.click("Search")
 
-    seen.wait("Silent")
+    seen.wait("No images")
 
     assert "Searching" not in seen.words
 
@@ -849,29 +861,31 @@ def test_what_shines_beside_the_covered_pen_is_found_and_masked(
     seen.until(lambda: [m.label for m in seen.markers] == ["stray", "stray"])
 
     seen.click("Mask the spots: 2")
-    seen.wait("Masked places: 2")
+    seen.wait("Masked areas: 2")
     seen.click("Uncover the LEDs")
     seen.wait("10 of 10 LEDs")
     seen.until(lambda: not others(seen))
     assert len(crossed(seen)) == 2
-    assert len(workbench.preparation.mask) == 2
+    assert len(workbench.selection.preparation.mask) == 2
 
 
 def test_a_mask_is_cleared(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     mask = np.array([[*lamp.center, 30.0] for lamp in LAMPS])
-    workbench.set_preparation(replace(workbench.preparation, mask=mask))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, mask=mask)
+    )
     plugged(workbench, small_scene, *LAMPS)
     seen.page.entered()
     seen.wait("10 of 10 LEDs")
     seen.until(lambda: len(crossed(seen)) == 2)
 
-    seen.click("Clear the mask")
+    seen.click("Clear mask")
 
     seen.until(lambda: len(others(seen)) == 2)
     assert crossed(seen) == []
-    assert not seen.named("Clear the mask").isEnabled()
+    assert not seen.named("Clear mask").isEnabled()
 
 
 def test_a_mask_is_clicked_and_drawn_on_the_image(
@@ -884,8 +898,10 @@ def test_a_mask_is_clicked_and_drawn_on_the_image(
     first, second = (view.place_of(*lamp.center).toPoint() for lamp in LAMPS)
 
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=first)
-    assert len(workbench.preparation.mask) == 0  # so far a click means nothing
-    seen.click("Draw the mask on the image")
+    assert (
+        len(workbench.selection.preparation.mask) == 0
+    )  # so far a click means nothing
+    seen.click("Draw mask on the image")
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=first)
     seen.until(lambda: len(others(seen)) == 1)
     QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=second)
@@ -894,29 +910,31 @@ def test_a_mask_is_clicked_and_drawn_on_the_image(
 
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=second)
     seen.until(lambda: len(others(seen)) == 1)
-    assert len(workbench.preparation.mask) == 1
+    assert len(workbench.selection.preparation.mask) == 1
 
 
 def test_a_mask_is_of_one_source_only(
     live: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
-    workbench.set_preparation(
-        replace(workbench.preparation, mask=np.array([[9.0, 9.0, 5.0]]))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, mask=np.array([[9.0, 9.0, 5.0]]))
     )
 
     folder = recording(tmp_path / "swing")
     live.choose("Recorded images")
     live.enter("Folder, record or video", str(folder))
 
-    assert workbench.preparation.source.place == str(folder)
-    assert len(workbench.preparation.mask) == 0
+    assert workbench.selection.preparation.source.place == str(folder)
+    assert len(workbench.selection.preparation.mask) == 0
 
 
 def test_a_mask_adds_to_the_one_before(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     first = np.array([[*LAMPS[0].center, 30.0]])
-    workbench.set_preparation(replace(workbench.preparation, mask=first))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, mask=first)
+    )
     plugged(workbench, small_scene, *LAMPS).operator.leave()
     seen.page.entered()
     seen.wait("Live")
@@ -927,13 +945,13 @@ def test_a_mask_adds_to_the_one_before(
     seen.wait("Stray spots: 1.")
     seen.click("Mask the spots: 1")
 
-    assert len(workbench.preparation.mask) == 2
+    assert len(workbench.selection.preparation.mask) == 2
 
 
 def test_a_pen_that_is_still_seen_is_not_masked(live: "Seen") -> None:
     live.click("Search")
 
-    live.wait("The pen is still seen. Cover all of its LEDs, then search again.")
+    live.wait("The pen is still visible;")
     assert not live.named("Mask the spots").isEnabled()
 
 
@@ -943,18 +961,20 @@ def test_nothing_left_is_told(live: "Seen") -> None:
 
     live.click("Search")
 
-    live.wait("No stray light: nothing bright is left.")
+    live.wait("No stray light found.")
 
 
 def test_without_a_pen_file_the_operator_is_asked_whether_it_is_covered(
     seen: "Seen", workbench: Workbench
 ) -> None:
-    workbench.set_preparation(replace(workbench.preparation, pen_file=None))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, pen_file=None)
+    )
     seen.page.entered()
-    seen.wait("bright spots: 10")
+    seen.wait("Bright spots: 10")
     operator = workbench.live.operator
     assert operator is not None
-    seen.until(lambda: operator.doing is Doing.SEATED)
+    seen.until(lambda: operator.doing is HandActivity.SEATED)
 
     seen.click("Search")
 
@@ -974,20 +994,24 @@ def test_what_shines_and_moves_is_no_stray_light(qtbot: QtBot) -> None:
         frame = Frame(sealed(image), i, 0)
         panel.feed(LiveImage(frame, detect_spots(frame.image), None))
 
-    assert panel.outcome().value().text.startswith("What shines moves")
+    assert (
+        panel.outcome()
+        .value()
+        .text.startswith("The bright spots move and are not stray light.")
+    )
     assert len(panel.found()) == 0
 
 
 def test_a_grey_button_says_why(seen: "Seen") -> None:
     reasons = {
         name: seen.named(name).toolTip()
-        for name in ("Search", "Mask the spots", "Clear the mask")
+        for name in ("Search", "Mask the spots", "Clear mask")
     }
 
     assert reasons == {
-        "Search": "No images come.",
-        "Mask the spots": "Nothing was found to mask.",
-        "Clear the mask": "Nothing is masked.",
+        "Search": "No images are received.",
+        "Mask the spots": "No spots to mask",
+        "Clear mask": "No mask is set.",
     }
 
 
@@ -1036,8 +1060,12 @@ class Ends(Page):
 
 
 @pytest.fixture
-def window(live: "Seen", settings: Settings, qtbot: QtBot) -> MainWindow:
-    window = MainWindow([live.page, Ends()], settings, Preferences())
+def window(
+    live: "Seen", workbench: Workbench, settings: Settings, qtbot: QtBot
+) -> MainWindow:
+    window = MainWindow(
+        [live.page, Ends()], settings, Preferences(), workbench.notifications
+    )
     qtbot.addWidget(window)
     window.show()
     return window
@@ -1046,24 +1074,22 @@ def window(live: "Seen", settings: Settings, qtbot: QtBot) -> MainWindow:
 def test_the_notice_of_a_lost_camera_goes_when_it_is_back(
     window: MainWindow, seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
-    workbench.troubled.connect(window.show_notice)
     camera = plugged(workbench, small_scene)
     seen.wait("10 of 10 LEDs")
 
-    camera.faults.unplug()
+    camera.unplug()
     seen.wait("Lost, reconnecting")
-    assert any("no longer answers" in each for each in window.words())
+    assert any("). Check cable and power." in each for each in window.words())
 
-    camera.faults.plug_in()
+    camera.plug_in()
     seen.wait("10 of 10 LEDs")
-    assert not any("no longer answers" in each for each in window.words())
+    assert not any("). Check cable and power." in each for each in window.words())
 
 
-def test_the_trouble_of_a_swing_is_not_taken_for_one_of_the_camera(
+def test_the_fault_of_a_swing_is_not_taken_for_one_of_the_camera(
     window: MainWindow, live: "Seen", workbench: Workbench
 ) -> None:
-    workbench.troubled.connect(window.show_notice)
-    workbench.live.troubled.emit("The disk is full.")
+    workbench.notifications.tell("a swing", "The disk is full.")
 
     workbench.live.close()
     live.wait("No camera is open.")
@@ -1098,17 +1124,19 @@ def test_enter_in_a_field_does_not_leave_the_step(
 def test_names_come_before_the_camera(page: CameraPage, workbench: Workbench) -> None:
     assert page.why_closed() == ""
 
-    workbench.set_preparation(replace(workbench.preparation, names=Names()))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, names=Names())
+    )
 
     assert page.why_closed() == "Enter the name of the station."
 
 
 def test_a_swing_under_way_is_told(live: "Seen", workbench: Workbench) -> None:
-    assert "A swing is under way." not in live.words
+    assert "A swing is in progress." not in live.words
 
-    workbench.run.runner.begin(workbench.preparation)
+    workbench.run.runner.begin(workbench.selection.preparation)
 
-    live.wait("A swing is under way.")
+    live.wait("A swing is in progress.")
 
 
 def test_every_control_is_named_and_reached_by_tab(
@@ -1123,19 +1151,19 @@ def test_every_control_is_named_and_reached_by_tab(
             reached.add(widget.accessibleName() or written)
 
     assert reached == {
-        "Source of the images",
+        "Image source",
         "Use its files",
         "Intrinsics file",
         "Open...",
-        "Calibrate this camera...",
-        "A second camera looks at the pen, too",
-        "Draw the mask on the image",
+        "Calibrate camera...",
+        "Use a second camera",
+        "Draw mask on the image",
         "Search",
         "Cover the LEDs",
         "Live image",
         "Exposure",
         "Gain",
-        "Set by the LEDs",
+        "Auto exposure (LEDs)",
         "Frame rate",
         "Pixel format",
     }
@@ -1143,12 +1171,12 @@ def test_every_control_is_named_and_reached_by_tab(
 
 def test_another_language_keeps_what_is_shown(live: "Seen") -> None:
     live.click("Search")
-    live.wait("The pen is still seen.")
+    live.wait("The pen is still visible;")
 
     QCoreApplication.sendEvent(live.page, QEvent(QEvent.Type.LanguageChange))
     for each in live.page.findChildren(QWidget):
         QCoreApplication.sendEvent(each, QEvent(QEvent.Type.LanguageChange))
 
-    assert "The pen is still seen." in live.words
-    assert "Fits the live images: 1224 x 1024" in live.words
+    assert "The pen is still visible;" in live.words
+    assert "Matches the live images: 1224 x 1024" in live.words
     live.wait("10 of 10 LEDs")

@@ -6,8 +6,8 @@ from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
 from lightpen.cameras.protocol import (
+    CameraCapabilities,
     CameraSettings,
-    Caps,
     Range,
     Region,
     RegionLimits,
@@ -20,7 +20,7 @@ from lightpen_app.steps.camera.settings_panel import SettingsPanel
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.push_button import PushButton
 
-CAPS = Caps(
+CAPS = CameraCapabilities(
     width=640,
     height=480,
     pixel_formats=("Mono8", "Mono12", "BayerRG8"),
@@ -102,19 +102,21 @@ def test_formats_and_triggers_are_chosen_by_name(
         formats.activated.emit(formats.findText("Mono12"))
     assert signal.args[0] == CameraSettings(pixel_format="Mono12")
     with qtbot.waitSignal(panel.settings_changed) as signal:
-        triggers.activated.emit(triggers.findText("By software"))
+        triggers.activated.emit(triggers.findText("Software trigger"))
     assert signal.args[0] == CameraSettings(trigger=TriggerMode.SOFTWARE)
 
 
 def test_what_became_of_the_images_is_counted(panel: SettingsPanel) -> None:
     panel.set_stats(Stats(delivered=812, incomplete=3, missed=2, skipped=1))
 
-    for words in ("delivered: 812", "incomplete: 3", "missed: 2", "skipped: 1"):
+    for words in ("Received: 812", "Incomplete: 3", "Lost: 2", "Not processed: 1"):
         assert words in panel.counts()
 
 
 def test_recorded_images_have_nothing_to_set(panel: SettingsPanel) -> None:
-    panel.set_camera(Caps(80, 60, ("Mono8",), n_images=4), CameraSettings())
+    panel.set_camera(
+        CameraCapabilities(80, 60, ("Mono8",), n_images=4), CameraSettings()
+    )
 
     assert panel.isHidden()
 

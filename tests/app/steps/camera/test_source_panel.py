@@ -8,9 +8,9 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.cameras.source import FoundDevice
 from lightpen.cameras.sources import SOURCES
-from lightpen.sentences import sentence
+from lightpen.messages import message
 from lightpen.swing.preparation import SourceChoice
-from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone
 from lightpen_app.steps.camera.device_field import DeviceField
 from lightpen_app.steps.camera.source_panel import SourcePanel
@@ -50,7 +50,7 @@ def test_choosing_a_kind_of_camera_looks_for_cameras_and_takes_the_first(
         choose(panel, "aravis")
     assert panel.value() == SourceChoice("aravis")
     panel.set_searching(True)
-    assert "looked for" in told(panel).value().text
+    assert "Searching for cameras" in told(panel).value().text
     panel.set_searching(False)
     with qtbot.waitSignal(panel.value_changed):
         panel.set_found(FOUND)
@@ -87,14 +87,15 @@ def test_an_address_can_be_typed(panel: SourcePanel, qtbot: QtBot) -> None:
 def test_a_library_that_is_absent_is_a_line_and_no_search(
     panel: SourcePanel, qtbot: QtBot
 ) -> None:
-    panel.set_absent({"basler": sentence("test.absent", "Install this: pip.")})
+    absent = message("basler.absent", python="python")
+    panel.set_absent({"basler": absent})
     kinds = panel.findChildren(QComboBox)[0]
     names = [kinds.itemText(index) for index in range(kinds.count())]
     assert "Basler (pylon) - not installed" in names
     with qtbot.assertNotEmitted(panel.search_requested):
         choose(panel, "basler")
 
-    assert told(panel).value().text == "Install this: pip."
+    assert told(panel).value().text == str(absent)
     assert not panel.findChildren(DeviceField)[0].isVisible()
 
 
@@ -113,8 +114,8 @@ def test_what_a_search_came_to_is_told_in_the_language_that_is_chosen(
     panel.set_found(())
     english = told(panel).value().text
 
-    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    LanguageSwitch(qapp).set_language("zh_CN")
     QApplication.processEvents()
 
-    assert english.startswith("No camera was found")
+    assert english.startswith("No camera found.")
     assert "No camera" not in told(panel).value().text

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
+from benchmarks.small_records import record_of, small_record
 from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -27,25 +28,25 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from lightpen.archive.chains import append, own_chain
-from lightpen.archive.check import Checked, check_archive
+from lightpen.archive.check import ArchiveCheckResult, check_archive
 from lightpen.archive.database import Database, open_file
 from lightpen.archive.entries import Event, Kind
 from lightpen.archive.exchange import export_entries, import_entries
-from lightpen.archive.late_logbook import LateLogbook
+from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.archive.logbook import ARCHIVE
-from lightpen.model.due_rule import DueRule
-from lightpen.model.limits import StationLimits
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.model.limits import DueRule, StationLimits
 from lightpen.model.origin import Origin
-from lightpen.record.folder_archive import FolderArchive
-from lightpen.record.library_changes import Author, add_item
-from lightpen.record.names import Names
-from lightpen.record.results import Result
-from lightpen.record.supervision import Signature, lay_down
-from lightpen.record.tip_library import ListedTip
-from lightpen.verification.keeping import keep_verification
-from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen.record.library.library_changes import Author, add_item
+from lightpen.record.library.supervision import Signature, save_limits
+from lightpen.record.library.tip_library import ListedTip
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.names import Names
+from lightpen.verification.storage.verification_files import keep_verification
+from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import LIGHT, apply_theme
-from lightpen_app.paper.preview import PaperWindow
+from lightpen_app.print_report.preview import PrintReportWindow
 from lightpen_app.steps.history.archive_panel import ArchivePanel
 from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.steps.history.due_panel import DuePanel
@@ -69,6 +70,7 @@ from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
+from lightpen_resources import languages
 
 W = TypeVar("W", bound=QWidget)
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
@@ -89,8 +91,9 @@ class Desk:
         self.page = HistoryPage(workbench)
         self.notices: list[str] = []
         self.statuses: list[str] = []
-        self.page.notice_raised.connect(self.notices.append)
-        self.page.status_changed.connect(self.statuses.append)
+        notifications = workbench.notifications
+        notifications.raised.connect(lambda text, _: self.notices.append(text))
+        notifications.status_changed.connect(self.statuses.append)
         qtbot.addWidget(self.page)
 
     def enter(
@@ -108,7 +111,7 @@ class Desk:
                 at=NOON + timedelta(days=n),
                 names=names(tip),
                 program="lightpen 1",
-                grade="pass",
+                grade=Grade.PASS,
                 tip_pen_mm=(float(n), 0.0, -1.5),
                 expanded_uncertainty_mm=(0.0031, 0.0041, 0.0061),
                 settings={"max_uncertainty_mm": 0.012},
@@ -205,7 +208,7 @@ def test_the_newest_entries_come_first_and_can_be_chosen_by_tip_and_day(
     assert desk.column(TIP) == ["T-11", "T-10", "T-10", "T-10"]
     assert desk.column(X) == ["3.0000", "2.0000", "1.0000", "0.0000"]
     assert desk.column(WHAT)[:3] == [
-        *("Calibration, in force", "Calibration, in force", "Calibration, replaced"),
+        *("Calibration, current", "Calibration, current", "Calibration, replaced")
     ]
 
     tips = desk.child(QComboBox, 1)
@@ -225,8 +228,8 @@ def test_what_is_not_of_a_live_camera_is_marked_and_no_practice_is_in_force(
     desk.open()
 
     assert desk.column(WHAT) == [
-        *("RECORDED, in force", "SIMULATED, kept", "SIMULATED, replaced"),
-        "Calibration, in force",
+        *("RECORDED, current", "SIMULATED, saved", "SIMULATED, replaced"),
+        "Calibration, current",
     ]
 
 
@@ -235,7 +238,7 @@ def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
 ) -> None:
     desk.enter(2)
     folder, eve = desk.workbench.folder, Signature("Eve", "correct horse")
-    lay_down(folder, "Hall 2", StationLimits(), eve, "", NOON)
+    save_limits(folder, "Hall 2", StationLimits(), eve, "", NOON)
     desk.workbench.run.logbook.enter_owed()
     desk.open()
     assert sorted(desk.column(WHAT))[-2:] == ["Limits", "Limits"]
@@ -253,7 +256,7 @@ def test_a_server_that_cannot_be_reached_is_told_without_the_password(
 ) -> None:
     folder = desk.workbench.folder
     away = "postgresql://plant:secret-word@127.0.0.1:1/plant"
-    desk.workbench.run.logbook = LateLogbook(folder, away)
+    desk.workbench.run.logbook = LazyLogbook(folder, away)
     desk.enter(1)
     desk.open()
     desk.show_tab(WHOLE)
@@ -263,15 +266,15 @@ def test_a_server_that_cannot_be_reached_is_told_without_the_password(
         desk.page.entered()
         return panel.told()[0].text
 
-    desk.until(lambda: "does not have all entries" in told())
+    desk.until(lambda: "Entries not yet on the server;" in told())
     assert "The archive postgresql" in told()
     assert "secret-word" not in told()
     desk.workbench.run.logbook.close()
 
 
-@pytest.mark.parametrize("language", list(Language))
+@pytest.mark.parametrize("language", languages())
 def test_at_the_usual_width_every_column_is_seen_and_told_whole(
-    desk: Desk, qapp: QApplication, language: Language
+    desk: Desk, qapp: QApplication, language: str
 ) -> None:
     LanguageSwitch(qapp).set_language(language)
     desk.enter(1)
@@ -369,8 +372,8 @@ def test_two_that_are_selected_are_compared(desk: Desk) -> None:
     found = panel.comparison()
     assert found is not None
     assert found.change.difference[0] == 2.0
-    assert panel.words()[1] == "Repeatability of the 2 that are selected"
-    assert "The tip lies 2.0000 mm from" in panel.words()[2]
+    assert panel.words()[1] == "Repeatability of the 2 selected calibrations"
+    assert "The tip changed by 2.0000 mm since" in panel.words()[2]
     assert "scatters by 1.4142 mm along x" in panel.words()[3]
 
 
@@ -398,19 +401,17 @@ def test_it_is_told_what_scatter_of_tip_and_fixed_point_points_to(desk: Desk) ->
     assert "The tip scatters by 1.0000 mm over the calibrations" in words
     assert "something moved with the pen between the calibrations" in words
     assert "Next: seat the tip firmly" in words
-    assert "A fixed point touched 3 times with the tip, 2026-01-02" in words
+    assert "Fixed point probed 3 times with this tip (2026-01-02" in words
     assert "0.0000, 0.0000, 0.0100 mm" in words
     desk.enter(2, tip="T-11", first=3)
     desk.page.entered()
     desk.until(lambda: len(desk.column(TIP)) == 6)
     desk.select(0, 1)
-    desk.until(lambda: "Repeatability of the 2 that are selected" in panel.words())
-    assert "A fixed point" not in " ".join(panel.words())
+    desk.until(lambda: "Repeatability of the 2 selected calibrations" in panel.words())
+    assert "Fixed point probed " not in " ".join(panel.words())
 
 
-def test_the_capability_is_studied_with_a_tolerance_and_a_reference(
-    desk: Desk,
-) -> None:
+def test_the_capability_is_studied_with_a_tolerance_and_a_reference(desk: Desk) -> None:
     desk.enter(3)  # at x of 0, 1 and 2 mm
     desk.open()
     desk.show_tab(SELECTION)
@@ -424,8 +425,8 @@ def test_the_capability_is_studied_with_a_tolerance_and_a_reference(
 
     assert "Cg: x 0.30" in row.words()  # 0.2 * 9 / (6 * 1)
     assert "Cgk: x 0.30" in row.words()
-    assert "Not capable: 1.33 is asked for." in row.words()
-    assert "A study takes 30 to 50 repeats; these are 3." in row.words()
+    assert "Not capable: 1.33 is required." in row.words()
+    assert "A study needs 30 to 50 repeats; 3 are available." in row.words()
 
 
 def test_a_note_is_entered_and_shown_with_its_entry(desk: Desk) -> None:
@@ -433,15 +434,15 @@ def test_a_note_is_entered_and_shown_with_its_entry(desk: Desk) -> None:
     desk.open()
     desk.show_tab(ENTRY)
     desk.select(1)
-    desk.click("Add a note...")
+    desk.click("Add comment...")
     desk.type_reason("Dropped on the floor.")
 
     desk.until(lambda: len(desk.column(WHAT)) == 3)
-    assert desk.column(WHAT)[0] == "Note"
+    assert desk.column(WHAT)[0] == "Comment"
     assert desk.column(WORDS)[0] == "Dropped on the floor."
     desk.select(2)
     panel = desk.child(EntryPanel)
-    desk.until(lambda: any("Note" in words for words in panel.words()))
+    desk.until(lambda: any("Comment" in words for words in panel.words()))
     assert any("Ann: Dropped on the floor." in words for words in panel.words())
 
 
@@ -450,11 +451,13 @@ def test_a_note_is_entered_while_the_archive_is_checked(
 ) -> None:
     is_entered = threading.Event()
 
-    def check_slowly(database: Database, folder: Path, report: Report) -> Checked:
+    def check_slowly(
+        database: Database, folder: Path, report: Report
+    ) -> ArchiveCheckResult:
         is_entered.wait()
         return check_archive(database, folder, report)
 
-    place = "lightpen_app.steps.history.content.check_archive"
+    place = "lightpen_app.steps.history.archive_control.check_archive"
     monkeypatch.setattr(place, check_slowly)
     desk.enter(1)
     desk.open()
@@ -463,9 +466,9 @@ def test_a_note_is_entered_while_the_archive_is_checked(
     try:
         desk.show_tab(ENTRY)
         desk.select(0)
-        desk.click("Add a note...")
+        desk.click("Add comment...")
         desk.type_reason("Dropped on the floor.")
-        desk.until(lambda: desk.column(WHAT)[0] == "Note")
+        desk.until(lambda: desk.column(WHAT)[0] == "Comment")
     finally:
         is_entered.set()
     desk.wait_idle()
@@ -483,7 +486,7 @@ def test_a_change_of_the_tip_library_is_shown_with_what_it_says(desk: Desk) -> N
     assert (desk.column(TIP), desk.column(WORDS)) == (["T-10"], ["chipped"])
     desk.show_tab(ENTRY)
     told = desk.child(EntryPanel).words()
-    parts = ("T-10", "ball 6.0 mm", "change at most 0.02 mm", "retired", "chipped")
+    parts = ("T-10", "ball 6.0 mm", "max. change 0.02 mm", "retired", "chipped")
     assert "  \N{MIDDLE DOT}  ".join(parts) in told
 
 
@@ -492,15 +495,17 @@ def store(folder: Path, n: int) -> Result:
     result = Result(
         names=names("T-10"),
         accepted=NOON + timedelta(days=n),
-        grade="pass",
+        grade=Grade.PASS,
         record=folder / "records" / "gone",
         images=None,
-        calibration={
-            "tip_pen_mm": [float(n), 2.0, 3.0],
-            "expanded_uncertainty_mm": [0.1, 0.1, 0.1],
-            "cone_cam_mm": [1.0, 2.0, 3.0],
-            "covariance": [[0.25] * 6] * 6,
-        },
+        calibration=small_record(
+            {
+                "tip_pen_mm": [float(n), 2.0, 3.0],
+                "expanded_uncertainty_mm": [0.1, 0.1, 0.1],
+                "cone_cam_mm": [1.0, 2.0, 3.0],
+                "covariance": [[0.25] * 6] * 6,
+            }
+        ),
         origin=Origin.LIVE,
     )
     FolderArchive(folder).store(result)
@@ -515,12 +520,12 @@ def test_an_older_tip_is_put_in_force_again_for_a_reason(desk: Desk) -> None:
     desk.open()
     desk.show_tab(ENTRY)
     desk.select(1)
-    desk.click("Put in force again...")
+    desk.click("Reinstate...")
     desk.type_reason("The new one is bent.")
 
     desk.until(lambda: len(desk.column(WHAT)) == 3)
     assert desk.column(WHAT) == [
-        *("Restored, in force", "Calibration, replaced", "Calibration, replaced"),
+        *("Reinstated, current", "Calibration, replaced", "Calibration, replaced")
     ]
     found = FolderArchive(folder).in_force("LP-04", "T-10")
     assert found is not None
@@ -532,20 +537,22 @@ def test_what_was_accepted_here_is_put_on_paper_as_its_file_has_it(
     desk: Desk, stated: dict[str, Any]
 ) -> None:
     folder = desk.workbench.folder
-    result = replace(store(folder, 0), calibration=stated)
+    result = replace(store(folder, 0), calibration=record_of(stated))
     FolderArchive(folder).store(result)
     desk.workbench.run.logbook.enter_owed()
     desk.open()
     desk.show_tab(ENTRY)
-    desk.click("Record on paper...")
-    desk.until(lambda: desk.page.findChildren(PaperWindow))
+    desk.click("Calibration report...")
+    desk.until(lambda: desk.page.findChildren(PrintReportWindow))
 
-    window = desk.child(PaperWindow)
+    window = desk.child(PrintReportWindow)
     desk.until(lambda: window.n_pages() > 2)
     window.close()
 
+    first = FolderArchive(folder).all_files()[0]
+    first.write_bytes(first.read_bytes()[:-10])
     desk.select(1)
-    desk.click("Record on paper...")
+    desk.click("Calibration report...")
     desk.until(lambda: desk.notices)
     assert "000001" in desk.notices[0]
 
@@ -567,12 +574,12 @@ def test_what_is_not_accepted_or_not_of_this_station_has_no_record_on_paper(
     why_not = {}
     for row, tip in enumerate(desk.column(TIP)):
         desk.select(row)
-        button = desk.button("Record on paper...")
+        button = desk.button("Calibration report...")
         why_not[tip] = "" if button.isEnabled() else button.toolTip()
     assert why_not == {
         "T-10": "",
-        "": "Only a tip that was accepted has a record on paper.",
-        "T-11": "Its result is at the station that it is of.",
+        "": "Only an accepted tip has a calibration report.",
+        "T-11": "The result is stored at its own station.",
     }
 
 
@@ -607,7 +614,9 @@ def test_a_rule_that_is_being_typed_stays_while_something_else_changes(
         QTest.keyClicks(field, "7")
 
         workbench = desk.workbench
-        workbench.set_choices(replace(workbench.choices, n_touches=12))
+        workbench.selection.set_choices(
+            replace(workbench.selection.choices, n_frames=12)
+        )
         assert field.text() == "7"
 
 
@@ -615,11 +624,13 @@ def test_what_a_supervisor_laid_down_is_not_changed_by_anybody(desk: Desk) -> No
     desk.enter(3)
     folder, eve = desk.workbench.folder, Signature("Eve", "correct horse")
     limits = StationLimits(due=DueRule(7))
-    names = replace(desk.workbench.preparation.names, station="Hall 2")
-    desk.workbench.set_preparation(replace(desk.workbench.preparation, names=names))
+    names = replace(desk.workbench.selection.preparation.names, station="Hall 2")
+    desk.workbench.selection.set_preparation(
+        replace(desk.workbench.selection.preparation, names=names)
+    )
     desk.open()
-    laid_down = lay_down(folder, "Hall 2", limits, eve, "", NOON)
-    desk.workbench.set_supervision(laid_down)
+    laid_down = save_limits(folder, "Hall 2", limits, eve, "", NOON)
+    desk.workbench.selection.set_supervision(laid_down)
 
     panel = desk.child(DuePanel)
     desk.until(lambda: panel.figures().rows)
@@ -637,7 +648,7 @@ def test_what_was_changed_is_said_in_the_list_and_by_a_check(desk: Desk) -> None
             "WHERE number = 2"
         )
     desk.open()
-    assert desk.column(WHAT)[1] == "Changed since it was entered"
+    assert desk.column(WHAT)[1] == "Modified after entry"
     assert desk.column(PEN)[1] == ""
     assert not desk.page.is_doubtful()
 
@@ -645,7 +656,7 @@ def test_what_was_changed_is_said_in_the_list_and_by_a_check(desk: Desk) -> None
     desk.click("Check the archive")
     desk.until(desk.page.is_doubtful)
     told = [remark.text for remark in desk.child(ArchivePanel).told()]
-    assert any("Entry 2 of the chain" in text for text in told)
+    assert any("Entry 2 of chain" in text for text in told)
 
 
 def test_entries_are_saved_and_taken_up_at_another_station(
@@ -654,19 +665,19 @@ def test_entries_are_saved_and_taken_up_at_another_station(
     desk.enter(2)
     desk.open()
     desk.show_tab(WHOLE)
-    desk.click("Entries shown (JSON)...")
+    desk.click("Listed entries (JSON)...")
     desk.choose_file(tmp_path / "shown.json")
-    desk.until(lambda: "2 entries are saved" in desk.statuses[-1])
+    desk.until(lambda: "2 entries saved" in desk.statuses[-1])
     assert len(json.loads((tmp_path / "shown.json").read_text("utf-8"))) == 2
 
     desk.wait_idle()
-    desk.click("All, for another station...")
+    desk.click("All entries for another station...")
     desk.choose_file(tmp_path / "hall-2.jsonl")
     desk.until(lambda: "hall-2.jsonl" in desk.statuses[-1])
     desk.wait_idle()
-    desk.click("Take up another station's...")
+    desk.click("Import from another station...")
     desk.choose_file(tmp_path / "hall-2.jsonl")
-    desk.until(lambda: "0 entries are new, 2 were" in "".join(desk.statuses[-2:]))
+    desk.until(lambda: "0 new entries, 2 already" in "".join(desk.statuses[-2:]))
     assert desk.notices == []
 
 
@@ -677,11 +688,11 @@ def test_a_file_that_is_no_archive_is_refused_in_words(
     desk.open()
     (tmp_path / "other.jsonl").write_text("{}\n")
     desk.show_tab(WHOLE)
-    desk.click("Take up another station's...")
+    desk.click("Import from another station...")
     desk.choose_file(tmp_path / "other.jsonl")
 
     desk.until(lambda: desk.notices)
-    assert "is no exported archive" in desk.notices[0]
+    assert "is not an exported archive, or was modified:" in desk.notices[0]
 
 
 def test_no_trend_is_left_of_what_is_no_longer_looked_for(desk: Desk) -> None:
@@ -693,4 +704,4 @@ def test_no_trend_is_left_of_what_is_no_longer_looked_for(desk: Desk) -> None:
     desk.until(lambda: desk.statuses[-1] == "0 entries")
 
     assert panel.value().entries == ()
-    assert panel.words().startswith("Choose an entry")
+    assert panel.words().startswith("Select an entry with a tip to see its trend.")

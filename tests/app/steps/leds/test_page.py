@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 from tests.app.undressed import undressed
+from tests.faulty_camera import FaultyCamera
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
@@ -28,28 +29,27 @@ from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.pen_check.match import Finding, PenMatch, What
-from lightpen.record.names import Names
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.hand import Doing
-from lightpen.simulator.sample_pens import fanned_pen, six_led_pen
+from lightpen.pen_check.match import Finding, MatchFinding, PenMatch
+from lightpen.record.swings.names import Names
+from lightpen.simulator.hand import HandActivity
+from lightpen.simulator.samples import fanned_pen, six_led_pen
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_pen
-from lightpen.swing.preparation import Lack, SourceChoice, SourceKind
-from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen.swing.preparation import MissingInput, SourceChoice, SourceKind
+from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.leds.file_panel import LedFilePanel
-from lightpen_app.steps.leds.hand_row import HandRow
 from lightpen_app.steps.leds.led_table import MISFIT, LedTable
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.page import LedsPage
 from lightpen_app.steps.leds.pen_view import PenView
+from lightpen_app.steps.leds.simulator_controls import LedSimulatorControls
 from lightpen_app.steps.leds.table_panel import LedTablePanel
 from lightpen_app.widgets.image_view import ImageView
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.state_banner import StateBanner
-from lightpen_app.work.live_view import Shown
+from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 
@@ -137,8 +137,8 @@ def live(seen: "Seen", workbench: Workbench, small_scene: Scene) -> "Seen":
     return seen
 
 
-def plugged(workbench: Workbench, scene: Scene) -> SimulatedCamera:
-    camera = SimulatedCamera(scene, workbench.around.clock)
+def plugged(workbench: Workbench, scene: Scene) -> FaultyCamera:
+    camera = FaultyCamera(scene, workbench.around.clock)
     workbench.live.open([camera], CameraSettings(), workbench.around.clock)
     camera.operator.seat()
     camera.operator.swing()
@@ -146,7 +146,7 @@ def plugged(workbench: Workbench, scene: Scene) -> SimulatedCamera:
 
 
 def in_use(workbench: Workbench) -> PenFile:
-    file = workbench.preparation.pen_file
+    file = workbench.selection.preparation.pen_file
     assert file is not None
     return file
 
@@ -176,14 +176,14 @@ def raw() -> FloatArray:
 def test_the_file_in_use_is_shown(seen: "Seen", workbench: Workbench) -> None:
     assert shown_path(seen) == str(in_use(workbench).path)
     assert [cell(seen, 8, column) for column in (X, Y, Z)] == ["25", "35", "0"]
-    for words in ("Numbers in order", "LED 1 over the origin", "Axes right-handed"):
+    for words in ("LED numbering", "LED 1 on the origin axis", "Right-handed axes"):
         assert words in seen.words
     assert seen.page.is_complete()
     assert why_not(seen) == ""
 
 
 def test_the_rules_say_in_words_how_they_fare(seen: "Seen") -> None:
-    label = seen.named("LEDs 1 to 4 in a line")
+    label = seen.named("LEDs 1-4 on a line")
 
     assert label.accessibleDescription() == "fulfilled"
     assert "0.00 mm" in seen.words
@@ -192,21 +192,25 @@ def test_the_rules_say_in_words_how_they_fare(seen: "Seen") -> None:
 def test_without_a_file_one_has_to_be_opened(
     seen: "Seen", workbench: Workbench
 ) -> None:
-    workbench.set_preparation(replace(workbench.preparation, pen_file=None))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, pen_file=None)
+    )
 
     assert why_not(seen) == "Open the LED geometry file."
     assert not seen.page.is_complete()
     assert led_table(seen).model().rowCount() == 0
     save = seen.named("Save as...")
-    assert (save.isEnabled(), save.toolTip()) == (False, "There are no LEDs yet.")
+    assert (save.isEnabled(), save.toolTip()) == (False, "The table has no LEDs.")
 
 
 def test_the_simulated_pens_file_is_used_at_a_click(
     seen: "Seen", workbench: Workbench
 ) -> None:
-    workbench.set_preparation(replace(workbench.preparation, pen_file=None))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, pen_file=None)
+    )
 
-    seen.click("Use the simulated pen's file")
+    seen.click("Use file of the simulated pen")
     seen.settle()
 
     assert in_use(workbench).path.name == "pen.json"
@@ -217,31 +221,41 @@ def test_the_simulated_pens_file_is_offered_for_that_pen_alone(
     seen: "Seen", workbench: Workbench
 ) -> None:
     recorded = SourceChoice(SourceKind.RECORDED, "")
-    workbench.set_preparation(replace(workbench.preparation, source=recorded))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, source=recorded)
+    )
 
     with pytest.raises(AssertionError):
-        seen.named("Use the simulated pen's file")
+        seen.named("Use file of the simulated pen")
 
 
 def test_a_pen_is_to_be_held_before_a_camera_alone(
     seen: "Seen", workbench: Workbench
 ) -> None:
-    assert seen.page.lead().endswith("hold the pen before the camera.")
+    assert seen.page.lead().endswith(
+        "Open the LED file of this pen and hold the pen in view of the camera."
+    )
 
     recorded = SourceChoice(SourceKind.RECORDED, "")
-    workbench.set_preparation(replace(workbench.preparation, source=recorded))
-    assert seen.page.lead().endswith("what the recorded images show.")
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, source=recorded)
+    )
+    assert seen.page.lead().endswith("It is compared with the recorded images.")
 
 
 def test_the_step_is_closed_until_names_and_camera_are_there(
     seen: "Seen", workbench: Workbench
 ) -> None:
-    assert seen.page.why_closed() == "No image has come from the camera yet."
+    assert seen.page.why_closed() == "No image received from the camera yet."
 
-    workbench.set_preparation(replace(workbench.preparation, image_size=(1224, 1024)))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, image_size=(1224, 1024))
+    )
     assert seen.page.why_closed() == ""
 
-    workbench.set_preparation(replace(workbench.preparation, names=Names()))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, names=Names())
+    )
     assert seen.page.why_closed() == "Enter the name of the station."
 
 
@@ -314,8 +328,8 @@ def test_units_are_asked_for_where_a_file_does_not_say_them(
     path = write_table(tmp_path / "leds.csv", LEDS / 25.4, units="")
 
     open_file(seen, path)
-    assert "leds.csv does not say the units of its coordinates." in seen.words
-    choice = seen.named("Units of the file")
+    assert "leds.csv does not state the unit of its coordinates." in seen.words
+    choice = seen.named("Unit of the file")
     assert isinstance(choice, QComboBox)
     assert choice.hasFocus()
     QTest.keyClicks(choice, "inch")
@@ -325,7 +339,7 @@ def test_units_are_asked_for_where_a_file_does_not_say_them(
     file = in_use(workbench)
     assert (file.path, file.units) == (path, "inch")
     np.testing.assert_allclose(file.pen.leds, LEDS, atol=1e-9)
-    assert "does not say the units" not in seen.words
+    assert "does not state the unit of its coordinates." not in seen.words
 
 
 def test_wrong_units_are_told(
@@ -347,8 +361,8 @@ def test_a_pen_of_another_layout_keeps_its_frame(seen: "Seen", tmp_path: Path) -
 
     open_file(seen, path)
 
-    assert "Not the layout of the ten-LED pen" in seen.words
-    assert "LEDs 1 to 4 in a line" not in seen.words
+    assert "Other layout than the ten-LED pen;" in seen.words
+    assert "LEDs 1-4 on a line" not in seen.words
     assert seen.page.is_complete()
 
 
@@ -362,19 +376,19 @@ def test_exchanged_leds_of_a_file_are_named_and_can_be_mended(
     path = write_table(tmp_path / "swapped.csv", exchanged())
 
     open_file(seen, path)
-    assert "swapped.csv: LEDs 5 and 8 are exchanged" in seen.words
-    numbers = seen.named("Numbers in order")
+    assert "swapped.csv: LEDs 5 and 8 are swapped" in seen.words
+    numbers = seen.named("LED numbering")
     assert numbers.accessibleDescription() == "not fulfilled"
     assert in_use(workbench) is before
     assert seen.page.unsaved() == ""  # nobody has changed anything
-    assert why_not(seen) == "Mend the LED table first: what is wrong is told above."
+    assert why_not(seen) == "Correct the LED table first (see the message above)."
     assert not seen.named("Save as...").isEnabled()
 
-    seen.click("Exchange 5 and 8")
+    seen.click("Swap 5 and 8")
 
     assert "exchanged" not in seen.words
-    assert not seen.shows("Exchange 5 and 8")
-    assert why_not(seen) == "Save the LED table first: the record needs its file."
+    assert not seen.shows("Swap 5 and 8")
+    assert why_not(seen) == "Save the LED table first; the record needs its file."
     save_as(seen, tmp_path / "mended.csv")
     assert in_use(workbench).path == tmp_path / "mended.csv"
     assert why_not(seen) == ""
@@ -386,7 +400,7 @@ def test_a_file_that_cannot_be_used_is_left_again(
     open_file(seen, write_table(tmp_path / "swapped.csv", exchanged()))
 
     discard = seen.named("Discard")
-    assert discard.toolTip() == "Go back to the file in use."
+    assert discard.toolTip() == "Restore the file in use"
     seen.click("Discard")
 
     assert shown_path(seen) == str(in_use(workbench).path)
@@ -399,10 +413,10 @@ def test_raw_coordinates_are_put_into_the_pen_frame(
 ) -> None:
     open_file(seen, write_table(tmp_path / "raw.csv", raw()))
     assert "The LEDs are not in the pen frame" in seen.words
-    origin = seen.named("LED 1 over the origin")
+    origin = seen.named("LED 1 on the origin axis")
     assert origin.accessibleDescription() == "not fulfilled"
 
-    seen.click("Put into the pen frame")
+    seen.click("Transform to pen frame")
 
     assert "not in the pen frame" not in seen.words
     assert cell(seen, 8, Y) == "35"
@@ -412,7 +426,7 @@ def test_raw_coordinates_are_put_into_the_pen_frame(
 
 def test_a_pen_in_its_frame_need_not_be_moved(seen: "Seen") -> None:
     with pytest.raises(AssertionError):
-        seen.named("Put into the pen frame")
+        seen.named("Transform to pen frame")
 
 
 # The table
@@ -422,7 +436,7 @@ def test_a_cell_that_is_no_number_is_told(seen: "Seen") -> None:
     type_cell(seen, 5, Y, "12,4O")
 
     assert 'LED 5, y: "12,4O" is not a number (letter O).' in seen.words
-    assert why_not(seen) == "Mend the LED table first: what is wrong is told above."
+    assert why_not(seen) == "Correct the LED table first (see the message above)."
     assert not seen.page.is_complete()
 
 
@@ -446,20 +460,22 @@ def test_a_changed_cell_is_in_use_once_it_is_saved(
     type_cell(seen, 7, Y, "160,25")
 
     assert in_use(workbench) is before
-    assert why_not(seen) == "Save the LED table first: the record needs its file."
-    assert seen.page.unsaved() == "The LED table has changes that are not saved."
-    assert workbench.preparation.leds_lacks() == (Lack.SAVED_LEDS,)
+    assert why_not(seen) == "Save the LED table first; the record needs its file."
+    assert seen.page.unsaved() == "The LED table has unsaved changes."
+    assert workbench.selection.preparation.leds_missing_inputs() == (
+        MissingInput.SAVED_LEDS,
+    )
 
     statuses: list[str] = []
-    seen.page.status_changed.connect(statuses.append)
+    workbench.notifications.status_changed.connect(statuses.append)
     save_as(seen, tmp_path / "other")  # the dialog adds the ending
 
     path = tmp_path / "other.json"
     assert read_pen(path).leds[6, 1] == 160.25
     assert (in_use(workbench).path, shown_path(seen)) == (path, str(path))
-    assert statuses == ["The LEDs are saved as other.json and in use."]
+    assert statuses == ["LEDs saved as other.json and in use."]
     assert (why_not(seen), seen.page.unsaved()) == ("", "")
-    assert workbench.preparation.leds_lacks() == ()
+    assert workbench.selection.preparation.leds_missing_inputs() == ()
 
 
 def test_typing_the_old_number_again_leaves_nothing_to_save(seen: "Seen") -> None:
@@ -477,7 +493,7 @@ def test_a_file_that_exists_is_replaced_only_if_the_user_agrees(
     type_cell(seen, 7, Y, "161")
 
     save_as(seen, path)
-    assert "other.json exists already. Replace it by these LEDs?" in seen.words
+    assert "other.json already exists. Replace it with these LEDs?" in seen.words
     seen.click("Cancel")
     assert path.read_text() == "precious"
     assert seen.page.unsaved()
@@ -511,7 +527,7 @@ def test_a_file_that_cannot_be_written_is_told(seen: "Seen", tmp_path: Path) -> 
 
 def test_discarding_changes_asks_first(seen: "Seen") -> None:
     discard = seen.named("Discard")
-    assert (discard.isEnabled(), discard.toolTip()) == (False, "Nothing is changed.")
+    assert (discard.isEnabled(), discard.toolTip()) == (False, "No changes")
     type_cell(seen, 7, Y, "161")
 
     seen.click("Discard")
@@ -520,7 +536,7 @@ def test_discarding_changes_asks_first(seen: "Seen") -> None:
     assert cell(seen, 7, Y) == "161"
 
     seen.click("Discard")
-    seen.click("Discard them")
+    seen.click("Discard changes")
     assert cell(seen, 7, Y) == "160"
     assert seen.page.unsaved() == ""
 
@@ -538,7 +554,7 @@ def test_opening_another_file_asks_before_changes_are_lost(
     assert cell(seen, 7, Y) == "161"
 
     open_file(seen, path)
-    seen.click("Discard them")
+    seen.click("Discard changes")
     seen.settle()
     assert in_use(workbench).path == path
     assert cell(seen, 7, Y) == "160"
@@ -548,7 +564,8 @@ def test_opening_another_file_asks_before_changes_are_lost(
 def slow_disk(hold_back: "HoldBack") -> Event:
     """LED files are read and written once this is set."""
     return hold_back(
-        "lightpen_app.steps.leds.page.open_pen", "lightpen_app.steps.leds.page.save_pen"
+        "lightpen_app.steps.leds.file_control.open_pen",
+        "lightpen_app.steps.leds.file_control.save_pen",
     )
 
 
@@ -561,9 +578,11 @@ def test_what_is_typed_while_a_file_is_read_is_lost_after_a_question_only(
     slow_disk.set()
     seen.settle()
     assert cell(seen, 7, Y) == "161"
-    assert seen.child(QuestionBar).words().startswith("The LED table has changes")
+    assert (
+        seen.child(QuestionBar).words().startswith("The LED table has unsaved changes.")
+    )
 
-    seen.click("Discard them")
+    seen.click("Discard changes")
     assert in_use(workbench).path == path
     assert cell(seen, 7, Y) == "160"
 
@@ -583,9 +602,9 @@ def test_what_is_typed_while_the_table_is_saved_is_still_to_be_saved(
     assert cell(seen, 7, Y) == "162"
     assert shown_path(seen).endswith("leds.json")
     assert seen.page.unsaved()
-    assert why_not(seen) == "Save the LED table first: the record needs its file."
+    assert why_not(seen) == "Save the LED table first; the record needs its file."
     seen.click("Discard")
-    seen.click("Discard them")
+    seen.click("Discard changes")
     assert cell(seen, 7, Y) == "161"
 
 
@@ -604,11 +623,11 @@ def test_choosing_units_asks_before_changes_are_lost(
     seen.click("Cancel")
     assert (in_use(workbench), shown_path(seen)) == (before, str(before.path))
     assert cell(seen, 7, Y) == "161"
-    assert "does not say the units" not in seen.words
+    assert "does not state the unit of its coordinates." not in seen.words
 
     type_cell(seen, 7, Y, "160")
     choose_units()
-    seen.click("Discard them")
+    seen.click("Discard changes")
     seen.settle()
     assert in_use(workbench).path == path
     assert cell(seen, 7, Y) == "160"
@@ -621,16 +640,16 @@ def test_changes_outlive_another_file_that_another_step_puts_in_use(
     write_pen(six_led_pen(), path := tmp_path / "six.json")
     type_cell(seen, 7, Y, "161")
 
-    workbench.set_preparation(
-        replace(workbench.preparation, pen_file=PenFile.read(path))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, pen_file=PenFile.read(path))
     )
     assert cell(seen, 7, Y) == "161"
     assert shown_path(seen) == str(path)
     assert seen.page.unsaved()
-    assert why_not(seen) == "Save the LED table first: the record needs its file."
+    assert why_not(seen) == "Save the LED table first; the record needs its file."
 
     seen.click("Discard")
-    seen.click("Discard them")
+    seen.click("Discard changes")
     assert led_table(seen).model().rowCount() == 6
     assert (why_not(seen), seen.page.unsaved()) == ("", "")
 
@@ -638,9 +657,9 @@ def test_changes_outlive_another_file_that_another_step_puts_in_use(
 def test_the_simulated_pens_file_asks_before_changes_are_lost(seen: "Seen") -> None:
     type_cell(seen, 7, Y, "161")
 
-    seen.click("Use the simulated pen's file")
+    seen.click("Use file of the simulated pen")
     assert cell(seen, 7, Y) == "161"
-    seen.click("Discard them")
+    seen.click("Discard changes")
 
     assert cell(seen, 7, Y) == "160"
     assert seen.page.unsaved() == ""
@@ -649,7 +668,7 @@ def test_the_simulated_pens_file_asks_before_changes_are_lost(seen: "Seen") -> N
 def test_leds_are_added_and_removed(seen: "Seen") -> None:
     remove = seen.named("Remove")
     assert not remove.isEnabled()
-    assert remove.toolTip() == "Choose an LED in the table first."
+    assert remove.toolTip() == "Select an LED in the table."
 
     seen.click("Add")
     assert "LED 11, x: a cell is empty where a number is needed." in seen.words
@@ -676,7 +695,7 @@ def test_diameter_and_tip_are_edited_with_the_table(
     seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     seen.enter("Diameter of the LED discs, mm", "8")
-    seen.enter("Nominal centre of the tip, y, mm", "-95,5")
+    seen.enter("Nominal tip centre, y, mm", "-95,5")
     save_as(seen, tmp_path / "leds.json")
 
     pen = in_use(workbench).pen
@@ -690,7 +709,7 @@ def test_a_diameter_or_tip_that_cannot_be_is_told(seen: "Seen") -> None:
     assert 'Diameter of the discs: "x" is not a number.' in seen.words
 
     seen.enter("Diameter of the LED discs, mm", "10")
-    seen.enter("Nominal centre of the tip, y, mm", "-9O")
+    seen.enter("Nominal tip centre, y, mm", "-9O")
     assert 'Nominal tip, y: "-9O" is not a number (letter O).' in seen.words
 
 
@@ -698,9 +717,11 @@ def test_the_nominal_tip_of_the_first_step_is_told_where_it_rules(
     seen: "Seen", workbench: Workbench
 ) -> None:
     tip = np.array([1.0, -80.0, -20.0])
-    workbench.set_preparation(replace(workbench.preparation, nominal_tip=tip))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, nominal_tip=tip)
+    )
 
-    words = "In force is the nominal tip of the step Start: 1  -80  -20 mm."
+    words = "Nominal tip in use (step Start): 1  -80  -20 mm"
     assert words in seen.words
     shown = seen.child(PenView).value().tip
     assert shown is not None
@@ -722,9 +743,9 @@ def test_row_and_disc_are_chosen_together(seen: "Seen") -> None:
 
 def test_a_pen_that_fits_is_said_to(live: "Seen") -> None:
     live.wait("10 of 10 LEDs")
-    live.wait("Every LED is within 0.1 mm of its place in the table, in")
+    live.wait("All LEDs are within 0.1 mm of their table positions, in")
 
-    assert "misfit 0.0" in live.words
+    assert "RMS residual 0.0" in live.words
     assert live.child(StateBanner).value().tone is Tone.GOOD
     live.qtbot.waitUntil(lambda: cell(live, 7, MISFIT).startswith("0.0"))
     labels = {marker.label for marker in live.markers}
@@ -736,16 +757,16 @@ def test_a_bug_in_the_comparison_leaves_no_old_finding_and_the_next_views_are_co
 ) -> None:
     caught: list[BaseException] = []
     monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
-    live.wait("Every LED is within 0.1 mm of its place in the table, in")
+    live.wait("All LEDs are within 0.1 mm of their table positions, in")
     with monkeypatch.context() as broken:
         broken.setattr(
-            "lightpen_app.steps.leds.match_watch.match_pen", lambda *_: 1 / 0
+            "lightpen_app.steps.leds.match_control.match_pen", lambda *_: 1 / 0
         )
         live.qtbot.waitUntil(lambda: bool(caught))
         live.qtbot.waitUntil(lambda: not cell(live, 7, MISFIT))
         assert "Every LED sits" not in live.words
 
-    live.wait("Every LED is within 0.1 mm of its place in the table, in")
+    live.wait("All LEDs are within 0.1 mm of their table positions, in")
     live.qtbot.waitUntil(lambda: cell(live, 7, MISFIT).startswith("0.0"))
     assert all(isinstance(error, ZeroDivisionError) for error in caught)
 
@@ -755,19 +776,21 @@ def test_a_displaced_led_is_named_and_marked_everywhere(live: "Seen") -> None:
 
     type_cell(live, 7, Y, "160.5")
 
-    live.wait("LED 7 sits 0.50 mm off its place: x 0.00, y -0.50, z 0.00 mm.")
-    assert "LED 7 sits" in told_of(live, 7)
+    live.wait(
+        "LED 7 is 0.50 mm from its file position. Measured: x 0.00, y -0.50, z 0.00 mm."
+    )
+    assert "LED 7 is 0.50 mm from" in told_of(live, 7)
     assert float(cell(live, 7, MISFIT)) > 0.5
     assert live.child(PenView).value().marked == {7}
     assert live.child(StateBanner).value().tone is Tone.WARN
 
-    live.click("Use the measured place")
+    live.click("Use measured position")
     assert led_table(live).hasFocus()
 
-    live.wait("Every LED is within 0.1 mm of its place in the table, in")
+    live.wait("All LEDs are within 0.1 mm of their table positions, in")
     assert float(cell(live, 7, Y)) == pytest.approx(160, abs=0.05)
     assert told_of(live, 7) == ""
-    assert not live.shows("Use the measured place")
+    assert not live.shows("Use measured position")
 
 
 def test_an_exchanged_coordinate_is_put_back_by_a_click(live: "Seen") -> None:
@@ -776,11 +799,11 @@ def test_an_exchanged_coordinate_is_put_back_by_a_click(live: "Seen") -> None:
     sixth = cell(live, 6, Y)
     type_cell(live, 2, Y, sixth)
     type_cell(live, 6, Y, second)
-    live.wait("of LEDs 2 and 6 are exchanged in the table.")
+    live.wait("of LEDs 2 and 6 are swapped in the table.")
 
-    live.click("Exchange 2 and 6")
+    live.click("Swap 2 and 6")
 
-    live.wait("Every LED is within 0.1 mm of its place in the table, in")
+    live.wait("All LEDs are within 0.1 mm of their table positions, in")
     assert [cell(live, led, Y) for led in (2, 4, 6)] == [second, fourth, sixth]
     assert not live.page.unsaved()
 
@@ -818,7 +841,7 @@ def test_the_focus_goes_from_undo_to_redo_and_back_when_nothing_is_left_to_do(
 
 
 def test_a_number_typed_letter_by_letter_is_undone_at_once(seen: "Seen") -> None:
-    tip = seen.named("Nominal centre of the tip, x, mm")
+    tip = seen.named("Nominal tip centre, x, mm")
     QTest.keyClicks(tip, "12.5")
     seen.click("Undo")
     assert not seen.page.unsaved()
@@ -827,7 +850,7 @@ def test_a_number_typed_letter_by_letter_is_undone_at_once(seen: "Seen") -> None
 def test_discarded_changes_come_back(seen: "Seen") -> None:
     type_cell(seen, 7, Y, "161")
     seen.click("Discard")
-    seen.click("Discard them")
+    seen.click("Discard changes")
 
     seen.click("Undo")
 
@@ -865,9 +888,9 @@ def test_another_page_sees_the_pen_in_use_again(
 
     live.page.left()
 
-    def sees_all(shown: Shown) -> bool:
-        sighting = shown.seen.sighting
-        return sighting is not None and len(sighting.pixels) == 10
+    def sees_all(shown: DisplayedImage) -> bool:
+        detection = shown.seen.detection
+        return detection is not None and len(detection.pixels) == 10
 
     with qtbot.waitSignal(workbench.live.image_shown, check_params_cb=sees_all):
         pass
@@ -877,7 +900,7 @@ def test_raw_coordinates_are_matched_too(live: "Seen", tmp_path: Path) -> None:
     open_file(live, write_table(tmp_path / "raw.csv", raw()))
 
     live.wait("10 of 10 LEDs")
-    live.wait("The LEDs fit the images, but not the pen frame")
+    live.wait("The LEDs agree with the images but not with the pen frame.")
 
 
 def test_a_covered_led_is_told(
@@ -887,7 +910,7 @@ def test_a_covered_led_is_told(
     camera.operator.cover(leds=[6])
     seen.page.entered()
 
-    seen.wait("LED 6 is not seen where the table has it.")
+    seen.wait("LED 6 is not detected at its table position.")
     assert "9 of 10 LEDs" in seen.words
 
 
@@ -897,23 +920,23 @@ def test_the_simulated_pen_is_leaned_and_covered_at_a_click(
     small_scene: Scene,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("lightpen_app.steps.leds.hand_row.COVER_S", math.inf)
-    row = seen.child(HandRow)
+    monkeypatch.setattr("lightpen_app.steps.leds.simulator_controls.COVER_S", math.inf)
+    row = seen.child(LedSimulatorControls)
     assert not row.isVisibleTo(seen.page)
-    camera = SimulatedCamera(small_scene, workbench.around.clock)
+    camera = FaultyCamera(small_scene, workbench.around.clock)
     workbench.live.open([camera], CameraSettings(), workbench.around.clock)
     seen.page.entered()
     seen.wait("10 of 10 LEDs")
     assert row.isVisibleTo(seen.page)
 
-    seen.click("Lean the pen")
-    seen.wait("Every LED is within 0.1 mm of its place in the table")
-    seen.until(lambda: camera.operator.doing is Doing.SWINGING)
+    seen.click("Tilt pen")
+    seen.wait("All LEDs are within 0.1 mm of their table positions")
+    seen.until(lambda: camera.operator.doing is HandActivity.SWINGING)
     seen.click("Cover LEDs")
     seen.wait("7 of 10 LEDs")
 
     seen.page.left()  # the swing finds the pen at rest
-    seen.until(lambda: camera.operator.doing is Doing.SEATED)
+    seen.until(lambda: camera.operator.doing is HandActivity.SEATED)
 
 
 def test_another_pens_file_is_told(live: "Seen", tmp_path: Path) -> None:
@@ -921,13 +944,13 @@ def test_another_pens_file_is_told(live: "Seen", tmp_path: Path) -> None:
     open_file(live, write_table(tmp_path / "other.csv", leds))
 
     live.wait("Pen not found")
-    live.wait("these do not fit the pen file")
+    live.wait("LEDs of the LED file.")
 
 
 def test_a_pen_that_is_away_is_not_found(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
-    camera = SimulatedCamera(small_scene, workbench.around.clock)
+    camera = FaultyCamera(small_scene, workbench.around.clock)
     workbench.live.open([camera], CameraSettings(), workbench.around.clock)
     seen.page.entered()
     seen.wait("10 of 10 LEDs")  # the simulated pen is shown by itself
@@ -945,31 +968,32 @@ def test_too_few_views_do_not_say_that_a_pen_fits(seen: "Seen") -> None:
     rms = np.full(10, 0.05)
     panel.set_value(PenMatch(2, 2, np.full(10, 2), rms, 0.05, findings=()))
 
-    assert "Lean and turn the pen, so that it is seen from all sides." in seen.words
+    assert "Tilt and turn the pen so that it is seen from all sides." in seen.words
 
 
 @pytest.mark.parametrize(
     ("finding", "sentence"),
     [
         (
-            Finding(What.EXCHANGED, (5, 8), axes="y"),
-            "y of LEDs 5 and 8 are exchanged in the table.",
+            Finding(MatchFinding.EXCHANGED, (5, 8), axes="y"),
+            "y of LEDs 5 and 8 are swapped in the table.",
         ),
         (
-            Finding(What.SHIFTED, (7,), (0.5, 0.0, 0.0), is_sure=False),
-            "LED 7 sits off its place. Lean and turn the pen to see by how much.",
+            Finding(MatchFinding.SHIFTED, (7,), (0.5, 0.0, 0.0), is_sure=False),
+            "LED 7 is not at its file position. Tilt and turn the pen to measure "
+            "the deviation.",
         ),
         (
-            Finding(What.SHIFTED_EITHER, (2, 4), (0.3, 0.4, 0.0)),
-            "LED 2 or 4 sits off its place, by 0.50 mm.",
+            Finding(MatchFinding.SHIFTED_EITHER, (2, 4), (0.3, 0.4, 0.0)),
+            "LED 2 or 4 is 0.50 mm from its file position.",
         ),
         (
-            Finding(What.UNKNOWN_LED, by=(25.0, 170.0, 0.0)),
+            Finding(MatchFinding.UNKNOWN_LED, by=(25.0, 170.0, 0.0)),
             "A light at x 25.00, y 170.00, z 0.00 mm moves with the pen.",
         ),
         (
-            Finding(What.MISFIT),
-            "The LEDs fit to 0.21 px, 0.1 px or less is usual.",
+            Finding(MatchFinding.MISFIT),
+            "RMS residual 0.21 px; usual is 0.1 px or less.",
         ),
     ],
     ids=lambda value: value.what if isinstance(value, Finding) else "",
@@ -990,11 +1014,13 @@ def test_what_is_missing_for_a_match_is_told(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     seen.page.entered()
-    assert "The camera is not open. See the step Camera." in seen.words
+    assert "No camera is open. See the step Camera." in seen.words
 
     plugged(workbench, small_scene)
-    workbench.set_preparation(replace(workbench.preparation, camera_file=None))
-    seen.wait("The intrinsics are missing. See the step Camera.")
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, camera_file=None)
+    )
+    seen.wait("Intrinsics file missing. See the step Camera.")
     assert "No match yet" in seen.words
 
 
@@ -1005,12 +1031,12 @@ def test_a_camera_that_is_lost_leaves_no_old_image(
     seen.page.entered()
     seen.wait("10 of 10 LEDs")
 
-    camera.faults.unplug()
+    camera.unplug()
 
-    seen.wait("The camera is lost. It is looked for until it is back.")
+    seen.wait("Camera connection lost. Reconnecting automatically.")
     assert seen.markers == ()
 
-    camera.faults.plug_in()
+    camera.plug_in()
     seen.wait("10 of 10 LEDs")
 
 
@@ -1032,7 +1058,7 @@ def test_it_can_be_used_by_keys_alone(
     qtbot: QtBot, workbench: Workbench, settings: Settings
 ) -> None:
     page = LedsPage(workbench)
-    window = MainWindow((page,), settings, Preferences())
+    window = MainWindow((page,), settings, Preferences(), workbench.notifications)
     qtbot.addWidget(window)
     window.show()
     window.activateWindow()
@@ -1045,9 +1071,9 @@ def test_it_can_be_used_by_keys_alone(
             names.add(focused.accessibleName() or written)
 
     assert names >= {
-        *("LED file", "Open...", "Save as...", "Use the simulated pen's file"),
-        *("LEDs of the pen, in mm", "Add", "Diameter of the LED discs, mm"),
-        *("Nominal centre of the tip, x, mm", "The LEDs in space", "Live image"),
+        *("LED file", "Open...", "Save as...", "Use file of the simulated pen"),
+        *("LED coordinates / mm", "Add", "Diameter of the LED discs, mm"),
+        *("Nominal tip centre, x, mm", "The LEDs in space", "Live image"),
     }
 
 
@@ -1111,7 +1137,7 @@ def test_what_is_wrong_and_what_is_asked_is_told_in_the_language_that_is_chosen(
     assert english[1] != ""
     assert english[2] != ""
 
-    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    LanguageSwitch(qapp).set_language("zh_CN")
     QApplication.processEvents()
 
     now = panel.problem(), table.flaw(), panel.question()

@@ -7,7 +7,7 @@ from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
-from lightpen.simulator.sample_pens import fanned_pen
+from lightpen.simulator.samples import fanned_pen
 from lightpen.simulator.swings import paper_pen
 from lightpen_app.steps.leds.pen_view import PenPicture, PenView
 

@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QAbstractButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import FloatArray
-from lightpen.record.reading import open_record
-from lightpen.record.solving import Solution, solve_record
+from lightpen.record.swings.reading import open_record
+from lightpen.record.swings.solving import Solution, solve_record
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.plots_panel import ResidualsPanel

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import pytest
+from benchmarks.small_records import small_record
 from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt, QThreadPool, QUrl
 from PySide6.QtGui import QImage, QMouseEvent
 from PySide6.QtTest import QTest
@@ -33,21 +34,23 @@ from tests.app.pictures import colors_in
 from tests.app.undressed import undressed
 
 from lightpen.arrays import FloatArray
+from lightpen.detection.pen_detection import detect_pen
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import look
-from lightpen.estimation.verdict import Grade
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
-from lightpen.record.assumed import PREFIX
-from lightpen.record.library_changes import Author, add_item
-from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, Record, open_record
-from lightpen.record.recorded_source import source
-from lightpen.record.results import Result
-from lightpen.record.solving import Solution, solve_again, solve_record
-from lightpen.record.tip_library import ListedTip
-from lightpen.record.writing import RecordWriter
+from lightpen.record.exports.dcc import Laboratory
+from lightpen.record.exports.formats import FORMATS
+from lightpen.record.library.library_changes import Author, add_item
+from lightpen.record.library.tip_library import ListedTip
+from lightpen.record.results.results import Result
+from lightpen.record.swings.assumed import PREFIX
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import DISCARDED, Record, open_record
+from lightpen.record.swings.recorded_source import source
+from lightpen.record.swings.solving import Solution, solve_again, solve_record
+from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.image_plans import ImagePlan, render_plan
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.scene_files import write_sample_files
@@ -63,23 +66,23 @@ from lightpen.swing.resuming import (
 )
 from lightpen.swing.shortfall import N_MORE
 from lightpen.swing.state import SwingState
-from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone, colors_of
-from lightpen_app.paper.preview import PaperWindow
+from lightpen_app.print_report.preview import PrintReportWindow
 from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
+from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog
+from lightpen_app.steps.review.message_list import StatusMessageList
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
-from lightpen_app.steps.review.next_tips_row import NextTipsRow
+from lightpen_app.steps.review.next_tips import NextTipsRow
 from lightpen_app.steps.review.page import ReviewPage
 from lightpen_app.steps.review.plot_card import PlotCard
 from lightpen_app.steps.review.plots_panel import MethodsPanel
-from lightpen_app.steps.review.remark_list import RemarkList
 from lightpen_app.steps.review.residual_plots import MisfitPlot
 from lightpen_app.steps.review.residual_view import ResidualView
-from lightpen_app.steps.review.result_panel import ResultPanel
+from lightpen_app.steps.review.result_panel import ResultPanel, TipReadout
 from lightpen_app.steps.review.result_tools import ResultTools
-from lightpen_app.steps.review.tip_readout import TipReadout
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import NumberTable
 from lightpen_app.widgets.plots import MARK_HEIGHT, PNG_SCALE
@@ -126,7 +129,7 @@ def recorded(small_scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Pa
             R, t = swing.rotations[i], swing.translations[i]
             image_plan = ImagePlan(i, still_view(pen, R, t), small_scene.optics, R, t)
             image = render_plan(small_scene, image_plan)
-            seen = look(image, camera, pen)
+            seen = detect_pen(image, camera, pen)
             writer.append(image, seen.pixels, seen.rotation, seen.translation, 0.1 * i)
     return folder / "swing"
 
@@ -235,7 +238,7 @@ def bed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[Bed]:
     """Lay a recorded swing ready."""
-    monkeypatch.setattr("lightpen.swing.course.solve_record", solved_once.solve)
+    monkeypatch.setattr("lightpen.swing.workflow.solve_record", solved_once.solve)
     folder = workbench.run.records_folder / "swing"
     shutil.copytree(recorded, folder)
     bed = Bed(qtbot, workbench, folder, [], rewrite_header, solved_once)
@@ -267,7 +270,7 @@ def table(page: ReviewPage) -> ImageTable:
 
 
 def remarks(page: ReviewPage) -> str:
-    return " ".join(remark.text for remark in the(page, RemarkList).value())
+    return " ".join(remark.text for remark in the(page, StatusMessageList).value())
 
 
 def button(page: ReviewPage, text: str) -> QPushButton:
@@ -331,7 +334,7 @@ def differences(page: ReviewPage) -> dict[str, tuple[str, ...]]:
 
 def count(page: ReviewPage) -> str:
     labels = the(page, ImagesPanel).findChildren(QLabel)
-    return next(label.text() for label in labels if " used" in label.text())
+    return next(label.text() for label in labels if " included" in label.text())
 
 
 def centres(page: ReviewPage) -> list[list[float]]:
@@ -357,7 +360,7 @@ def await_count(qtbot: QtBot, page: ReviewPage, words: str) -> None:
 
 
 def in_force(workbench: Workbench) -> Result | None:
-    names = workbench.preparation.names
+    names = workbench.selection.preparation.names
     return workbench.run.archive.in_force(names.pen, names.tip)
 
 
@@ -371,13 +374,8 @@ def put_in_force(
 ) -> None:
     """Store a result of some time ago."""
     names = names or replace(workbench.run.status.names, pen=pen)
-    calibration = {
-        "tip_pen_mm": tip_pen.tolist(),
-        "expanded_uncertainty_mm": [0.002, 0.002, 0.002],
-        "cone_cam_mm": [0.0, 0.0, 1000.0],
-        "covariance": np.diag(6 * [0.001**2]).tolist(),
-        **entries,
-    }
+    tip = {"tip_pen_mm": tip_pen.tolist(), "expanded_uncertainty_mm": 3 * [0.002]}
+    calibration = small_record({**tip, **entries})
     record = workbench.run.records_folder / "elsewhere"
     workbench.run.archive.store(
         Result(names, THEN, Grade.PASS, record, (), calibration, origin)
@@ -402,8 +400,8 @@ def test_the_step_is_closed_until_the_pen_was_swung(
     assert page.why_closed() == "Swing the pen first."
     assert page.main_action().why_not == "Swing the pen first."
     assert page.unsaved() == ""
-    assert not button(page, "Repeat").isEnabled()
-    assert button(page, "Repeat").toolTip() == "Swing the pen first."
+    assert not button(page, "Repeat swing").isEnabled()
+    assert button(page, "Repeat swing").toolTip() == "Swing the pen first."
     page.run_main_action()
     assert not page.is_complete()
 
@@ -431,7 +429,7 @@ def test_a_good_swing_passes_with_its_reason_and_the_next_step(
     page: ReviewPage,
 ) -> None:
     state = banner(page)
-    assert state.word == "PASS: Good"
+    assert state.word == "PASS: Within limits"
     assert re.match(r"U \(k = 2\) of the tip is 0\.\d{4} mm\.", state.detail)
     assert page.lead().startswith("Next: accept the tip.")
     assert page.why_closed() == ""
@@ -457,7 +455,7 @@ def test_an_uncertain_tip_is_to_be_checked_and_more_images_are_advised(
     workbench = bed.solve_uncertain()
     page = bed.show()
 
-    assert banner(page).word == "CHECK: Not certain enough"
+    assert banner(page).word == "CHECK: Uncertainty too large"
     assert page.lead().startswith("Next: capture more images")
     assert page.main_action() == MainAction("Capture more")
     page.run_main_action()
@@ -475,9 +473,9 @@ def test_the_settings_are_to_be_checked_where_no_file_makes_the_tip_uncertain(
     bed.solve_uncertain()
     page = bed.show()
 
-    assert banner(page).word == "CHECK: Not certain enough"
-    assert page.lead() == "Next: see to the cause that is named, then repeat."
-    assert page.main_action() == MainAction("Check the settings")
+    assert banner(page).word == "CHECK: Uncertainty too large"
+    assert page.lead() == "Next: correct the stated cause, then repeat the swing."
+    assert page.main_action() == MainAction("Check settings")
     with bed.qtbot.waitSignal(page.step_requested) as asked:
         page.run_main_action()
     assert asked.args == ["start"]
@@ -487,12 +485,12 @@ def test_a_tip_that_is_far_too_uncertain_cannot_be_accepted(bed: Bed) -> None:
     workbench = bed.solve(1e-6)
     page = bed.show()
 
-    assert banner(page).word == "REPEAT: Not certain enough"
+    assert banner(page).word == "REPEAT: Uncertainty too large"
     assert page.main_action() == MainAction("Capture more")
     assert not button(page, "Accept...").isEnabled()
-    assert button(page, "Accept...").toolTip().startswith("Not good enough")
+    assert button(page, "Accept...").toolTip().startswith("Result not acceptable.")
     workbench.run.runner.accept("whatever")
-    with bed.qtbot.waitSignal(workbench.troubled) as told:
+    with bed.qtbot.waitSignal(workbench.notifications.raised) as told:
         pass
     assert told.args[0].startswith("The tip cannot be accepted.")
     assert not page.is_complete()
@@ -503,23 +501,21 @@ def test_without_an_earlier_result_or_a_nominal_tip_that_is_said(
     page: ReviewPage,
 ) -> None:
     rows = differences(page)
-    assert rows["no earlier result"] == ("", "", "")
+    assert rows["No earlier result"] == ("", "", "")
     assert page.lead() == "Next: accept the tip."  # none is in force until then
-    assert "odd - even" in rows
+    assert "Odd - even" in rows
     assert remarks(page) == ""
 
 
-def test_a_small_change_since_the_last_result_is_told_in_micrometres(
-    bed: Bed,
-) -> None:
+def test_a_small_change_since_the_last_result_is_told_in_micrometres(bed: Bed) -> None:
     u = u_x(bed.solve())
     bed.solve_after([1.0, 1.0, 1.0], pen="another")
     bed.solve_after([0.5 * u, 0.0, 0.0])
     page = bed.show()
 
-    x, y, z = map(float, differences(page)[f"since {THEN:%Y-%m-%d}"])
+    x, y, z = map(float, differences(page)[f"Since {THEN:%Y-%m-%d}"])
     assert (x, y, z) == pytest.approx((500 * u, 0.0, 0.0), abs=0.5)
-    assert banner(page).word == "PASS: Good"
+    assert banner(page).word == "PASS: Within limits"
 
 
 def test_a_change_that_u_does_not_explain_is_to_be_checked(bed: Bed) -> None:
@@ -528,10 +524,13 @@ def test_a_change_that_u_does_not_explain_is_to_be_checked(bed: Bed) -> None:
 
     assert banner(page).word == "CHECK: Tip has changed"
     assert banner(page).detail.startswith(
-        f"The tip lies 0.4200 mm from that of {THEN:%Y-%m-%d}: along x 0.4200 mm"
+        f"The tip changed by 0.4200 mm since {THEN:%Y-%m-%d}: along x 0.4200 mm"
     )
-    assert page.lead().startswith("Next: see that it is the tip that is named")
-    assert page.main_action() == MainAction("Repeat")
+    assert page.lead().startswith(
+        "Next: check that the right tip is fitted, clean and tight, then repeat the "
+        "swing."
+    )
+    assert page.main_action() == MainAction("Repeat swing")
 
 
 def test_the_result_says_which_tip_it_is_of(bed: Bed, workbench: Workbench) -> None:
@@ -541,14 +540,16 @@ def test_the_result_says_which_tip_it_is_of(bed: Bed, workbench: Workbench) -> N
     assert "Tip T-10 in the frame of pen LP-04 / mm, U\xa0(k\xa0=\xa02)" in texts
     assert remarks(page) == ""
 
-    names = replace(workbench.preparation.names, tip="T-11")
-    workbench.set_preparation(replace(workbench.preparation, names=names))
+    names = replace(workbench.selection.preparation.names, tip="T-11")
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, names=names)
+    )
     page.left()
     page.entered()
 
     assert remarks(page) == (
-        "This swing is of tip T-10, pen LP-04, whatever the step Start names now: tip "
-        "T-11, pen LP-04."
+        "This swing belongs to tip T-10, pen LP-04; the step Start now shows "
+        "tip T-11, pen LP-04."
     )
 
 
@@ -557,7 +558,7 @@ def test_a_tip_far_from_its_nominal_place_is_asked_about(bed: Bed) -> None:
     bed.solve()
 
     said = remarks(bed.show())
-    assert re.search(r"The tip lies \d\.\d mm from its nominal place", said)
+    assert re.search(r"The tip is \d\.\d mm from its nominal centre", said)
 
 
 def test_a_tip_that_cannot_be_compared_is_to_be_checked(bed: Bed) -> None:
@@ -568,9 +569,9 @@ def test_a_tip_that_cannot_be_compared_is_to_be_checked(bed: Bed) -> None:
     bed.solve()
     page = bed.show()
 
-    assert banner(page).word == "CHECK: Nothing to compare with"
+    assert banner(page).word == "CHECK: No comparison possible"
     assert "is damaged" in banner(page).detail
-    assert "no earlier result" in differences(page)
+    assert "No earlier result" in differences(page)
 
 
 def test_what_comes_into_force_meanwhile_is_compared_before_it_is_replaced(
@@ -579,10 +580,10 @@ def test_what_comes_into_force_meanwhile_is_compared_before_it_is_replaced(
     workbench = bed.solve()
     page = bed.show()
     put_in_force(workbench, tip(workbench) - [0.42, 0.0, 0.0])
-    with bed.qtbot.waitSignal(workbench.troubled) as told:
+    with bed.qtbot.waitSignal(workbench.notifications.raised) as told:
         page.run_main_action()
 
-    assert "Accept it with a reason" in told.args[0]
+    assert "Enter a reason to accept it." in told.args[0]
     bed.qtbot.waitUntil(lambda: banner(page).word == "CHECK: Tip has changed")
     assert not page.is_complete()
     assert button(page, "Accept...").isVisibleTo(page)
@@ -605,8 +606,8 @@ def test_a_tip_to_be_checked_is_accepted_with_a_reason_and_stays_amber(
     assert result.change is not None
     assert result.change.difference_mm[0] == pytest.approx(0.42)
     state = banner(page)
-    assert (state.word, state.tone) == ("IN FORCE", Tone.WARN)
-    assert "accepted with the reason: New ball mounted." in state.detail
+    assert (state.word, state.tone) == ("IN USE", Tone.WARN)
+    assert "New ball mounted." in state.detail
     assert page.is_doubtful()
 
 
@@ -619,7 +620,7 @@ def test_without_a_reason_a_tip_to_be_checked_is_not_accepted(bed: Bed) -> None:
     (give,) = [
         each
         for each in bar.findChildren(QPushButton)
-        if each.text() == "Accept with this reason"
+        if each.text() == "Accept with reason"
     ]
     assert bar.isVisibleTo(page)
     assert not give.isEnabled()
@@ -633,15 +634,13 @@ def test_without_a_reason_a_tip_to_be_checked_is_not_accepted(bed: Bed) -> None:
     assert found.accepted == THEN
 
 
-def test_an_acceptance_is_taken_back_and_the_tip_before_is_in_force(
-    bed: Bed,
-) -> None:
+def test_an_acceptance_is_taken_back_and_the_tip_before_is_in_force(bed: Bed) -> None:
     workbench = bed.solve_after([0.42, 0.0, 0.0])
     page = bed.show()
     give_reason(page, "New ball mounted.")
     bed.qtbot.waitUntil(page.is_complete)
-    click(page, "Take back...")
-    answer(page, "Take back")
+    click(page, "Revoke acceptance...")
+    answer(page, "Revoke acceptance")
     bed.qtbot.waitUntil(lambda: not page.is_complete())
 
     found = in_force(workbench)
@@ -649,8 +648,8 @@ def test_an_acceptance_is_taken_back_and_the_tip_before_is_in_force(
     assert found.accepted == THEN
     assert banner(page).word == "CHECK: Tip has changed"
     assert len(list(workbench.run.archive.folder.glob("*.json"))) == 3
-    assert "taken back" in page.unsaved()
-    assert "offered again" not in page.unsaved()
+    assert "Acceptance revoked." in page.unsaved()
+    assert ") are saved;" not in page.unsaved()
 
 
 def test_the_acceptance_of_a_simulated_tip_is_no_force(bed: Bed) -> None:
@@ -660,9 +659,9 @@ def test_the_acceptance_of_a_simulated_tip_is_no_force(bed: Bed) -> None:
     page.run_main_action()
     bed.qtbot.waitUntil(page.is_complete)
 
-    assert banner(page).word == "PRACTICE KEPT"
+    assert banner(page).word == "PRACTICE SAVED"
     assert in_force(workbench) is None
-    names = workbench.preparation.names
+    names = workbench.selection.preparation.names
     archive = workbench.run.archive
     assert archive.in_force(names.pen, names.tip, is_simulated=True) is not None
 
@@ -682,7 +681,7 @@ def test_the_next_tip_is_one_click_away_with_its_ball_and_nominal_centre(
     with bed.qtbot.waitSignal(page.step_requested) as asked:
         click(page, "T-11")
 
-    now = workbench.preparation
+    now = workbench.selection.preparation
     assert asked.args == ["swing"]
     assert (now.names.tip, now.names.ball_diameter) == ("T-11", 5.0)
     assert now.nominal_tip is not None
@@ -703,7 +702,7 @@ def test_a_tip_of_the_library_that_was_never_calibrated_can_be_next(bed: Bed) ->
     with bed.qtbot.waitSignal(page.step_requested):
         click(page, "T-12")
 
-    names = workbench.preparation.names
+    names = workbench.selection.preparation.names
     assert (names.tip, names.ball_diameter) == ("T-12", 3.0)
 
 
@@ -714,12 +713,15 @@ def test_the_tip_as_found_is_told_against_its_limit(bed: Bed) -> None:
 
     remarks = [each.value() for each in bed.show().findChildren(SignLabel)]
     (found,) = [each for each in remarks if each.text.startswith("As found")]
-    assert re.fullmatch(r"As found: 0\.100\d* mm off, limit 0\.05 mm", found.text)
+    assert re.fullmatch(
+        r"As found: 0\.100\d* mm from the previous calibration, limit 0\.05 mm",
+        found.text,
+    )
     assert found.tone is Tone.WARN
 
 
 def test_of_practice_no_older_tip_is_said_to_stay_in_force(bed: Bed) -> None:
-    told = "The old one stays in force until then."
+    told = "Until then the previous result remains current."
     bed.solve_after([0.0, 0.0, 0.001])
     assert told in bed.show().lead()
 
@@ -739,7 +741,7 @@ def test_of_practice_no_older_tip_is_said_to_stay_in_force(bed: Bed) -> None:
 def test_the_tip_is_copied_in_millimetres(
     page: ReviewPage, workbench: Workbench
 ) -> None:
-    click(page, "Copy the tip")
+    click(page, "Copy tip")
 
     copied = QApplication.clipboard().text().split("\t")
     assert list(map(float, copied)) == tip(workbench).tolist()
@@ -759,7 +761,7 @@ def test_the_folder_of_the_swing_is_opened(
     bed.solve()
     page = bed.show()
     told: list[str] = []
-    page.status_changed.connect(told.append)
+    bed.workbench.notifications.status_changed.connect(told.append)
 
     click(page, "Open folder")
     assert opened == [str(bed.swing)]
@@ -767,7 +769,7 @@ def test_the_folder_of_the_swing_is_opened(
 
     can_show = False
     click(page, "Open folder")
-    assert told[-1] == f"No program here shows folders. This one is {bed.swing}"
+    assert told[-1] == f"No file manager found. Folder: {bed.swing}"
 
 
 def save(bed: Bed, page: ReviewPage, what: str, folder: Path) -> None:
@@ -776,7 +778,7 @@ def save(bed: Bed, page: ReviewPage, what: str, folder: Path) -> None:
     (action,) = [each for each in menu.actions() if each.text() == what]
     action.trigger()
     (dialog,) = [d for d in page.findChildren(QFileDialog) if d.isVisible()]
-    with bed.qtbot.waitSignal(page.status_changed):
+    with bed.qtbot.waitSignal(bed.workbench.notifications.status_changed):
         dialog.fileSelected.emit(str(folder))
     dialog.close()
 
@@ -789,7 +791,7 @@ def test_all_is_saved_at_once_under_pen_tip_and_date_and_nothing_overwritten(
     folder = tmp_path / "saved"
     folder.mkdir()
     for _ in range(2):
-        save(bed, page, "All at once...", folder)
+        save(bed, page, "Record, tables and plots...", folder)
 
     stem = f"LP-04_T-10_{workbench.around.now():%Y-%m-%d}"
     names = {path.name for path in folder.iterdir()}
@@ -802,7 +804,41 @@ def test_all_is_saved_at_once_under_pen_tip_and_date_and_nothing_overwritten(
     assert len(rows) == N_IMAGES + 1
     assert "live camera" in (folder / f"{stem}_tip.csv").read_text()
     assert len([name for name in names if name.endswith(".png")]) == 2 * N_PLOTS
-    assert workbench.export_folder() == str(folder)
+    assert workbench.settings.export_folder() == str(folder)
+
+
+def test_all_formats_are_offered_and_a_certificate_asks_for_the_laboratory(
+    bed: Bed, tmp_path: Path
+) -> None:
+    workbench = bed.solve()
+    page = bed.show()
+    (menu,) = button(page, "Save...").findChildren(QMenu)
+    actions = {action.text(): action for action in menu.actions()}
+    assert {f"{each.label}..." for each in FORMATS} <= set(actions)
+
+    actions["Digital Calibration Certificate (XML)..."].trigger()
+    (dialog,) = page.findChildren(LaboratoryDialog)
+    (save_button,) = [
+        each for each in dialog.findChildren(QPushButton) if each.text() == "Save..."
+    ]
+    edits = dialog.findChildren(QLineEdit)
+    for edit, text in zip(
+        edits, ("Hall 2", "a@b.de", "Berlin", "Germany"), strict=True
+    ):
+        edit.setText(text)
+    assert not save_button.isEnabled()
+    edits[-1].setText("DE")
+    save_button.click()
+    (folder_dialog,) = [d for d in page.findChildren(QFileDialog) if d.isVisible()]
+    with bed.qtbot.waitSignal(workbench.notifications.status_changed):
+        folder_dialog.fileSelected.emit(str(tmp_path))
+    folder_dialog.close()
+
+    (written,) = tmp_path.glob("*_dcc.xml")
+    assert "<dcc:city>Berlin</dcc:city>" in written.read_text("utf-8")
+    assert "LP-04" in written.read_text("utf-8")
+    laboratory = Laboratory("Hall 2", "a@b.de", "Berlin", "DE")
+    assert workbench.settings.laboratory() == laboratory
 
 
 def test_plots_that_were_not_looked_at_are_saved_whole_and_with_their_mark(
@@ -839,7 +875,7 @@ def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
     page = bed.show()
 
     deviation = (tip(workbench) - [-1.0, -90.0, -24.0]) * 1000
-    shown = list(map(float, differences(page)["since nominal"]))
+    shown = list(map(float, differences(page)["From nominal"]))
     assert shown == pytest.approx(deviation.tolist(), abs=1.0)
 
 
@@ -873,7 +909,7 @@ def test_the_words_change_with_the_language(page: ReviewPage) -> None:
     QApplication.sendEvent(page, QEvent(QEvent.Type.LanguageChange))
 
     assert the(page, QTabWidget).tabText(0) == "Images"
-    assert banner(page).word == "PASS: Good"
+    assert banner(page).word == "PASS: Within limits"
 
 
 def test_every_control_has_a_name_for_a_screen_reader(page: ReviewPage) -> None:
@@ -911,7 +947,8 @@ def test_images_are_listed_worst_first_with_their_reasons(bed: Bed) -> None:
     misfits = [float(misfit) for _, misfit, _, _ in rows[1:]]
     assert misfits == sorted(misfits, reverse=True)
     assert (
-        count(page) == f"{N_IMAGES - 2} of {N_IMAGES} used; 1 unreadable; 1 tip slipped"
+        count(page)
+        == f"{N_IMAGES - 2} of {N_IMAGES} included; 1 unreadable; 1 tip slipped"
     )
 
 
@@ -989,7 +1026,7 @@ def test_an_image_that_cannot_be_read_says_why(bed: Bed) -> None:
 
     assert table(page).number() == DAMAGED
     bed.qtbot.waitUntil(
-        lambda: "wrong checksum" in the(page, ResidualView).accessibleDescription(),
+        lambda: "wrong checksum" in the(page, ResidualView).accessibleDescription()
     )
     assert the(page, ResidualView).image_size().isEmpty()
 
@@ -1007,7 +1044,7 @@ def test_a_bug_while_an_image_is_read_is_told_and_other_images_are_shown(
         page = bed.show()
         view, numbers = the(page, ResidualView), table(page)
         bed.qtbot.waitUntil(
-            lambda: "The image cannot be shown." in view.accessibleDescription(),
+            lambda: "Image not available" in view.accessibleDescription()
         )
     assert isinstance(caught[0], ZeroDivisionError)
     assert view.image_size().isEmpty()
@@ -1018,7 +1055,7 @@ def test_a_bug_while_an_image_is_read_is_told_and_other_images_are_shown(
         bed.qtbot.waitUntil(lambda: bool(view.markers()))
     bed.qtbot.waitUntil(lambda: not view.image_size().isEmpty())
     assert numbers.number() == first
-    assert "cannot be shown" not in view.accessibleDescription()
+    assert "Image not available" not in view.accessibleDescription()
 
 
 def test_a_click_on_the_misfit_chooses_the_image(
@@ -1041,30 +1078,32 @@ def test_an_image_is_taken_out_and_put_back_with_the_tip_solved_at_once(
         assert may_solve.wait(PATIENCE_MS / 1000)
         return solve_again(solution, taken_out)
 
-    monkeypatch.setattr("lightpen.swing.course.solve_again", solve)
+    monkeypatch.setattr("lightpen.swing.workflow.solve_again", solve)
     before = tip(workbench).copy()
     number = table(page).number()
     assert number is not None
-    assert not button(page, "Put back").isEnabled()
-    assert button(page, "Put back").toolTip() == "It takes part already."
+    assert not button(page, "Include").isEnabled()
+    assert button(page, "Include").toolTip() == "Already included"
 
     hindrances: list[str] = []
     page.changed.connect(lambda: hindrances.append(page.main_action().why_not))
-    click(page, "Take out")
-    qtbot.waitUntil(lambda: "The tip is being computed." in hindrances)
+    click(page, "Exclude")
+    qtbot.waitUntil(lambda: "Computing the tip" in hindrances)
     may_solve.set()
-    await_count(qtbot, page, f"{N_IMAGES - 1} of {N_IMAGES} used; 1 taken out")
+    await_count(
+        qtbot, page, f"{N_IMAGES - 1} of {N_IMAGES} included; 1 excluded manually"
+    )
 
     assert table(page).number() == number
     assert not np.array_equal(tip(workbench), before)
     assert open_record(workbench.run.records_folder / "swing").taken_out == {
         number: "taken out"
     }
-    assert not button(page, "Take out").isEnabled()
+    assert not button(page, "Exclude").isEnabled()
     assert page.main_action().why_not == ""
 
-    click(page, "Put back")
-    await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} used")
+    click(page, "Include")
+    await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} included")
 
     np.testing.assert_array_equal(tip(workbench), before)
 
@@ -1078,11 +1117,13 @@ def test_keys_take_several_images_out_and_put_them_back(
         QTest.keyClick(table(page), Qt.Key.Key_Down, shift)
 
     QTest.keyClick(table(page), Qt.Key.Key_Delete)
-    await_count(qtbot, page, f"{N_IMAGES - 3} of {N_IMAGES} used; 3 taken out")
+    await_count(
+        qtbot, page, f"{N_IMAGES - 3} of {N_IMAGES} included; 3 excluded manually"
+    )
     assert len(table(page).selected()) == 3
 
     QTest.keyClick(table(page), Qt.Key.Key_Insert)
-    await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} used")
+    await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} included")
 
 
 def test_what_was_taken_out_or_put_back_is_undone_and_redone(
@@ -1093,15 +1134,19 @@ def test_what_was_taken_out_or_put_back_is_undone_and_redone(
         Qt.KeyboardModifier.ShiftModifier,
     )
     assert not button(page, "Undo").isEnabled()
-    click(page, "Take out")
-    await_count(qtbot, page, f"{N_IMAGES - 1} of {N_IMAGES} used; 1 taken out")
+    click(page, "Exclude")
+    await_count(
+        qtbot, page, f"{N_IMAGES - 1} of {N_IMAGES} included; 1 excluded manually"
+    )
 
     QTest.keyClick(table(page), Qt.Key.Key_Z, control)
-    await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} used")
+    await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} included")
     assert not button(page, "Undo").isEnabled()
 
     QTest.keyClick(table(page), Qt.Key.Key_Z, control | shift)
-    await_count(qtbot, page, f"{N_IMAGES - 1} of {N_IMAGES} used; 1 taken out")
+    await_count(
+        qtbot, page, f"{N_IMAGES - 1} of {N_IMAGES} included; 1 excluded manually"
+    )
 
 
 def test_the_line_over_the_misfits_takes_out_what_it_is_drawn_below(
@@ -1117,10 +1162,10 @@ def test_the_line_over_the_misfits_takes_out_what_it_is_drawn_below(
     drag(plot.canvas(), grip, QPoint(grip.x(), wanted))
 
     n_used = N_IMAGES - n_above
-    taken_out = f"{n_used} of {N_IMAGES} used; {n_above} taken out"
+    taken_out = f"{n_used} of {N_IMAGES} included; {n_above} excluded manually"
     await_count(qtbot, page, taken_out)
     click(page, "Undo")
-    await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} used")
+    await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} included")
 
 
 def test_no_line_is_saved_with_the_misfits(page: ReviewPage) -> None:
@@ -1140,7 +1185,7 @@ def test_the_line_leaves_the_better_half_of_the_images(
     drag(plot.canvas(), plot.limit_pixel(), plot.limit_pixel() + QPoint(0, 500))
 
     half = N_IMAGES // 2
-    await_count(qtbot, page, f"{half} of {N_IMAGES} used; {half} taken out")
+    await_count(qtbot, page, f"{half} of {N_IMAGES} included; {half} excluded manually")
 
 
 def test_a_slipped_image_of_the_swing_may_be_put_back(bed: Bed) -> None:
@@ -1150,9 +1195,9 @@ def test_a_slipped_image_of_the_swing_may_be_put_back(bed: Bed) -> None:
     table(page).choose(SLIPPED)
 
     assert "1 tip slipped" in count(page)
-    click(page, "Put back")
+    click(page, "Include")
 
-    await_count(bed.qtbot, page, f"{N_IMAGES} of {N_IMAGES} used")
+    await_count(bed.qtbot, page, f"{N_IMAGES} of {N_IMAGES} included")
 
 
 def test_an_image_that_the_program_left_out_cannot_be_put_back(bed: Bed) -> None:
@@ -1161,10 +1206,10 @@ def test_an_image_that_the_program_left_out_cannot_be_put_back(bed: Bed) -> None
     page = bed.show()
 
     assert table(page).number() == DAMAGED
-    assert not button(page, "Put back").isEnabled()
-    why = "It would be left out again: unreadable."
-    assert button(page, "Put back").toolTip() == why
-    assert not button(page, "Take out").isEnabled()
+    assert not button(page, "Include").isEnabled()
+    why = "Excluded automatically: unreadable"
+    assert button(page, "Include").toolTip() == why
+    assert not button(page, "Exclude").isEnabled()
 
 
 def test_taking_out_too_many_is_refused_and_nothing_is_lost(
@@ -1173,11 +1218,11 @@ def test_taking_out_too_many_is_refused_and_nothing_is_lost(
     before = tip(workbench).copy()
     table(page).selectAll()
 
-    with qtbot.waitSignal(workbench.troubled) as told:
-        click(page, "Take out")
+    with qtbot.waitSignal(workbench.notifications.raised) as told:
+        click(page, "Exclude")
 
     assert "at least 6" in told.args[0]
-    assert count(page) == f"{N_IMAGES} of {N_IMAGES} used"
+    assert count(page) == f"{N_IMAGES} of {N_IMAGES} included"
     np.testing.assert_array_equal(tip(workbench), before)
     assert open_record(workbench.run.records_folder / "swing").taken_out == {}
     assert not button(page, "Undo").isEnabled()
@@ -1186,7 +1231,7 @@ def test_taking_out_too_many_is_refused_and_nothing_is_lost(
 def test_a_computation_shows_its_progress_and_can_be_cancelled(
     bed: Bed, monkeypatch: pytest.MonkeyPatch, solving_on: "SolvingOn"
 ) -> None:
-    monkeypatch.setattr("lightpen_app.steps.review.page.PATIENCE_MS", 0)
+    monkeypatch.setattr("lightpen_app.steps.review.view.PATIENCE_MS", 0)
     workbench = bed.solve()
     page = bed.show()
     before = workbench.run.status.solution
@@ -1206,7 +1251,7 @@ def test_a_computation_shows_its_progress_and_can_be_cancelled(
 
 
 def test_every_plot_is_saved_as_picture_and_as_numbers(
-    page: ReviewPage, qtbot: QtBot, tmp_path: Path
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot, tmp_path: Path
 ) -> None:
     look_at_all_tabs(page)
     cards = page.findChildren(PlotCard)
@@ -1214,7 +1259,7 @@ def test_every_plot_is_saved_as_picture_and_as_numbers(
 
     for i, card in enumerate(cards):
         for suffix in ("png", "csv"):
-            with qtbot.waitSignal(page.status_changed) as told:
+            with qtbot.waitSignal(workbench.notifications.status_changed) as told:
                 card.save(tmp_path / f"{i}.{suffix}")
             assert told.args[0] == f"Saved as {tmp_path / f'{i}.{suffix}'}"
         lines = (tmp_path / f"{i}.csv").read_text().splitlines()
@@ -1242,11 +1287,11 @@ def test_the_plot_beside_the_images_is_enlarged_over_all_about_it(
 
 
 def test_a_plot_that_cannot_be_saved_is_told(
-    page: ReviewPage, qtbot: QtBot, tmp_path: Path
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot, tmp_path: Path
 ) -> None:
     card = page.findChildren(PlotCard)[0]
     for name in ("plot.csv", "plot.png"):
-        with qtbot.waitSignal(page.notice_raised) as told:
+        with qtbot.waitSignal(workbench.notifications.raised) as told:
             card.save(tmp_path / "nowhere" / name)
 
         assert "cannot be written" in told.args[0]
@@ -1298,7 +1343,7 @@ def accept(page: ReviewPage, qtbot: QtBot) -> None:
 def test_an_accepted_tip_is_in_force_and_said_to_be(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
-    assert page.unsaved().startswith("The tip is not accepted.")
+    assert page.unsaved().startswith("Tip not accepted.")
     assert in_force(workbench) is None
 
     accept(page, qtbot)
@@ -1307,11 +1352,11 @@ def test_an_accepted_tip_is_in_force_and_said_to_be(
     assert result is not None
     np.testing.assert_array_equal(result.tip_pen, tip(workbench))
     state = banner(page)
-    assert state.word == "IN FORCE"
+    assert state.word == "IN USE"
     assert f"{result.accepted.astimezone():%Y-%m-%d %H:%M:%S}" in state.detail
     assert page.is_complete()
     assert page.unsaved() == ""
-    assert "no earlier result" in differences(page)  # not compared with itself
+    assert "No earlier result" in differences(page)  # not compared with itself
     assert open_record(workbench.run.records_folder / "swing").verdict == Grade.PASS
 
 
@@ -1322,16 +1367,16 @@ def test_the_record_on_paper_is_of_the_result_on_the_disk(
         action
         for menu in page.findChildren(QMenu)
         for action in menu.actions()
-        if action.text() == "Record on paper..."
+        if action.text() == "Calibration report..."
     )
     assert not entry.isEnabled()
     assert entry.toolTip().startswith("Accept the tip first")
 
     accept(page, qtbot)
     entry.trigger()
-    qtbot.waitUntil(lambda: bool(page.findChildren(PaperWindow)))
+    qtbot.waitUntil(lambda: bool(page.findChildren(PrintReportWindow)))
 
-    window = the(page, PaperWindow)
+    window = the(page, PrintReportWindow)
     qtbot.waitUntil(lambda: window.n_pages() > 2)
     window.close()
 
@@ -1342,20 +1387,20 @@ def test_a_result_that_is_gone_is_not_put_on_paper(
     accept(page, qtbot)
     shutil.rmtree(bed.workbench.run.archive.folder)
 
-    with qtbot.waitSignal(page.notice_raised) as told:
+    with qtbot.waitSignal(bed.workbench.notifications.raised) as told:
         the(page, ResultTools).paper_requested.emit()
 
     assert "LP-04" in told.args[0]
-    assert page.findChildren(PaperWindow) == []
+    assert page.findChildren(PrintReportWindow) == []
 
 
 def test_an_accepted_swing_is_changed_no_more(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
     accept(page, qtbot)
-    why = "The tip is accepted; start the next calibration."
+    why = "Tip accepted. Start the next calibration."
 
-    for text in ("Take out", "Put back", "Capture more", "Repeat"):
+    for text in ("Exclude", "Include", "Capture more", "Repeat swing"):
         assert not button(page, text).isEnabled()
         assert button(page, text).toolTip() == why
     table(page).setFocus()
@@ -1368,9 +1413,7 @@ def test_after_acceptance_the_next_calibration_starts(
 ) -> None:
     accept(page, qtbot)
     # The second click of a double one must not go on.
-    assert page.main_action() == MainAction(
-        "Start the next calibration", "The tip is accepted."
-    )
+    assert page.main_action() == MainAction("Start next calibration", "Tip accepted.")
     qtbot.waitUntil(lambda: not page.main_action().why_not)
 
     with qtbot.waitSignal(page.step_requested) as asked:
@@ -1385,12 +1428,12 @@ def test_a_result_that_cannot_be_stored_is_told_and_the_old_one_stays(
 ) -> None:
     workbench.run.archive.folder.write_text("a file where a folder should be")
 
-    with qtbot.waitSignal(workbench.troubled) as told:
+    with qtbot.waitSignal(workbench.notifications.raised) as told:
         page.run_main_action()
 
     assert "cannot be" in told.args[0]
     assert not page.is_complete()
-    assert banner(page).word == "PASS: Good"
+    assert banner(page).word == "PASS: Within limits"
     assert open_record(workbench.run.records_folder / "swing").verdict is None
 
 
@@ -1406,12 +1449,12 @@ def test_more_images_are_captured_into_the_same_swing(
         assert may_read.wait(PATIENCE_MS / 1000)
         return read_for_more(folder)
 
-    monkeypatch.setattr("lightpen.swing.course.read_for_more", read)
-    workbench.open_camera()
+    monkeypatch.setattr("lightpen.swing.workflow.read_for_more", read)
+    workbench.camera.open()
     assert page.main_action().why_not == ""
     with qtbot.waitSignal(page.step_requested) as asked:
         click(page, "Capture more")
-        qtbot.waitUntil(lambda: page.main_action().why_not == "The swing goes on.")
+        qtbot.waitUntil(lambda: page.main_action().why_not == "Swing in progress")
         may_read.set()
 
     assert asked.args == ["swing"]
@@ -1428,7 +1471,7 @@ def test_a_record_that_is_gone_cannot_be_captured_into(
 ) -> None:
     (workbench.run.records_folder / "swing" / "journal.jsonl").write_text("{}\n{}\n")
 
-    with qtbot.waitSignal(workbench.troubled) as told:
+    with qtbot.waitSignal(workbench.notifications.raised) as told:
         click(page, "Capture more")
 
     assert "is damaged" in told.args[0]
@@ -1439,13 +1482,13 @@ def test_a_record_that_is_gone_cannot_be_captured_into(
 def test_a_repetition_is_asked_for_and_can_be_declined(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
-    click(page, "Repeat")
+    click(page, "Repeat swing")
     asks = the(page, QuestionBar)
     assert asks.words() == (
-        "Repeat the swing from the start? These images stay on the disk."
+        "Repeat the swing from the start? These images remain on the disk."
     )
 
-    answer(page, "Go on with these")
+    answer(page, "Continue with these")
 
     assert asks.words() == ""
     assert workbench.run.status.solution is not None
@@ -1454,10 +1497,10 @@ def test_a_repetition_is_asked_for_and_can_be_declined(
 def test_a_repetition_sets_the_swing_aside_and_keeps_its_images(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
-    click(page, "Repeat")
+    click(page, "Repeat swing")
 
     with qtbot.waitSignal(page.step_requested) as asked:
-        answer(page, "Repeat")
+        answer(page, "Repeat swing")
 
     assert asked.args == ["swing"]
     record = open_record(workbench.run.records_folder / "swing")
@@ -1470,10 +1513,10 @@ def test_a_swing_that_cannot_be_set_aside_is_told(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
     shutil.rmtree(workbench.run.records_folder / "swing")
-    click(page, "Repeat")
+    click(page, "Repeat swing")
 
-    with qtbot.waitSignal(workbench.troubled) as told:
-        answer(page, "Repeat")
+    with qtbot.waitSignal(workbench.notifications.raised) as told:
+        answer(page, "Repeat swing")
 
     assert "does not exist" in told.args[0]
     assert workbench.run.status.solution is not None
@@ -1485,21 +1528,19 @@ def test_a_swing_that_cannot_be_set_aside_is_told(
 def test_a_question_stays_in_another_language(
     page: ReviewPage, qapp: QApplication
 ) -> None:
-    click(page, "Repeat")
+    click(page, "Repeat swing")
     english = the(page, QuestionBar).words()
-    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    LanguageSwitch(qapp).set_language("zh_CN")
     QApplication.processEvents()
 
     assert english.startswith("Repeat the swing")
     assert the(page, QuestionBar).words() not in ("", english)
 
 
-def test_whether_to_repeat_is_asked_no_more_once_the_tip_is_accepted(
-    bed: Bed,
-) -> None:
+def test_whether_to_repeat_is_asked_no_more_once_the_tip_is_accepted(bed: Bed) -> None:
     bed.solve()
     page = bed.show()
-    click(page, "Repeat")
+    click(page, "Repeat swing")
     page.run_main_action()
     bed.qtbot.waitUntil(page.is_complete)
 

@@ -9,17 +9,17 @@ from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from lightpen.detection.reasons import Reason
-from lightpen.record.image_rows import ImageRow
+from lightpen.record.swings.image_list import ImageRow
 from lightpen_app.look.quantities import decimals_for, number_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.steps.review.image_table import ImageTable
-from lightpen_app.steps.review.remark_list import MOST, RemarkList
+from lightpen_app.steps.review.message_list import MOST, StatusMessageList
 from lightpen_app.steps.review.residual_view import Arrows, ResidualView
-from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
+from lightpen_app.steps.review.result_panel import TipReadout, TipValue
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.question_bar import Question, QuestionBar
-from lightpen_app.widgets.sign_label import Remark
+from lightpen_app.widgets.sign_label import StatusMessage
 
 
 @pytest.mark.parametrize(
@@ -104,11 +104,11 @@ def test_a_table_is_wide_enough_for_its_longest_figure(qtbot: QtBot) -> None:
         assert names.width() >= names.sizeHint().width()
 
 
-def test_remarks_take_no_more_room_than_they_need(qtbot: QtBot) -> None:
-    remarks = RemarkList()
+def test_messages_take_no_more_room_than_they_need(qtbot: QtBot) -> None:
+    remarks = StatusMessageList()
     qtbot.addWidget(remarks)
     assert remarks.isHidden()
-    warning = Remark("Look into this.", Sign.WARNING, Tone.WARN)
+    warning = StatusMessage("Look into this.", Sign.WARNING, Tone.WARN)
 
     remarks.set_value([warning])
     low = remarks.sizeHint().height()

@@ -7,8 +7,10 @@ from PySide6.QtWidgets import QDialogButtonBox
 from pytestqt.qtbot import QtBot
 
 from lightpen.model.assumptions import USUAL
-from lightpen_app.steps.start.assumptions_dialog import AssumptionsDialog
-from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
+from lightpen_app.steps.start.assumptions_panel import (
+    AssumptionsDialog,
+    AssumptionsPanel,
+)
 from lightpen_app.widgets.number_field import NumberField
 
 
@@ -27,15 +29,15 @@ def field(dialog: AssumptionsDialog, name: str) -> NumberField:
 def test_every_number_is_shown_in_its_own_unit(dialog: AssumptionsDialog) -> None:
     assert field(dialog, "Focal length").text() == "0.50 %"
     assert field(dialog, "Scale").text() == "10.0 ppm"
-    assert field(dialog, "Ball and cone").text() == "0.20 \N{MICRO SIGN}m"
-    assert field(dialog, "Temperature").text() == "not measured"
+    assert field(dialog, "Form error").text() == "0.20 \N{MICRO SIGN}m"
+    assert field(dialog, "Pen temperature").text() == "not measured"
 
 
 def test_what_is_typed_is_assumed_at_once(
     qtbot: QtBot, dialog: AssumptionsDialog
 ) -> None:
     with qtbot.waitSignal(dialog.value_changed):
-        field(dialog, "Ball and cone").setValue(1.5)
+        field(dialog, "Form error").setValue(1.5)
     assert dialog.value() == replace(USUAL, form_error=0.0015)
 
 
@@ -51,10 +53,10 @@ def test_a_measured_temperature_has_an_uncertainty_of_its_own(
     dialog: AssumptionsDialog,
 ) -> None:
     assert not field(dialog, "Uncertainty").isEnabled()
-    field(dialog, "Temperature").setValue(23.5)
+    field(dialog, "Pen temperature").setValue(23.5)
     assert dialog.value().temperature_c == 23.5
     assert field(dialog, "Uncertainty").isEnabled()
-    assert not field(dialog, "How much warmer").isEnabled()
+    assert not field(dialog, "Temperature difference").isEnabled()
 
 
 def test_the_usual_values_come_back(dialog: AssumptionsDialog) -> None:

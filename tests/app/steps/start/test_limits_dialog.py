@@ -10,9 +10,14 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialogButtonBox, QLineEdit
 from pytestqt.qtbot import QtBot
 
-from lightpen.model.due_rule import DueRule
-from lightpen.model.limits import StationLimits, SwingLimits, VerificationLimits
-from lightpen.record.supervision import Signature, Supervision
+from lightpen.model.limits import (
+    LIMITS,
+    DueRule,
+    StationLimits,
+    SwingLimits,
+    VerificationLimits,
+)
+from lightpen.record.library.supervision import Signature, Supervision
 from lightpen_app.steps.start.limits_dialog import LimitsDialog
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.reason_bar import ReasonBar
@@ -42,7 +47,7 @@ def field(dialog: LimitsDialog, name: str) -> NumberField:
 
 
 def sign(dialog: LimitsDialog) -> None:
-    for name, text in (("Supervisor", "Eve"), ("Supervisor's password", "secret")):
+    for name, text in (("Supervisor", "Eve"), ("Supervisor password", "secret")):
         (edit,) = (
             each
             for each in dialog.findChildren(QLineEdit)
@@ -57,6 +62,12 @@ def test_the_limits_that_are_shown_are_those_that_were_given(
     dialog.set_value(TIGHT, is_guarded=True)
 
     assert dialog.value() == TIGHT
+
+
+def test_every_limit_is_in_the_dialog(dialog: LimitsDialog) -> None:
+    shown = {each.accessibleName() for each in dialog.findChildren(NumberField)}
+
+    assert shown == {str(limit.label) for limit in LIMITS}
 
 
 def test_limits_are_laid_down_only_with_a_signature(
@@ -113,13 +124,13 @@ def test_limits_are_laid_down_once_however_often_enter_is_pressed(
 
 
 def test_what_is_laid_down_counts_for_its_station_alone(workbench: Workbench) -> None:
-    workbench.set_supervision(Supervision("a hash", {"Hall 2": TIGHT}))
-    assert workbench.preparation.limits == TIGHT.swing
-    assert workbench.choices.limits == TIGHT.verification
+    workbench.selection.set_supervision(Supervision("a hash", {"Hall 2": TIGHT}))
+    assert workbench.selection.preparation.limits == TIGHT.swing
+    assert workbench.selection.choices.limits == TIGHT.verification
 
-    workbench.choose_station("Hall 3")
-    assert workbench.preparation.limits == SwingLimits()
-    assert workbench.choices.limits == VerificationLimits()
+    workbench.selection.choose_station("Hall 3")
+    assert workbench.selection.preparation.limits == SwingLimits()
+    assert workbench.selection.choices.limits == VerificationLimits()
 
 
 def test_a_supervisor_is_asked_for_name_and_password(qtbot: QtBot) -> None:

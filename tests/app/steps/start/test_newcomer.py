@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QApplication, QLabel
 
 from lightpen.model.origin import Origin
 from lightpen_app.steps.start import newcomer_panel
-from lightpen_app.steps.start.introduction import Introduction
+from lightpen_app.steps.start.newcomer_panel import Introduction
 from lightpen_app.widgets.pen_in_space import PenInSpace
 from lightpen_app.work.settings import Settings
 
@@ -23,7 +23,9 @@ def test_a_simulated_pen_is_at_the_swing_after_one_click(
 
     walker.click("Try it with a simulated pen")
 
-    assert walker.workbench.preparation.lacks()  # no swing begins with other files
+    assert (
+        walker.workbench.selection.preparation.missing_inputs()
+    )  # no swing begins with other files
     walker.until_shows("Swing")
     walker.click("Let the simulated operator swing")
     walker.until(lambda: walker.workbench.run.status.state is not None)
@@ -58,7 +60,7 @@ def test_enter_goes_to_the_first_field_that_is_missing(
         assert focused is not None
         walked.append(focused.accessibleName())
 
-    assert walked == ["Operator", "Pen, serial number", "Probe tip", "Cone"]
+    assert walked == ["Operator", "Pen serial number", "Probe tip", "Cone"]
     walker.type("C-9")
     walker.press(Qt.Key.Key_Return)
     walker.until_shows("Camera")

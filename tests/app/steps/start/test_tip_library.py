@@ -18,9 +18,9 @@ from tests.app.undressed import undressed
 
 from lightpen.local_time import local_now
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.record.library_changes import Author, add_item, retire_item
-from lightpen.record.supervision import Signature, set_password
-from lightpen.record.tip_library import (
+from lightpen.record.library.library_changes import Author, add_item, retire_item
+from lightpen.record.library.supervision import Signature, set_password
+from lightpen.record.library.tip_library import (
     AxisOrigin,
     ItemKind,
     Library,
@@ -32,8 +32,8 @@ from lightpen.record.tip_library import (
     read_library,
 )
 from lightpen.swing.preparation import SourceChoice, SourceKind
-from lightpen_app.look.sounds import Silence
-from lightpen_app.shell.sidebar import Sidebar
+from lightpen_app.look.sounds import SilentSounds
+from lightpen_app.shell.sidebar import Sidebar, Subject, subject_of
 from lightpen_app.steps.start.barcode import PACE_MS
 from lightpen_app.steps.start.form import NamesForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog
@@ -57,14 +57,19 @@ class Desk:
     def __init__(self, qtbot: QtBot, workbench: Workbench) -> None:
         self.qtbot, self.workbench = qtbot, workbench
         with undressed():
-            self.page = StartPage(workbench, Silence())
+            self.page = StartPage(workbench, SilentSounds())
         self.told: list[str] = []
-        self.page.status_changed.connect(self.told.append)
+        workbench.notifications.status_changed.connect(self.told.append)
         qtbot.addWidget(self.page)
         self.page.resize(1000, 640)
         self.page.show()
         self.page.entered()
         self.settle()
+
+    def subject(self) -> Subject:
+        """Return what the window says is calibrated."""
+        now, chosen = self.workbench.run.status, self.workbench.selection.preparation
+        return subject_of(now, chosen, self.workbench.library.statuses)
 
     @property
     def data(self) -> Path:
@@ -146,7 +151,9 @@ def desk(qtbot: QtBot, workbench: Workbench) -> Iterator[Desk]:
 def of_real_pen(workbench: Workbench, tmp_path: Path) -> None:
     """Let images be of a real pen, whose tips are in force or due."""
     source = SourceChoice(SourceKind.RECORDED, str(tmp_path))
-    workbench.set_preparation(workbench.preparation.with_source(source))
+    workbench.selection.set_preparation(
+        workbench.selection.preparation.with_source(source)
+    )
 
 
 def test_a_tip_is_exchanged_by_two_clicks_with_its_ball_and_centre(desk: Desk) -> None:
@@ -155,7 +162,7 @@ def test_a_tip_is_exchanged_by_two_clicks_with_its_ball_and_centre(desk: Desk) -
     assert desk.control("List of tips") is desk.names.list_of(ItemKind.TIP)
     desk.names.list_of(ItemKind.TIP).menu().actions()[0].trigger()
 
-    now = desk.workbench.preparation
+    now = desk.workbench.selection.preparation
     assert (now.names.tip, now.names.ball_diameter) == ("T-7", 6.0)
     assert now.nominal_tip is not None
     assert now.nominal_tip.tolist() == [0, -80, -20]
@@ -174,7 +181,7 @@ def test_a_list_that_is_open_stays_as_it_is_while_the_library_is_read(
 
     desk.add(ListedTip(id="T-1"))
     QTest.keyClick(menu, Qt.Key.Key_Return)
-    assert desk.workbench.preparation.names.tip == "T-7"
+    assert desk.workbench.selection.preparation.names.tip == "T-7"
     menu.popup(button.mapToGlobal(button.rect().bottomLeft()))
     names = [each.text().partition("\t")[0] for each in menu.actions()]
     assert names[:2] == ["T-7", "T-1"]
@@ -190,7 +197,7 @@ def test_pens_and_cones_are_chosen_from_their_lists(desk: Desk) -> None:
             {ItemKind.PEN: "LP-9", ItemKind.CONE: "C-9"}[kind]
         ]
         button.chosen.emit(button.choices()[0].name)
-    names = desk.workbench.preparation.names
+    names = desk.workbench.selection.preparation.names
     assert (names.pen, names.cone) == ("LP-9", "C-9")
 
 
@@ -199,7 +206,7 @@ def test_a_tip_that_is_typed_brings_its_ball_from_the_library(desk: Desk) -> Non
     desk.enter("Probe tip", "T-7")
     QTest.keyClick(desk.control("Probe tip"), Qt.Key.Key_Tab)
 
-    assert desk.workbench.preparation.names.ball_diameter == 6.0
+    assert desk.workbench.selection.preparation.names.ball_diameter == 6.0
 
 
 @pytest.mark.usefixtures("of_real_pen")
@@ -208,17 +215,17 @@ def test_a_tip_that_was_never_calibrated_is_marked_in_list_panel_and_side_bar(
 ) -> None:
     desk.add(TIP, ListedCone(id="C-1", due=date(2020, 1, 1)))
     desk.names.list_of(ItemKind.TIP).chosen.emit("T-7")
-    cone = desk.workbench.preparation.names.cone
+    cone = desk.workbench.selection.preparation.names.cone
     desk.settle()
 
     (choice,) = desk.names.list_of(ItemKind.TIP).choices()
     assert choice.remark.text == "NOT CALIBRATED"
-    assert desk.workbench.subject.standings.library.tips
+    assert desk.subject().statuses.library.tips
     sidebar = Sidebar()
     desk.qtbot.addWidget(sidebar)
     told: list[tuple[str, bool]] = []
     sidebar.subject_told.connect(lambda text, marked: told.append((text, marked)))
-    subject = desk.workbench.subject
+    subject = desk.subject()
     sidebar.set_subject(replace(subject, names=replace(subject.names, cone="C-1")))
     assert cone
     assert sidebar.standing().text == (
@@ -234,7 +241,7 @@ def test_a_simulated_tip_is_not_marked(desk: Desk) -> None:
 
     sidebar = Sidebar()
     desk.qtbot.addWidget(sidebar)
-    sidebar.set_subject(desk.workbench.subject)
+    sidebar.set_subject(desk.subject())
     assert sidebar.standing().text == ""
 
 
@@ -248,21 +255,21 @@ def test_a_retired_tip_is_no_choice_and_typed_it_leads_no_further(desk: Desk) ->
     desk.enter("Probe tip", "T-7")
     assert not desk.page.is_complete()
     assert desk.page.main_action().why_not == (
-        "Tip T-7 is retired. Choose another one, or bring it back in the library."
+        "Tip T-7 is retired. Choose another tip, or reactivate it in the tip library."
     )
 
 
 def test_a_damaged_library_is_told_and_told_off_once_it_is_mended(desk: Desk) -> None:
     told, relieved = list[str](), list[str]()
-    desk.workbench.troubled.connect(told.append)
-    desk.workbench.relieved.connect(relieved.append)
+    desk.workbench.notifications.raised.connect(lambda text, _: told.append(text))
+    desk.workbench.notifications.withdrawn.connect(relieved.append)
     desk.add(TIP)
     (file,) = library_files(desk.data)
     sound = file.read_bytes()
     file.write_bytes(sound.replace(b"T-7", b"T-6"))
     desk.workbench.library.refresh()
     desk.settle()
-    assert "was changed or damaged since" in told[-1]
+    assert "was modified or damaged after it was saved." in told[-1]
 
     file.write_bytes(sound)
     desk.workbench.library.refresh()
@@ -278,19 +285,19 @@ def test_a_tip_is_added_and_changed_in_the_dialog_and_entered_with_who(
 ) -> None:
     desk.names.library_requested.emit(ItemKind.TIP)
     desk.click("Add...")
-    desk.enter("Id, as on its label", "T-11")
-    desk.enter("To be used until", "2031-02-03")
-    desk.enter("Why, for the archive", "new")
-    desk.click("Keep")
+    desk.enter("ID (as on label)", "T-11")
+    desk.enter("Expiry date", "2031-02-03")
+    desk.enter("Reason for change", "new")
+    desk.click("Save")
     desk.settle()
     assert desk.library.tips["T-11"].due == date(2031, 2, 3)
     assert desk.dialog.rows()[0][0] == "T-11"
 
     desk.click("Change...")
-    assert isinstance(field := desk.control("Id, as on its label"), QLineEdit)
+    assert isinstance(field := desk.control("ID (as on label)"), QLineEdit)
     assert field.isReadOnly()
     desk.enter("Ball diameter", "8")
-    desk.click("Keep")
+    desk.click("Save")
     desk.settle()
     tip = desk.library.tips["T-11"]
     assert (tip.ball_diameter_mm, tip.axis_origin) == (8.0, None)
@@ -311,11 +318,11 @@ def test_what_is_being_kept_is_neither_asked_for_again_nor_left(
 ) -> None:
     desk.names.library_requested.emit(ItemKind.TIP)
     desk.click("Add...")
-    desk.enter("Id, as on its label", "T-11")
-    desk.click("Keep")
-    for name in ("Keep", "Leave it"):
+    desk.enter("ID (as on label)", "T-11")
+    desk.click("Save")
+    for name in ("Save", "Cancel"):
         assert not desk.control(name).isEnabled()
-        assert desk.control(name).toolTip() == "It is being kept."
+        assert desk.control(name).toolTip() == "Saving"
 
     slow_disk.set()
     desk.settle()
@@ -327,8 +334,8 @@ def keep_and_leave(desk: Desk, name: str) -> None:
     """Add a tip, and leave the dialog before it is kept."""
     desk.names.library_requested.emit(ItemKind.TIP)
     desk.click("Add...")
-    desk.enter("Id, as on its label", name)
-    desk.click("Keep")
+    desk.enter("ID (as on label)", name)
+    desk.click("Save")
     QTest.keyClick(desk.dialog, Qt.Key.Key_Escape)
 
 
@@ -338,13 +345,13 @@ def test_what_is_typed_stays_when_the_change_before_is_kept(
     keep_and_leave(desk, "T-11")
     desk.names.library_requested.emit(ItemKind.TIP)
     desk.click("Add...")
-    desk.enter("Id, as on its label", "T-12")
+    desk.enter("ID (as on label)", "T-12")
     slow_disk.set()
     desk.settle()
 
     assert list(desk.library.tips) == ["T-11"]
-    assert desk.text_of("Id, as on its label") == "T-12"
-    desk.click("Leave it")
+    assert desk.text_of("ID (as on label)") == "T-12"
+    desk.click("Cancel")
     desk.click("Close")
 
 
@@ -396,7 +403,7 @@ def test_the_picture_of_a_tip_is_seen_where_it_is_chosen_and_where_it_is_kept(
         desk.settle()
         assert preview.pixmap().isNull() is not is_picture
     assert_red(preview)
-    desk.click("Keep")
+    desk.click("Save")
     desk.settle()
 
     (kept,) = seen()
@@ -407,7 +414,7 @@ def test_the_picture_of_a_tip_is_seen_where_it_is_chosen_and_where_it_is_kept(
     red.save(str(file))
     desk.click("Change...")
     desk.settle()
-    assert "is not the one that was kept" in preview.text()
+    assert "was modified after it was saved." in preview.text()
 
 
 def assert_red(picture: TipPicture) -> None:
@@ -422,19 +429,18 @@ def test_what_makes_no_sense_is_told_in_the_dialog_and_nothing_is_kept(
     desk.add(TIP)
     desk.names.library_requested.emit(ItemKind.TIP)
     desk.click("Add...")
-    desk.enter("Id, as on its label", "t-7")
-    desk.enter("To be used until", "soon")
-    assert not desk.control("Keep").isEnabled()
-    desk.enter("To be used until", "2031-02-03")
-    desk.click("Keep")
+    desk.enter("ID (as on label)", "t-7")
+    desk.enter("Expiry date", "soon")
+    assert not desk.control("Save").isEnabled()
+    desk.enter("Expiry date", "2031-02-03")
+    desk.click("Save")
     desk.settle()
 
     assert len(library_files(desk.data)) == 1
     assert desk.control(
-        "The tip T-7 is in the library already. Change that one, or "
-        "give this one another id."
+        "The tip T-7 is in the library already. Edit that item, or choose another ID."
     )
-    desk.click("Leave it")
+    desk.click("Cancel")
     desk.click("Close")
 
 
@@ -442,18 +448,18 @@ def test_a_tip_is_retired_and_brought_back_with_a_reason(desk: Desk) -> None:
     desk.add(TIP)
     desk.names.library_requested.emit(ItemKind.TIP)
     desk.click("Retire...")
-    desk.enter("Why, for the archive", "chipped")
-    desk.click("Keep")
+    desk.enter("Reason for change", "chipped")
+    desk.click("Save")
     desk.settle()
     assert desk.library.tips["T-7"].is_retired
     assert desk.dialog.rows() == ()
 
-    box = desk.control("Show retired ones")
+    box = desk.control("Show retired items")
     assert isinstance(box, QAbstractButton)
     box.click()
     assert desk.dialog.rows()[0][:2] == ("T-7", "RETIRED")
-    desk.click("Bring back...")
-    desk.click("Keep")
+    desk.click("Reactivate...")
+    desk.click("Save")
     desk.settle()
     assert not desk.library.tips["T-7"].is_retired
     desk.click("Close")
@@ -462,15 +468,15 @@ def test_a_tip_is_retired_and_brought_back_with_a_reason(desk: Desk) -> None:
 def test_where_a_password_guards_a_supervisor_signs(desk: Desk) -> None:
     eve = Signature("Eve", "correct horse")
     set_password(desk.data, eve, eve.password, local_now())
-    desk.workbench.set_supervision(desk.workbench.run.archive.supervision())
+    desk.workbench.selection.set_supervision(desk.workbench.run.archive.supervision())
 
     desk.names.library_requested.emit(ItemKind.CONE)
     desk.click("Add...")
-    desk.enter("Id, as on its label", "C-5")
-    assert not desk.control("Keep").isEnabled()
+    desk.enter("ID (as on label)", "C-5")
+    assert not desk.control("Save").isEnabled()
     desk.enter("Supervisor", "Eve")
-    desk.enter("Supervisor's password", eve.password)
-    desk.click("Keep")
+    desk.enter("Supervisor password", eve.password)
+    desk.click("Save")
     desk.settle()
     ((_, change),) = library_changes(desk.data)
     assert (change.item.id, change.supervisor) == ("C-5", "Eve")
@@ -483,8 +489,8 @@ def test_the_axis_of_a_spin_stays_one_until_it_is_typed_anew(desk: Desk) -> None
     before = desk.library.tips["T-7"]
     desk.names.library_requested.emit(ItemKind.TIP)
     desk.click("Change...")
-    desk.enter("Note", "polished")
-    desk.click("Keep")
+    desk.enter("Comment", "polished")
+    desk.click("Save")
     desk.settle()
     after = desk.library.tips["T-7"]
     assert after.stylus_axis == before.stylus_axis
@@ -492,7 +498,7 @@ def test_the_axis_of_a_spin_stays_one_until_it_is_typed_anew(desk: Desk) -> None
 
     desk.click("Change...")
     desk.enter("Axis of the stylus, x", "0.5")
-    desk.click("Keep")
+    desk.click("Save")
     desk.settle()
     assert desk.library.tips["T-7"].axis_origin is AxisOrigin.GIVEN
     desk.click("Close")
@@ -505,7 +511,7 @@ def test_the_axis_of_a_stylus_is_found_by_a_spin(desk: Desk) -> None:
     box = desk.control("Axis of the stylus, from the ball into the pen")
     assert isinstance(box, QAbstractButton)
     box.click()
-    desk.click("By a spin")
+    desk.click("Determine by rotation")
     recorder = desk.page.findChild(SpinRecorder)
     assert isinstance(recorder, SpinRecorder)
     axis = np.array([0.0, 0.8, 0.6])
@@ -515,11 +521,11 @@ def test_the_axis_of_a_stylus_is_found_by_a_spin(desk: Desk) -> None:
         np.radians(np.arange(0, 90, 3))[:, None] * axis
     ):
         recorder.keep(rotation)
-    assert said[0].startswith("The pen is seen in 1 images of the spin")
-    assert said[-1].startswith("Turned by 87 degrees")
+    assert said[0].startswith("The pen is detected in 1 images of the rotation;")
+    assert said[-1].startswith("Rotation 87\N{DEGREE SIGN}")
 
-    desk.click("End the spin")
-    desk.click("Keep")
+    desk.click("Stop rotation")
+    desk.click("Save")
     desk.settle()
     tip = desk.library.tips["T-7"]
     assert tip.stylus_axis == pytest.approx(tuple(axis), abs=1e-9)
@@ -537,13 +543,13 @@ def test_a_barcode_chooses_its_tip_wherever_the_focus_is(
     desk.add(TIP)
     field = desk.control(focus)
     field.setFocus()
-    before = desk.workbench.preparation.names.operator
+    before = desk.workbench.selection.preparation.names.operator
     desk.scan("T-7")
 
-    now = desk.workbench.preparation.names
+    now = desk.workbench.selection.preparation.names
     assert (now.tip, now.ball_diameter, now.operator) == ("T-7", 6.0, before)
     assert desk.text_of("Operator") == before
-    assert desk.told[-1] == "Tip T-7, by its barcode."
+    assert desk.told[-1] == "Tip T-7 selected by barcode."
     assert field.hasFocus()
 
 
@@ -555,7 +561,7 @@ def test_what_a_hand_types_stays_in_its_field(desk: Desk) -> None:
     desk.scan("T-7", pace_ms=2 * PACE_MS)
 
     assert desk.text_of("Operator") == "T-7"
-    assert desk.workbench.preparation.names.tip != "T-7"
+    assert desk.workbench.selection.preparation.names.tip != "T-7"
 
 
 def test_two_keys_hit_at_once_are_no_barcode(desk: Desk) -> None:
@@ -584,10 +590,10 @@ def test_an_unknown_barcode_is_offered_to_be_added(desk: Desk) -> None:
     desk.scan("T-77")
     questions = desk.page.findChildren(QuestionBar)
     assert any(each.isVisible() for each in questions)
-    desk.click("Add it")
+    desk.click("Add tip")
 
-    assert desk.text_of("Id, as on its label") == "T-77"
-    desk.click("Keep")
+    assert desk.text_of("ID (as on label)") == "T-77"
+    desk.click("Save")
     desk.settle()
     assert "T-77" in desk.library.tips
     desk.click("Close")
@@ -600,7 +606,7 @@ def test_the_barcode_of_a_retired_tip_chooses_nothing(desk: Desk) -> None:
     desk.settle()
     desk.scan("T-7")
 
-    assert desk.workbench.preparation.names.tip != "T-7"
+    assert desk.workbench.selection.preparation.names.tip != "T-7"
     assert desk.told[-1].startswith("Tip T-7 is retired")
 
 
@@ -610,7 +616,7 @@ def test_an_unknown_barcode_is_asked_about_no_more_once_its_tip_is_there(
     desk.scan("T-7")
     question = desk.page.findChild(QuestionBar)
     assert isinstance(question, QuestionBar)
-    assert question.words() == "There is no tip T-7 in the library. Add it?"
+    assert question.words() == "Tip T-7 is not in the tip library. Add it?"
 
     desk.add(TIP)
 

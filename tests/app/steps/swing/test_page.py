@@ -11,6 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication
 from pytestqt.qtbot import QtBot
+from tests.faulty_camera import FaultyCamera
 from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
@@ -18,28 +19,18 @@ from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker_events import Connection
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import OpenedFiles
-from lightpen.live.sources import Surroundings
+from lightpen.live.sources import SourceEnvironment
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import Posture
-from lightpen.record.journal import JOURNAL
-from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, Record, open_record
-from lightpen.record.unfinished import (
-    find_unfinished,
-)
-from lightpen.simulator.camera import SimulatedCamera
+from lightpen.record.swings.interrupted import find_unfinished
+from lightpen.record.swings.journal import JOURNAL
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import DISCARDED, Record, open_record
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
-from lightpen.swing.preparation import (
-    SourceChoice,
-    SourceKind,
-)
+from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen.swing.resuming import Resumable, read_for_more
-from lightpen.swing.state import (
-    Pause,
-    Phase,
-    SwingState,
-)
+from lightpen.swing.state import Pause, Phase, SwingState
 from lightpen_app.look.phrases import grade_text, phrase
 from lightpen_app.look.sounds import Sound
 from lightpen_app.shell.main_window import MainWindow
@@ -109,8 +100,9 @@ class Desk:
         self.recorder = Recorder()
         self.page = SwingPage(workbench, self.recorder)
         pages = (Blank("leds"), self.page, Blank("review"))
-        self.window = MainWindow(pages, settings, Preferences())
-        workbench.troubled.connect(self.window.show_notice)
+        self.window = MainWindow(
+            pages, settings, Preferences(), workbench.notifications
+        )
         self.window.resize(1280, 800)
         self.window.show()
         self.shown: list[OperatorValue] = []
@@ -182,9 +174,10 @@ class Desk:
 
 
 def open_camera(qtbot: QtBot, workbench: Workbench) -> None:
-    workbench.open_camera()
+    workbench.camera.open()
     qtbot.waitUntil(
-        lambda: not workbench.preparation.camera_lacks(), timeout=PATIENCE_MS
+        lambda: not workbench.selection.preparation.camera_missing_inputs(),
+        timeout=PATIENCE_MS,
     )
 
 
@@ -210,7 +203,9 @@ def until(qtbot: QtBot, happened: Callable[[], bool]) -> None:
 @pytest.fixture
 def desk(qtbot: QtBot, workbench: Workbench, settings: Settings) -> Iterator[Desk]:
     """The step before Swing is shown; images come, a short swing is enough."""
-    workbench.set_preparation(replace(workbench.preparation, limits=SHORT))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, limits=SHORT)
+    )
     open_camera(qtbot, workbench)
     desk = Desk(workbench, settings)
     yield desk
@@ -224,7 +219,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory, small_scene: Scene) -> P
     clock = SkippingClock()
     operator = Operator(clock, seated=True)
     operator.swing()
-    camera = SimulatedCamera(small_scene, clock, operator)
+    camera = FaultyCamera(small_scene, clock, operator)
     camera.open()
     camera.start()
     for number in range(16):
@@ -237,7 +232,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory, small_scene: Scene) -> P
 @pytest.fixture(scope="module")
 def shared_desk(
     tmp_path_factory: pytest.TempPathFactory,
-    around: Surroundings,
+    around: SourceEnvironment,
     samples: OpenedFiles,
     dressed: QApplication,
 ) -> Iterator[Desk]:
@@ -245,9 +240,9 @@ def shared_desk(
     folder = tmp_path_factory.mktemp("shared")
     settings = Settings(folder / "lightpen.json")
     workbench = Workbench(settings, folder / "data", around)
-    workbench.set_preparation(
+    workbench.selection.set_preparation(
         replace(
-            workbench.preparation,
+            workbench.selection.preparation,
             names=NAMES,
             limits=SHORT,
             camera_file=samples.camera_file,
@@ -275,9 +270,11 @@ def at_verdict(qtbot: QtBot, shared_desk: Desk) -> Desk:
 def capturing(qtbot: QtBot, shared_desk: Desk) -> Desk:
     """A swing that goes on and on, captured without a disturbance."""
     desk, workbench = shared_desk, shared_desk.workbench
-    if workbench.preparation.limits is SHORT:
+    if workbench.selection.preparation.limits is SHORT:
         short = desk.run.status.record_folder
-        workbench.set_preparation(replace(workbench.preparation, limits=LONG))
+        workbench.selection.set_preparation(
+            replace(workbench.selection.preparation, limits=LONG)
+        )
         desk.run.runner.set_aside()  # the next may begin at once
         until(
             qtbot,
@@ -318,7 +315,9 @@ def keep_on(qtbot: QtBot, desk: Desk, n_more: int = 3) -> None:
 
 
 def test_the_step_is_closed_while_something_is_missing(desk: Desk) -> None:
-    desk.workbench.set_preparation(replace(desk.workbench.preparation, pen_file=None))
+    desk.workbench.selection.set_preparation(
+        replace(desk.workbench.selection.preparation, pen_file=None)
+    )
 
     desk.window.go_to(1)
 
@@ -337,19 +336,19 @@ def test_a_record_that_cannot_be_made_is_told_and_tried_again(
 
     until(qtbot, lambda: desk.value.instruction == "No swing")
     until(qtbot, lambda: desk.value.hint in desk.words())
-    assert "No image is kept yet." in desk.words()
+    assert "No image captured yet" in desk.words()
 
     blocker.unlink()
     desk.click("Try again")
 
-    until(qtbot, lambda: desk.value.instruction == "Show the pen")
+    until(qtbot, lambda: desk.value.instruction == "Hold the pen in view")
 
 
 def test_the_newcomer_leads_the_pen_by_the_dial(qtbot: QtBot, desk: Desk) -> None:
     desk.window.go_to(1)
     until(qtbot, lambda: "press Seat" in desk.value.hint)
     desk.click("Seat")
-    until(qtbot, lambda: desk.value.instruction == "Lean RIGHT")
+    until(qtbot, lambda: desk.value.instruction == "Tilt RIGHT")
     dial = desk.page.findChild(LeaningDial)
     assert isinstance(dial, LeaningDial)
 
@@ -365,10 +364,12 @@ def test_a_recording_ends_when_a_whole_pass_brought_nothing_new(
     qtbot: QtBot, desk: Desk, recording: Path
 ) -> None:
     choice = SourceChoice(SourceKind.RECORDED, str(recording))
-    desk.workbench.set_preparation(
-        replace(desk.workbench.preparation, limits=LONG, source=choice)
+    desk.workbench.selection.set_preparation(
+        replace(desk.workbench.selection.preparation, limits=LONG, source=choice)
     )
-    until(qtbot, lambda: not desk.workbench.preparation.camera_lacks())
+    until(
+        qtbot, lambda: not desk.workbench.selection.preparation.camera_missing_inputs()
+    )
 
     desk.window.go_to(1)
 
@@ -384,8 +385,14 @@ def test_no_key_is_needed_from_the_seat_to_the_verdict(at_verdict: Desk) -> None
     desk = at_verdict
 
     for instruction in (
-        *("Show the pen", "Seat the tip", "Seated", "Starts in 3", "Lean RIGHT"),
-        *("Captured",),
+        *(
+            "Hold the pen in view",
+            "Seat the tip",
+            "Seated",
+            "Starts in 3",
+            "Tilt RIGHT",
+        ),
+        *("Capture complete",),
     ):
         assert desk.has_told(instruction), instruction
     verdict = desk.run.status.verdict
@@ -436,10 +443,10 @@ def test_after_the_verdict_more_can_be_captured(
         is_seen.wait(PATIENCE_MS / 1000)
         return read_for_more(folder)
 
-    monkeypatch.setattr("lightpen.swing.course.read_for_more", read_late)
+    monkeypatch.setattr("lightpen.swing.workflow.read_for_more", read_late)
     desk.click("Capture more")
 
-    until(qtbot, lambda: desk.page.main_action().why_not == "The swing goes on.")
+    until(qtbot, lambda: desk.page.main_action().why_not == "Swing in progress")
     is_seen.set()
     until(qtbot, lambda: desk.state.n_kept > n_before + 5)
     desk.finish()
@@ -464,8 +471,8 @@ def test_computing_can_be_stopped_and_begun_again(
 
         until(qtbot, lambda: desk.value.instruction == "Not computed")
     assert desk.value.state.word == "STOPPED"
-    assert "The tip is not computed yet." in desk.words()
-    assert "is offered again" in desk.page.unsaved()
+    assert "Tip not computed yet" in desk.words()
+    assert ") are saved;" in desk.page.unsaved()
 
     desk.click("Compute again")
 
@@ -479,7 +486,7 @@ def test_an_accepted_swing_is_left_alone_and_the_next_one_begins(
     folder = desk.run.status.record_folder
     desk.window.go_to(2)
     desk.run.runner.accept("It is seen to.")
-    until(qtbot, lambda: desk.value.state.word == "PRACTICE KEPT")
+    until(qtbot, lambda: desk.value.state.word == "PRACTICE SAVED")
     assert desk.value.instruction == "Accepted"
     assert folder is not None
     journal = (folder / JOURNAL).read_bytes()
@@ -507,7 +514,7 @@ def test_a_covered_pen_is_told_and_the_swing_goes_on_by_itself(
     capturing.click("Cover")
 
     until(qtbot, lambda: bool(lost()))
-    assert lost()[0].instruction == "Pen not seen"
+    assert lost()[0].instruction == "Pen not detected"
     assert Sound.LOST in capturing.recorder.sounds()[n_played:]
     keep_on(qtbot, capturing)
 
@@ -548,8 +555,8 @@ def test_a_slip_costs_only_the_images_that_slipped(
 def test_space_pauses_and_goes_on(qtbot: QtBot, capturing: Desk) -> None:
     capturing.type(Key.Key_Space)
     until(qtbot, lambda: capturing.value.state.word == "PAUSED")
-    assert capturing.value.hint == "Press Space to go on."
-    assert capturing.offers("Go on (Space)")
+    assert capturing.value.hint == "Press Space to continue."
+    assert capturing.offers("Continue (Space)")
 
     capturing.type(Key.Key_Space)
     keep_on(qtbot, capturing)
@@ -592,17 +599,17 @@ def test_a_camera_that_is_unplugged_and_back_costs_nothing(
     qtbot: QtBot, capturing: Desk
 ) -> None:
     around = capturing.workbench.around
-    camera = SimulatedCamera(around.scene, around.clock)
+    camera = FaultyCamera(around.scene, around.clock)
     capturing.workbench.live.open([camera], CameraSettings(), around.clock)
     keep_on(qtbot, capturing)  # on another camera, from the record
     n_before, n_played = capturing.state.n_kept, len(capturing.recorder.played)
 
-    camera.faults.unplug()
+    camera.unplug()
     until(qtbot, lambda: capturing.value.state.word == "NO IMAGES")
-    assert "goes on by itself" in capturing.value.hint
+    assert "The camera sends no images." in capturing.value.hint
     assert Sound.LOST in capturing.recorder.sounds()[n_played:]
 
-    camera.faults.plug_in()
+    camera.plug_in()
     until(qtbot, lambda: capturing.workbench.live.connection is Connection.STREAMING)
     keep_on(qtbot, capturing)
     assert capturing.state.n_kept > n_before
@@ -611,7 +618,7 @@ def test_a_camera_that_is_unplugged_and_back_costs_nothing(
 def test_a_damaged_image_is_not_taken_for_the_reason_of_a_pause(
     qtbot: QtBot, capturing: Desk
 ) -> None:
-    camera = SimulatedCamera(
+    camera = FaultyCamera(
         capturing.workbench.around.scene, capturing.workbench.around.clock
     )
     capturing.workbench.live.open(
@@ -621,10 +628,10 @@ def test_a_damaged_image_is_not_taken_for_the_reason_of_a_pause(
     capturing.type(Key.Key_Space)
     until(qtbot, lambda: capturing.value.state.word == "PAUSED")
 
-    camera.faults.spoil_frames(1)
+    camera.spoil_frames(1)
 
-    until(qtbot, lambda: "arrived incomplete" in capturing.words())
-    assert capturing.value.hint == "Press Space to go on."
+    until(qtbot, lambda: "was incomplete and was discarded." in capturing.words())
+    assert capturing.value.hint == "Press Space to continue."
     capturing.type(Key.Key_Space)
 
 
@@ -649,10 +656,10 @@ def test_finishing_early_says_what_is_missing_and_can_be_declined(
     QTest.mouseClick(capturing.main_button, Qt.MouseButton.LeftButton)
 
     question = asked(capturing)
-    assert f"Images kept: {capturing.state.n_kept} of at least 5000" in question
+    assert f"Images captured: {capturing.state.n_kept} of 5000 (minimum)" in question
     assert capturing.state.phase is not Phase.SOLVING
 
-    capturing.click("Go on swinging")
+    capturing.click("Continue swinging")
 
     assert asked(capturing) == ""
     keep_on(qtbot, capturing)
@@ -666,7 +673,7 @@ def test_closing_the_window_asks_and_names_the_images(
 
     said = capturing.page.unsaved()
     capturing.run.runner.resume()  # for the tests that go on with this swing
-    assert f"kept so far ({capturing.state.n_kept}) are safe" in said
+    assert f"captured images ({capturing.state.n_kept}) are saved" in said
 
 
 def test_other_choices_do_not_change_a_swing_that_is_under_way(
@@ -674,13 +681,13 @@ def test_other_choices_do_not_change_a_swing_that_is_under_way(
 ) -> None:
     workbench, setup = capturing.workbench, capturing.run.status.setup
     capturing.window.go_to(0)
-    workbench.set_preparation(
-        replace(workbench.preparation, names=replace(NAMES, operator="Bob"))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, names=replace(NAMES, operator="Bob"))
     )
     capturing.window.go_to(1)
 
-    until(qtbot, lambda: "goes on with the files, names" in asked(capturing))
-    capturing.click("Go on with this swing")
+    until(qtbot, lambda: "Settings were changed during this swing." in asked(capturing))
+    capturing.click("Continue this swing")
 
     keep_on(qtbot, capturing)
     capturing.window.go_to(0)
@@ -702,7 +709,7 @@ def test_enter_presses_the_main_button_unless_another_was_chosen(
     assert not isinstance(focused, QAbstractButton)
     capturing.type(Key.Key_Return)
     assert asked(capturing)
-    capturing.click("Go on swinging")
+    capturing.click("Continue swinging")
 
 
 def test_space_pauses_even_after_a_click_on_the_simulated_hand(
@@ -730,7 +737,7 @@ def test_starting_over_asks_and_keeps_the_images_of_the_old_swing(
     capturing.click("Start over")
     assert f"The images of this swing ({n_before})" in asked(capturing)
     assert capturing.run.status.record_folder == old
-    capturing.click("Begin anew")
+    capturing.click("Restart swing")
     # Enter shall press the main button, not begin anew once more.
     assert not isinstance(capturing.window.focusWidget(), QAbstractButton)
 

@@ -7,10 +7,11 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from lightpen.model.posture import Posture
-from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen.verification.tasks.circle import CIRCLE
+from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.steps.verify.findings import dial_of
 from lightpen_app.steps.verify.ring_view import RingValue, RingView
-from lightpen_app.steps.verify.strips import RingStrip, SurfaceField
+from lightpen_app.steps.verify.task_form import SurfaceField, TaskForm
 
 
 def test_what_is_covered_begins_behind_the_largest_gap() -> None:
@@ -39,19 +40,19 @@ def test_a_field_of_the_dial_is_full_that_was_touched_in() -> None:
 def test_a_strip_is_laid_out_alike_whatever_language_came_before(
     qtbot: QtBot, qapp: QApplication
 ) -> None:
-    def opened() -> RingStrip:
-        strip = RingStrip()
+    def opened() -> TaskForm:
+        strip = TaskForm(CIRCLE)
         qtbot.addWidget(strip)
         strip.show()
         return strip
 
-    def least_width(strip: RingStrip) -> int:
+    def least_width(strip: TaskForm) -> int:
         (field,) = strip.findChildren(SurfaceField)
         return field.minimumSizeHint().width()
 
     strip = opened()
     in_english = least_width(strip)
-    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    LanguageSwitch(qapp).set_language("zh_CN")
     qtbot.waitUntil(lambda: least_width(strip) < in_english)
 
     assert least_width(strip) == least_width(opened())

@@ -39,7 +39,7 @@ def test_what_comes_of_the_pen_before_is_not_told_of_the_next_one(
     qtbot: QtBot, workbench: Workbench, slow_machine: Event
 ) -> None:
     for seed in (3, 4, 5, 6):
-        accept_tip(workbench.folder, workbench.preparation, seed=seed)
+        accept_tip(workbench.folder, workbench.selection.preparation, seed=seed)
     panel = PenPanel(workbench)
     qtbot.addWidget(panel)
     panel.show()
@@ -48,8 +48,10 @@ def test_what_comes_of_the_pen_before_is_not_told_of_the_next_one(
     QTest.mouseClick(improve, Qt.MouseButton.LeftButton)
     assert button(panel, "Cancel").isVisible()
 
-    now = workbench.preparation
-    workbench.set_preparation(replace(now, names=replace(now.names, pen="LP-05")))
+    now = workbench.selection.preparation
+    workbench.selection.set_preparation(
+        replace(now, names=replace(now.names, pen="LP-05"))
+    )
     assert not button(panel, "Cancel").isVisible()
     slow_machine.set()
     QThreadPool.globalInstance().waitForDone()
@@ -72,7 +74,9 @@ def test_swings_are_said_to_be_read_only_as_long_as_they_are(
     QCoreApplication.processEvents()
     assert words(panel).startswith("Two accepted swings")
 
-    workbench.set_preparation(replace(workbench.preparation, pen_file=None))
+    workbench.selection.set_preparation(
+        replace(workbench.selection.preparation, pen_file=None)
+    )
 
     assert not words(panel)
     panel.shut_down()

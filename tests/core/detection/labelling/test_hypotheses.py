@@ -5,13 +5,15 @@ import pytest
 from benchmarks.labelling import CAMERA, PEN, random_view
 
 from lightpen.detection.labelling.constellation import constellation_of
-from lightpen.detection.labelling.hypotheses import Effort, poses_from_triples
+from lightpen.detection.labelling.hypotheses import SearchEffort, poses_from_triples
 from lightpen.detection.labelling.labels import EFFORTS
 from lightpen.detection.labelling.spot_arrays import spot_arrays
 
 
 @pytest.mark.parametrize("effort", EFFORTS)
-def test_other_images_do_not_change_the_poses_guessed_for_one(effort: Effort) -> None:
+def test_other_images_do_not_change_the_poses_guessed_for_one(
+    effort: SearchEffort,
+) -> None:
     rng = np.random.default_rng(4)
     crowded = random_view(rng, 0, 10).spots
     pen = constellation_of(PEN)

@@ -20,12 +20,12 @@ from lightpen.detection.labelling.labels import (
     label_spots,
     track_spots,
 )
-from lightpen.detection.spots import Flaw, Spots
+from lightpen.detection.spots import SpotFlaw, Spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.sample_pens import SAMPLE_PENS
+from lightpen.simulator.samples import SAMPLE_PENS
 from lightpen.simulator.swings import flat_pen, paper_camera, paper_pen
 
 CAMERA = paper_camera()
@@ -194,7 +194,7 @@ def with_lamp(view: View, beside: tuple[float, float]) -> View:
     return replace(view, spots=spots)
 
 
-def flawed(spots: Spots, which: int, flaw: Flaw, shift: float = 0.0) -> Spots:
+def flawed(spots: Spots, which: int, flaw: SpotFlaw, shift: float = 0.0) -> Spots:
     """Return the spots with one of them flawed, its centre shifted by some px."""
     centers, flaws = spots.centers.copy(), spots.flaws.copy()
     centers[which] += shift
@@ -378,7 +378,7 @@ def test_a_lamp_near_the_place_of_a_hidden_led_does_not_make_up_for_it() -> None
 def test_five_leds_of_which_one_is_off_are_hardly_ever_believed() -> None:
     rng = np.random.default_rng(48)
     views = [random_view(rng, FIVE_LED_PEN) for _ in range(16)]
-    spots = [flawed(view.spots, 0, Flaw.NONE, shift=2.0) for view in views]
+    spots = [flawed(view.spots, 0, SpotFlaw.NONE, shift=2.0) for view in views]
     labels = label_images(spots, CAMERA, FIVE_LED_PEN)
     # The pose of five follows the shift of one to 0.3 px at times.
     assert sum(label.reason is LabelStatus.NO_FIT for label in labels) >= 14
@@ -472,7 +472,7 @@ def test_nearly_symmetric_pens_are_right_or_refused(asymmetry: float) -> None:
 
 def test_a_cut_spot_is_labelled_but_not_whole() -> None:
     view = random_view(np.random.default_rng(60))
-    spots = flawed(view.spots, int(view.spot[4]), Flaw.CUT, shift=5.0)
+    spots = flawed(view.spots, int(view.spot[4]), SpotFlaw.CUT, shift=5.0)
     label = label_spots(spots, CAMERA, PEN)
     np.testing.assert_array_equal(label.spot, view.spot)
     np.testing.assert_array_equal(np.flatnonzero(~label.whole), [4])
@@ -481,13 +481,13 @@ def test_a_cut_spot_is_labelled_but_not_whole() -> None:
 
 def test_spots_that_are_only_blurred_or_saturated_count_as_whole() -> None:
     view = random_view(np.random.default_rng(61))
-    spots = flawed(view.spots, int(view.spot[4]), Flaw.BLURRED | Flaw.SATURATED)
+    spots = flawed(view.spots, int(view.spot[4]), SpotFlaw.BLURRED | SpotFlaw.SATURATED)
     assert label_spots(spots, CAMERA, PEN).whole.all()
 
 
 def test_merged_spots_are_the_last_resort() -> None:
     view = random_view(np.random.default_rng(62))
-    spots = replace(view.spots, flaws=np.full(10, int(Flaw.MERGED)))
+    spots = replace(view.spots, flaws=np.full(10, int(SpotFlaw.MERGED)))
     label = label_spots(spots, CAMERA, PEN)
     np.testing.assert_array_equal(label.spot, view.spot)
     assert not label.whole.any()
@@ -620,7 +620,7 @@ def test_a_pen_file_in_another_unit_is_named(unit: float, factor: str) -> None:
 
 def test_a_wrong_disc_diameter_is_named() -> None:
     advice = diagnose(some_spots(), CAMERA, replace(PEN, diameter=25.0))
-    assert "about 0.4 times as large" in str(advice)
+    assert "appear 0.4 times as large" in str(advice)
 
 
 def test_a_camera_file_of_another_lens_is_named() -> None:
@@ -629,7 +629,9 @@ def test_a_camera_file_of_another_lens_is_named() -> None:
 
 
 def test_the_file_of_another_pen_is_named() -> None:
-    assert "file of this pen" in str(diagnose(some_spots(), CAMERA, TWELVE_LED_PEN))
+    assert "LED file belongs to this pen" in str(
+        diagnose(some_spots(), CAMERA, TWELVE_LED_PEN)
+    )
 
 
 def test_images_with_too_few_spots_are_named() -> None:

@@ -1,4 +1,9 @@
-"""Chains of entries, and the records that these vouch for: the first tables."""
+"""Chains of entries, and the records that these vouch for.
+
+The tables are made as they are now, see `lightpen.archive.tables`. A version that
+changes them adds a module beside this one, whose ``upgrade`` changes those of the
+version before.
+"""
 
 revision = "1"
 down_revision = None

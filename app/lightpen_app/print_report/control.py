@@ -1,0 +1,108 @@
+"""Shows the record on paper of a result on the disk, in a window of its own."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QWidget
+
+from lightpen.archive.result_entry import ArchivePlace, entry_of_file
+from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.calibrations.reestimated_poses import (
+    ReestimatedPoses,
+    reestimate_poses,
+)
+from lightpen_app.work.job import Job
+from lightpen_app.work.save_place import SavePlace
+
+
+@dataclass(frozen=True)
+class ReportContent:
+    """What is put on paper of a calibration.
+
+    Attributes
+    ----------
+    reestimated : ReestimatedPoses or None
+        Its images, where the file holds enough for that.
+    entered : ArchivePlace or None
+        Where in an archive it is entered, if it is.
+    """
+
+    calibration_file: CalibrationFile
+    reestimated: ReestimatedPoses | None
+    entered: ArchivePlace | None
+
+
+def read_calibration_file(file: Path) -> ReportContent:
+    """Return what a file has that is put on paper.
+
+    Raises
+    ------
+    ArchiveError
+        The archive beside it cannot be read.
+    FileError
+        The calibration cannot be read, or is not the one that was entered.
+    UsageError
+        The file holds no calibration, or not all that is put on paper.
+    """
+    calibration_file = read_calibration(file)
+    reestimated = reestimate_poses(calibration_file.calibration)
+    return ReportContent(
+        calibration_file, reestimated, entry_of_file(file, calibration_file.sha256)
+    )
+
+
+class PrintReportControl(QObject):
+    """Reads a file beside the window, and opens another one with its pages.
+
+    Parameters
+    ----------
+    place : SavePlace
+        Where PDFs are saved.
+    page : QWidget
+        Whose windows are opened.
+
+    Signals
+    -------
+    saved(Path)
+        The PDF that was written.
+    failed(str)
+        The sentence why something is not shown, or was not saved.
+    """
+
+    saved = Signal(object)
+    failed = Signal(str)
+
+    def __init__(self, place: SavePlace, page: QWidget) -> None:
+        super().__init__(page)
+        self._place = place
+        self._page = page
+        self._reading: Job | None = None
+
+    def show(self, find: Callable[[], Path]) -> None:
+        """Show the record on paper of the file that a function finds on the disk."""
+        self.shut_down()
+        self._reading = job = Job(lambda _: read_calibration_file(find()), self)
+
+        # Connections
+        job.succeeded.connect(self._show)
+        job.failed.connect(self.failed)
+        job.start()
+
+    def shut_down(self) -> None:
+        """Show nothing any more that is not shown yet."""
+        if self._reading is not None:
+            self._reading.cancel()
+
+    def _show(self, found: ReportContent) -> None:
+        # Printing takes long to be imported, and few swings are printed.
+        from lightpen_app.print_report.preview import PrintReportWindow
+        from lightpen_app.print_report.printing import paper_of, paper_stem
+
+        paper = paper_of(found.calibration_file, found.reestimated, found.entered)
+        stem = paper_stem(found.calibration_file)
+        window = PrintReportWindow(paper, self._place, stem, self._page)
+        window.saved.connect(self.saved)
+        window.failed.connect(self.failed)
+        window.show()

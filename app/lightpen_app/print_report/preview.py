@@ -1,0 +1,138 @@
+"""The record on paper as it will be printed, to be saved or printed."""
+
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtPrintSupport import QPrintDialog, QPrinter, QPrintPreviewWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
+from typing_extensions import override
+
+from lightpen.formats.files import write_whole
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
+from lightpen_app.look.theme import GRID
+from lightpen_app.print_report.pages import PrintReport
+from lightpen_app.print_report.printing import A4, paint_on, pdf_of
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.job import Job
+from lightpen_app.work.save_place import SavePlace
+
+
+class PrintReportWindow(Translated, QWidget):
+    """Shows the pages by the strokes by which they are saved and printed.
+
+    Parameters
+    ----------
+    place : SavePlace
+        Where PDFs are saved.
+    stem : str
+        What the name of its PDF begins with.
+
+    Signals
+    -------
+    saved(Path)
+        The PDF that was written.
+    failed(str)
+        A sentence on why it was not.
+    """
+
+    saved = Signal(object)
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        paper: PrintReport,
+        place: SavePlace,
+        stem: str,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent, Qt.WindowType.Window)
+        self.setObjectName("paper")
+        self.resize(100 * GRID, 110 * GRID)
+        self._paper = paper
+        self._place = place
+        self._stem = stem
+        self._saving: Job | None = None
+
+        # Widgets
+        self._printer = QPrinter(QPrinter.PrinterMode.HighResolution)
+        self._printer.setPageLayout(A4)
+        self._pages = QPrintPreviewWidget(self._printer)
+        self._pages.setZoomMode(QPrintPreviewWidget.ZoomMode.FitToWidth)
+        self._smaller = PushButton()
+        self._larger = PushButton()
+        self._save = PushButton()
+        self._print = PushButton()
+
+        # Layout
+        layout = vertical_layout(self, (self._pages, 1), margins=GRID)
+        horizontal_layout(
+            layout, self._smaller, self._larger, 1, self._print, self._save
+        )
+
+        # Connections
+        self._pages.paintRequested.connect(partial(paint_on, paper))
+        self._smaller.clicked.connect(self._pages.zoomOut)
+        self._larger.clicked.connect(self._pages.zoomIn)
+        self._save.clicked.connect(self._ask_file)
+        self._print.clicked.connect(self._ask_printer)
+
+        self._retranslate()
+
+    @override
+    def closeEvent(self, event: QCloseEvent) -> None:
+        super().closeEvent(event)
+        if self._saving is None:  # else it tells of it first
+            self.deleteLater()
+
+    def n_pages(self) -> int:
+        """Return how many pages are shown."""
+        return self._pages.pageCount()
+
+    def _retranslate(self) -> None:
+        self.setWindowTitle(self.tr("Calibration report"))
+        self._pages.setAccessibleName(self.tr("Pages"))
+        self._smaller.setText(self.tr("Smaller"))
+        self._larger.setText(self.tr("Larger"))
+        self._save.setText(self.tr("Save as PDF..."))
+        self._print.setText(self.tr("Print..."))
+
+    def _ask_file(self) -> None:
+        dialog = QFileDialog(self, self.tr("Save calibration report"))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setNameFilter("PDF (*.pdf)")
+        dialog.setDefaultSuffix("pdf")
+        dialog.setDirectory(str(self._place.folder()))
+        dialog.selectFile(f"{self._stem}.pdf")
+        dialog.fileSelected.connect(lambda path: self.write(Path(path)))
+        dialog.open()
+
+    def write(self, path: Path) -> None:
+        """Save it as PDF in a file."""
+        self._place.remember(path.parent)
+        pdf = pdf_of(self._paper)
+        self._saving = job = Job(lambda _: write_whole(path, pdf), self)
+
+        # Connections
+        job.succeeded.connect(lambda _: self.saved.emit(path))
+        job.failed.connect(self.failed)
+        job.ended.connect(self._on_saving_ended)
+        job.start()
+
+    def _on_saving_ended(self) -> None:
+        self._saving = None
+        if self.isHidden():
+            self.deleteLater()
+
+    def _ask_printer(self) -> None:
+        dialog = QPrintDialog(self._printer, self)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.finished.connect(self._on_printer_chosen)
+        QDialog.open(dialog)  # its own wants a slot by name
+
+    def _on_printer_chosen(self, answer: int) -> None:
+        if answer == QDialog.DialogCode.Accepted:
+            paint_on(self._paper, self._printer)

@@ -1,0 +1,232 @@
+"""What a record on paper says, section by section, from what the file states."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from datetime import datetime
+
+from PySide6.QtCore import QCoreApplication, QRectF
+from PySide6.QtGui import QPainter
+
+from lightpen.archive.result_entry import ArchivePlace
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.record.calibrations.calibrations import CalibrationFile
+from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
+from lightpen_app.look.phrases import grade_text, origin_text
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.theme import LIGHT
+from lightpen_app.print_report.blocks import (
+    MM,
+    WIDTH,
+    Block,
+    PrintSize,
+    draw_text,
+    facts,
+    heading,
+    line_pen,
+    paragraph,
+    printed_text,
+    text_height,
+)
+from lightpen_app.print_report.evidence import file_blocks, image_blocks, led_blocks
+from lightpen_app.print_report.findings import budget_blocks, result_blocks, rule_blocks
+
+translate = QCoreApplication.translate
+
+GRADE_COLORS = {
+    Grade.PASS: LIGHT.good,
+    Grade.CHECK: LIGHT.warn,
+    Grade.REPEAT: LIGHT.bad,
+}
+
+
+def all_sections(
+    calibration_file: CalibrationFile,
+    reestimated: ReestimatedPoses | None,
+    entered: ArchivePlace | None,
+) -> tuple[Block, ...]:
+    """Return the whole record, from its title to its end mark."""
+    return (
+        *_title(calibration_file),
+        *_items(calibration_file),
+        *result_blocks(calibration_file),
+        *rule_blocks(calibration_file),
+        *budget_blocks(calibration_file.calibration),
+        *image_blocks(calibration_file.calibration, reestimated),
+        *led_blocks(calibration_file.calibration),
+        *file_blocks(calibration_file.calibration),
+        *_proof(calibration_file, entered),
+        *_signatures(),
+    )
+
+
+def title_text() -> str:
+    """Return what the paper is."""
+    return translate("paper", "Calibration report")
+
+
+def zoned_moment_text(moment: datetime) -> str:
+    """Return a moment with the time zone that it was written in."""
+    return moment.isoformat(sep=" ", timespec="seconds")
+
+
+def _title(calibration_file: CalibrationFile) -> Iterable[Block]:
+    yield paragraph(title_text(), PrintSize.TITLE, bold=True)
+    yield paragraph(
+        translate("paper", "Probe tip centre of a light pen, image-based"),
+        PrintSize.HEADING,
+        LIGHT.muted,
+    )
+    yield _verdict(calibration_file)
+
+
+def _verdict(calibration_file: CalibrationFile) -> Block:
+    """Return the grade in a frame, with its reason."""
+    word = grade_text(calibration_file.grade)
+    lines = [worded(calibration_file.why)]
+    if calibration_file.accepted is None:
+        lines.append(translate("paper", "This tip has not been accepted."))
+    elif calibration_file.restores is not None:
+        told = translate(
+            "paper", "This tip was reinstated from an earlier calibration. Reason: {0}"
+        )
+        lines.append(told.format(calibration_file.reason))
+    elif calibration_file.grade is Grade.PASS:
+        lines.append(translate("paper", "The tip was accepted."))
+    else:
+        lines.append(
+            translate("paper", "The tip was accepted. Reason: {0}").format(
+                calibration_file.reason
+            )
+        )
+    text, left, pad = "\n".join(lines), 900.0, 60.0
+    height = max(
+        text_height(text, PrintSize.BODY, WIDTH - left - pad),
+        text_height(word, PrintSize.TITLE, left),
+    )
+    color = GRADE_COLORS[calibration_file.grade]
+
+    def paint(painter: QPainter) -> None:
+        painter.setPen(line_pen(color, 15))
+        painter.drawRect(QRectF(0, 0, WIDTH, height + 2 * pad))
+        area = QRectF(pad, pad, left, height)
+        draw_text(painter, area, word, PrintSize.TITLE, color, bold=True)
+        area = QRectF(left, pad + 10, WIDTH - left - pad, height)
+        draw_text(painter, area, text, PrintSize.BODY)
+
+    return Block(paint, height + 2 * pad, space=110)
+
+
+def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
+    names, calibration = calibration_file.names, calibration_file.calibration
+    accepted = calibration_file.accepted
+    diameter = names.ball_diameter
+    temperature = calibration.assumptions.temperature_c
+    yield heading(translate("paper", "Item under calibration"))
+    yield from facts(
+        [
+            (translate("paper", "Pen serial number"), _stated(names.pen)),
+            (translate("paper", "Station"), _stated(names.station)),
+            (translate("paper", "Probe tip"), _stated(names.tip)),
+            (translate("paper", "Operator"), _stated(names.operator)),
+            (
+                translate("paper", "Ball diameter"),
+                _stated("" if diameter is None else f"{diameter:g} mm"),
+            ),
+            (translate("paper", "Computed"), zoned_moment_text(calibration.created)),
+            (translate("paper", "Cone"), _stated(names.cone)),
+            (
+                translate("paper", "Accepted"),
+                translate("paper", "no")
+                if accepted is None
+                else zoned_moment_text(accepted),
+            ),
+            (translate("paper", "Image source"), origin_text(calibration_file.origin)),
+            (
+                translate("paper", "Pen temperature"),
+                translate("paper", "not measured")
+                if temperature is None
+                else f"{temperature:.1f} \xb0C",
+            ),
+            (translate("paper", "Method"), _method(calibration.method)),
+            (
+                translate("paper", "Program"),
+                f"{calibration.program.name} {calibration.program.version}",
+            ),
+        ]
+    )
+    stated = (names.pen, names.tip, names.cone, names.station, names.operator)
+    if any(printed_text(each) != each for each in (*stated, calibration_file.reason)):
+        yield paragraph(
+            translate(
+                "paper",
+                "[U+...] is the Unicode number of a character missing in the fonts "
+                "of this report.",
+            )
+        )
+
+
+def _proof(
+    calibration_file: CalibrationFile, entered: ArchivePlace | None
+) -> Iterable[Block]:
+    """Return what binds the paper to its file; the signatures stand on its page."""
+    return (replace(block, keeps=True) for block in _binding(calibration_file, entered))
+
+
+def _binding(
+    calibration_file: CalibrationFile, entered: ArchivePlace | None
+) -> Iterable[Block]:
+    yield heading(translate("paper", "Source of this report"))
+    rows = [
+        (translate("paper", "JSON file"), calibration_file.name),
+        ("SHA-256", calibration_file.sha256),
+    ]
+    if entered is None:
+        nowhere = translate("paper", "none")
+        rows.append((translate("paper", "Entry in the archive"), nowhere))
+    else:
+        rows += [
+            (translate("paper", "Entry in the archive"), f"{entered.number}"),
+            (translate("paper", "Its SHA-256"), entered.sha256),
+            (translate("paper", "SHA-256 of the previous entry"), entered.previous),
+        ]
+    yield from facts(rows, n_columns=1)
+    yield paragraph(
+        translate(
+            "paper",
+            "All figures are taken from this file, which is the complete original. "
+            "They relate only to the items named, in their condition at the time. "
+            "This is a calibration report, not a certificate of an accredited "
+            "laboratory. It must not be reproduced except in full.",
+        )
+    )
+
+
+def _signatures() -> Iterable[Block]:
+    names = (translate("paper", "Calibrated by"), translate("paper", "Checked by"))
+    below = translate("paper", "Name, date, signature")
+    width, height = WIDTH / 2 - 100, 24 * MM
+
+    def paint(painter: QPainter) -> None:
+        for i, name in enumerate(names):
+            left = i * (WIDTH / 2 + 100)
+            area = QRectF(left, 0, width, PrintSize.BODY)
+            draw_text(painter, area, name, PrintSize.BODY, bold=True)
+            line = height - 1.6 * PrintSize.SMALL
+            painter.setPen(line_pen(LIGHT.text))
+            painter.drawLine(round(left), round(line), round(left + width), round(line))
+            area = QRectF(left, line + 15, width, PrintSize.SMALL)
+            draw_text(painter, area, below, PrintSize.SMALL, LIGHT.muted)
+
+    yield Block(paint, height, space=200, keeps=True)
+    end = translate("paper", "End of report")
+    yield paragraph(f"\u2014 {end} \u2014", PrintSize.SMALL, LIGHT.muted)
+
+
+def _method(method: str) -> str:
+    if method == "joint":
+        return translate("paper", "joint adjustment of all images")
+    return translate("paper", "two-stage, as published by S. Liu et al. (2013)")
+
+
+def _stated(text: str) -> str:
+    return text or translate("paper", "not stated")

@@ -1,0 +1,232 @@
+"""Views of a board from live images: which are kept, and where it is wanted next."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from hashlib import sha256
+
+from PySide6.QtCore import QCoreApplication, QObject, Signal
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.cameras.protocol import Frame
+from lightpen.intrinsics.boards import Board
+from lightpen.intrinsics.capture import BoardVisibility, Capture, wanted_outline
+from lightpen.intrinsics.observing import why_unseen
+from lightpen.intrinsics.sightings import find_points
+from lightpen.messages import Message
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import Tone
+from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.work.job import Job, Report
+
+LONGEST_UNSEEN = 3.0  # s, after which it is asked what is seen instead
+NANOSECONDS = 1e9
+
+
+@dataclass(frozen=True, eq=False)
+class BoardLook:
+    """What one image shows, and the hash of its pixels where that is the board."""
+
+    points: FloatArray | None
+    sha256: str = ""
+    why_unseen: Message | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SuggestedOutline:
+    """Where the board should be held next, as its outline in the image, (4, 2), px."""
+
+    outline: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class CaptureState:
+    """How the capture of views stands.
+
+    Attributes
+    ----------
+    sought : Board or None
+        What is looked for; None while no views are taken.
+    capture : Capture or None
+        The views so far; None before the first image.
+    outline : (4, 2) array or None
+        Where the board should be held next, px.
+    why_unseen : Message or None
+        Why it has not been seen for a while.
+    seen_s : float
+        When it was seen, or last asked why it is not, s on the clock of the images.
+    hashes : mapping of str to str
+        SHA-256 of the views that were kept, by name.
+    """
+
+    sought: Board | None = None
+    capture: Capture | None = None
+    outline: FloatArray | None = None
+    why_unseen: Message | None = None
+    seen_s: float = 0.0
+    hashes: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def n_kept(self) -> int:
+        """Number of views that were kept."""
+        return 0 if self.capture is None else len(self.capture.kept)
+
+
+class BoardCapture(QObject):
+    """Looks for a board in one image after another, off the thread of the GUI.
+
+    Signals
+    -------
+    changed()
+        `state` is different.
+    """
+
+    changed = Signal()
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self._state = CaptureState()
+        self._searching: Job | None = None
+        self._leading: Job | None = None
+
+    @property
+    def state(self) -> CaptureState:
+        """How it stands now."""
+        return self._state
+
+    @property
+    def is_searching(self) -> bool:
+        """Whether an image is being looked at."""
+        return self._searching is not None
+
+    def start(self, board: Board | None) -> None:
+        """Begin anew, without views."""
+        for job in (self._searching, self._leading):
+            if job is not None:
+                job.cancel()
+        self._searching = self._leading = None
+        self._become(CaptureState(board))
+
+    def stop(self) -> None:
+        """Take no more views; those that were kept stay."""
+        self._become(replace(self._state, sought=None, outline=None))
+
+    def take(self, frame: Frame) -> None:
+        """Look at an image, unless one before is still looked at."""
+        state, time_s = self._state, frame.host_ts_ns / NANOSECONDS
+        if state.sought is None or self._searching is not None:
+            return
+        capture = state.capture
+        if capture is None:
+            height, width = frame.image.shape
+            capture = Capture(state.sought, (width, height))
+            state = replace(state, capture=capture, seen_s=time_s, why_unseen=None)
+            self._state = state
+            self._lead()
+        asks_why = time_s - state.seen_s >= LONGEST_UNSEEN
+        if asks_why or capture.points is not None:
+            self._state = replace(state, seen_s=time_s)
+        look = partial(look_for_board, frame.image, capture.board, asks_why)
+        self._searching = job = Job(look, self)
+
+        # Connections
+        job.succeeded.connect(lambda seen: self._on_looked(seen, time_s))
+        job.ended.connect(partial(self._on_search_ended, job))
+        job.start()
+
+    def _become(self, state: CaptureState) -> None:
+        self._state = state
+        self.changed.emit()
+
+    def _on_search_ended(self, job: Job) -> None:
+        if job is self._searching:
+            self._searching = None
+
+    def _on_looked(self, seen: BoardLook, time_s: float) -> None:
+        state = self._state
+        if state.capture is None or state.sought is None:
+            return
+        now = replace(state, capture=state.capture.after(seen.points, time_s))
+        if seen.why_unseen is not None or seen.points is not None:
+            now = replace(now, why_unseen=seen.why_unseen)
+        if now.capture is not None and now.n_kept > state.n_kept:
+            name = now.capture.views.names[-1]
+            now = replace(now, hashes={**state.hashes, name: seen.sha256})
+        self._become(now)
+        if now.n_kept > state.n_kept:
+            self._lead()
+
+    def _lead(self) -> None:
+        """Find where the board is wanted next."""
+        capture = self._state.capture
+        if capture is None or self._leading is not None:
+            return
+        self._leading = job = Job(partial(find_outline, capture), self)
+
+        # Connections
+        job.succeeded.connect(self._on_led)
+        job.ended.connect(partial(self._on_leading_ended, job, len(capture.kept)))
+        job.start()
+
+    def _on_led(self, wanted: SuggestedOutline) -> None:
+        if self._state.sought is not None:
+            self._become(replace(self._state, outline=wanted.outline))
+
+    def _on_leading_ended(self, job: Job, n_kept: int) -> None:
+        """Find it again where more views were kept meanwhile."""
+        if job is self._leading:
+            self._leading = None
+            if self._state.sought is not None and self._state.n_kept > n_kept:
+                self._lead()
+
+
+def look_for_board(
+    image: Image, board: Board, asks_why: bool, report: Report
+) -> BoardLook:
+    """Return what an image shows of a board, and why nothing if it is asked."""
+    points = find_points(image, board, quick=True)
+    if points is None:
+        return BoardLook(
+            None, why_unseen=why_unseen(lambda: [image], board) if asks_why else None
+        )
+    return BoardLook(points, sha256(image.tobytes()).hexdigest())
+
+
+def find_outline(capture: Capture, report: Report) -> SuggestedOutline:
+    """Return where the board should be held next."""
+    return SuggestedOutline(wanted_outline(capture))
+
+
+def sight_text(sight: BoardVisibility) -> str:
+    """Return what is seen of the board, and what to do."""
+    translate = QCoreApplication.translate
+    words = {
+        BoardVisibility.UNSEEN: translate("BoardWindow", "Board not detected"),
+        BoardVisibility.MOVING: translate("BoardWindow", "Hold still."),
+        BoardVisibility.STILL: translate("BoardWindow", "Keep still."),
+        BoardVisibility.KEPT: translate(
+            "BoardWindow", "View captured. Align the board with the outline."
+        ),
+        BoardVisibility.ALIKE: translate(
+            "BoardWindow",
+            "Similar view already captured. Align the board with the outline.",
+        ),
+    }
+    return words[sight]
+
+
+def sight_message(state: CaptureState) -> StatusMessage | None:
+    """Return what is said of the last image; None while no views are taken."""
+    if state.sought is None:
+        return None
+    if state.why_unseen is not None:
+        return fault_message(state.why_unseen)
+    if state.capture is None:
+        return None
+    return StatusMessage(sight_text(state.capture.sight), Sign.WAIT, Tone.QUIET)
+
+
+def fault_message(message: Message) -> StatusMessage:
+    """Return a message as that of a fault."""
+    return StatusMessage(worded(message), Sign.CROSS, Tone.BAD)

@@ -1,0 +1,144 @@
+"""What is done to the archive as a whole: checked, saved elsewhere, and imported."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QFileDialog
+
+from lightpen.archive.chains import CopyResult
+from lightpen.archive.check import ArchiveCheckResult, check_archive
+from lightpen.archive.exchange import export_entries, import_entries
+from lightpen.archive.listing import save_entries
+from lightpen_app.steps.history.archive_panel import ArchivePanel, SaveFormat
+from lightpen_app.steps.history.filter_bar import FilterBar
+from lightpen_app.work.job import Job, Report
+from lightpen_app.work.workbench import Workbench
+
+T = TypeVar("T")
+NOTICE = "history"  # cause of what is to be read
+
+
+class ArchiveControl(QObject):
+    """Does what the panel of the archive asks for, one thing at a time.
+
+    Parameters
+    ----------
+    filter_bar : FilterBar
+        Tells which entries are saved.
+
+    Signals
+    -------
+    checked()
+        A check has ended; the panel shows what it found.
+    imported()
+        There may be other entries.
+    """
+
+    checked = Signal()
+    imported = Signal()
+
+    def __init__(
+        self, workbench: Workbench, panel: ArchivePanel, filter_bar: FilterBar
+    ) -> None:
+        super().__init__(panel)
+        self._panel, self._filter = panel, filter_bar
+        self._logbook, self._place = workbench.run.logbook, workbench.save_place
+        self._folder, self._clock = workbench.folder, workbench.around.now
+        self._notices = workbench.notifications
+        self._work: Job | None = None
+
+        # Connections
+        panel.check_requested.connect(self._check)
+        panel.cancel_requested.connect(self.shut_down)
+        panel.import_requested.connect(self._ask_import)
+        panel.save_requested.connect(self._ask_save)
+
+    def _check(self) -> None:
+        logbook, folder = self._logbook, self._folder
+        self._do(
+            lambda report: check_archive(logbook.opened().database, folder, report),
+            self._on_checked,
+        )
+
+    def _on_checked(self, checked: ArchiveCheckResult) -> None:
+        self._panel.set_checked(checked)
+        self.checked.emit()
+
+    def shut_down(self) -> None:
+        """Cancel what is under way."""
+        if self._work is not None:
+            self._work.cancel()
+
+    def _ask_import(self) -> None:
+        dialog = self._dialog(self.tr("Entries of another station"), SaveFormat.WHOLE)
+        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        dialog.fileSelected.connect(lambda path: self._import(Path(path)))
+        dialog.open()
+
+    def _import(self, path: Path) -> None:
+        logbook = self._logbook
+        self._place.remember(path.parent)
+        self._do(
+            lambda _: import_entries(logbook.opened().database, path), self._on_imported
+        )
+
+    def _on_imported(self, copied: CopyResult) -> None:
+        self.imported.emit()
+        told = self.tr("{0} new entries, {1} already present.")
+        self._notices.show_status(told.format(copied.n_new, copied.n_known))
+
+    def _ask_save(self, saving: SaveFormat) -> None:
+        dialog = self._dialog(self.tr("Save entries"), saving)
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix(saving.suffix[1:])
+        day = self._clock()
+        dialog.selectFile(f"lightpen-{day:%Y-%m-%d}{saving.suffix}")
+        dialog.fileSelected.connect(lambda path: self._save(saving, Path(path)))
+        dialog.open()
+
+    def _save(self, saving: SaveFormat, path: Path) -> None:
+        logbook, wanted = self._logbook, self._filter.value()
+        self._place.remember(path.parent)
+
+        def save(_: Report) -> int:
+            database = logbook.opened().database
+            if saving is SaveFormat.WHOLE:
+                return export_entries(database, path)
+            return save_entries(database, wanted, path)
+
+        told = self.tr("{0} entries saved in {1}")
+        self._do(
+            save, lambda n_saved: self._notices.show_status(told.format(n_saved, path))
+        )
+
+    def _dialog(self, title: str, saving: SaveFormat) -> QFileDialog:
+        dialog = QFileDialog(self._panel, title)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setNameFilter(f"{saving.suffix[1:].upper()} (*{saving.suffix})")
+        dialog.setDirectory(str(self._place.folder()))
+        return dialog
+
+    def _do(
+        self, function: Callable[[Report], T], on_succeeded: Callable[[T], object]
+    ) -> None:
+        """Do one thing at a time to the archive as a whole, beside the window."""
+        if self._work is not None:
+            return
+        self._work = job = Job(function, self)
+        self._panel.set_working(True)
+
+        # Connections
+        job.progressed.connect(self._panel.set_progress)
+        job.succeeded.connect(on_succeeded)
+        job.failed.connect(self._on_failed)
+        job.ended.connect(self._on_done)
+        job.start()
+
+    def _on_failed(self, sentence: str) -> None:
+        self._notices.tell(NOTICE, sentence)
+
+    def _on_done(self) -> None:
+        self._work = None
+        self._panel.set_working(False)

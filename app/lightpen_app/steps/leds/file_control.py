@@ -1,0 +1,191 @@
+"""What the step LEDs does with files: one is opened, or the table is saved in one."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from PySide6.QtCore import QObject, Signal
+
+from lightpen.formats.opened_files import PenFile
+from lightpen.messages import Message
+from lightpen.pen_check.draft import (
+    OpenedPen,
+    PenDraft,
+    leds_to_exchange,
+    open_pen,
+    save_pen,
+)
+from lightpen_app.look.sentences import worded
+from lightpen_app.steps.leds.draft import (
+    LedDraft,
+    LedState,
+    unsaved_leds_text,
+    why_not_savable,
+)
+from lightpen_app.steps.leds.file_panel import LedFilePanel
+from lightpen_app.work.chosen_files import ChosenFiles
+from lightpen_app.work.job import Job, Report
+
+T = TypeVar("T")
+
+
+class LedFileControl(QObject):
+    """Does what is asked for by the panel of the file; asks before changes are lost.
+
+    Signals
+    -------
+    status_changed(str)
+        What was done, for the status line.
+    """
+
+    status_changed = Signal(str)
+
+    def __init__(
+        self, leds: LedDraft, chosen_files: ChosenFiles, panel: LedFilePanel
+    ) -> None:
+        super().__init__(panel)
+        self._leds, self._chosen_files, self._panel = leds, chosen_files, panel
+        self._shown = LedState()
+        self._problem: Callable[[], str] = self._frame_error
+        self._job: Job | None = None
+
+        # Connections
+        panel.path_chosen.connect(self._on_path_chosen)
+        panel.units_chosen.connect(self._on_units_chosen)
+        panel.save_chosen.connect(self._on_save_chosen)
+        panel.samples_requested.connect(self._on_samples_requested)
+        leds.changed.connect(self._on_draft_changed)
+
+    def retranslate(self) -> None:
+        """Say anew what is wrong with the file, and why it cannot be saved."""
+        self._panel.set_problem(self._problem())
+        draft = self._leds.state.draft
+        with_more = bool(draft.name or any(draft.tip))
+        why_not = why_not_savable(self._leds.state)
+        self._panel.set_savable(why_not, "json" if with_more else "csv")
+
+    def discard(self) -> None:
+        """Give up the changes of the table, or a file that cannot be used."""
+        self._unless_lost(self._discard)
+
+    def drop_job(self) -> None:
+        """Tell nothing more of a file that is being read or written."""
+        if self._job is not None:
+            self._job.cancel()
+
+    def _on_draft_changed(self) -> None:
+        before, self._shown = self._shown, self._leds.state
+        now = self._shown
+        if now.draft != before.draft:
+            self._panel.withdraw()
+        if now.opened is not before.opened or now.path != before.path:
+            self._panel.ask_units("")
+            self._panel.set_value(now.path)
+        self._panel.set_exchange(leds_to_exchange(now.check.frame))
+        self._tell(self._frame_error)
+
+    def _tell(self, problem: Callable[[], str]) -> None:
+        """Say what is wrong with the file, in each language anew."""
+        self._problem = problem
+        self.retranslate()
+
+    def _frame_error(self) -> str:
+        frame = self._leds.state.check.frame
+        return "" if frame is None else worded(frame.error)
+
+    def _on_path_chosen(self, path: str) -> None:
+        self._unless_lost(partial(self._open, Path(path)))
+
+    def _on_units_chosen(self, path: str, units: str) -> None:
+        self._unless_lost(partial(self._open, Path(path), units))
+
+    def _on_samples_requested(self) -> None:
+        self._unless_lost(self._use_samples)
+
+    def _discard(self) -> None:
+        """Go back to what was opened; from what cannot be used, to the file in use."""
+        if self._leds.state.is_edited:
+            self._leds.edit(self._leds.state.opened)
+        else:
+            self._leds.open_in_use()
+
+    def _unless_lost(self, act: Callable[[], None]) -> None:
+        """Do what gives up the changes of the table, but ask before."""
+        if self._leds.state.is_edited:
+            self._panel.ask(self._discarding, act)
+        else:
+            act()
+
+    def _discarding(self) -> tuple[str, str]:
+        return unsaved_leds_text(self._leds.state), self.tr("Discard changes")
+
+    def _open(self, path: Path, units: str | None = None) -> None:
+        self.status_changed.emit("")
+        self._panel.ask_units("")
+        before = self._leds.state.draft
+
+        def take(opened: OpenedPen) -> None:
+            """Show it, but ask if the table was changed meanwhile."""
+            act = partial(self._on_opened, opened)
+            if self._leds.state.draft == before:
+                act()
+            else:
+                self._unless_lost(act)
+
+        self._start(lambda _: open_pen(path, units), take)
+
+    def _on_opened(self, opened: OpenedPen) -> None:
+        if opened.file is not None:
+            self._leds.use(opened.file)
+            self._tell(str)
+        elif opened.draft is not None:  # those in use stay in use
+            self._leds.open(opened.draft, opened.path)
+            self._tell(partial(worded, opened.problem))
+        elif opened.needs_units:
+            self._tell(str)
+            self._panel.ask_units(opened.path.name)
+        else:
+            self._tell(partial(self._refusal, opened.problem, self._panel.value()))
+
+    def _refusal(self, why: Message | None, still_open: str) -> str:
+        """Return why a file cannot be opened, and which one is open."""
+        if not still_open:
+            return worded(why)
+        kept = self.tr("{0} remains open.").format(Path(still_open).name)
+        return f"{worded(why)} {kept}"
+
+    def _use_samples(self) -> None:
+        if self._leds.state.is_edited:
+            self._leds.show(self._leds.state.opened)
+        self._chosen_files.use_samples()
+
+    def _on_save_chosen(self, path: Path) -> None:
+        state = self._leds.state
+        pen = state.check.usable
+        if pen is not None:
+            on_saved = partial(self._on_saved, state.draft)
+            self._start(lambda _: save_pen(pen, path), on_saved)
+
+    def _on_saved(self, saved: PenDraft, file: PenFile) -> None:
+        is_same = self._leds.state.draft == saved
+        self._leds.use(file, keeps_changes=not is_same)
+        if is_same:
+            self._tell(str)
+        words = self.tr("LEDs saved as {0} and in use.")
+        self.status_changed.emit(words.format(file.path.name))
+
+    def _start(
+        self, function: Callable[[Report], T], on_succeeded: Callable[[T], None]
+    ) -> None:
+        """Read or write a file; an earlier one that is under way is not waited for."""
+        self.drop_job()
+        self._job = job = Job(function, self)
+
+        # Connections
+        job.succeeded.connect(on_succeeded)
+        job.failed.connect(self._on_failed)
+        job.start()
+
+    def _on_failed(self, sentence: str) -> None:
+        self._tell(lambda: sentence)

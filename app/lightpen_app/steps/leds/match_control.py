@@ -1,0 +1,203 @@
+"""The LEDs of the table, compared with the live images off the GUI thread."""
+
+from dataclasses import replace
+
+import numpy as np
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from lightpen.cameras.worker_events import Connection
+from lightpen.detection.spots import Spots
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+from lightpen.pen_check.match import add_view, match_pen
+from lightpen_app.steps.leds.draft import LedDraft
+from lightpen_app.steps.leds.match_panel import MatchPanel
+from lightpen_app.work.job import Job
+from lightpen_app.work.live_view import DisplayedImage, LiveView
+from lightpen_app.work.selection import Selection
+from lightpen_app.work.swing_run import SwingRun
+
+PERIOD_MS = 500
+
+
+class PenWatch(QObject):
+    """Compares a pen with what is seen, at most twice a second.
+
+    Signals
+    -------
+    value_changed(PenMatch)
+        How the pen fits the views so far; None when that has to be found out anew.
+    """
+
+    value_changed = Signal(object)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._camera: Camera | None = None
+        self._pen: Pen | None = None
+        self._views: tuple[Spots, ...] = ()
+        self._compared: tuple[Spots, ...] = ()
+        self._job: Job | None = None  # whose outcome is awaited
+        self._timer = QTimer(self)
+        self._timer.setInterval(PERIOD_MS)
+
+        # Connections
+        self._timer.timeout.connect(self._compare)
+
+    def set_pen(self, camera: Camera | None, pen: Pen | None) -> None:
+        """Compare with another pen; views of the same camera stay."""
+        if camera is not self._camera:
+            self._views = ()
+        if camera is self._camera and pen is self._pen:
+            return
+        self._camera, self._pen = camera, pen
+        self._forget()
+        self._compare()
+
+    def add(self, spots: Spots) -> None:
+        """Take in what an image shows."""
+        self._views = add_view(self._views, spots)
+
+    def start(self) -> None:
+        """Begin with no views."""
+        self._views = ()
+        self._forget()
+        self._timer.start()
+
+    def stop(self) -> None:
+        """Compare no more."""
+        self._timer.stop()
+        self._drop_job()
+
+    def _forget(self) -> None:
+        self._compared = ()
+        self._drop_job()
+        self.value_changed.emit(None)
+
+    def _drop_job(self) -> None:
+        if self._job is not None:
+            self._job.cancel()
+            self._job = None
+
+    def _compare(self) -> None:
+        camera, pen, views = self._camera, self._pen, self._views
+        if camera is None or pen is None or not views or self._job is not None:
+            return
+        if views is self._compared:
+            return
+        self._compared = views
+        self._job = job = Job(lambda report: match_pen(camera, pen, views), self)
+
+        # Connections
+        job.succeeded.connect(self._on_compared)
+        job.crashed.connect(self._on_crashed)
+        job.start()
+
+    def _on_compared(self, match: object) -> None:
+        self._job = None
+        self.value_changed.emit(match)
+
+    def _on_crashed(self) -> None:
+        self._job = None
+        self.value_changed.emit(None)  # the views after these are compared again
+
+
+class MatchControl(QObject):
+    """Shows live images in its panel, with how the pen of the table fits them.
+
+    Attributes
+    ----------
+    watch : PenWatch
+        Tells how it fits.
+    """
+
+    def __init__(
+        self,
+        leds: LedDraft,
+        selection: Selection,
+        run: SwingRun,
+        live: LiveView,
+        panel: MatchPanel,
+    ) -> None:
+        super().__init__(panel)
+        self._leds, self._selection = leds, selection
+        self._run, self._live, self._panel = run, live, panel
+        self._is_shown = False
+        self.watch = PenWatch(self)
+
+        # Connections
+        leds.changed.connect(self._on_draft_changed)
+        selection.changed.connect(self._region)
+        live.image_shown.connect(self._on_image_shown)
+        live.connection_changed.connect(self._on_connection_changed)
+        live.other_changed.connect(self._on_connection_changed)
+
+    def start(self) -> None:
+        """Look for the pen of the table from now on."""
+        self._is_shown = True
+        self._panel.clear()
+        self.watch.start()
+        self._live.show_pen()
+        self._region()
+
+    def stop(self) -> None:
+        """Leave the images to the pen in use."""
+        self._is_shown = False
+        self.watch.stop()
+        if self._leds.state.is_pending and not self._run.status.is_capturing:
+            self._live.set_region(self._selection.preparation.region)
+
+    def retranslate(self) -> None:
+        """Say what is missing to find the pen in the images."""
+        preparation = self._selection.preparation
+        if not self._live.is_open:
+            why = self.tr("No camera is open. See the step Camera.")
+        elif self._live.worst_connection is Connection.LOST:
+            why = self.tr("Camera connection lost. Reconnecting automatically.")
+        elif preparation.camera is None:
+            why = self.tr("Intrinsics file missing. See the step Camera.")
+        elif self._leds.state.check.sought is None:
+            why = self.tr("Enter or correct the LEDs first.")
+        else:
+            why = ""
+        self._panel.set_why_unknown(why)
+
+    def _on_draft_changed(self) -> None:
+        check = self._leds.state.check
+        self._panel.set_has_frame(check.frame is None or not check.frame.error)
+        self._panel.set_can_mend(check.sought is check.pen)
+        self._region()
+
+    def _region(self) -> None:
+        """Look for the pen of the table, also before it is saved."""
+        if not self._is_shown:
+            return
+        state, preparation = self._leds.state, self._selection.preparation
+        pen, status = state.check.sought, self._run.status
+        self.watch.set_pen(preparation.camera, pen)
+        swung = status.setup if status.is_capturing else None
+        self._panel.set_aside(swung is not None and _differ(swung.pen, pen))
+        if not status.is_capturing:
+            wanted_region = replace(preparation.region, pen=pen)
+            self._live.set_region(
+                wanted_region if state.is_pending else preparation.region
+            )
+        self.retranslate()
+
+    def _on_image_shown(self, shown: DisplayedImage) -> None:
+        is_live = self._live.worst_connection is Connection.STREAMING
+        if self._is_shown and is_live:  # the last image comes after the loss
+            self._panel.set_image(shown)
+            self.watch.add(shown.seen.spots)
+
+    def _on_connection_changed(self) -> None:
+        if self._is_shown:
+            self._live.show_pen()
+            if self._live.worst_connection is not Connection.STREAMING:
+                self._panel.clear()
+            self.retranslate()
+
+
+def _differ(swung: Pen, pen: Pen | None) -> bool:
+    """Return whether the LEDs of a table are not those that a swing began with."""
+    return pen is None or not np.array_equal(swung.leds, pen.leds)

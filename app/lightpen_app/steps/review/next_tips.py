@@ -1,0 +1,166 @@
+"""What comes after a tip was accepted: the other tips of its pen, one click each."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QIcon
+from PySide6.QtWidgets import QWidget
+
+from lightpen.record.library.calibration_status import StationStatus, TipStatus
+from lightpen.record.results.next_tips import NextTip, next_tips
+from lightpen.record.results.results import Result
+from lightpen_app.look.layouts import horizontal_layout
+from lightpen_app.look.theme import TextSize, Tone, text_label
+from lightpen_app.look.words import PARTED, shortened
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.widgets.status_mark import message_icon, status_message
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.job import Job
+from lightpen_app.work.library_watch import LibraryWatch
+from lightpen_app.work.selection import Selection
+from lightpen_app.work.swing_run import SwingRun
+
+LONGEST = 12  # characters of a tip on its button
+
+
+class NextTipsRow(Translated, QWidget):
+    """Shows other tips with how each stands; hidden while there is none.
+
+    Signals
+    -------
+    chosen(NextTip)
+        It is to be calibrated.
+    """
+
+    chosen = Signal(object)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value: tuple[NextTip, ...] = ()
+        self._buttons: list[PushButton] = []
+        self._statuses = StationStatus()
+
+        # Widgets
+        self._label = text_label(TextSize.SMALL, Tone.QUIET)
+
+        # Layout
+        self._layout = horizontal_layout(self, self._label)
+
+        self._retranslate()
+        self.hide()
+
+    def value(self) -> tuple[NextTip, ...]:
+        """Return the tips that are shown."""
+        return self._value
+
+    def set_statuses(self, statuses: StationStatus) -> None:
+        """Mark the tips as they stand."""
+        self._statuses = statuses
+        self._retranslate()
+
+    def set_value(self, value: Sequence[NextTip]) -> None:
+        """Show other tips, or none."""
+        self._value = tuple(value)
+        while self._buttons:
+            button = self._buttons.pop()
+            self._layout.removeWidget(button)
+            button.deleteLater()
+        for each in self._value:
+            button = PushButton(0)
+            button.clicked.connect(lambda _=False, each=each: self.chosen.emit(each))
+            self._buttons.append(button)
+            self._layout.addWidget(button)
+        self.setVisible(bool(value))
+        self._retranslate()
+
+    def _retranslate(self) -> None:
+        self._label.setText(self.tr("Next tip"))
+        for button, each in zip(self._buttons, self._value, strict=True):
+            tip, mark = each.tip, self._mark_of(each)
+            button.setText(shortened(tip, LONGEST))
+            button.setIcon(message_icon(mark, self) if mark.text else QIcon())
+            name = self.tr("Next tip {0}").format(tip)
+            button.setAccessibleName(name)
+            button.setAccessibleDescription(mark.text)
+            told = self.tr(
+                "Calibrate tip {0} next with its ball diameter and nominal centre"
+            )
+            button.setToolTip(PARTED.join(filter(None, (told.format(tip), mark.text))))
+
+    def _mark_of(self, each: NextTip) -> StatusMessage:
+        """Return what is the matter with a tip: overdue, or not calibrated."""
+        if each.last is not None and each.last.is_simulated:
+            return StatusMessage()
+        standing = self._statuses.of_tip(each.pen, each.tip)
+        return (
+            StatusMessage() if standing is TipStatus.VALID else status_message(standing)
+        )
+
+
+class NextTipsControl(QObject):
+    """Looks for the other tips of a pen, and chooses the one that is wanted.
+
+    Parameters
+    ----------
+    row : NextTipsRow
+        Shows them.
+
+    Signals
+    -------
+    chosen()
+        The station is prepared for another tip; the swing before is left.
+    """
+
+    chosen = Signal()
+
+    def __init__(
+        self,
+        selection: Selection,
+        run: SwingRun,
+        library: LibraryWatch,
+        row: NextTipsRow,
+    ) -> None:
+        super().__init__(row)
+        self._selection, self._run, self._tips = selection, run, library
+        self._row = row
+        self._search: Job | None = None
+
+        # Connections
+        library.changed.connect(self._show_statuses)
+        row.chosen.connect(self._on_chosen)
+
+        self._show_statuses()
+
+    def follow(self, result: Result | None) -> None:
+        """Show the other tips of the pen whose tip was accepted, if one was."""
+        self.shut_down()
+        self._row.set_value(())
+        if result is None:
+            return
+        archive = self._run.archive
+        self._search = job = Job(lambda _: next_tips(archive, result), self)
+
+        # Connections
+        job.succeeded.connect(self._row.set_value)
+        job.start()
+
+    def shut_down(self) -> None:
+        """Look no more."""
+        if self._search is not None:
+            self._search.cancel()
+
+    def _show_statuses(self) -> None:
+        self._row.set_statuses(self._tips.statuses)
+
+    def _on_chosen(self, tip: NextTip) -> None:
+        self._run.runner.abandon()
+        chosen = self._selection.preparation
+        if tip.last is not None:
+            chosen = chosen.with_last(tip.last)
+        if tip.listed is not None:
+            chosen = chosen.with_listed(tip.listed)
+        names = replace(chosen.names, pen=tip.pen)
+        self._selection.set_preparation(replace(chosen, names=names))
+        self.chosen.emit()

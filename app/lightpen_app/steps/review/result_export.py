@@ -1,0 +1,152 @@
+"""Opens the folder of a result, copies the tip, exports and prints the result."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
+
+from lightpen.record.calibrations.calibrations import read_calibration
+from lightpen.record.exports.dcc import Laboratory
+from lightpen.record.exports.exports import copied_tip, exported_solution, save_new
+from lightpen_app.print_report.control import PrintReportControl
+from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog
+from lightpen_app.steps.review.result_tools import Export, ResultTools
+from lightpen_app.widgets.opened_folder import open_folder
+from lightpen_app.work.job import Job, Report
+from lightpen_app.work.save_place import SavePlace
+from lightpen_app.work.swing_run import SwingRun
+
+if TYPE_CHECKING:
+    from lightpen_app.steps.review.plot_card import NamedPicture
+
+DrawPlots: TypeAlias = "Callable[[], Sequence[NamedPicture]]"
+
+
+class ResultExport(QObject):
+    """Does what is asked for by the tools of a result.
+
+    Parameters
+    ----------
+    run : SwingRun
+        With the tip.
+    place : SavePlace
+    draw_plots : callable
+        Returns all plots as pictures; only the page can draw them.
+    page : QWidget
+        Whose windows are opened.
+
+    Signals
+    -------
+    told(str)
+        What was done.
+    failed(str)
+        The sentence why something was not.
+    """
+
+    told = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self, run: SwingRun, place: SavePlace, draw_plots: DrawPlots, page: QWidget
+    ) -> None:
+        super().__init__(page)
+        self._run = run
+        self._place = place
+        self._draw_plots = draw_plots
+        self._page = page
+        self._saving: Job | None = None
+        self._paper = PrintReportControl(place, page)
+
+        # Connections
+        self._paper.saved.connect(lambda path: self._tell_saved(path.parent))
+        self._paper.failed.connect(self.failed)
+
+    def follow(self, tools: ResultTools) -> None:
+        """Do what these ask for."""
+        tools.folder_requested.connect(self._open_folder)
+        tools.copy_requested.connect(self._copy_tip)
+        tools.save_requested.connect(self._ask_laboratory)
+        tools.paper_requested.connect(self._show_paper)
+
+    def shut_down(self) -> None:
+        """Tell of nothing any more."""
+        self._paper.shut_down()
+        if self._saving is not None:
+            self._saving.cancel()
+
+    def _open_folder(self) -> None:
+        folder = self._run.status.record_folder
+        if folder is not None:
+            self.told.emit(open_folder(folder))
+
+    def _copy_tip(self) -> None:
+        status = self._run.status
+        if status.solution is not None:
+            tip = status.solution.calibration.joint.tip_pen
+            line = copied_tip(tip, status.origin)
+            QApplication.clipboard().setText(line)
+            self.told.emit(self.tr("Tip copied: x, y, z in mm."))
+
+    def _ask_laboratory(self, export: Export) -> None:
+        """Ask for the laboratory where a format names it, then for the folder."""
+        if not any(each.needs_laboratory for each in export.formats):
+            self._ask_folder(export, None)
+            return
+        dialog = LaboratoryDialog(self._place.settings.laboratory(), self._page)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.given.connect(self._place.settings.set_laboratory)
+        dialog.given.connect(lambda laboratory: self._ask_folder(export, laboratory))
+        dialog.open()
+
+    def _ask_folder(self, export: Export, laboratory: Laboratory | None) -> None:
+        dialog = QFileDialog(self._page, self.tr("Folder for saving"))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.setOption(QFileDialog.Option.ShowDirsOnly)
+        dialog.setDirectory(str(self._place.folder()))
+        dialog.fileSelected.connect(
+            lambda path: self._save(export, laboratory, Path(path))
+        )
+        dialog.open()
+
+    def _save(
+        self, export: Export, laboratory: Laboratory | None, folder: Path
+    ) -> None:
+        """Save the files of an export; those of an accepted result from its file."""
+        status, stem, archive = self._run.status, self._place.stem(), self._run.archive
+        solution, names, result = status.solution, status.names, status.result
+        if solution is None:
+            return
+        self._place.remember(folder)
+        pictures = self._draw_plots() if export.has_plots else ()
+
+        def write(_: Report) -> None:
+            for picture in pictures:
+                save_new(folder, f"{stem}_{picture.name}", picture.data)
+            if not export.formats:
+                return
+            found = (
+                exported_solution(solution, names)
+                if result is None
+                else read_calibration(archive.file_of(result))
+            )
+            for each in export.formats:
+                save_new(folder, stem + each.suffix, each.content(found, laboratory))
+
+        self._saving = job = Job(write, self)
+
+        # Connections
+        job.succeeded.connect(lambda _: self._tell_saved(folder))
+        job.failed.connect(self.failed)
+        job.start()
+
+    def _show_paper(self) -> None:
+        """Show the record on paper, of the result as it is on the disk."""
+        result, archive = self._run.status.result, self._run.archive
+        if result is not None:
+            self._paper.show(lambda: archive.file_of(result))
+
+    def _tell_saved(self, folder: Path) -> None:
+        self.told.emit(self.tr("Saved in {0}").format(folder))

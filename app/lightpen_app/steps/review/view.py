@@ -1,0 +1,185 @@
+"""What the step Review shows: the verdict, the result, and its details."""
+
+from PySide6.QtCore import QSize, QTimer
+from PySide6.QtWidgets import QBoxLayout, QProgressBar, QWidget
+from typing_extensions import override
+
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.theme import GRID, TextSize
+from lightpen_app.steps.review.detail_tabs import DetailTabs
+from lightpen_app.steps.review.message_list import StatusMessageList
+from lightpen_app.steps.review.next_tips import NextTipsRow
+from lightpen_app.steps.review.result_panel import ResultPanel
+from lightpen_app.steps.review.result_tools import ResultTools
+from lightpen_app.steps.review.view_state import ReviewPageState
+from lightpen_app.widgets.page_scroll import PageScroll
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.reason_bar import ReasonBar
+from lightpen_app.widgets.responsive_layout import ResponsiveLayout
+from lightpen_app.widgets.state_banner import StateBanner
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.save_place import SavePlace
+from lightpen_app.work.swing_run import SwingRun
+
+PATIENCE_MS = 300  # before the progress of a solution is shown
+RESULT_WIDTH, LARGE_RESULT_WIDTH = 46 * GRID, 80 * GRID
+ANY_WIDTH = 16777215  # QWIDGETSIZE_MAX
+
+
+class ReviewView(ResponsiveLayout, Translated, QWidget):
+    """Shows a solved swing, the result beside its details.
+
+    Attributes
+    ----------
+    question, reason : QuestionBar, ReasonBar
+    cancel, repeat, capture_more, accept, verify, take_back : PushButton
+    result : ResultPanel
+    tools : ResultTools
+    next_tips : NextTipsRow
+    tabs : DetailTabs
+    """
+
+    narrow_below = 112 * GRID  # px; then it has the result in a tab
+    vast_from = QSize(240 * GRID, 140 * GRID)  # px; then the result is larger
+
+    def __init__(
+        self, run: SwingRun, place: SavePlace, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+
+        # Widgets
+        self._banner = StateBanner(TextSize.TITLE)
+        self._banner.setMinimumHeight(self._banner.sizeHint().height())
+        self.question, self.reason = QuestionBar(), ReasonBar()
+        self._progress = QProgressBar()
+        self.cancel = PushButton()
+        self._solving = QWidget()
+        self._patience = QTimer(self)
+        self._patience.setSingleShot(True)
+        self._patience.setInterval(PATIENCE_MS)
+        self._messages = StatusMessageList()
+        self.result = ResultPanel()
+        self._scroll = PageScroll()
+        self.repeat, self.capture_more = PushButton(), PushButton()
+        self.accept, self.verify = PushButton(), PushButton()
+        self.take_back = PushButton()
+        self.tools = ResultTools()
+        self.next_tips = NextTipsRow()
+        self.tabs = DetailTabs(run, place)
+        self._result_side = QWidget()
+
+        # Layout
+        horizontal_layout(self._solving, (self._progress, 1), self.cancel)
+        self._solving.hide()
+        self._scroll.setWidget(self.result)
+        self._result_box = vertical_layout(self._result_side, (self._scroll, 1))
+        below = vertical_layout(self._result_box, self.tools)
+        buttons = horizontal_layout(below, (self.repeat, 1), (self.capture_more, 1))
+        fill(buttons, (self.accept, 1), (self.verify, 1), (self.take_back, 1))
+        fill(below, self.next_tips, 0)
+        layout = vertical_layout(self, self._banner, self.question, self.reason)
+        fill(layout, self._solving, self._messages)
+        self._columns = horizontal_layout(layout, stretch=1, spacing=2 * GRID)
+        self._use_room()  # before the tabs: the order of the Tab key
+        self._columns.addWidget(self.tabs, 1)
+
+        # Connections
+        self._patience.timeout.connect(self._solving.show)
+        self.reason.declined.connect(self.tabs.setFocus)
+        self.question.declined.connect(self.tabs.setFocus)
+
+        self._retranslate()
+
+    def set_state(self, state: ReviewPageState) -> None:
+        """Show a swing as it stands."""
+        self._banner.set_value(state.banner)
+        self._messages.set_value(state.remarks)
+        images = self.tabs.images()
+        if images is not None:
+            images.set_locked(state.why_locked)
+        self.capture_more.set_why_not(
+            state.why_not_more, self.tr("Adds images to this swing")
+        )
+        self.repeat.set_why_not(
+            state.why_not_repeated, self.tr("Starts a new swing without these images")
+        )
+        self.accept.setVisible(state.takes_reason)
+        self.accept.set_why_not(state.why_not_accepted, self.tr("Accept with a reason"))
+        self.tools.set_why_not(state.why_not_saved)
+        self.tools.set_paper_why_not(state.why_not_printed)
+        for button in (self.repeat, self.capture_more):
+            is_main = button.text() == state.main.text
+            button.setVisible(not state.is_accepted and not is_main)
+        self.verify.setVisible(state.is_accepted)
+        self.take_back.setVisible(state.is_accepted)
+
+    def set_solving(self, is_solving: bool) -> None:
+        """Show how far the solution is, once it takes long."""
+        self._progress.setValue(0)
+        if is_solving:
+            self._patience.start()
+        else:
+            self._patience.stop()
+            self._solving.hide()
+
+    def set_progress(self, fraction: float) -> None:
+        """Show how far the solution is, 0 to 1."""
+        self._progress.setValue(round(100 * fraction))
+
+    def end_questions(self) -> None:
+        """Ask nothing any more."""
+        self.question.hide()
+        self.reason.hide()
+
+    @override
+    def _retranslate(self) -> None:
+        self.tabs.set_names(
+            self.tr("Images"),
+            self.tr("Residuals"),
+            self.tr("Uncertainty"),
+            self.tr("Two-stage"),
+        )
+        if self._room.is_narrow:
+            self.tabs.setTabText(0, self.tr("Result"))
+        self._scroll.setAccessibleName(self.tr("Result"))
+        self.tabs.setAccessibleName(self.tr("Details"))
+        self._progress.setAccessibleName(self.tr("Progress of the computation"))
+        self.cancel.setText(self.tr("Cancel"))
+        self.cancel.setToolTip(self.tr("Keep last solution"))
+        self.capture_more.setText(self.tr("Capture more"))
+        self.repeat.setText(self.tr("Repeat swing"))
+        self.accept.setText(self.tr("Accept..."))
+        self.verify.setText(self.tr("Verify tip"))
+        self.verify.setToolTip(
+            self.tr("Verify the tip on reference artefacts within minutes.")
+        )
+        self.take_back.setText(self.tr("Revoke acceptance..."))
+        self.take_back.setToolTip(
+            self.tr("Reinstate the previous result. Both results stay in the archive.")
+        )
+        self.reason.set_words(
+            self.tr("This result needs checking. Enter the reason for accepting it."),
+            self.tr("Reason"),
+            self.tr("Accept with reason"),
+            self.tr("Do not accept"),
+        )
+
+    @override
+    def _use_room(self) -> None:
+        """Put the result beside the tabs, or make it the first of a narrow page."""
+        side, direction = self._result_side, QBoxLayout.Direction
+        self.result.set_large(self._room.is_vast)
+        if self._room.is_narrow:
+            self._result_box.setDirection(direction.LeftToRight)
+            side.setMinimumWidth(0)
+            side.setMaximumWidth(ANY_WIDTH)
+            self.tabs.insertTab(0, side, self.tr("Result"))
+            self.tabs.setCurrentIndex(0)
+        else:
+            self._result_box.setDirection(direction.TopToBottom)
+            is_vast = self._room.is_vast
+            side.setFixedWidth(LARGE_RESULT_WIDTH if is_vast else RESULT_WIDTH)
+            self._columns.insertWidget(0, side)
+            if side.parentWidget() is not None:  # else it would be a window
+                side.show()  # a tab that is not the current one is hidden

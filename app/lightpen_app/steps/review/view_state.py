@@ -1,0 +1,306 @@
+"""What the step Review says of a swing as it stands."""
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QCoreApplication
+
+from lightpen.estimation.reports.verdict import Grade, NextStep
+from lightpen.local_time import local_time
+from lightpen.messages import Message
+from lightpen.model.origin import Origin
+from lightpen.record.results.results import Result
+from lightpen.record.swings.names import Names
+from lightpen.swing.status import Activity, SwingStatus
+from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.phrases import accepted_phrase, grade_text, phrase
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import Tone
+from lightpen_app.look.words import shortened
+from lightpen_app.steps.page import MainAction
+from lightpen_app.widgets.question_bar import Question
+from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.widgets.state_banner import State
+
+# What the sentence of a verdict has in it whose cause is the intrinsics file.
+OF_CAMERA = {"share.camera", "share.rig", "warning.camera-file-contradicted"}
+OF_FILES = (
+    *(NextStep.CHECK_FILES, NextStep.CHECK_CAMERA),
+    *(NextStep.CHECK_LEDS, NextStep.CHECK_RIG),
+)
+
+
+@dataclass(frozen=True)
+class ReviewPageState:
+    """All that the page shows of a swing besides its solution.
+
+    Attributes
+    ----------
+    takes_reason : bool
+        Whether the tip can be accepted with a reason only.
+    why_locked : str
+        Why images cannot be taken out or put back; what follows says likewise why a
+        button cannot be pressed.
+    """
+
+    banner: State
+    remarks: tuple[StatusMessage, ...]
+    main: MainAction
+    is_accepted: bool
+    takes_reason: bool
+    why_locked: str
+    why_not_more: str
+    why_not_repeated: str
+    why_not_accepted: str
+    why_not_saved: str
+    why_not_printed: str
+
+
+def review_page_state(
+    status: SwingStatus, named: Names, main: MainAction
+) -> ReviewPageState:
+    """Return what is shown.
+
+    Parameters
+    ----------
+    named : Names
+        What is chosen at the step Start.
+    main : MainAction
+        What the main button does.
+    """
+    translate, verdict = QCoreApplication.translate, status.verdict
+    why_locked, is_accepted = why_not_changed(status), status.result is not None
+    goes_on = all_read = not_swung = not_accepted = ""
+    if status.is_reading:
+        goes_on = translate("ReviewPage", "Swing in progress")
+    if status.is_recording:
+        all_read = translate("ReviewPage", "All recorded images are loaded.")
+    if status.solution is None:
+        not_swung = translate("ReviewPage", "Swing the pen first.")
+    if not is_accepted:
+        not_accepted = translate(
+            "ReviewPage",
+            "Accept the tip first. The report is made from the accepted result.",
+        )
+    is_doubted = verdict is not None and verdict.grade is not Grade.PASS
+    return ReviewPageState(
+        banner=review_state(status),
+        remarks=remarks(status, named),
+        main=main,
+        is_accepted=is_accepted,
+        takes_reason=is_doubted and not is_accepted,
+        why_locked=why_locked or goes_on,
+        why_not_more=why_locked or all_read,
+        why_not_repeated=why_locked,
+        why_not_accepted=why_not_accepted(status),
+        why_not_saved=not_swung,
+        why_not_printed=not_accepted,
+    )
+
+
+def differs(before: SwingStatus, now: SwingStatus) -> bool:
+    """Return whether the review shows something else by another status."""
+    return (
+        *(before.solution, before.assessment, before.result),
+        *(before.activity, before.is_capturing),
+    ) != (
+        *(now.solution, now.assessment, now.result),
+        *(now.activity, now.is_capturing),
+    )
+
+
+def returns_to_swing(before: SwingStatus, now: SwingStatus) -> bool:
+    """Return whether the swing goes on with more images, or another one begins."""
+    if before.solution is None or now.is_reading:
+        return False
+    captures_more = now.is_capturing and (before.is_reading or not before.is_capturing)
+    return captures_more or now.solution is None
+
+
+def review_action(status: SwingStatus, *, is_new: bool) -> MainAction:
+    """Return what the main button does now.
+
+    Parameters
+    ----------
+    is_new : bool
+        Whether the tip was accepted a moment ago.
+    """
+    translate = QCoreApplication.translate
+    if status.result is not None:
+        why_not = translate("ReviewPage", "Tip accepted.") if is_new else ""
+        return MainAction(translate("ReviewPage", "Start next calibration"), why_not)
+    verdict, why_not = status.verdict, why_not_now(status)
+    match None if verdict is None else verdict.next_step:
+        case None | NextStep.ACCEPT:
+            text = translate("ReviewPage", "Accept")
+            return MainAction(text, why_not, at_screen=True)
+        case NextStep.CAPTURE_MORE if not status.is_recording:
+            return MainAction(translate("ReviewPage", "Capture more"), why_not)
+        case NextStep.SEE_TO_CAUSE:
+            return MainAction(translate("ReviewPage", "Check settings"), why_not)
+        case step if step in OF_FILES:
+            return MainAction(translate("ReviewPage", "Check files"), why_not)
+    return MainAction(translate("ReviewPage", "Repeat swing"), why_not)
+
+
+def repeat_question() -> Question:
+    """Return whether to swing anew."""
+    translate = QCoreApplication.translate
+    return Question(
+        translate(
+            "ReviewPage",
+            "Repeat the swing from the start? These images remain on the disk.",
+        ),
+        translate("ReviewPage", "Repeat swing"),
+        translate("ReviewPage", "Continue with these"),
+    )
+
+
+def take_back_question() -> Question:
+    """Return whether to take an acceptance back."""
+    translate = QCoreApplication.translate
+    return Question(
+        translate(
+            "ReviewPage",
+            "Revoke this acceptance? The previous result becomes current again. "
+            "Both stay in the archive.",
+        ),
+        translate("ReviewPage", "Revoke acceptance"),
+        translate("ReviewPage", "Keep acceptance"),
+    )
+
+
+def review_state(status: SwingStatus) -> State:
+    """Return the banner: what the tip is worth, or since when it is in force."""
+    translate = QCoreApplication.translate
+    if status.result is not None:
+        return _accepted_state(status.result)
+    if status.verdict is None:
+        text = translate("ReviewPage", "The tip appears here after the swing.")
+        word = translate("ReviewPage", "NO TIP YET")
+        return State(word, text, Sign.WAIT, Tone.QUIET)
+    heading = None if status.state is None else status.state.heading
+    said = phrase(status.verdict.reason, heading)
+    sign, tone = GRADE_MARKS[status.verdict.grade]
+    form = translate("ReviewPage", "{0}: {1}")
+    word = form.format(grade_text(status.verdict.grade), said.short)
+    return State(word, said.hint, sign, tone)
+
+
+def remarks(status: SwingStatus, named: Names) -> tuple[StatusMessage, ...]:
+    """Return the doubts, and whether the step Start names another pen or tip by now."""
+    if status.assessment is None:
+        return ()
+    texts = (_other_names(status.names, named), *map(worded, status.assessment.doubts))
+    return tuple(StatusMessage(text, Sign.WARNING, Tone.WARN) for text in texts if text)
+
+
+def next_step_text(status: SwingStatus) -> str:
+    """Return the sentence of what comes next."""
+    translate = QCoreApplication.translate
+    if status.result is not None:
+        return translate(
+            "ReviewPage", "Next: start the next calibration or close the program."
+        )
+    if status.verdict is None:
+        return translate("ReviewPage", "The result takes effect when it is accepted.")
+    next_step = status.verdict.next_step
+    text = worded(next_step.message)
+    if next_step is NextStep.CAPTURE_MORE and status.is_recording:
+        text = translate(
+            "ReviewPage", "Next: record more images and load all of them again."
+        )
+    has_last = status.assessment is not None and status.assessment.last is not None
+    is_practice = status.origin is Origin.SIMULATED
+    if next_step is NextStep.ACCEPT and has_last and not is_practice:
+        form = translate(
+            "ReviewPage", "{0} Until then the previous result remains current."
+        )
+        text = form.format(text)
+    return text
+
+
+def why_not_now(status: SwingStatus) -> str:
+    """Return why nothing can be done with the tip at this moment."""
+    translate = QCoreApplication.translate
+    if status.solution is None or status.verdict is None:
+        return translate("ReviewPage", "Swing the pen first.")
+    if status.is_solving:
+        return translate("ReviewPage", "Computing the tip")
+    if status.is_reading:
+        return translate("ReviewPage", "Swing in progress")
+    if status.activity is Activity.ACCEPTING:
+        return translate("ReviewPage", "Saving the result")
+    return ""
+
+
+def why_not_accepted(status: SwingStatus) -> str:
+    """Return why the tip cannot be accepted with a reason."""
+    verdict, why_not = status.verdict, why_not_now(status)
+    if why_not or verdict is None or verdict.can_be_accepted:
+        return why_not
+    return QCoreApplication.translate(
+        "ReviewPage", "Result not acceptable. Capture more images or repeat the swing."
+    )
+
+
+def why_not_changed(status: SwingStatus) -> str:
+    """Return why the swing cannot be changed."""
+    translate = QCoreApplication.translate
+    if status.result is not None:
+        return translate("ReviewPage", "Tip accepted. Start the next calibration.")
+    if status.solution is None:
+        return translate("ReviewPage", "Swing the pen first.")
+    return ""
+
+
+def unsaved_text(status: SwingStatus) -> str:
+    """Return what to think of before the window closes; nothing where all is done."""
+    translate = QCoreApplication.translate
+    if status.solution is None or status.result is not None:
+        return ""
+    taken = status.revoked
+    if taken is not None and taken.record == status.record_folder:
+        # Its swing is over, however little is in force.
+        return translate(
+            "ReviewPage",
+            "Acceptance revoked. The swing is saved; open it with the file "
+            "swing.lightpen in {0}.",
+        ).format(status.record_folder)
+    return translate(
+        "ReviewPage",
+        "Tip not accepted. The swing is saved; you can resume it at the next start.",
+    )
+
+
+def step_of_file(reason: Message) -> str:
+    """Return the key of the step at which the file is opened that a reason names."""
+    codes = {part.code for part in reason.parts()}
+    return "camera" if codes & OF_CAMERA else "leds"
+
+
+def _accepted_state(result: Result) -> State:
+    translate = QCoreApplication.translate
+    since = f"{local_time(result.accepted):%Y-%m-%d %H:%M:%S}"
+    told = accepted_phrase(result.origin)
+    text = translate(
+        "ReviewPage", "Current since {0}. Earlier results stay in the archive."
+    ).format(since)
+    if result.reason:
+        text = translate(
+            "ReviewPage", "Current since {0}, check needed. Reason for acceptance: {1}"
+        ).format(since, result.reason)
+    sign, tone = GRADE_MARKS[result.grade]
+    return State(told.short, " ".join(filter(None, (told.hint, text))), sign, tone)
+
+
+def _other_names(swung: Names, named: Names) -> str:
+    if (swung.pen, swung.tip) == (named.pen, named.tip):
+        return ""
+    text = QCoreApplication.translate(
+        "ReviewPage",
+        "This swing belongs to tip {0}, pen {1}; the step Start now shows tip {2}, "
+        "pen {3}.",
+    )
+    names = (swung.tip, swung.pen, named.tip, named.pen)
+    return text.format(*map(shortened, names))

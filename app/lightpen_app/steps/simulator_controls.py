@@ -1,0 +1,42 @@
+"""What the buttons for the simulated operator have in common."""
+
+from collections.abc import Callable
+
+from PySide6.QtWidgets import QAbstractButton, QFrame, QWidget
+
+from lightpen.simulator.hand import Operator
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.live_view import LiveView
+
+
+class SimulatorControls(Translated, QFrame):
+    """Base of what commands the simulated operator; hidden with a real pen.
+
+    A subclass calls `_follow_connection` once it has its buttons.
+
+    Parameters
+    ----------
+    live : LiveView
+        Whose operator it is.
+    """
+
+    def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._live = live
+        live.connection_changed.connect(self._follow_connection)
+
+    def _follow_connection(self) -> None:
+        """Show it where there is an operator; he is another one when a camera opens."""
+        self.setVisible(self._live.operator is not None)
+
+    def _command(self, act: Callable[[Operator], object]) -> None:
+        """Have the operator do something, if there is one."""
+        if operator := self._live.operator:
+            act(operator)
+
+
+def set_words(button: QAbstractButton, text: str, told: str) -> None:
+    """Set the text of a button, and what it does."""
+    button.setText(text)
+    button.setToolTip(told)
+    button.setAccessibleDescription(told)

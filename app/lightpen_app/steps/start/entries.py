@@ -1,0 +1,152 @@
+"""What is typed and chosen at the step Start, as fields and as the selection."""
+
+from dataclasses import replace
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from lightpen.record.library.tip_library import ItemKind
+from lightpen.swing.preparation import Preparation
+from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
+from lightpen_app.steps.start.form import LimitsForm, NamesForm
+from lightpen_app.steps.start.library_control import LibraryControl
+from lightpen_app.work.selection import Selection
+
+TYPING_PAUSE_MS = 400  # after which what was typed is taken over
+
+
+class EntryPresenter(QObject):
+    """Fills the fields from the selection, and takes over what is entered.
+
+    Signals
+    -------
+    edited()
+        Something is being typed; it may be unfinished.
+    tip_named()
+        Another tip was named.
+    """
+
+    edited = Signal()
+    tip_named = Signal()
+
+    def __init__(
+        self,
+        selection: Selection,
+        library: LibraryControl,
+        names: NamesForm,
+        limits: LimitsForm,
+        assumed: AssumptionsPanel,
+    ) -> None:
+        super().__init__(names)
+        self._selection, self._library = selection, library
+        self._names, self._limits, self._assumed = names, limits, assumed
+        self._typing = QTimer(self)
+        self._typing.setSingleShot(True)
+        self._typing.setInterval(TYPING_PAUSE_MS)
+
+        # Connections
+        names.value_edited.connect(self._on_edited)
+        names.value_changed.connect(self._take_names)
+        names.station_changed.connect(self._on_station_changed)
+        names.nominal_tip_changed.connect(self._on_nominal_tip_changed)
+        library.chosen.connect(self._on_item_chosen)
+        limits.value_changed.connect(self._on_limits_changed)
+        assumed.value_changed.connect(self._on_assumed_changed)
+        self._typing.timeout.connect(self._take_names)
+        selection.changed.connect(self._on_selected)
+
+        self._show(selection.preparation)
+
+    def typed(self) -> Preparation:
+        """Return what is chosen, with the names as they are being typed."""
+        return replace(self._selection.preparation, names=self._names.value())
+
+    def _on_edited(self) -> None:
+        self._typing.start()
+        self.edited.emit()
+
+    def _take_names(self) -> None:
+        """Take over all names but that of the station, which may be unfinished."""
+        self._typing.stop()
+        now = self._selection.preparation
+        names = replace(self._names.value(), station=now.names.station)
+        if names == now.names:
+            return
+        is_other = names.tip != now.names.tip
+        renamed, listed = now.renamed(names), self._library.tip(names.tip)
+        is_bare = renamed.names.ball_diameter is None
+        if is_other and listed is not None and is_bare:
+            renamed = renamed.with_listed(listed)
+        self._selection.set_preparation(renamed)
+        if is_other:
+            self.tip_named.emit()
+
+    def _on_item_chosen(self, kind: ItemKind, name: str) -> None:
+        """Take over a pen, tip or cone that was chosen; a tip with what is its own."""
+        self._take_names()
+        now = self._selection.preparation
+        tip = self._library.tip(name)
+        if kind is ItemKind.TIP and tip is not None:
+            self._selection.set_preparation(now.with_listed(tip))
+            self.tip_named.emit()
+        elif kind is ItemKind.PEN:
+            names = replace(now.names, pen=name)
+            self._selection.set_preparation(replace(now, names=names))
+        else:
+            names = replace(now.names, cone=name)
+            self._selection.set_preparation(replace(now, names=names))
+
+    def _on_station_changed(self, name: str) -> None:
+        """Bring back a known station; a new one takes over the present choices."""
+        self._take_names()
+        now = self._selection.preparation
+        if name in self._selection.stations():
+            self._selection.choose_station(name)
+        else:
+            now = replace(now, names=replace(now.names, station=name))
+            self._selection.set_preparation(now)
+        self._names.set_stations(self._selection.stations())
+
+    def _on_nominal_tip_changed(self) -> None:
+        now, point = self._selection.preparation, self._names.nominal_tip()
+        self._selection.set_preparation(replace(now, nominal_tip=point))
+
+    def _on_limits_changed(self) -> None:
+        now, limits = self._selection.preparation, self._limits.value()
+        self._selection.set_preparation(replace(now, limits=limits))
+
+    def _on_assumed_changed(self) -> None:
+        now, assumed = self._selection.preparation, self._assumed.value()
+        self._selection.set_preparation(replace(now, assumptions=assumed))
+
+    def settle(self) -> None:
+        """Take over what is being typed."""
+        self._names.settle()
+        self._limits.settle()
+        self._take_names()
+        station = self._names.value().station
+        if station != self._selection.preparation.names.station:
+            self._on_station_changed(station)
+
+    def _on_selected(self, before: Preparation) -> None:
+        self._show(self._selection.preparation, before)
+
+    def _show(self, now: Preparation, before: Preparation | None = None) -> None:
+        """Fill the fields of what is different; others may be being typed in."""
+        if before is None or now.names != before.names:
+            self._typing.stop()
+            names = now.names
+            if before is not None and names.station == before.names.station:
+                names = replace(names, station=self._names.value().station)
+            self._names.set_value(names)
+        if before is None or now.names.station != before.names.station:
+            self._names.set_stations(self._selection.stations())
+        if now.limits != self._limits.value():
+            self._limits.set_value(now.limits)
+        self._limits.set_guarded(self._selection.supervision.is_guarded)
+        if now.assumptions != self._assumed.value():
+            self._assumed.set_value(now.assumptions)
+        if before is None or now.nominal_tip is not before.nominal_tip:
+            self._names.set_nominal_tip(now.nominal_tip)
+        if before is None or now.pen_file is not before.pen_file:
+            pen = None if now.pen_file is None else now.pen_file.pen
+            self._names.set_tip_of_file(None if pen is None else pen.nominal_tip)

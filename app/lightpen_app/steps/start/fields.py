@@ -1,0 +1,267 @@
+"""The fields of the step Start: a station, a point, and an item of the library."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QCheckBox, QLabel, QLineEdit, QMenu, QWidget
+from typing_extensions import override
+
+from lightpen.arrays import FloatArray
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.theme import GRID
+from lightpen_app.look.words import shortened
+from lightpen_app.widgets.choice_field import ChoiceField
+from lightpen_app.widgets.keys import ENTER_KEYS, PAGE_KEYS
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.widgets.status_mark import message_icon
+from lightpen_app.widgets.translated import Translated
+
+NO_REMARK = StatusMessage()
+
+
+@dataclass(frozen=True)
+class ItemChoice:
+    """An item to choose, and how it stands."""
+
+    name: str
+    remark: StatusMessage = NO_REMARK
+
+
+class ItemButton(Translated, PushButton):
+    """Opens the list; it ends with the way to the library.
+
+    Signals
+    -------
+    chosen(str)
+        The id of an item.
+    library_requested()
+    """
+
+    chosen = Signal(str)
+    library_requested = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(0, parent)
+        self._choices: tuple[ItemChoice, ...] = ()
+        self._menu = QMenu(self)
+        self.setMenu(self._menu)
+
+        # Connections
+        self._menu.aboutToShow.connect(self._fill)
+
+        self._retranslate()
+
+    def choices(self) -> tuple[ItemChoice, ...]:
+        """Return what can be chosen."""
+        return self._choices
+
+    def set_choices(self, choices: Sequence[ItemChoice]) -> None:
+        """Let other items be chosen; a list that is open stays as it is."""
+        self._choices = tuple(choices)
+        if not self._menu.isVisible():
+            self._fill()
+
+    def _fill(self) -> None:
+        menu = self._menu
+        menu.clear()
+        for choice in self._choices:
+            text = shortened(choice.name).replace("&", "&&")
+            word = choice.remark.text
+            action = menu.addAction(f"{text}\t{word}" if word else text)
+            action.setIcon(message_icon(choice.remark, self))
+            action.triggered.connect(
+                lambda _=False, name=choice.name: self.chosen.emit(name)
+            )
+        if self._choices:
+            menu.addSeparator()
+        menu.addAction(self.tr("Tip library...")).triggered.connect(
+            lambda _=False: self.library_requested.emit()
+        )
+
+    def _retranslate(self) -> None:
+        self.setText(self.tr("Choose..."))
+        self._fill()
+
+
+LONGEST_NAME = 200
+ARROWS = (Qt.Key.Key_Up, Qt.Key.Key_Down)
+
+
+class StationField(ChoiceField):
+    """A list of the known stations in which another name can be typed.
+
+    Signals
+    -------
+    value_edited(str)
+        The name that is being typed; it may be unfinished.
+    value_changed(str)
+        The name is finished, or chosen from the list.
+    entered()
+        It was finished by the Enter key.
+    """
+
+    value_edited = Signal(str)
+    value_changed = Signal(str)
+    entered = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = ""
+        self._edit = _NameEdit()
+        self._edit.setMaxLength(LONGEST_NAME)
+        self.setLineEdit(self._edit)
+        self.setInsertPolicy(ChoiceField.InsertPolicy.NoInsert)
+        # "Hall" must not become "Hall 2" because that is known; Qt takes None for no
+        # completer, its stub does not.
+        self.setCompleter(None)  # type: ignore[arg-type]
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+
+        # Connections
+        self._edit.textEdited.connect(self.value_edited)
+        self._edit.editingFinished.connect(self._on_finished)
+        self._edit.entered.connect(self.entered)
+        self.activated.connect(self._on_finished)
+
+    def value(self) -> str:
+        """Return the name as it is typed."""
+        return self.currentText().strip()
+
+    def set_value(self, name: str) -> None:
+        """Show another name."""
+        self._value = name
+        self.setEditText(name)
+        self._edit.setCursorPosition(0)
+
+    def set_known(self, names: Sequence[str]) -> None:
+        """List these stations."""
+        shown = self.currentText()
+        self.clear()
+        self.addItems(list(names))
+        self.setEditText(shown)
+        self._edit.setCursorPosition(0)
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Open the list by an arrow; the page keys lead through the steps."""
+        if event.key() in ARROWS:
+            self.showPopup()
+        elif event.key() in PAGE_KEYS:
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
+
+    def _on_finished(self) -> None:
+        name, before = self.value(), self._value
+        self.set_value(name)
+        if name != before:
+            self.value_changed.emit(name)
+
+
+class _NameEdit(QLineEdit):
+    """A line whose Enter key takes over what was typed, and else does nothing."""
+
+    entered = Signal()
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        is_typed = self.isModified()
+        super().keyPressEvent(event)
+        if is_typed and event.key() in ENTER_KEYS:
+            event.accept()  # the window would press its main button, too soon
+            self.entered.emit()
+
+
+REACH = 1000.0  # mm from the origin of the pen; no pen is longer
+AXES = ("x", "y", "z")
+
+
+class PointField(Translated, QWidget):
+    """A box to check for the point of the LED file, else three coordinates in mm.
+
+    Signals
+    -------
+    value_changed()
+        The user chose another point.
+    """
+
+    value_changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._of_file: FloatArray | None = None
+
+        # Widgets
+        self._from_file = QCheckBox()
+        self._from_file.setChecked(True)
+        self._coordinates = QWidget()
+        self._fields = tuple(NumberField("mm", (-REACH, REACH), 4) for _ in AXES)
+        labels = tuple(QLabel(axis) for axis in AXES)
+
+        # Layout
+        vertical_layout(self, self._from_file, self._coordinates, spacing=GRID // 2)
+        row = horizontal_layout(self._coordinates)
+        for label, field in zip(labels, self._fields, strict=True):
+            field.setKeyboardTracking(False)
+            field.setMinimumWidth(16 * GRID)
+            label.setBuddy(field)
+            fill(row, label, (field, 1))
+
+        # Connections
+        self._from_file.toggled.connect(self._on_toggled)
+        for field in self._fields:
+            field.valueChanged.connect(self.value_changed)
+
+        self._coordinates.hide()
+        self._retranslate()
+
+    def value(self) -> FloatArray | None:
+        """Return the point (3,), mm; None for that of the LED file."""
+        if self._from_file.isChecked():
+            return None
+        return np.array([field.value() for field in self._fields])
+
+    def set_value(self, value: FloatArray | None) -> None:
+        """Show another point."""
+        blocked = self.blockSignals(True)
+        self._from_file.setChecked(value is None)
+        if value is not None:
+            self._show(value)
+        self.blockSignals(blocked)
+
+    def set_point_of_file(self, point: FloatArray | None) -> None:
+        """Show what the LED file has; None if it has no such point."""
+        self._of_file = point
+        self._retranslate()
+
+    def settle(self) -> None:
+        """Take over what is being typed."""
+        for field in self._fields:
+            field.interpretText()
+
+    def _show(self, point: FloatArray) -> None:
+        for field, coordinate in zip(self._fields, point.tolist(), strict=True):
+            field.setValue(coordinate)
+
+    def _on_toggled(self, from_file: bool) -> None:
+        self._coordinates.setVisible(not from_file)
+        if not from_file:  # the user begins with what was in force
+            blocked = self.blockSignals(True)
+            self._show(np.zeros(3) if self._of_file is None else self._of_file)
+            self.blockSignals(blocked)
+        self.value_changed.emit()
+
+    def _retranslate(self) -> None:
+        if self._of_file is None:
+            text = self.tr("As in the LED file")
+        else:
+            numbers = "  ".join(f"{each:.3f}" for each in self._of_file)
+            text = self.tr("As in the LED file: {0} mm").format(numbers)
+        self._from_file.setText(text)
+        for axis, field in zip(AXES, self._fields, strict=True):
+            name = self.tr("Nominal tip centre, {0}").format(axis)
+            field.setAccessibleName(name)

@@ -1,0 +1,92 @@
+"""What Start shows on a vast screen: how the tip developed, or how all of it goes."""
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtWidgets import QWidget
+
+from lightpen.archive.lazy_logbook import LazyLogbook
+from lightpen_app.look.layouts import vertical_layout
+from lightpen_app.steps.start.pictures import Pictures
+from lightpen_app.widgets.lazy import LazyWidget
+from lightpen_app.work.job import Job, Report
+
+if TYPE_CHECKING:
+    from lightpen.verification.history.trend import Trend
+    from lightpen_app.widgets.trend_panel import TrendPanel
+
+LEAST_TREND = 2  # calibrations; of one there is nothing to see but its figures
+
+
+class LargeScreenPanel(QWidget):
+    """Shows the trend of a tip; of one that has none, what the program is for.
+
+    Parameters
+    ----------
+    logbook : LazyLogbook
+        Of the archive that tells of the tip.
+    """
+
+    def __init__(self, logbook: LazyLogbook, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._logbook = logbook
+        self._job: Job | None = None
+
+        # Widgets
+        self._trend = LazyWidget(_make_trend)
+        self._pictures = LazyWidget(_make_pictures)
+
+        # Layout
+        vertical_layout(self, self._trend, self._pictures, spacing=-1)
+        for each in (self._trend, self._pictures):
+            each.hide()
+
+    def set_value(self, pen: str, tip: str, *, is_simulated: bool) -> None:
+        """Show another tip; one without a name has no trend."""
+        self.shut_down()
+        if not (pen and tip):
+            self._show(None)
+            return
+        logbook = self._logbook
+
+        def read(_: Report) -> "Trend":
+            # With the archive, a quarter of a second that the start need not take.
+            from lightpen.archive.queries import EntryFilter
+            from lightpen.verification.history.trend import trend_of
+
+            wanted = EntryFilter(pen=pen, tip=tip, is_simulated=is_simulated)
+            return trend_of(logbook.opened().database, wanted)
+
+        self._job = job = Job(read, self)
+
+        # Connections
+        job.succeeded.connect(self._show)
+        job.failed.connect(self._on_failed)
+        job.start()
+
+    def shut_down(self) -> None:
+        """Cancel what is under way."""
+        if self._job is not None:
+            self._job.cancel()
+
+    def _on_failed(self, _: str) -> None:
+        self._show(None)  # History tells why
+
+    def _show(self, trend: "Trend | None") -> None:
+        has_trend = trend is not None and len(trend.entries) >= LEAST_TREND
+        if trend is not None and has_trend:
+            self._trend.content().set_value(trend)
+        self._trend.setVisible(has_trend)
+        self._pictures.setVisible(not has_trend)
+
+
+def _make_trend() -> "TrendPanel":
+    # What draws plots takes a fifth of the time to the first window, which has none.
+    from lightpen_app.widgets.trend_panel import TrendPanel
+
+    return TrendPanel()
+
+
+def _make_pictures() -> Pictures:
+    pictures = Pictures()
+    pictures.set_vast()
+    return pictures

@@ -1,0 +1,128 @@
+"""Looks up the result of the pen and tip that are named, and shows what it says."""
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Signal
+
+from lightpen.model.origin import Origin
+from lightpen.record.results.results import Result
+from lightpen.swing.preparation import Preparation
+from lightpen_app.look.phrases import first_missing
+from lightpen_app.steps.start.large_screen_panel import LargeScreenPanel
+from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
+from lightpen_app.work.job import Job
+from lightpen_app.work.library_watch import LibraryWatch
+from lightpen_app.work.selection import Selection
+from lightpen_app.work.swing_run import SwingRun
+
+
+class LastResultPresenter(QObject):
+    """Shows the last result in one panel, how it came about in another.
+
+    Signals
+    -------
+    verification_requested()
+        The tip that is shown shall be verified.
+    """
+
+    verification_requested = Signal()
+
+    def __init__(
+        self,
+        selection: Selection,
+        run: SwingRun,
+        library: LibraryWatch,
+        panel: LastResultPanel,
+        large: LargeScreenPanel,
+    ) -> None:
+        super().__init__(panel)
+        self._selection, self._run, self._library = selection, run, library
+        self._panel, self._large = panel, large
+        self._lookup: Job | None = None
+
+        # Connections
+        selection.changed.connect(self._on_selected)
+        library.changed.connect(self.show_status)
+        run.result_changed.connect(self.look_up)
+        panel.take_back_requested.connect(self._on_take_back_requested)
+        panel.verification_requested.connect(self.verification_requested)
+
+        self.show_status()
+
+    def look_up(self) -> None:
+        """Look for the result in force."""
+        self._look_up(lambda result: None)
+
+    def look_up_tip(self) -> None:
+        """Look for it, and fill in ball and nominal centre of a tip just named."""
+        self._look_up(self._fill_in)
+
+    def show_trend(self) -> None:
+        """Show how the tip developed, where there is the room."""
+        pen, tip, is_simulated = _key(self._selection.preparation)
+        if not self._large.isHidden():
+            self._large.set_value(pen, tip, is_simulated=is_simulated)
+
+    def shut_down(self) -> None:
+        """Look no more."""
+        self._large.shut_down()
+        if self._lookup is not None:
+            self._lookup.cancel()
+
+    def _look_up(self, use: Callable[[Result | None], None]) -> None:
+        self.shut_down()
+        self.show_trend()
+        pen, tip, is_simulated = _key(self._selection.preparation)
+        if not (pen and tip):
+            self._panel.set_value(LastResult(is_named=False))
+            return
+        archive = self._run.archive
+        self._lookup = job = Job(
+            lambda _: archive.in_force(pen, tip, is_simulated=is_simulated), self
+        )
+
+        def show(result: Result | None) -> None:
+            self._panel.set_value(LastResult(result, is_simulated=is_simulated))
+            use(result)
+
+        # Connections
+        job.succeeded.connect(show)
+        job.failed.connect(self._on_failed)
+        job.crashed.connect(self._on_crashed)
+        job.start()
+
+    def _fill_in(self, result: Result | None) -> None:
+        now = self._selection.preparation
+        is_bare = now.names.ball_diameter is None and now.nominal_tip is None
+        if is_bare and result is not None:
+            self._selection.set_preparation(now.with_last(result))
+
+    def _on_failed(self, sentence: str) -> None:
+        self._panel.set_value(LastResult(trouble=sentence))
+
+    def _on_crashed(self) -> None:
+        self._on_failed(self.tr("Last calibration not available"))
+
+    def _on_selected(self, before: Preparation) -> None:
+        self.show_status()
+        if _key(self._selection.preparation) != _key(before):
+            self.look_up()
+
+    def show_status(self) -> None:
+        """Mark the tip that is named, as it stands now."""
+        now, library = self._selection.preparation, self._library
+        status = library.statuses.of_tip(now.names.pen, now.names.tip)
+        self._panel.set_status(None if now.origin is Origin.SIMULATED else status)
+        due = self._selection.limits.due
+        self._panel.set_rule(library.library.rule_of(now.names.tip, due))
+        self._panel.set_why_unverified(first_missing(now.missing_inputs()))
+
+    def _on_take_back_requested(self, result: Result) -> None:
+        operator = self._selection.preparation.names.operator
+        self._run.runner.revoke(result, operator)
+
+
+def _key(preparation: Preparation) -> tuple[str, str, bool]:
+    """Return what the result that is shown is looked for by."""
+    names = preparation.names
+    return names.pen, names.tip, preparation.origin is Origin.SIMULATED

@@ -1,0 +1,329 @@
+"""What the step Swing shows and offers, computed from the status of the swing."""
+
+from dataclasses import dataclass, replace
+from enum import Enum, auto
+from math import isfinite
+from pathlib import Path
+
+from PySide6.QtCore import QCoreApplication, QObject
+
+from lightpen.cameras.worker_events import Connection
+from lightpen.model.limits import SwingLimits
+from lightpen.swing.kept_images import AcceptedImages
+from lightpen.swing.rules import stillness
+from lightpen.swing.shortfall import Shortfall, measure_shortfall, missing
+from lightpen.swing.state import Pause, Phase, SwingEventKind, SwingState
+from lightpen.swing.status import SwingStatus
+from lightpen_app.look.phrases import phrase
+from lightpen_app.look.sounds import Sound
+from lightpen_app.steps.page import MainAction
+from lightpen_app.steps.swing.live_detection import LiveDetectionView
+from lightpen_app.steps.swing.remaining_images import RemainingImages
+from lightpen_app.steps.swing.view_state import SwingViewState, SwingWords
+from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.pen_in_space import DisplayedPosture
+from lightpen_app.widgets.question_bar import Question
+from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.work.live_view import LiveView
+from lightpen_app.work.swing_run import SwingRun
+
+SOUNDS: dict[SwingEventKind, Sound] = {
+    SwingEventKind.SEATED: Sound.SEATED,
+    SwingEventKind.KEPT: Sound.KEPT,
+    SwingEventKind.FIELD_FULL: Sound.FIELD_FULL,
+    SwingEventKind.SLIPPED: Sound.LOST,
+    SwingEventKind.LOST: Sound.LOST,
+    SwingEventKind.CAPTURED: Sound.CAPTURED,
+    SwingEventKind.DONE: Sound.DONE,
+    SwingEventKind.FAILED: Sound.FAILED,
+}
+
+
+class SideAction(Enum):
+    """What the button beside Start over does."""
+
+    OPEN_CAMERA = auto()
+    TRY_AGAIN = auto()
+    RESUME = auto()
+    PAUSE = auto()
+    STOP_COMPUTING = auto()
+    COMPUTE = auto()
+    CAPTURE_MORE = auto()
+
+
+@dataclass(frozen=True, eq=False)
+class SwingPageState:
+    """All that the page shows.
+
+    Attributes
+    ----------
+    value, operator_value : OperatorValue
+        What the page shows, and what the operator view.
+    note : str
+        What the count leaves out.
+    stand : DisplayedPosture or None
+        How the pen is drawn in space.
+    why_not_side : str
+        Why the button beside Start over cannot be pressed.
+    """
+
+    value: OperatorValue
+    operator_value: OperatorValue
+    note: str
+    warning: StatusMessage
+    stand: DisplayedPosture | None
+    is_verdict: bool
+    is_capturing: bool
+    has_fault: bool
+    is_complete: bool
+    main: MainAction
+    side: SideAction
+    why_not_side: str
+
+
+@dataclass(frozen=True, eq=False)
+class SwingProgress:
+    """What a swing lacks, measured once for each image that is kept.
+
+    Attributes
+    ----------
+    to_go : RemainingImages or None
+        How many images are told to be to go; None as long as nothing is told.
+    """
+
+    kept: AcceptedImages
+    record_folder: Path | None
+    limits: SwingLimits
+    short: Shortfall
+    to_go: RemainingImages | None
+
+
+def advance_progress(
+    before: SwingProgress | None, status: SwingStatus
+) -> SwingProgress | None:
+    """Return what the swing lacks now; None where there is no swing."""
+    state, setup = status.state, status.setup
+    if state is None or setup is None:
+        return None
+    if before is not None and before.kept is state.kept:
+        return before
+    short = measure_shortfall(setup, state)
+    swing = status.record_folder, setup.limits
+    told = None
+    if before is not None and swing == (before.record_folder, before.limits):
+        told = before.to_go
+    if not isfinite(state.kept.uncertainty):
+        told = None
+    elif told is None:
+        told = RemainingImages.first(short.n_more, state.n_kept)
+    else:
+        told = told.after(short.n_more, state.n_kept)
+    return SwingProgress(state.kept, *swing, short, told)
+
+
+class SwingPresenter(QObject):
+    """Computes what the page shows; counts the images beside the swing.
+
+    Attributes
+    ----------
+    sight : LiveDetectionView
+        Looks at the live images.
+    solved : float
+        How far the tip is computed, 0 to 1.
+    """
+
+    def __init__(self, run: SwingRun, live: LiveView, parent: QObject) -> None:
+        super().__init__(parent)
+        self._run, self._live = run, live
+        self._words = SwingWords(self)
+        self._progress: SwingProgress | None = None
+        self.sight = LiveDetectionView(run, self)
+        self.solved = 0.0
+
+    def view_state(self, *, is_away: bool) -> SwingViewState | None:
+        """Return all that decides what is told of the swing; None without one."""
+        status = self._run.status
+        state, setup = status.state, status.setup
+        self._progress = progress = advance_progress(self._progress, status)
+        if state is None or setup is None or progress is None:
+            return None
+        return SwingViewState(
+            setup=setup,
+            state=state,
+            short=progress.short,
+            connection=self._live.worst_connection,
+            seen=self.sight.words(),
+            has_fault=status.has_fault,
+            solving=self.solved if status.is_solving else None,
+            verdict=status.verdict,
+            is_accepted=status.result is not None,
+            stillness=stillness(state) if state.phase is Phase.VERDICT else 0.0,
+            origin=status.origin,
+            is_simulated=self._live.operator is not None,
+            is_away=is_away,
+            to_go=progress.to_go,
+        )
+
+    def fraction_kept(self) -> float:
+        """Return how many of the images of the swing are kept, 0 to 1."""
+        state, progress = self._run.status.state, self._progress
+        if state is None or progress is None:
+            return 0.0
+        return state.n_kept / max(state.n_kept + progress.short.n_more, 1)
+
+    def page_state(self, *, is_away: bool) -> SwingPageState:
+        """Return what the page shows now."""
+        status, view = self._run.status, self.view_state(is_away=is_away)
+        connection, words = self._live.worst_connection, self._words
+        is_near = connection is Connection.STREAMING
+        is_verdict = view is not None and view.state.phase is Phase.VERDICT
+        if view is None:
+            value = words.waiting_value(status.refusal, is_near=is_near)
+            shown = words.resting_value() if is_away else value
+        else:
+            value = shown = words.operator_value(view)
+            if is_verdict and not view.asks_upright:
+                shown = replace(value, dial=None)
+        return SwingPageState(
+            value=value,
+            operator_value=shown,
+            note="" if view is None else words.note(view),
+            warning=StatusMessage() if view is None else words.warning(view),
+            stand=None if view is None else words.stand(view),
+            is_verdict=is_verdict,
+            is_capturing=status.is_capturing,
+            has_fault=status.has_fault,
+            is_complete=status.solution is not None,
+            main=main_action(status),
+            side=side_action(status, connection),
+            why_not_side=why_not_more(status),
+        )
+
+
+def main_action(status: SwingStatus) -> MainAction:
+    """Return what the main button does now."""
+    translate, state = QCoreApplication.translate, status.state
+    if state is None or status.is_capturing:
+        has_images = state is not None and state.n_kept > 0
+        why_not = translate("SwingPage", "No image captured yet")
+        finish = translate("SwingPage", "Finish early")
+        return MainAction(finish, "" if has_images else why_not)
+    return MainAction(translate("SwingPage", "Review"), _why_no_review(status, state))
+
+
+def _why_no_review(status: SwingStatus, state: SwingState) -> str:
+    translate = QCoreApplication.translate
+    if status.is_solving:
+        return translate("SwingPage", "Computing the tip")
+    if status.is_reading:
+        return translate("SwingPage", "Swing in progress")
+    if status.solution is not None:
+        return ""
+    if state.phase is Phase.VERDICT and status.is_recording:
+        return translate("SwingPage", "No tip to review. Choose other images.")
+    if state.phase is Phase.VERDICT:
+        return translate(
+            "SwingPage", "No tip to review. Capture more images or start over."
+        )
+    return translate("SwingPage", "Tip not computed yet")
+
+
+def side_action(status: SwingStatus, connection: Connection) -> SideAction:
+    """Return what the button beside Start over does now."""
+    state = status.state
+    if state is None or status.is_capturing:
+        if connection is Connection.CLOSED:
+            return SideAction.OPEN_CAMERA
+        if state is None:
+            return SideAction.TRY_AGAIN
+        is_paused = state.pause is Pause.BY_USER
+        return SideAction.RESUME if is_paused else SideAction.PAUSE
+    if status.is_solving:
+        return SideAction.STOP_COMPUTING
+    is_unsolved = state.phase is Phase.SOLVING
+    return SideAction.COMPUTE if is_unsolved else SideAction.CAPTURE_MORE
+
+
+def side_text(action: SideAction) -> str:
+    """Return what the button beside Start over is called."""
+    translate = QCoreApplication.translate
+    texts = {
+        SideAction.OPEN_CAMERA: translate("SwingPage", "Open the camera"),
+        SideAction.TRY_AGAIN: translate("SwingPage", "Try again"),
+        SideAction.RESUME: translate("SwingPage", "Continue (Space)"),
+        SideAction.PAUSE: translate("SwingPage", "Pause (Space)"),
+        SideAction.STOP_COMPUTING: translate("SwingPage", "Stop computing"),
+        SideAction.COMPUTE: translate("SwingPage", "Compute again"),
+        SideAction.CAPTURE_MORE: translate("SwingPage", "Capture more"),
+    }
+    return texts[action]
+
+
+def why_not_more(status: SwingStatus) -> str:
+    """Return why no more images can be captured after the verdict."""
+    is_judged = status.state is not None and status.state.phase is Phase.VERDICT
+    if is_judged and status.is_recording:
+        return QCoreApplication.translate(
+            "SwingPage", "All recorded images are loaded."
+        )
+    return ""
+
+
+def missing_text(status: SwingStatus) -> str:
+    """Return what the swing lacks, in sentences."""
+    state, setup = status.state, status.setup
+    if state is None or setup is None:
+        return ""
+    return " ".join(phrase(each, state.heading).hint for each in missing(setup, state))
+
+
+def unsaved_swing_text(status: SwingStatus) -> str:
+    """Return what to think of before the window closes; nothing where all is done."""
+    state = status.state
+    if state is None or state.phase is Phase.VERDICT or not state.n_kept:
+        return ""
+    text = QCoreApplication.translate(
+        "SwingPage",
+        "Swing not finished. The captured images ({0}) are saved; you can resume "
+        "the swing at the next start.",
+    )
+    return text.format(state.n_kept)
+
+
+def finish_question(status: SwingStatus) -> Question:
+    """Return whether to finish though something is missing."""
+    translate = QCoreApplication.translate
+    return Question(
+        missing_text(status),
+        translate("SwingPage", "Finish now"),
+        translate("SwingPage", "Continue swinging"),
+    )
+
+
+def other_choices_question() -> Question:
+    """Return whether a swing goes on though something else was chosen meanwhile."""
+    translate = QCoreApplication.translate
+    return Question(
+        translate(
+            "SwingPage",
+            "Settings were changed during this swing. The swing continues with its "
+            "original files, names and limits.",
+        ),
+        translate("SwingPage", "Restart with new settings"),
+        translate("SwingPage", "Continue this swing"),
+    )
+
+
+def start_over_question(status: SwingStatus) -> Question:
+    """Return whether to set a swing aside and begin anew."""
+    translate = QCoreApplication.translate
+    text = translate(
+        "SwingPage",
+        "Start over? The images of this swing ({0}) are set aside and remain on the "
+        "disk.",
+    )
+    return Question(
+        text.format(0 if status.state is None else status.state.n_kept),
+        translate("SwingPage", "Restart swing"),
+        translate("SwingPage", "Continue this swing"),
+    )

@@ -1,0 +1,56 @@
+"""How many images of a swing are told to be to go: the figure does not creep up."""
+
+from dataclasses import dataclass
+from math import ceil
+from typing import Self
+
+# Of the images to go: from so many on, rounded up to this.
+STEPS = ((30, 10), (10, 5), (-1, 1))
+LEAST_RISE = 2  # by which a small figure has to be wrong before it is told
+
+
+@dataclass(frozen=True)
+class RemainingImages:
+    """How many images are to go, as it is told.
+
+    What is estimated anew with each image goes up and down. Told is the least of it,
+    but for a rise that is more than chance, and after images were dropped.
+
+    Attributes
+    ----------
+    n_images : int
+        To go, rounded up to what the estimate is worth.
+    n_kept : int
+        With how many images that was estimated.
+    has_risen : bool
+        Whether more are to go than was told before, though none were dropped.
+    """
+
+    n_images: int
+    n_kept: int
+    has_risen: bool = False
+
+    @classmethod
+    def first(cls, n_more: int, n_kept: int) -> Self:
+        """Return what is told first of a swing."""
+        return cls(in_true_steps(n_more), n_kept)
+
+    def after(self, n_more: int, n_kept: int) -> Self:
+        """Return what is told by the next estimate."""
+        now = self.first(n_more, n_kept)
+        if n_kept < self.n_kept or now.n_images < self.n_images:
+            return now
+        rise = now.n_images - self.n_images
+        if rise > max(_step(self.n_images), LEAST_RISE):
+            return type(self)(now.n_images, n_kept, has_risen=True)
+        return type(self)(self.n_images, n_kept, self.has_risen)
+
+
+def in_true_steps(n_more: int) -> int:
+    """Return how many images are to go, rounded up to what an estimate is worth."""
+    step = _step(n_more)
+    return ceil(n_more / step) * step
+
+
+def _step(n_more: int) -> int:
+    return next(step for least, step in STEPS if n_more > least)

@@ -1,0 +1,150 @@
+"""Buttons for the simulated operator, where the pen is simulated."""
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QToolButton, QWidget
+from typing_extensions import override
+
+from lightpen.model.posture import Posture
+from lightpen.simulator.hand import Operator
+from lightpen_app.look.layouts import fill, horizontal_layout
+from lightpen_app.look.theme import GRID
+from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
+from lightpen_app.work.live_view import LiveView
+
+SLIP_MM, SLIP_S = 0.5, 1.5
+COVER_S = 2.0
+
+
+class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
+    """Lets the simulated operator do things; hidden with a real pen.
+
+    Signals
+    -------
+    led_by_itself()
+        From now on the pen is not where the user wanted it last.
+    """
+
+    narrow_below = 100 * GRID  # px; then its buttons are closer together
+    led_by_itself = Signal()
+
+    def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:
+        super().__init__(live, parent)
+        self.setProperty("area", "panel")
+        self._room = NO_ROOM  # so that its least size at first widens no window
+        self._led: Operator | None = None  # who was told to seat the tip and follow
+
+        # Widgets
+        self._follow = PushButton(checkable=True)
+        self._follow.setProperty("inviting", True)
+        slots = (
+            *(self._on_seat_clicked, self._on_swing_clicked, self._on_hold_clicked),
+            *(self._on_lift_clicked, self._on_leave_clicked, self._on_slip_clicked),
+            self._on_cover_clicked,
+        )
+        self._buttons = tuple(QToolButton() for _ in slots)
+
+        # Layout
+        margins = (GRID, GRID // 2, GRID, GRID // 2)
+        self._layout = horizontal_layout(self, self._follow, 1, margins=margins)
+        fill(self._layout, *self._buttons)
+
+        # Connections
+        self._follow.toggled.connect(self._on_follow_toggled)
+        for button, slot in zip(self._buttons, slots, strict=True):
+            button.clicked.connect(slot)
+        for each in (self._follow, *self._buttons):
+            # A click leaves Space and Enter to the swing.
+            each.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+
+        self._use_room()
+        self._retranslate()
+        self._follow_connection()
+
+    @override
+    def _use_room(self) -> None:
+        self._layout.setSpacing(GRID // 2 if self._room.is_narrow else GRID)
+
+    def lean(self, posture: Posture) -> None:
+        """Hold the pen as the user wants, who leads it from now on."""
+        self._lead_by_hand()
+        tilt, direction, turn = posture.tilt, posture.direction, posture.turn
+        self._command(lambda operator: operator.lean(tilt, direction, turn))
+
+    def follows(self) -> bool:
+        """Return whether the operator does what the swing asks for."""
+        return self._follow.isChecked()
+
+    @override
+    def _retranslate(self) -> None:
+        self.setAccessibleName(self.tr("Simulated pen"))
+        set_words(
+            self._follow,
+            self.tr("Let the simulated operator swing"),
+            self.tr("Seats the tip and follows the arrow automatically"),
+        )
+        slip = self.tr("Lets the tip slip by {0} mm for a moment").format(SLIP_MM)
+        words = (
+            (
+                self.tr("Seat"),
+                self.tr("Seats the tip in the cone; then drag the dot of the dial"),
+            ),
+            (
+                self.tr("Swing"),
+                self.tr("Swings the pen about the cone regardless of the arrow"),
+            ),
+            (self.tr("Hold"), self.tr("Holds the pen still")),
+            (self.tr("Lift"), self.tr("Lifts the tip out of the cone")),
+            (self.tr("Leave"), self.tr("Moves the pen out of the image")),
+            (self.tr("Slip"), slip),
+            (self.tr("Cover"), self.tr("Covers the LEDs for a moment")),
+        )
+        for button, (text, told) in zip(self._buttons, words, strict=True):
+            set_words(button, text, told)
+
+    def _lead_by_hand(self) -> None:
+        self._follow.setChecked(False)
+
+    @override
+    def _follow_connection(self) -> None:
+        super()._follow_connection()
+        if self.follows() and self._live.operator is not self._led:
+            self._lead()  # of a camera that was opened anew
+
+    def _on_follow_toggled(self, follows: bool) -> None:
+        if follows:
+            self._lead()
+        else:
+            self._live.set_following(False)
+            self._led = None
+
+    def _lead(self) -> None:
+        self.led_by_itself.emit()
+        self._led = self._live.operator
+        self._live.set_following(True)
+        self._command(Operator.seat)
+
+    def _on_seat_clicked(self) -> None:
+        self._command(Operator.seat)
+
+    def _on_swing_clicked(self) -> None:
+        self._lead_by_hand()
+        self.led_by_itself.emit()
+        self._command(Operator.swing)
+
+    def _on_hold_clicked(self) -> None:
+        self._lead_by_hand()
+        self._command(Operator.hold)
+
+    def _on_lift_clicked(self) -> None:
+        self._command(Operator.lift)
+
+    def _on_leave_clicked(self) -> None:
+        self._command(Operator.leave)
+
+    def _on_slip_clicked(self) -> None:
+        self._command(lambda operator: operator.slip(SLIP_MM, SLIP_S))
+
+    def _on_cover_clicked(self) -> None:
+        self._command(lambda operator: operator.cover(COVER_S))

@@ -1,0 +1,226 @@
+"""What is seen of a swing: instruction, dial, count, state, image and plots."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
+from typing_extensions import override
+
+from lightpen_app.look.layouts import grid_layout, horizontal_layout, vertical_layout
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.swing.leaning_dial import LeaningDial
+from lightpen_app.steps.swing.page_state import SwingPageState, side_text
+from lightpen_app.widgets.fitted_text import FittedText
+from lightpen_app.widgets.image_view import ImageView
+from lightpen_app.widgets.lazy import LazyWidget
+from lightpen_app.widgets.live_markers import live_markers
+from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
+from lightpen_app.widgets.pen_in_space import PenInSpace
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
+from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.widgets.state_banner import StateBanner
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.live_view import DisplayedImage
+
+if TYPE_CHECKING:
+    from lightpen_app.steps.swing.plots_panel import SwingPlots
+
+DIAL_SHARE, SIDE_SHARE = 2, 3  # of the width
+SIDE_SHARES = (9, 4, 6)  # of it: numbers, pen in space, live image
+ROW_SHARES = (1, 2)  # of the height: these, plots
+LARGE_SIDE_SHARES, LARGE_ROW_SHARES = (9, 5, 7), (2, 3)  # where there is plenty
+VAST_SIDE_SHARES, VAST_ROW_SHARES = (5, 0, 6), (1, 1)  # and where there is more
+PEN_PLACE = 3  # below the count, its bar and its note
+LEAST_IMAGE = 14 * GRID  # px of width
+PROGRESS_STEPS = 1000
+PLOTS_HEIGHT = 32 * GRID  # px, there
+ANY_HEIGHT = 16777215  # QWIDGETSIZE_MAX
+
+
+class SwingView(ResponsiveLayout, Translated, QWidget):
+    """Shows a swing at one moment.
+
+    Attributes
+    ----------
+    dial : LeaningDial
+    side, start_over : PushButton
+        The buttons at the upper right.
+    """
+
+    narrow_below, low_below = 100 * GRID, 56 * GRID  # px; then its plots are below
+    large_from = QSize(150 * GRID, 80 * GRID)  # px; then image and letters are larger
+    vast_from = QSize(240 * GRID, 130 * GRID)  # px; then they are larger still
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = OperatorValue()
+        self._room = NO_ROOM  # so that its least size at first widens no window
+
+        # Widgets
+        self.side, self.start_over = PushButton(), PushButton()
+        self._instruction = FittedText(TextSize.HUGE)
+        self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
+        self._warning = SignLabel()
+        self._verdict = StateBanner(TextSize.DISPLAY)
+        self._verdict.setMinimumHeight(10 * GRID)
+        self.dial = LeaningDial()
+        # As high as its place is; it draws itself as large as it can.
+        self.dial.setSizePolicy(
+            QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored
+        )
+        self._count = FittedText(TextSize.DISPLAY)
+        self._note = text_label(TextSize.SMALL, Tone.QUIET)
+        self._progress = QProgressBar()
+        self._progress.setRange(0, PROGRESS_STEPS)
+        self._progress.setTextVisible(False)
+        self._banner = StateBanner(TextSize.TITLE)
+        self._pen = PenInSpace()
+        self._image = ImageView()
+        self._image.setMinimumWidth(LEAST_IMAGE)
+        self._plots = LazyWidget(_make_plots)
+
+        # Layout
+        self._content = ShrinkingScrollContent()
+        self._body = grid_layout(self._content, spacing=(3 * GRID, GRID))
+        self._body.addWidget(self.dial, 0, 0)
+        self._side = grid_layout(self._body, at=(0, 1), spacing=2 * GRID)
+        numbers = (self._count, self._progress, self._note, 1)
+        self._numbers = vertical_layout(self._side, *numbers, at=(0, 0))
+        self._body.setRowStretch(0, 1)
+        self._body.setColumnStretch(0, DIAL_SHARE)
+        self._body.setColumnStretch(1, SIDE_SHARE)
+        self._scroll = PageScroll()
+        self._scroll.setWidget(self._content)
+        layout = grid_layout(self)
+        layout.addWidget(self._hint, 1, 0)
+        layout.addWidget(self._warning, 2, 0)
+        layout.addWidget(self._verdict, 3, 0)
+        layout.addWidget(self._scroll, 4, 0)
+        # The last in the order of the Tab key: Enter must press a button of these only
+        # if somebody has chosen it.
+        head = ((self._instruction, 1), self.side, self.start_over)
+        horizontal_layout(layout, *head, at=(0, 0))
+        layout.setRowStretch(0, 1)
+        layout.setRowStretch(4, 10)
+
+        # Connections
+        self._scroll.height_changed.connect(self._hold_first_row)
+
+        self._verdict.hide()
+        self._use_room()
+        self._retranslate()
+
+    def value(self) -> OperatorValue:
+        """Return what is shown."""
+        return self._value
+
+    def set_value(
+        self, value: OperatorValue, note: str = "", *, is_verdict: bool = False
+    ) -> None:
+        """Show something else; a verdict has the whole width."""
+        self._value = value
+        self._instruction.set_text(value.instruction)
+        self._hint.set_text(value.hint, bold=False)
+        self._verdict.set_value(value.state)
+        self._banner.set_value(value.state)
+        self._banner.setVisible(not is_verdict)
+        self._verdict.setVisible(is_verdict)
+        self._count.set_text(value.count)
+        self._note.setText(note)
+        self._progress.setVisible(value.fraction is not None)
+        self._progress.setValue(round(PROGRESS_STEPS * (value.fraction or 0.0)))
+        if value.dial is not None:
+            self.dial.set_value(value.dial)
+
+    def set_state(self, state: SwingPageState) -> None:
+        """Show all of a swing at one moment."""
+        self.set_value(state.value, state.note, is_verdict=state.is_verdict)
+        self._warning.set_value(state.warning)
+        self._pen.set_value(state.stand)
+        self.side.setText(side_text(state.side))
+        self.side.set_why_not(state.why_not_side)
+
+    def set_image(self, shown: DisplayedImage) -> None:
+        """Show a live image, with rings about what is seen."""
+        rings = (replace(ring, label="") for ring in live_markers(shown.seen))
+        self._image.set_half(shown.half, shown.size, tuple(rings))
+
+    def plots(self) -> "SwingPlots":
+        """Return the plots."""
+        return self._plots.content()
+
+    def _retranslate(self) -> None:
+        """Set the texts anew."""
+        self._image.set_message(self.tr("No image yet"))
+        self._progress.setAccessibleName(self.tr("Progress"))
+        self.start_over.setText(self.tr("Start over"))
+        self.start_over.setToolTip(
+            self.tr(
+                "Abandon this swing and start again. Its images remain on the disk."
+            )
+        )
+
+    @property
+    def _is_small(self) -> bool:
+        return self._room.is_narrow or self._room.is_low
+
+    @override
+    def _use_room(self) -> None:
+        """Put the plots beside the dial, or below it where there is little room."""
+        is_small = self._is_small
+        if is_small:
+            self._side.addWidget(self._banner, 1, 0, 1, 3)
+            self._body.addWidget(self._plots, 1, 0, 1, 2)
+            self._body.addWidget(self._image, 2, 0, 1, 2)
+        else:
+            self._numbers.addWidget(self._banner)
+            self._side.addWidget(self._plots, 1, 0, 1, 3)
+            self._side.addWidget(self._image, 0, 2)
+        if self._room.is_vast:
+            self._numbers.insertWidget(PEN_PLACE, self._pen, 100)
+        else:
+            self._side.addWidget(self._pen, 0, 1)
+        self._share_room()
+        self._side.setVerticalSpacing(GRID if is_small else 2 * GRID)
+        self._hold_first_row(self._scroll.viewport().height())
+        policy = QSizePolicy.Policy
+        # Beside the numbers it is as high as they are; the plots have the rest.
+        down = policy.Preferred if is_small else policy.Ignored
+        self._image.setSizePolicy(policy.Expanding, down)
+        for each in (self._plots, self._image):
+            each.setMinimumHeight(PLOTS_HEIGHT if is_small else 0)
+            each.setMaximumHeight(PLOTS_HEIGHT if is_small else ANY_HEIGHT)
+        self._content.set_squeezed(not is_small)
+        is_large = self._room.is_large
+        self._instruction.setMinimumHeight(
+            (5 if is_small else 9 if is_large else 7) * GRID
+        )
+        self._count.set_largest(TextSize.HUGE if is_large else TextSize.DISPLAY)
+
+    def _share_room(self) -> None:
+        """Divide the room beside the dial among numbers, pen, image and plots."""
+        columns, rows = SIDE_SHARES, ROW_SHARES
+        if self._is_small:
+            columns, rows = (*columns[:2], 0), (1, 0)
+        elif self._room.is_vast:
+            columns, rows = VAST_SIDE_SHARES, VAST_ROW_SHARES
+        elif self._room.is_large:
+            columns, rows = LARGE_SIDE_SHARES, LARGE_ROW_SHARES
+        for column, share in enumerate(columns):
+            self._side.setColumnStretch(column, share)
+        for row, share in enumerate(rows):
+            self._side.setRowStretch(row, share)
+
+    def _hold_first_row(self, height: int) -> None:
+        """Let the dial and what is beside it be seen whole above the plots."""
+        self._body.setRowMinimumHeight(0, height if self._is_small else 0)
+
+
+def _make_plots() -> "SwingPlots":
+    # What draws plots takes a fifth of the time to the first window, which has none.
+    from lightpen_app.steps.swing.plots_panel import SwingPlots
+
+    return SwingPlots()

@@ -1,0 +1,446 @@
+"""What the operator is shown at one moment of a swing, as a value for the widgets."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import ceil, isfinite
+
+from PySide6.QtCore import QObject
+
+from lightpen.arrays import FloatArray
+from lightpen.cameras.worker_events import Connection
+from lightpen.estimation.reports.verdict import Grade, NextStep, Verdict
+from lightpen.messages import Message
+from lightpen.model.origin import Origin
+from lightpen.model.posture import Posture, posture_of
+from lightpen.simulator.follower import FIRST_LEAN
+from lightpen.swing.rules import COUNTDOWN, has_just_slipped
+from lightpen.swing.shortfall import Shortfall, out_of_reach, turn_range
+from lightpen.swing.state import Pause, Phase, SwingSetup, SwingState
+from lightpen.swing_messages import SHOW_PEN, Code
+from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.phrases import (
+    Instruction,
+    accepted_phrase,
+    grade_text,
+    lean_phrase,
+    n_images_text,
+    phase_text,
+    phrase,
+)
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import Tone
+from lightpen_app.look.words import PARTED
+from lightpen_app.steps.swing.remaining_images import RemainingImages
+from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.pen_in_space import DisplayedPosture
+from lightpen_app.widgets.posture_dial import DialValue
+from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.widgets.state_banner import State
+
+ENDED = (Phase.SOLVING, Phase.VERDICT)
+FLAWS = (Code.FEW_LEDS, Code.TOO_FAST, Code.BAD_FIT)  # images that are not kept
+UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
+PACE_S, N_PACING = 15.0, 6  # the last seconds and images by which time left is told
+LONG_S = 90.0  # told in minutes
+
+_LOOKS: dict[Phase, tuple[Sign, Tone]] = {
+    Phase.WAIT: (Sign.WAIT, Tone.QUIET),
+    Phase.SEEN: (Sign.EYE, Tone.ACTIVE),
+    Phase.SETTLED: (Sign.CHECK, Tone.GOOD),
+    Phase.COUNTDOWN: (Sign.PLAY, Tone.ACTIVE),
+    Phase.CAPTURING: (Sign.RECORD, Tone.GOOD),
+    Phase.PAUSED: (Sign.PAUSE, Tone.WARN),
+    Phase.SOLVING: (Sign.WAIT, Tone.ACTIVE),
+    Phase.VERDICT: (Sign.CROSS, Tone.BAD),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class SwingViewState:
+    """All that decides what is shown.
+
+    Attributes
+    ----------
+    connection : Connection
+        How the camera is.
+    seen : str
+        What the last image shows, a few words.
+    has_fault : bool
+        Whether the swing was paused because an image could not be recorded.
+    solving : float or None
+        How far the tip is computed, 0 to 1; None while it is not.
+    is_accepted : bool
+        Whether the tip is in force.
+    stillness : float
+        How long the pen has been upright and still after the verdict: 1 is enough.
+    origin : Origin or None
+        What the images are of.
+    is_simulated : bool
+        Whether the pen is led by the mouse, so that it leans as the camera sees it.
+    is_away : bool
+        Whether another step is shown.
+    to_go : RemainingImages or None
+        How many images are to go, by this moment and those before it.
+    """
+
+    setup: SwingSetup
+    state: SwingState
+    short: Shortfall
+    connection: Connection = Connection.STREAMING
+    seen: str = ""
+    has_fault: bool = False
+    solving: float | None = None
+    verdict: Verdict | None = None
+    is_accepted: bool = False
+    stillness: float = 0.0
+    origin: Origin | None = None
+    is_simulated: bool = False
+    is_away: bool = False
+    to_go: RemainingImages | None = None
+
+    @cached_property
+    def dial(self) -> DialValue:
+        """What the dial shows."""
+        return _dial(self)
+
+    @property
+    def asks_upright(self) -> bool:
+        """Whether the pen held upright and still leads to the review."""
+        asks = self.verdict is not None and not self.is_accepted
+        return asks and not (self.setup.is_recording or self.is_away)
+
+    @property
+    def lacks_images(self) -> bool:
+        """Whether the swing waits for the camera."""
+        streams = self.connection is Connection.STREAMING
+        return not streams and self.state.phase not in ENDED
+
+    @property
+    def is_unsolved(self) -> bool:
+        """Whether the tip could be computed, but is not being."""
+        return self.state.phase is Phase.SOLVING and self.solving is None
+
+
+class SwingWords(QObject):
+    """Puts a moment of a swing into words, signs and numbers."""
+
+    def operator_value(self, moment: SwingViewState) -> OperatorValue:
+        """Return what is shown, on the page and in the operator view."""
+        told = self._told(moment)
+        return OperatorValue(
+            instruction=told.short,
+            hint=told.hint,
+            state=self._banner(moment),
+            count=self._count(moment),
+            time_left=self._time_left(moment),
+            fraction=_fraction(moment),
+            keys=self._keys(moment),
+            dial=moment.dial,
+        )
+
+    def resting_value(self) -> OperatorValue:
+        """Return what is shown while other steps are, without a swing."""
+        told = Instruction(
+            self.tr("No swing yet"),
+            self.tr("The swing starts when the step Swing is opened at the computer."),
+        )
+        state = State(phase_text(Phase.WAIT), "", *_LOOKS[Phase.WAIT])
+        return OperatorValue(told.short, told.hint, state)
+
+    def waiting_value(self, refusal: Message | None, *, is_near: bool) -> OperatorValue:
+        """Return what is shown before there is a swing.
+
+        Parameters
+        ----------
+        refusal : Message or None
+            Why none can begin; None while images are waited for.
+        is_near : bool
+            Whether images come, so that a swing begins at any moment.
+        """
+        if is_near and refusal is None:
+            told = phrase(SHOW_PEN)
+            state = State(phase_text(Phase.WAIT), "", *_LOOKS[Phase.WAIT])
+            return OperatorValue(told.short, told.hint, state, dial=DialValue())
+        told = self._no_images()
+        if refusal is not None:
+            told = Instruction(self.tr("No swing"), worded(refusal))
+        return OperatorValue(
+            instruction=told.short,
+            hint=told.hint,
+            state=State(told.short, "", Sign.CROSS, Tone.BAD),
+            dial=DialValue(),
+        )
+
+    def note(self, moment: SwingViewState) -> str:
+        """Return what the count leaves out: time, limit, and what was of no use."""
+        limit = moment.setup.limits.max_images
+        text = self.tr("at most {0} images").format(limit)
+        if moment.setup.is_recording:
+            text = self._read(moment) if moment.state.phase in ENDED else ""
+            text = text or self.tr("recorded images")
+        n_dropped = sum(moment.state.n_dropped.values())
+        if n_dropped:
+            text = self.tr("{0}; {1} rejected").format(text, n_dropped)
+        why_more = self._why_more(moment)
+        return PARTED.join(filter(None, (self._time_left(moment), text, why_more)))
+
+    def _why_more(self, moment: SwingViewState) -> str:
+        """Return why more images are to go than before."""
+        is_counted = moment.state.phase is Phase.CAPTURING
+        if not is_counted or moment.to_go is None or not moment.to_go.has_risen:
+            return ""
+        short = moment.short
+        if short.n_for_uncertainty >= short.n_more:
+            return self.tr("More images needed: U (k = 2) has increased")
+        return self.tr("More images needed to complete the postures")
+
+    def warning(self, moment: SwingViewState) -> StatusMessage:
+        """Return what no swing can mend, told as soon as it is known."""
+        why = out_of_reach(moment.setup.limits, moment.state, moment.short)
+        is_asked = not moment.setup.is_recording
+        if why is None or not is_asked or moment.state.phase is Phase.VERDICT:
+            return StatusMessage()
+        return StatusMessage(worded(why), Sign.WARNING, Tone.WARN)
+
+    def stand(self, moment: SwingViewState) -> DisplayedPosture | None:
+        """Return how the pen is drawn in space; nothing where its tip is not known."""
+        pen, seat = moment.setup.pen, moment.state.kept.seat or moment.state.seat
+        tip = pen.nominal_tip if seat is None else seat.tip_pen
+        if tip is None:
+            return None
+        dial = moment.dial
+        return DisplayedPosture(pen, tip, dial.posture, dial.target, dial.heading)
+
+    def _told(self, moment: SwingViewState) -> Instruction:
+        state = moment.state
+        message, heading = state.message, state.heading
+        if moment.lacks_images and state.pause is Pause.BY_USER:
+            hint = self.tr(
+                "The camera sends no images. No data is lost. Press Space to "
+                "continue when images are received."
+            )
+            return replace(self._no_images(), hint=hint)
+        if moment.lacks_images:
+            return self._no_images()
+        if moment.is_unsolved:
+            return Instruction(
+                self.tr("Not computed"),
+                self.tr("The images are saved. Compute the tip again or start over."),
+            )
+        told = phrase(message, heading)
+        if moment.is_accepted:
+            return Instruction(
+                self.tr("Accepted"), self.tr("You can put the pen down.")
+            )
+        if moment.verdict is not None:
+            return self._next_step(moment, moment.verdict)
+        if moment.is_away and state.pause is Pause.BY_USER:
+            hint = self.tr("Return to the step Swing at the computer to continue.")
+            return Instruction(told.short, hint)
+        if moment.has_fault and state.pause is Pause.BY_USER:
+            hint = self.tr(
+                "An image could not be recorded (see the message at the top). "
+                "Correct the cause, then press Space."
+            )
+            return Instruction(told.short, hint)
+        if message.code == Code.SOLVING and moment.setup.is_recording:
+            return Instruction(told.short, self.tr("Computing the tip"))
+        if message.code == Code.SHOW_PEN and moment.is_simulated:
+            hint = self.tr(
+                "Let the simulated operator swing; or press Seat and tilt the pen "
+                "by dragging the dial."
+            )
+            return Instruction(told.short, hint)
+        if message.code == Code.FOLLOW_ARROW and state.target and heading is not None:
+            return lean_phrase(state.target, _posture(moment), heading)
+        return told
+
+    def _next_step(self, moment: SwingViewState, verdict: Verdict) -> Instruction:
+        steps = {
+            Grade.PASS: self.tr("Done"),
+            Grade.CHECK: self.tr("Check needed"),
+            Grade.REPEAT: self.tr("Repeat swing"),
+        }
+        step, is_recording = steps[verdict.grade], moment.setup.is_recording
+        can_go_on = verdict.next_step is NextStep.CAPTURE_MORE and not is_recording
+        if not verdict.can_be_accepted and can_go_on:
+            step = self.tr("Capture more")
+        if moment.is_away and is_recording:
+            hint = self.tr("Continue at the computer.")
+        elif moment.is_away:
+            hint = self.tr("Put the pen down. Continue at the computer.")
+        elif is_recording:
+            hint = self.tr("Continue with the review.")
+        else:
+            hint = self.tr("Hold the pen upright and still for 3 s to see the review.")
+        return Instruction(step, hint)
+
+    def _no_images(self) -> Instruction:
+        return Instruction(
+            self.tr("No images"),
+            self.tr(
+                "The camera sends no images. No data is lost. The swing continues "
+                "automatically when images are received."
+            ),
+        )
+
+    def _banner(self, moment: SwingViewState) -> State:
+        state = moment.state
+        word, (sign, tone) = phase_text(state.phase, state.pause), _LOOKS[state.phase]
+        fraction = None
+        if moment.lacks_images:
+            return State(self.tr("NO IMAGES"), "", Sign.CROSS, Tone.BAD)
+        if moment.is_unsolved:
+            word, sign, tone = self.tr("STOPPED"), Sign.PAUSE, Tone.WARN
+        elif state.phase is Phase.SOLVING:
+            fraction = moment.solving
+        elif state.phase is Phase.COUNTDOWN:
+            fraction = min((state.time - state.since) / COUNTDOWN, 1.0)
+        elif state.phase is Phase.CAPTURING and moment.setup.is_recording:
+            word, tone = self.tr("READING"), Tone.ACTIVE
+        elif state.phase is Phase.CAPTURING and has_just_slipped(state):
+            word, sign, tone = self.tr("TIP SLIPPED"), Sign.WARNING, Tone.BAD
+        elif state.phase is Phase.CAPTURING and state.message.code in FLAWS:
+            word, sign, tone = self.tr("NOT SAVED"), Sign.WARNING, Tone.WARN
+        elif state.phase is Phase.VERDICT:
+            return self._verdict(moment)
+        # What the last image shows is no news beside the pen being lost.
+        seen = "" if state.pause is Pause.LOST else moment.seen
+        return State(word, seen, sign, tone, fraction)
+
+    def _verdict(self, moment: SwingViewState) -> State:
+        if moment.verdict is None:
+            return State(
+                phase_text(Phase.VERDICT),
+                phrase(moment.state.message, moment.state.heading).hint,
+                *_LOOKS[Phase.VERDICT],
+            )
+        if moment.is_accepted:
+            told = accepted_phrase(moment.origin)
+            words = told.hint or self.tr("The tip is now in use.")
+            return State(told.short, words, *GRADE_MARKS[moment.verdict.grade])
+        told = phrase(moment.verdict.reason, moment.state.heading)
+        grade = moment.verdict.grade
+        sign, tone = GRADE_MARKS[grade]
+        word = grade_text(grade)
+        fraction = moment.stillness if moment.asks_upright else 0.0
+        return State(word, told.hint, sign, tone, fraction or None)
+
+    def _count(self, moment: SwingViewState) -> str:
+        state, n_kept = moment.state, moment.state.n_kept
+        if state.phase is Phase.COUNTDOWN:
+            return str(state.message.values["seconds"])
+        if state.phase in ENDED:
+            return n_images_text(n_kept)
+        if moment.setup.is_recording:
+            return self._read(moment)
+        if not isfinite(state.kept.uncertainty):
+            least = moment.setup.limits.min_images
+            return self.tr("{0} of {1} (minimum)").format(n_kept, least)
+        n_in_all = n_kept + _to_go(moment).n_images
+        return self.tr("{0} of about {1} images").format(n_kept, n_in_all)
+
+    def _read(self, moment: SwingViewState) -> str:
+        """Return how many images of a recording are read; nothing before the first."""
+        progress = moment.state.progress
+        if not progress.n_images:
+            return ""
+        words = self.tr("{0} of {1} images loaded")
+        return words.format(progress.n_read, progress.n_images)
+
+    def _time_left(self, moment: SwingViewState) -> str:
+        """Return how long the swing goes on at the pace of the last images."""
+        state, is_recording = moment.state, moment.setup.is_recording
+        is_on = state.phase is Phase.CAPTURING and not is_recording
+        if not is_on or not isfinite(state.kept.uncertainty):
+            return ""
+        times = state.kept.times
+        period = images_period(times[times > state.time - PACE_S])
+        if period is None or moment.lacks_images:
+            return ""
+        seconds = _n_more(moment) * period
+        if seconds > LONG_S:
+            return self.tr("about {0} min left").format(ceil(seconds / 60))
+        return self.tr("about {0} s left").format(max(10 * ceil(seconds / 10), 10))
+
+    def _keys(self, moment: SwingViewState) -> str:
+        """Return what the keys of the operator view do now."""
+        if moment.is_away:
+            return ""
+        if moment.verdict is not None:
+            return self.tr("Enter: review")
+        if moment.state.phase in ENDED:
+            return ""
+        if moment.state.pause is Pause.BY_USER:
+            return self.tr("Space: continue")
+        return self.tr("Space: pause")
+
+
+def images_period(times: FloatArray) -> float | None:
+    """Return the time from one kept image to the next, s; None of too few.
+
+    Parameters
+    ----------
+    times : (N,) array
+        Of the last images, s.
+    """
+    if len(times) < N_PACING:
+        return None
+    return float(times[-1] - times[0]) / (len(times) - 1)
+
+
+def _fraction(moment: SwingViewState) -> float | None:
+    n_kept, progress = moment.state.n_kept, moment.state.progress
+    match moment.state.phase:
+        case Phase.VERDICT:
+            return None
+        case Phase.SOLVING:
+            return moment.solving or 0.0
+    if moment.setup.is_recording:
+        return progress.n_read / max(progress.n_images, 1)
+    return n_kept / max(n_kept + _n_more(moment), 1)
+
+
+def _to_go(moment: SwingViewState) -> RemainingImages:
+    first = RemainingImages.first(moment.short.n_more, moment.state.n_kept)
+    return first if moment.to_go is None else moment.to_go
+
+
+def _n_more(moment: SwingViewState) -> int:
+    """Return how many images are to go, no more than is told."""
+    return min(moment.short.n_more, _to_go(moment).n_images)
+
+
+def _posture(moment: SwingViewState) -> Posture | None:
+    detection = moment.state.detection
+    if detection is None:
+        return None
+    return posture_of(moment.setup.pen, detection.rotation)
+
+
+def _dial(moment: SwingViewState) -> DialValue:
+    state, wanted = moment.state, moment.short.wanted
+    counts = state.counts
+    is_capturing = state.phase is Phase.CAPTURING and not moment.lacks_images
+    posture, target = _posture(moment), state.target if is_capturing else None
+    if moment.asks_upright:
+        turn = 0.0 if posture is None else posture.turn
+        target = replace(UPRIGHT, turn=turn)
+    elif state.phase in ENDED or moment.lacks_images:
+        posture = None
+    if state.heading is None and not moment.setup.is_recording:
+        # Nobody knows yet how the operator sees the pen lean; right is his own right.
+        if posture is not None and not moment.is_simulated:
+            posture = UPRIGHT
+        target = FIRST_LEAN if is_capturing else target
+    return DialValue(
+        counts=counts[1:],
+        needed=wanted[1:],
+        n_upright=int(counts[0, 0]),
+        n_upright_needed=int(wanted[0, 0]),
+        posture=posture,
+        target=target,
+        turns=turn_range(moment.setup.pen, state.kept.rotations),
+        heading=-(state.heading or 0.0),
+    )

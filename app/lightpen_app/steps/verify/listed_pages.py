@@ -1,0 +1,94 @@
+"""Pages, one of which is shown, and a list of them beside it or a field above it."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QFrame,
+    QListWidget,
+    QSizePolicy,
+    QStackedWidget,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen_app.look.layouts import horizontal_layout
+from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.choice_field import ChoiceField
+from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
+
+ROOM = 2 * GRID  # px, beside the longest title
+
+
+class ListedPages(ResponsiveLayout, QWidget):
+    """Shows the page whose title is chosen."""
+
+    narrow_below = 116 * GRID  # px; then the titles are in a field above the page
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._room = NO_ROOM
+
+        # Widgets
+        self._list = QListWidget()
+        self._list.setObjectName("task_list")
+        self._list.setFrameShape(QFrame.Shape.NoFrame)
+        never = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        self._list.setHorizontalScrollBarPolicy(never)
+        self._list.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Ignored)
+        self._field = ChoiceField()
+        self._stack = QStackedWidget()
+
+        # Layout
+        self._columns = horizontal_layout(
+            self, self._field, self._list, (self._stack, 1), spacing=2 * GRID
+        )
+        self._use_room()
+
+        # Connections
+        self._list.currentRowChanged.connect(self._stack.setCurrentIndex)
+        self._list.currentRowChanged.connect(self._field.setCurrentIndex)
+        self._field.activated.connect(self._list.setCurrentRow)
+
+    def add(self, page: QWidget) -> None:
+        """Add a page as the last one; the first is shown."""
+        self._stack.addWidget(page)
+        self._field.addItem("")
+        self._list.addItem("")
+        if self._list.currentRow() < 0:
+            self._list.setCurrentRow(0)
+
+    def remove(self, page: QWidget) -> None:
+        """Leave a page to another parent."""
+        index = self._stack.indexOf(page)
+        if index >= 0:
+            self._stack.removeWidget(page)
+            self._field.removeItem(index)
+            self._list.takeItem(index)
+
+    def set_title(self, page: QWidget, title: str) -> None:
+        """Name a page."""
+        index = self._stack.indexOf(page)
+        if self._list.item(index).text() != title:
+            self._list.item(index).setText(title)
+            self._list.setFixedWidth(self._list.sizeHintForColumn(0) + ROOM)
+            self._field.setItemText(index, title)
+
+    def show_page(self, page: QWidget) -> None:
+        """Show a page."""
+        self._list.setCurrentRow(self._stack.indexOf(page))
+
+    def set_list_name(self, name: str) -> None:
+        """Say to a screen reader what is listed."""
+        for each in (self._list, self._field):
+            each.setAccessibleName(name)
+
+    @override
+    def _use_room(self) -> None:
+        is_narrow, direction = self._room.is_narrow, QBoxLayout.Direction
+        self._columns.setDirection(
+            direction.TopToBottom if is_narrow else direction.LeftToRight
+        )
+        self._columns.setSpacing(GRID if is_narrow else 2 * GRID)
+        self._field.setVisible(is_narrow)
+        self._list.setVisible(not is_narrow)
+        self.setFocusProxy(self._field if is_narrow else self._list)

@@ -1,0 +1,304 @@
+"""What the step Verify shows, computed from the status of the verification."""
+
+from dataclasses import dataclass, field
+
+from PySide6.QtCore import QObject
+
+from lightpen.cameras.worker_events import Connection
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.messages import Message
+from lightpen.model.origin import Origin
+from lightpen.record.library.calibration_status import TipStatus
+from lightpen.verification.probing.probing import HELD_ENOUGH, ProbingPhase
+from lightpen.verification.session.session import BROKEN_OFF, rules_of
+from lightpen.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+    fraction_done,
+    instruction,
+)
+from lightpen.verification.session.status import ReadingState, VerificationStatus
+from lightpen.verification.tasks.registry import TASKS, AnyTask
+from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.phrases import Instruction, grade_text
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import Tone
+from lightpen_app.look.words import PARTED, moment_text, shortened
+from lightpen_app.steps.page import MainAction
+from lightpen_app.steps.verify.findings import posture_value
+from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.widgets.state_banner import State
+from lightpen_app.widgets.status_mark import status_text
+from lightpen_app.work.workbench import Workbench
+
+
+@dataclass(frozen=True)
+class Headline:
+    """What the page says of itself to the window.
+
+    Attributes
+    ----------
+    lead : str
+        Below its title.
+    """
+
+    lead: str = ""
+    tone: Tone = Tone.QUIET
+    action: MainAction = field(default_factory=lambda: MainAction(""))
+    is_complete: bool = False
+    is_doubtful: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class VerifyView:
+    """All that the page shows of a verification, except the results.
+
+    Attributes
+    ----------
+    operator : OperatorValue
+        What is shown in the operator view, too.
+    lamps : StatusMessage
+        The drift of fixed lamps, unless it is the verdict.
+    titles : tuple of str
+        Of the tasks, with how far each is.
+    task : VerificationTask or None
+        At hand.
+    reading : float or None
+        How much of recorded images is read, 0 to 1; None while none are.
+    """
+
+    headline: Headline = field(default_factory=Headline)
+    operator: OperatorValue = field(default_factory=OperatorValue)
+    lamps: StatusMessage = field(default_factory=StatusMessage)
+    titles: tuple[str, ...] = ()
+    task: AnyTask | None = None
+    reading: float | None = None
+    pause: str = ""
+    can_be_accepted: bool = False
+
+
+class VerifyPresenter(QObject):
+    """Computes what is shown from the status of runner, camera and station."""
+
+    def __init__(self, workbench: Workbench, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._selection, self._tips = workbench.selection, workbench.library
+        self._verification, self._live = workbench.verification, workbench.live
+
+    def view(self) -> VerifyView:
+        """Return what is shown now."""
+        status = self._status
+        is_reading = status.reading is ReadingState.IMAGES
+        headline = self.headline()
+        return VerifyView(
+            headline=headline,
+            operator=self.operator_value(),
+            lamps=_lamps_message(status),
+            titles=tuple(self._title(task) for task in TASKS),
+            task=status.task,
+            reading=self._verification.progress if is_reading else None,
+            pause=(
+                self.tr("Continue (Space)")
+                if status.is_paused
+                else self.tr("Pause (Space)")
+            ),
+            can_be_accepted=headline.is_doubtful
+            and status.is_done
+            and not status.accepted_by,
+        )
+
+    def headline(self) -> Headline:
+        """Return what the page says of itself."""
+        status, found = self._status, self._status.assessment
+        is_doubted = self._tip_is_doubted()
+        return Headline(
+            lead=self._lead(),
+            tone=Tone.WARN if is_doubted else Tone.QUIET,
+            action=self._action(),
+            is_complete=status.is_done,
+            is_doubtful=found is not None and found.grade is not Grade.PASS,
+        )
+
+    def operator_value(self) -> OperatorValue:
+        """Return what is shown on the page and in the operator view."""
+        status, said, banner = self._status, self._instruction(), self._banner()
+        setup, state, task = status.setup, status.state, status.task
+        if setup is None or state is None or task is None:
+            return OperatorValue(said.short, said.hint, banner)
+        options = setup.choices.options_of(task)
+        shown = task.shows_postures
+        return OperatorValue(
+            instruction=said.short,
+            hint=said.hint,
+            state=banner,
+            count=worded(task.counted(options, state.progress(setup, task))),
+            fraction=fraction_done(setup, state),
+            keys=(
+                self.tr("Space: continue")
+                if status.is_paused
+                else self.tr("Space: pause")
+            ),
+            dial=posture_value(setup, state, task) if shown else None,
+        )
+
+    @property
+    def _status(self) -> VerificationStatus:
+        return self._verification.status
+
+    # What the page says of itself
+
+    def _lead(self) -> str:
+        status = self._status
+        if status.tip is None:
+            return self.tr("Verify the current tip on reference artefacts.")
+        tip = status.tip
+        when = moment_text(tip.calibration.when, self.tr("d MMMM yyyy, hh:mm"))
+        words = self.tr("Tip {0} of pen {1}, in use since {2}").format(
+            shortened(tip.names.tip), shortened(tip.names.pen), when
+        )
+        doubt = grade_text(Grade.CHECK) if self._tip_is_doubted() else ""
+        files = ", ".join(file.name for file in status.files)
+        kept = self.tr("saved as {0}").format(files) if files else ""
+        by = shortened(status.accepted_by) if status.accepted_by else ""
+        accepted = self.tr("accepted by {0}").format(by) if by else ""
+        parts = words, doubt, self._tip_status(), kept, accepted
+        return PARTED.join(filter(None, parts))
+
+    def _tip_is_doubted(self) -> bool:
+        """Return whether the tip was accepted though its grade is CHECK."""
+        tip = self._status.tip
+        return tip is not None and tip.calibration.grade == Grade.CHECK
+
+    def _tip_status(self) -> str:
+        """Return the status of a tip, a word; nothing of a valid one."""
+        tip, statuses = self._status.tip, self._tips.statuses
+        if tip is None or self._selection.preparation.origin is Origin.SIMULATED:
+            return ""
+        status = statuses.of_tip(tip.names.pen, tip.names.tip)
+        return "" if status in (None, TipStatus.VALID) else status_text(status)
+
+    def _action(self) -> MainAction:
+        status = self._status
+        if status.is_done:
+            return MainAction(self.tr("Back to Start"))
+        has_points = status.state is not None and bool(status.state.touches)
+        why_not = "" if has_points else self.tr("No point is recorded yet.")
+        return MainAction(self.tr("Finish early"), why_not)
+
+    def _title(self, task: AnyTask) -> str:
+        """Return the name of a task, and how far it is if it is to be done."""
+        status, name = self._status, worded(task.title)
+        found = None if status.state is None else status.state.found.get(task.kind)
+        if found is not None:
+            far = self._grade_text(found.assessment.grade)
+        elif status.setup is not None and task.kind not in status.setup.choices.kinds:
+            return name
+        elif task is status.task:
+            far = self.tr("now")
+        else:
+            far = self.tr("to do")
+        return self.tr("{0}: {1}").format(name, far)
+
+    def _grade_text(self, grade: Grade) -> str:
+        """Return a grade; what is repeated is the verification and not a swing."""
+        return self.tr("REPEAT") if grade is Grade.REPEAT else grade_text(grade)
+
+    # What the operator has to do
+
+    def _instruction(self) -> Instruction:
+        status = self._status
+        setup, state = status.setup, status.state
+        if status.reading is ReadingState.IMAGES:
+            hint = self.tr("The points in recorded images are measured.")
+            return Instruction(self.tr("Reading images"), hint)
+        if status.refusal is not None:
+            return Instruction(self.tr("Nothing to verify"), worded(status.refusal))
+        if setup is None or state is None:
+            return Instruction(
+                self.tr("Wait"), self.tr("The current tip is being read.")
+            )
+        if status.assessment is not None and status.is_done:
+            verdicts = {
+                Grade.PASS: self.tr("Tip verified"),
+                Grade.CHECK: self.tr("Check needed"),
+                Grade.REPEAT: self.tr("Not verified"),
+            }
+            short = verdicts[status.assessment.grade]
+            return Instruction(short, worded(status.assessment.next_step))
+        if self._live.connection is not Connection.STREAMING:
+            hint = self.tr(
+                "The camera sends none. The verification continues when they arrive."
+            )
+            return Instruction(self.tr("No images"), hint)
+        if status.is_paused:
+            return Instruction(self.tr("Paused"), self.tr("Press Space to continue."))
+        return Instruction(self._short(setup, state), worded(instruction(setup, state)))
+
+    def _short(self, setup: SessionSetup, state: SessionState) -> str:
+        """Return in a few words what to do."""
+        task, touching = state.task(setup), state.touching
+        if _is_held(state):
+            return self.tr("Hold still")
+        if touching.phase is ProbingPhase.KNOWN:
+            return self.tr("Probed before")
+        if state.trouble is not None:
+            return self._fault(state.trouble)
+        if task is None:
+            return ""
+        progress = state.progress(setup, task)
+        is_next = touching.phase is ProbingPhase.RECORDED
+        return worded(task.headline(progress, is_next=is_next))
+
+    def _fault(self, trouble: Message) -> str:
+        if trouble.code == BROKEN_OFF.code:
+            return self.tr("Not recorded")
+        return self.tr("Not counted")
+
+    def _banner(self) -> State:
+        status = self._status
+        setup, state, task = status.setup, status.state, status.task
+        if status.reading is ReadingState.IMAGES:
+            fraction = self._verification.progress
+            return State(self.tr("READING"), "", Sign.WAIT, Tone.ACTIVE, fraction)
+        if status.refusal is not None:
+            return State(self.tr("NOT POSSIBLE"), "", Sign.CROSS, Tone.BAD)
+        if setup is None or state is None:
+            return State(self.tr("READING"), "", Sign.WAIT, Tone.ACTIVE)
+        if task is None and status.assessment is not None:
+            grade = status.assessment.grade
+            why = worded(status.assessment.reason)
+            return State(self._grade_text(grade), why, *GRADE_MARKS[grade])
+        if self._live.connection is not Connection.STREAMING:
+            return State(self.tr("NO IMAGES"), "", Sign.CROSS, Tone.BAD)
+        if status.is_paused:
+            return State(self.tr("PAUSED"), "", Sign.PAUSE, Tone.WARN)
+        assert task is not None
+        touching = state.touching
+        if touching.phase is ProbingPhase.RECORDED:
+            return State(self.tr("POINT RECORDED"), "", Sign.CHECK, Tone.GOOD)
+        if touching.phase is ProbingPhase.KNOWN:
+            return State(self.tr("PROBED BEFORE"), "", Sign.WARNING, Tone.WARN)
+        if _is_held(state):
+            fraction = touching.progress(rules_of(setup, task))
+            return State(self.tr("STEADY"), "", Sign.RECORD, Tone.ACTIVE, fraction)
+        if state.trouble is not None:
+            return State(self.tr("NOT RECORDED"), "", Sign.WARNING, Tone.WARN)
+        if touching.n_lost or not (touching.held or touching.path):
+            return State(self.tr("WAITING"), "", Sign.WAIT, Tone.QUIET)
+        return State(self.tr("PEN DETECTED"), "", Sign.EYE, Tone.ACTIVE)
+
+
+def _is_held(state: SessionState) -> bool:
+    """Return whether the pen is held still on a point that is not recorded yet."""
+    touching = state.touching
+    is_holding = touching.phase is ProbingPhase.HOLDING
+    return is_holding and len(touching.held) >= HELD_ENOUGH
+
+
+def _lamps_message(status: VerificationStatus) -> StatusMessage:
+    said = None if status.lamp_drift is None else status.lamp_drift.assessment
+    if said is None or (status.is_done and said is status.assessment):
+        return StatusMessage()
+    return StatusMessage(worded(said.reason), *GRADE_MARKS[said.grade])

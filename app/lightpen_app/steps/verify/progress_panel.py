@@ -1,0 +1,141 @@
+"""What to do next, how far the verification is, and the buttons that lead it."""
+
+from PySide6.QtWidgets import QProgressBar, QWidget
+from typing_extensions import override
+
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.record.library.supervision import Signature
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.theme import GRID, TextSize
+from lightpen_app.steps.verify.presenter import VerifyView
+from lightpen_app.widgets.fitted_text import FittedText
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.question_bar import Question, QuestionBar
+from lightpen_app.widgets.reason_bar import ReasonBar
+from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.widgets.state_banner import StateBanner
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.workbench import Workbench
+
+PROGRESS_STEPS = 1000
+STATE_HEIGHT, VERDICT_HEIGHT = 9 * GRID, 13 * GRID  # px; a verdict has its reason
+
+
+class ProgressPanel(Translated, QWidget):
+    """Shows the instruction, the state and the verdict of a verification."""
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._workbench, self._run = workbench, workbench.verification
+        self._runner = self._run.runner
+
+        # Widgets
+        self._question = QuestionBar()
+        self._question.set_words(self._starting_over)
+        self._reason = ReasonBar()
+        self._instruction = FittedText(TextSize.HUGE)
+        self._instruction.setMinimumHeight(6 * GRID)
+        self._act, self._start_over, self._accept = (PushButton() for _ in range(3))
+        self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
+        self._banner = StateBanner(TextSize.TITLE)
+        self._lamps = SignLabel()
+        self._numbers = QWidget()
+        self._count = FittedText(TextSize.DISPLAY)
+        self._progress = QProgressBar()
+        self._progress.setRange(0, PROGRESS_STEPS)
+        self._progress.setTextVisible(False)
+
+        # Layout
+        layout = vertical_layout(self, self._question, self._reason)
+        head = horizontal_layout(layout, (self._instruction, 1))
+        fill(head, self._accept, self._act, self._start_over)
+        fill(layout, self._hint)
+        state = horizontal_layout(layout, (self._banner, 3), spacing=2 * GRID)
+        fill(state, (self._numbers, 2))
+        vertical_layout(self._numbers, self._count, self._progress, spacing=GRID // 2)
+        fill(layout, self._lamps)
+
+        # Connections
+        self._run.refused.connect(self._on_refused)
+        self._act.clicked.connect(self.toggle_pause)
+        self._start_over.clicked.connect(self._on_start_over_clicked)
+        self._question.agreed.connect(self._begin_anew)
+        self._accept.clicked.connect(self._ask_reason)
+        self._reason.given.connect(self._on_reason_given)
+        self._reason.declined.connect(self._accept.setFocus)
+
+        self._retranslate()
+
+    def set_value(self, view: VerifyView) -> None:
+        """Show another moment of the verification."""
+        operator, is_done = view.operator, view.headline.is_complete
+        self._instruction.set_text(operator.instruction)
+        self._hint.set_text(operator.hint, bold=False)
+        self._banner.set_value(operator.state)
+        self._banner.setFixedHeight(VERDICT_HEIGHT if is_done else STATE_HEIGHT)
+        self._count.set_text(operator.count)
+        self._lamps.set_value(view.lamps)
+        self._numbers.setVisible(operator.fraction is not None)
+        self._progress.setValue(round(PROGRESS_STEPS * (operator.fraction or 0.0)))
+        self._act.setText(view.pause)
+        self._act.setEnabled(view.task is not None)
+        self._accept.setVisible(view.can_be_accepted)
+        if not view.can_be_accepted:
+            self._reason.hide()
+
+    def toggle_pause(self) -> None:
+        """Pause the verification, or continue."""
+        self._runner.ask(lambda workflow: workflow.toggle_pause())
+
+    def hide_question(self) -> None:
+        """Ask nothing any more."""
+        self._question.hide()
+
+    @override
+    def _retranslate(self) -> None:
+        self._reason.set_words(
+            self.tr(
+                "This result needs checking. Enter the reason for using the tip. It is "
+                "kept with the verification."
+            ),
+            self.tr("Reason"),
+            self.tr("Accept with reason"),
+            self.tr("Do not accept"),
+        )
+        self._accept.setText(self.tr("Accept..."))
+        self._accept.setToolTip(self.tr("Use the tip with a reason"))
+        self._start_over.setText(self.tr("Start over"))
+        self._start_over.setToolTip(
+            self.tr("Discard all points and verify the current tip from the start.")
+        )
+        self._progress.setAccessibleName(self.tr("Progress"))
+
+    def _starting_over(self) -> Question:
+        return Question(
+            self.tr("Start the verification over? Results are kept."),
+            self.tr("Start over"),
+            self.tr("Continue"),
+        )
+
+    def _begin_anew(self) -> None:
+        self._runner.ask(lambda workflow: workflow.start_over())
+
+    def _ask_reason(self) -> None:
+        found = self._run.status.assessment
+        is_beyond = found is not None and found.grade is Grade.REPEAT
+        is_guarded = self._workbench.selection.supervision.is_guarded
+        self._reason.ask(of_supervisor=is_guarded or is_beyond)
+
+    def _on_reason_given(self, reason: str, signature: Signature | None) -> None:
+        self._runner.ask(lambda workflow: workflow.accept(reason, signature))
+
+    def _on_refused(self) -> None:
+        if not self._accept.isHidden():
+            self._reason.refuse()
+
+    def _on_start_over_clicked(self) -> None:
+        status = self._run.status
+        if status.state is not None and status.state.is_begun and not status.is_done:
+            self._question.ask()
+        else:
+            self._begin_anew()

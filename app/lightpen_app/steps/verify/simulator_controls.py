@@ -1,0 +1,68 @@
+"""Buttons for the simulated operator who touches, where the pen is simulated."""
+
+from PySide6.QtWidgets import QToolButton, QWidget
+from typing_extensions import override
+
+from lightpen.simulator.hand import Operator
+from lightpen.verification.tasks.circle import SIMULATED_RADIUS
+from lightpen.verification.tasks.length import SIMULATED_LENGTH
+from lightpen_app.look.layouts import horizontal_layout
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.work.live_view import LiveView
+
+
+class ProbingSimulatorControls(SimulatorControls):
+    """Lets the simulated operator touch, or lift the pen; hidden with a real pen."""
+
+    def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:
+        super().__init__(live, parent)
+        self.setProperty("area", "panel")
+
+        # Widgets
+        self._touch = PushButton(checkable=True)
+        self._touch.setProperty("inviting", True)
+        self._sizes = text_label(TextSize.SMALL, Tone.QUIET)
+        self._lift = QToolButton()
+
+        # Layout
+        margins = (GRID, GRID // 2, GRID, GRID // 2)
+        cells = (self._touch, (self._sizes, 1), self._lift)
+        horizontal_layout(self, *cells, spacing=2 * GRID, margins=margins)
+
+        # Connections
+        self._touch.toggled.connect(live.set_touching)
+        self._lift.clicked.connect(self._on_lift_clicked)
+
+        self._retranslate()
+        self._follow_connection()
+
+    def stop(self) -> None:
+        """Leave the operator to others."""
+        self._touch.setChecked(False)
+
+    @override
+    def _retranslate(self) -> None:
+        self.setAccessibleName(self.tr("Simulated pen"))
+        set_words(
+            self._touch,
+            self.tr("Let the simulated operator probe"),
+            self.tr("It probes all tasks by itself."),
+        )
+        set_words(
+            self._lift, self.tr("Lift"), self.tr("Take the tip away for a moment.")
+        )
+        sizes = self.tr("Its ring has a radius of {0} mm, its bar a length of {1} mm.")
+        self._sizes.setText(
+            sizes.format(f"{SIMULATED_RADIUS:g}", f"{SIMULATED_LENGTH:g}")
+        )
+
+    @override
+    def _follow_connection(self) -> None:
+        super()._follow_connection()
+        if self._touch.isChecked():  # of a camera opened anew
+            self._live.set_touching(self._live.operator is not None)
+
+    def _on_lift_clicked(self) -> None:
+        self._command(Operator.lift)

@@ -1,0 +1,153 @@
+"""Whether a task is done, and its options: a row of fields made from the task."""
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtWidgets import QCheckBox, QWidget
+from typing_extensions import override
+
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.tasks.registry import AnyTask
+from lightpen.verification.tasks.task import (
+    NumberOption,
+    Option,
+    Surface,
+    SurfaceOption,
+    TaskOptions,
+)
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.choice_field import ChoiceField
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.translated import Translated
+
+
+class NumberOptionField(NumberField):
+    """A number among the options of a task."""
+
+    def __init__(self, option: NumberOption) -> None:
+        super().__init__(option.unit, (option.least, option.most), option.decimals)
+        self._option = option
+        self.setKeyboardTracking(False)
+
+    def chosen(self) -> float:
+        """Return the number; a count is whole."""
+        return self.value() if self._option.decimals else round(self.value())
+
+    def show_chosen(self, number: float) -> None:
+        """Show another number."""
+        self.setValue(number)
+
+    def retranslate(self) -> None:
+        """Set its texts anew."""
+        self.setSpecialValueText(worded(self._option.unknown))
+
+
+class SurfaceField(ChoiceField):
+    """Which surface is touched; as wide as its longest choice."""
+
+    def __init__(self, option: SurfaceOption) -> None:
+        super().__init__()
+        self._option = option
+        self.setSizeAdjustPolicy(ChoiceField.SizeAdjustPolicy.AdjustToContents)
+        for surface in Surface:
+            self.addItem("", surface)
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        # WORKAROUND for Qt 6: its own is kept from the language before.
+        return self.sizeHint()
+
+    def chosen(self) -> Surface:
+        """Return the surface."""
+        return Surface(self.currentData())
+
+    def show_chosen(self, surface: Surface) -> None:
+        """Show another surface."""
+        self.setCurrentIndex(self.findData(surface))
+
+    def retranslate(self) -> None:
+        """Set its texts anew."""
+        for index, label in enumerate(self._option.labels):
+            self.setItemText(index, worded(label))
+
+
+class TaskForm(Translated, QWidget):
+    """Shows whether a task is chosen, and its options.
+
+    Signals
+    -------
+    value_changed()
+        The user chose otherwise.
+    """
+
+    value_changed = Signal()
+
+    def __init__(self, task: AnyTask, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._task = task
+        self._value = VerificationChoices()
+
+        # Widgets
+        self._is_chosen = QCheckBox()
+        self._fields = {option.name: _field_of(option) for option in task.fields}
+        self._labels = tuple(
+            text_label(TextSize.SMALL, Tone.QUIET) for _ in self._fields
+        )
+
+        # Layout
+        layout = horizontal_layout(self, spacing=2 * GRID)
+        fill(layout, (self._is_chosen, 0, Qt.AlignmentFlag.AlignBottom))
+        for label, field in zip(self._labels, self._fields.values(), strict=True):
+            label.setWordWrap(False)
+            label.setBuddy(field)
+            vertical_layout(layout, label, field, spacing=GRID // 2)
+        layout.addStretch(1)
+
+        # Connections
+        self._is_chosen.toggled.connect(self._on_changed)
+        for field in self._fields.values():
+            if isinstance(field, NumberOptionField):
+                field.valueChanged.connect(self._on_changed)
+            else:
+                field.activated.connect(self._on_changed)
+
+        self._retranslate()
+
+    def value(self) -> VerificationChoices:
+        """Return all choices, with those of this task."""
+        is_chosen = self._is_chosen.isChecked()
+        choices = self._value.with_task(self._task, is_chosen=is_chosen)
+        values = {name: field.chosen() for name, field in self._fields.items()}
+        options: TaskOptions = self._task.options(**values)
+        return choices.with_options(options)
+
+    def set_value(self, choices: VerificationChoices) -> None:
+        """Show other choices."""
+        self._value = choices
+        options = choices.options_of(self._task)
+        blocked = self.blockSignals(True)
+        self._is_chosen.setChecked(self._task.kind in choices.kinds)
+        for name, field in self._fields.items():
+            field.show_chosen(getattr(options, name))
+        self.blockSignals(blocked)
+
+    def _on_changed(self) -> None:
+        self._value = self.value()
+        self.value_changed.emit()
+
+    @override
+    def _retranslate(self) -> None:
+        self._is_chosen.setText(worded(self._task.purpose))
+        fields = self._fields.values()
+        for option, label, field in zip(
+            self._task.fields, self._labels, fields, strict=True
+        ):
+            label.setText(worded(option.label))
+            field.setAccessibleName(worded(option.label))
+            field.retranslate()
+
+
+def _field_of(option: Option) -> NumberOptionField | SurfaceField:
+    if isinstance(option, NumberOption):
+        return NumberOptionField(option)
+    return SurfaceField(option)

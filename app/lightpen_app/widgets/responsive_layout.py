@@ -1,0 +1,83 @@
+"""Widgets that are arranged otherwise where they have little room, or much."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QWidget
+from typing_extensions import override
+
+from lightpen_app.look.theme import GRID
+
+if TYPE_CHECKING:
+    _Base = QWidget
+else:  # a class of Qt's cannot be a base twice
+    _Base = object
+
+
+@dataclass(frozen=True)
+class SizeClass:
+    """Whether a widget is short of room, in width and in height, or has plenty.
+
+    Attributes
+    ----------
+    is_vast : bool
+        Whether it has so much that it may show more than what is needed.
+    """
+
+    is_narrow: bool = False
+    is_low: bool = False
+    is_large: bool = False
+    is_vast: bool = False
+
+    @property
+    def margin(self) -> int:
+        """What is left free at the left and right of a page, px."""
+        return 2 * GRID if self.is_narrow else 4 * GRID
+
+
+NO_ROOM = SizeClass(is_narrow=True, is_low=True)
+
+
+class ResponsiveLayout(_Base):
+    """Put before the base of a widget, it arranges the widget anew as its room changes.
+
+    The widget itself does so once in its constructor.
+
+    Attributes
+    ----------
+    narrow_below, low_below : int
+        px; with less width or height it is short of room.
+    large_from, vast_from : QSize or None
+        From this on it has plenty, or more than that; None where that changes nothing.
+    """
+
+    narrow_below = 0
+    low_below = 0
+    large_from: QSize | None = None
+    vast_from: QSize | None = None
+    _room = SizeClass()
+
+    def _use_room(self) -> None:
+        """Arrange what is shown as `_room` allows."""
+        raise NotImplementedError
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        size = event.size()
+        room = SizeClass(
+            is_narrow=size.width() < self.narrow_below,
+            is_low=size.height() < self.low_below,
+            is_large=_holds(size, self.large_from),
+            is_vast=_holds(size, self.vast_from),
+        )
+        if room != self._room:
+            self._room = room
+            self._use_room()
+
+
+def _holds(size: QSize, other: QSize | None) -> bool:
+    """Return whether another size fits into a size, if there is one."""
+    return other is not None and other.boundedTo(size) == other

@@ -1,0 +1,53 @@
+"""What is entered in the archive because of what was kept in files."""
+
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+
+from PySide6.QtCore import QObject
+
+from lightpen.archive.lazy_logbook import LazyLogbook
+from lightpen.record.folder.camera_calibrations import CameraTrial, keep_camera_trial
+from lightpen.record.swings.names import Names
+from lightpen_app.work.job import Job, Report
+from lightpen_app.work.notifications import Notifications
+
+
+class ArchiveWriter(QObject):
+    """Enters beside the window what files of a data folder tell of."""
+
+    def __init__(
+        self,
+        folder: Path,
+        logbook: LazyLogbook,
+        now: Callable[[], datetime],
+        notifications: Notifications,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._folder = folder
+        self._logbook = logbook
+        self._now = now
+        self._notifications = notifications
+
+    def enter_owed(self) -> None:
+        """Enter what files tell of that the archive does not yet."""
+        logbook = self._logbook
+        Job(lambda _: logbook.enter_owed(), self).start()
+
+    def keep_camera_trial(self, trial: CameraTrial, names: Names) -> None:
+        """Keep what came of the calibration of a camera, and enter it."""
+        logbook, folder, now = self._logbook, self._folder, self._now
+
+        def keep(_: Report) -> None:
+            keep_camera_trial(folder, trial, names, now())
+            logbook.enter_owed()
+
+        job = Job(keep, self)
+
+        # Connections
+        job.failed.connect(self._on_failed)
+        job.start()
+
+    def _on_failed(self, why: str) -> None:
+        self._notifications.tell(self, why)

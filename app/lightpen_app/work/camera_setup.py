@@ -1,0 +1,142 @@
+"""The cameras that are chosen: opened, looked for, and remembered as they are set."""
+
+import logging
+from dataclasses import replace
+from functools import partial
+
+from PySide6.QtCore import QObject, Signal
+
+from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.source import FoundDevice, SourceNeeds
+from lightpen.cameras.sources import source_named
+from lightpen.live.sources import SourceEnvironment, cameras_of
+from lightpen.swing.preparation import CameraInUse, Preparation
+from lightpen_app.work.job import Job, Report
+from lightpen_app.work.live_view import DisplayedImage, LiveView
+from lightpen_app.work.selection import Selection
+from lightpen_app.work.settings import Settings
+
+_logger = logging.getLogger(__name__)
+
+
+class CameraSetup(QObject):
+    """Opens the source that is chosen, and looks for others.
+
+    A camera that is open is closed while others are looked for: some libraries end the
+    stream of one then.
+
+    Parameters
+    ----------
+    settings : Settings
+        Where it is remembered how cameras are set up.
+    around : SourceEnvironment
+        What simulated and recorded sources go by.
+
+    Signals
+    -------
+    cameras_found(tuple of FoundDevice)
+    search_failed(str)
+        The sentence why no cameras can be looked for.
+    """
+
+    cameras_found = Signal(object)
+    search_failed = Signal(str)
+
+    def __init__(
+        self,
+        selection: Selection,
+        live: LiveView,
+        settings: Settings,
+        around: SourceEnvironment,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._selection = selection
+        self._settings = settings
+        self._around = around
+        self._is_started = False
+        self._search: Job | None = None
+        self.live = live
+
+        # Connections
+        live.image_shown.connect(self._on_image_shown)
+        live.configured.connect(self._on_configured)
+        selection.changed.connect(self._on_selected)
+
+    def open(self) -> None:
+        """Open the source, or open it again after it failed; then follow its choice.
+
+        A swing that is captured goes on with it.
+        """
+        self._is_started = True
+        source, *others = self._selection.preparation.sources
+        if source.lacks_place:
+            self.live.close()
+            return
+        there = [other for other in others if not other.lacks_place]
+        cameras = cameras_of([source, *there], self._around)
+        clock, known = self._around.clock, self._settings.cameras()
+        _logger.info("opening %s", [source, *there])
+        self.live.open(cameras, CameraSettings(), clock, known)
+
+    def search(self, kind: str, producer: str) -> None:
+        """Look for the cameras of a source, by a GenTL producer where it needs one.
+
+        Of a search before nothing is told any more.
+        """
+        source = source_named(kind)
+        if source is None:
+            return
+        if self._search is not None:
+            self._search.cancel()
+        was_open = self.live.is_open
+        self.live.close()
+        find, live = source.find, self.live
+
+        def search(_: Report) -> tuple[FoundDevice, ...]:
+            live.await_closed()
+            return find(producer)
+
+        self._search = job = Job(search, self)
+
+        # Connections
+        job.succeeded.connect(self.cameras_found)
+        job.failed.connect(self.search_failed)
+        job.ended.connect(partial(self._on_search_ended, job, was_open=was_open))
+        job.start()
+
+    def _on_search_ended(self, job: Job, *, was_open: bool) -> None:
+        if job is not self._search:
+            return
+        self._search = None
+        if was_open and not self.live.is_open:
+            self.open()
+
+    def _on_selected(self, before: Preparation) -> None:
+        now = self._selection.preparation
+        if now.sources != before.sources and self._is_started:
+            self.open()
+        self.live.set_region(now.region)
+
+    def _on_image_shown(self, shown: DisplayedImage) -> None:
+        size, now = (
+            (shown.size.width(), shown.size.height()),
+            self._selection.preparation,
+        )
+        if shown.seen.camera == 0 and size != now.image_size:
+            self._selection.observe(replace(now, image_size=size))
+
+    def _on_configured(self, camera: int, settings: CameraSettings) -> None:
+        now, caps = self._selection.preparation, self.live.capabilities_of(camera)
+        serial = self.live.serial_of(camera)
+        used = CameraInUse(serial, settings)
+        if camera == 0:
+            now = replace(now, camera_in_use=used)
+        elif now.second is not None and caps is not None:
+            size = caps.width, caps.height
+            now = replace(now, second=replace(now.second, in_use=used, image_size=size))
+        else:
+            return
+        self._selection.observe(now)
+        if now.sources[camera].source.needs is not SourceNeeds.FILES:
+            self._settings.set_camera(serial, settings)

@@ -1,0 +1,51 @@
+"""What the user is told: published once, shown wherever somebody subscribes."""
+
+from collections.abc import Hashable
+
+from PySide6.QtCore import QObject, Signal
+
+from lightpen_app.look.theme import Tone
+
+
+class Notifications(QObject):
+    """The sentences that are to be read, each until its cause is gone.
+
+    Signals
+    -------
+    raised(str, Tone)
+        A sentence to be read.
+    withdrawn(str)
+        A sentence of `raised` whose cause is gone, in the language it was told in.
+    status_changed(str)
+        A sentence for the status line.
+    """
+
+    raised = Signal(str, object)
+    withdrawn = Signal(str)
+    status_changed = Signal(str)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._texts: dict[Hashable, str] = {}
+
+    def text(self, cause: Hashable) -> str:
+        """Return what is to be read because of a cause; empty if nothing is."""
+        return self._texts.get(cause, "")
+
+    def tell(self, cause: Hashable, text: str, tone: Tone = Tone.BAD) -> None:
+        """Publish a sentence, instead of an earlier one of its cause."""
+        if self.text(cause) != text:
+            self.withdraw(cause)
+        self._texts[cause] = text
+        self.raised.emit(text, tone)
+
+    def show_status(self, text: str) -> None:
+        """Publish a sentence for the status line; an empty one clears it."""
+        self.status_changed.emit(text)
+
+    def withdraw(self, *causes: Hashable) -> None:
+        """Take back what was published because of causes: they are gone."""
+        for cause in causes:
+            text = self._texts.pop(cause, "")
+            if text:
+                self.withdrawn.emit(text)

@@ -1,0 +1,154 @@
+"""What is chosen for a station: remembered, and limited by its supervisors."""
+
+from dataclasses import replace
+
+from PySide6.QtCore import QObject, Signal
+
+from lightpen.model.assumptions import USUAL
+from lightpen.model.limits import DueRule, StationLimits, SwingLimits
+from lightpen.record.library.supervision import Supervision
+from lightpen.record.swings.names import Names
+from lightpen.swing.preparation import Preparation, SourceChoice
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import FilePaths, Station, preparation_of, station_of
+
+# Nothing that is chosen for a trial is remembered.
+TRIAL = Names("Trial", "Trial", "SIM-1", "T-1", "C-1", 10.0)
+
+
+def trial_of(preparation: Preparation) -> Preparation:
+    """Return the choices of a trial with a simulated pen, without its files."""
+    trial = replace(
+        preparation,
+        names=TRIAL,
+        camera_file=None,
+        pen_file=None,
+        nominal_tip=None,
+        limits=SwingLimits(),
+        assumptions=USUAL,
+        second=None,
+    )
+    return trial.with_source(SourceChoice())
+
+
+def is_trial_ready(preparation: Preparation) -> bool:
+    """Return whether a trial may be swung."""
+    return preparation.names == TRIAL and not preparation.missing_inputs()
+
+
+class Selection(QObject):
+    """The choices for a calibration and for verifications.
+
+    Signals
+    -------
+    changed(Preparation)
+        Something else is chosen; with what was chosen before.
+    station_changed(FilePaths)
+        Another station is chosen, which had these files in use. What is still being
+        read is not for it.
+    """
+
+    changed = Signal(object)
+    station_changed = Signal(object)
+
+    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._settings = settings
+        self._preparation = Preparation()
+        self._choices = VerificationChoices()
+        self._supervision = Supervision()
+        self._unread = FilePaths()
+
+    @property
+    def preparation(self) -> Preparation:
+        """What is chosen for a calibration."""
+        return self._preparation
+
+    @property
+    def choices(self) -> VerificationChoices:
+        """What the tip is verified by."""
+        return self._choices
+
+    @property
+    def supervision(self) -> Supervision:
+        """What supervisors have laid down for the data folder."""
+        return self._supervision
+
+    @property
+    def limits(self) -> StationLimits:
+        """The limits of the station: as laid down, or as chosen."""
+        return self._limits_for(self._preparation)
+
+    def stations(self) -> tuple[str, ...]:
+        """Return the names of the stations that are known."""
+        return self._settings.stations()
+
+    def choose_station(self, name: str) -> None:
+        """Take over what was chosen last at a station, its files still to be read."""
+        station = self._settings.station(name) if name else Station()
+        before = self._preparation
+        chosen = preparation_of(name, station, before)
+        limits = self._limits_for(chosen)
+        self._preparation = replace(chosen, limits=limits.swing)
+        self._choices = replace(station.verification, limits=limits.verification)
+        self._unread = station.files
+        self._remember_last()
+        self.station_changed.emit(station.files)
+        self._follow(before)
+
+    def set_preparation(self, preparation: Preparation) -> None:
+        """Take over other choices, and remember them for the station."""
+        before, self._preparation = self._preparation, preparation
+        self._remember_last()
+        self._remember()
+        self._follow(before)
+
+    def observe(self, preparation: Preparation) -> None:
+        """Take over what cameras or files tell of themselves; it is not remembered."""
+        before, self._preparation = self._preparation, preparation
+        self._follow(before)
+
+    def forget_unread(self) -> None:
+        """Know that no file of the station is still to be read."""
+        self._unread = FilePaths()
+
+    def set_choices(self, choices: VerificationChoices) -> None:
+        """Take over other choices for verifications, and remember them."""
+        self._choices = choices
+        self._remember()
+        self.changed.emit(self._preparation)
+
+    def set_due_rule(self, rule: DueRule) -> None:
+        """Remember how long a tip may be in force where nothing is laid down."""
+        self._settings.set_due_rule(rule)
+        self.changed.emit(self._preparation)
+
+    def set_supervision(self, supervision: Supervision) -> None:
+        """Go by what supervisors have laid down, from now on."""
+        self._supervision = supervision
+        before, limits = self._preparation, self.limits
+        self._preparation = replace(before, limits=limits.swing)
+        self._choices = replace(self._choices, limits=limits.verification)
+        self._remember()
+        self._follow(before)
+
+    def _limits_for(self, preparation: Preparation) -> StationLimits:
+        chosen = StationLimits(preparation.limits, due=self._settings.due_rule())
+        return self._supervision.limits_at(preparation.names.station, chosen)
+
+    def _follow(self, before: Preparation) -> None:
+        if self._preparation.sources != before.sources:
+            self._preparation = self._preparation.without_images()
+        self.changed.emit(before)
+
+    def _remember_last(self) -> None:
+        station = self._preparation.names.station
+        if station not in ("", TRIAL.station):
+            self._settings.set_last_station(station)
+
+    def _remember(self) -> None:
+        name = self._preparation.names.station
+        if name not in ("", TRIAL.station):
+            station = station_of(self._preparation, self._choices, self._unread)
+            self._settings.set_station(name, station)

@@ -1,0 +1,128 @@
+"""What a station remembers from one run to the next."""
+
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.cameras.sources import source_named
+from lightpen.model.assumptions import USUAL, Assumptions
+from lightpen.model.limits import SwingLimits
+from lightpen.record.swings.names import Names
+from lightpen.swing.preparation import Preparation, SecondCamera, SourceChoice
+from lightpen.verification.session.choices import VerificationChoices
+
+Triple: TypeAlias = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class StoredCamera:
+    """Where the images of a camera come from, and what is left out of them.
+
+    Attributes
+    ----------
+    mask : tuple of triples
+        Circles of stray light: centre x, y and radius, px.
+    """
+
+    source: SourceChoice = field(default_factory=SourceChoice)
+    mask: tuple[Triple, ...] = ()
+
+
+@dataclass(frozen=True)
+class FilePaths:
+    """Paths of the files in use, empty where none is; units of a pen file without."""
+
+    camera: str = ""
+    pen: str = ""
+    pen_units: str = ""
+    rig: str = ""
+
+
+@dataclass(frozen=True)
+class Station:
+    """What was chosen last at a station.
+
+    Attributes
+    ----------
+    nominal_tip : triple or None
+        Its centre by design, mm, pen frame; None for that of the LED file.
+    second : StoredCamera or None
+        None where one camera is used.
+    """
+
+    names: Names = field(default_factory=Names)
+    nominal_tip: Triple | None = None
+    camera: StoredCamera = field(default_factory=StoredCamera)
+    second: StoredCamera | None = None
+    files: FilePaths = field(default_factory=FilePaths)
+    limits: SwingLimits = field(default_factory=SwingLimits)
+    assumptions: Assumptions = USUAL
+    verification: VerificationChoices = field(default_factory=VerificationChoices)
+
+
+def preparation_of(name: str, station: Station, before: Preparation) -> Preparation:
+    """Return what was chosen last at a station of a name, its files still to be read.
+
+    A source of a later version is passed over.
+    """
+    camera, second, tip = station.camera, station.second, station.nominal_tip
+    return replace(
+        before,
+        names=replace(station.names, station=name),
+        nominal_tip=None if tip is None else np.array(tip),
+        source=camera.source if _is_known(camera) else SourceChoice(),
+        second=SecondCamera(second.source, mask=_mask(second))
+        if second is not None and _is_known(second)
+        else None,
+        camera_file=None,
+        pen_file=None,
+        mask=_mask(camera),
+        limits=station.limits,
+        assumptions=station.assumptions,
+    )
+
+
+def station_of(
+    preparation: Preparation, choices: VerificationChoices, unread: FilePaths
+) -> Station:
+    """Return what a station keeps.
+
+    Parameters
+    ----------
+    unread : FilePaths
+        Of the files that are still being read: they stay remembered.
+    """
+    second, tip = preparation.second, preparation.nominal_tip
+    camera_file, pen_file = preparation.camera_file, preparation.pen_file
+    rig_file = preparation.rig_file
+    return Station(
+        names=preparation.names,
+        nominal_tip=None if tip is None else tuple(tip.tolist()),
+        camera=StoredCamera(preparation.source, _circles(preparation.mask)),
+        second=None
+        if second is None
+        else StoredCamera(second.source, _circles(second.mask)),
+        files=FilePaths(
+            unread.camera if camera_file is None else str(camera_file.path),
+            unread.pen if pen_file is None else str(pen_file.path),
+            unread.pen_units if pen_file is None else pen_file.units or "",
+            unread.rig if rig_file is None else str(rig_file.path),
+        ),
+        limits=preparation.limits,
+        assumptions=preparation.assumptions,
+        verification=choices,
+    )
+
+
+def _is_known(camera: StoredCamera) -> bool:
+    return source_named(camera.source.kind) is not None
+
+
+def _mask(camera: StoredCamera) -> FloatArray:
+    return np.array(camera.mask).reshape(-1, 3)
+
+
+def _circles(mask: FloatArray) -> tuple[Triple, ...]:
+    return tuple((x, y, radius) for x, y, radius in mask.tolist())

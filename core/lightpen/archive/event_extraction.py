@@ -1,0 +1,239 @@
+"""What happened, told by the files of a data folder: results, swings, the library."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from msgspec.structs import replace
+
+from lightpen.archive.entries import Event, FileHash, Kind, text_sha256, this_program
+from lightpen.errors import FileError
+from lightpen.estimation.reports.calibration_record import CalibrationRecord
+from lightpen.estimation.reports.report import calibration_record
+from lightpen.formats.files import read_bytes
+from lightpen.formats.files import sha256 as file_sha256
+from lightpen.formats.json_records import json_bytes
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.messages import Message
+from lightpen.record.library.tip_library import (
+    ItemKind,
+    ListedTip,
+    item_entries,
+    read_change,
+)
+from lightpen.record.results.assessment import SwingAssessment
+from lightpen.record.results.result_folder import LIMIT, WHAT, FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.header import HEADER, copy_name
+from lightpen.record.swings.journal import JOURNAL, journal_bytes
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import (
+    Record,
+    open_record,
+    recorded_limits,
+    recorded_names,
+    recorded_origin,
+)
+from lightpen.record.swings.solving import Solution, record_inputs
+
+
+@dataclass(frozen=True)
+class ExtractedEvent:
+    """What happened, as it is to be entered.
+
+    Attributes
+    ----------
+    record : str or None
+        The record of the calibration as JSON; of a swing without a tip what names its
+        images with their hashes. The event has its hash.
+    takes_back : str
+        File of the result that is taken back, as `FileHash.place`; else empty.
+    """
+
+    event: Event
+    record: str | None = None
+    takes_back: str = ""
+
+
+def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
+    """Return what a file says that put a tip in force, or took it back.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or is damaged.
+    """
+    digest = sha256(read_bytes(file, WHAT, LIMIT)).hexdigest()
+    place = FileHash(results.place_of(file), digest)
+    found = results.content(file)
+    if isinstance(found, Result):
+        return _account_of_acceptance(results, place, found)
+    event = Event(
+        kind=Kind.TAKEN_BACK,
+        at=found.at,
+        names=Names(operator=found.operator, pen=found.pen, tip=found.tip),
+        program=this_program(),
+        result=place,
+    )
+    revoked = file.with_name(f"{found.takes_back}.json")
+    return ExtractedEvent(event, takes_back=results.place_of(revoked))
+
+
+def account_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
+    """Return what a file says that changed the tip library.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or is damaged.
+    """
+    digest, change = file_sha256(file), read_change(file)
+    item, picture = change.item, None
+    if isinstance(item, ListedTip):
+        picture = item.picture
+    event = Event(
+        kind=Kind.LIBRARY,
+        at=change.at,
+        names=Names(
+            station=change.station,
+            operator=change.operator,
+            pen=item.id if item.kind is ItemKind.PEN else "",
+            tip=item.id if item.kind is ItemKind.TIP else "",
+            cone=item.id if item.kind is ItemKind.CONE else "",
+        ),
+        program=this_program(),
+        reason=change.reason,
+        settings=item_entries(item) | {"supervisor": change.supervisor},
+        result=FileHash(results.place_of(file), digest),
+        files=() if picture is None else (FileHash(picture.place, picture.sha256),),
+    )
+    return ExtractedEvent(event)
+
+
+def account_of_abandoned(
+    results: FolderArchive, record: Record, at: datetime
+) -> ExtractedEvent:
+    """Return what a swing says that was left without a tip."""
+    event = _event_of_swing(results, record, Kind.ABANDONED, at)
+    _, _, camera, pen = event.files
+    inputs = {
+        "camera": {"file": Path(camera.place).name, "sha256": camera.sha256},
+        "pen": {"file": Path(pen.place).name, "sha256": pen.sha256},
+        "observations": [
+            {"file": image.file.name, "sha256": image.sha256} for image in record.images
+        ],
+    }
+    return _with_record(event, {"inputs": inputs})
+
+
+def account_of_unreadable(
+    results: FolderArchive, folder: Path, at: datetime, why: Message
+) -> ExtractedEvent:
+    """Return all that can be said of a swing that was set aside and cannot be read."""
+    event = Event(
+        kind=Kind.ABANDONED,
+        at=at,
+        names=Names(),
+        program=this_program(),
+        why=StoredMessage.of(why),
+        swing=results.place_of(folder),
+    )
+    return ExtractedEvent(event)
+
+
+def account_of_refused(
+    results: FolderArchive,
+    solution: Solution,
+    assessment: SwingAssessment,
+    at: datetime,
+) -> ExtractedEvent:
+    """Return what a solved swing says whose tip was not accepted.
+
+    Raises
+    ------
+    FileError
+        A file of the swing cannot be read.
+    """
+    record, calibration = open_record(solution.source.folder), solution.calibration
+    event = replace(
+        _event_of_swing(results, record, Kind.REFUSED, at),
+        grade=assessment.verdict.grade.value,
+        why=StoredMessage.of(assessment.verdict.reason),
+        tip_pen_mm=tuple(calibration.joint.tip_pen.tolist()),
+        expanded_uncertainty_mm=tuple(
+            calibration.budget.expanded_uncertainty[:3].tolist()
+        ),
+    )
+    inputs, limits = record_inputs(solution.source), recorded_limits(record)
+    return _with_record(event, calibration_record(calibration, inputs, "joint", limits))
+
+
+def _account_of_acceptance(
+    results: FolderArchive, place: FileHash, result: Result
+) -> ExtractedEvent:
+    event = Event(
+        kind=Kind.ACCEPTED if result.restores is None else Kind.RESTORED,
+        at=result.accepted,
+        names=result.names,
+        program=str(result.calibration.program),
+        origin=result.origin,
+        grade=result.grade,
+        why=result.why,
+        reason=result.reason,
+        tip_pen_mm=tuple(result.tip_pen.tolist()),
+        expanded_uncertainty_mm=tuple(result.uncertainty.tolist()),
+        change=result.change,
+        swing=results.place_of(result.record),
+        result=place,
+        concerns=result.restores,
+    )
+    with suppress(FileError):  # a result outlives the record of its swing
+        record = open_record(result.record)
+        files = _files_of(results, record)
+        event = replace(event, settings=record.header.settings, files=files)
+    return _with_record(event, result.calibration)
+
+
+def _event_of_swing(
+    results: FolderArchive, record: Record, kind: Kind, at: datetime
+) -> Event:
+    return Event(
+        kind=kind,
+        at=at,
+        names=recorded_names(record),
+        program=record.header.program,
+        origin=recorded_origin(record),
+        swing=results.place_of(record.folder),
+        settings=record.header.settings,
+        files=_files_of(results, record),
+    )
+
+
+def _files_of(results: FolderArchive, record: Record) -> tuple[FileHash, ...]:
+    """Return header, journal and the copies of camera and pen file.
+
+    Of the journal no more than was read: lines are added to it.
+    """
+    header, folder = record.header, record.folder
+    digest = sha256(journal_bytes(folder)[: record.length]).hexdigest()
+    whole = [
+        FileHash(results.place_of(path), file_sha256(path))
+        for path in (
+            folder / HEADER,
+            folder / copy_name("camera", header.camera_file),
+            folder / copy_name("pen", header.pen_file),
+        )
+    ]
+    read = FileHash(results.place_of(folder / JOURNAL), digest, record.length)
+    return (whole[0], read, *whole[1:])
+
+
+def _with_record(
+    event: Event, record: Mapping[str, Any] | CalibrationRecord
+) -> ExtractedEvent:
+    text = json_bytes(record).decode()
+    return ExtractedEvent(replace(event, record_sha256=text_sha256(text)), text)

@@ -1,0 +1,95 @@
+"""A logbook that is opened when something is entered first."""
+
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING
+
+from lightpen.archive.uses import closed
+from lightpen.messages import Message
+from lightpen.record.results.assessment import SwingAssessment
+from lightpen.record.swings.solving import Solution
+
+if TYPE_CHECKING:
+    from lightpen.archive.logbook import Logbook
+
+SERVER = "LIGHTPEN_ARCHIVE"  # names the variable with the address of a server
+
+
+class LazyLogbook:
+    """Costs nothing until then, so that the start of the program need not wait for it.
+
+    Parameters
+    ----------
+    data, server
+        As of `lightpen.archive.logbook.Logbook`.
+    """
+
+    def __init__(self, data: Path, server: str = "") -> None:
+        self._data, self._server = data, server
+        self._lock = Lock()
+        self._opened: Logbook | None = None
+        self._is_closed = False
+
+    def enter_owed(
+        self, report: Callable[[float], None] = lambda fraction: None
+    ) -> tuple[Message, ...]:
+        """Enter what the files tell of; see `lightpen.archive.logbook.Logbook`."""
+        logbook = self._open()
+        return () if logbook is None else logbook.enter_owed(report)
+
+    def enter_set_aside(
+        self,
+        solution: Solution | None,
+        assessment: SwingAssessment | None,
+        at: datetime,
+    ) -> None:
+        """Enter that a swing was set aside, with the tip that was not accepted.
+
+        Raises
+        ------
+        ArchiveError, FileError
+            As of `lightpen.archive.logbook.Logbook.enter_refused`.
+        """
+        logbook = self._open()
+        if logbook is None:
+            return
+        if solution is not None and assessment is not None:
+            logbook.enter_refused(solution, assessment, at)
+        else:
+            logbook.enter_owed()
+
+    def opened(self) -> "Logbook":
+        """Return the logbook, opened by now.
+
+        Raises
+        ------
+        ArchiveError
+            It cannot be opened, or was closed.
+        """
+        logbook = self._open()
+        if logbook is None:
+            raise closed()
+        return logbook
+
+    def close(self) -> None:
+        """Let go of the archive; nothing is entered any more.
+
+        Raises
+        ------
+        ArchiveError, FileError
+            As of `lightpen.archive.logbook.Logbook.close`.
+        """
+        with self._lock:
+            logbook, self._opened, self._is_closed = self._opened, None, True
+        if logbook is not None:
+            logbook.close()
+
+    def _open(self) -> "Logbook | None":
+        with self._lock:
+            if self._opened is None and not self._is_closed:
+                from lightpen.archive.logbook import Logbook  # a quarter of a second
+
+                self._opened = Logbook(self._data, self._server)
+            return self._opened

@@ -1,0 +1,75 @@
+"""Bringing what a station enters to a server, whenever it answers.
+
+The archive of the station itself is what waits to be delivered: it has every entry
+before the server does, and keeps it. So nothing is lost while the server is away, and
+as entries are copied in their order and known ones passed over, none is doubled.
+
+The server is called for each delivery and then let go of: it has many stations to
+serve, and a line that is kept may be dead without either end knowing.
+"""
+
+from contextlib import closing
+from threading import Event, Thread
+
+from lightpen.archive.database import Database, open_server
+from lightpen.archive.exchange import deliver
+from lightpen.errors import ArchiveError
+from lightpen.messages import Message
+
+AGAIN_S = 30.0  # after a server did not answer
+
+
+class Replicator:
+    """Delivers in a thread of its own, until it is closed.
+
+    Parameters
+    ----------
+    database : Database
+        Of the station.
+    chain : str
+        That is at home there.
+    address : str
+        Of the server; see `lightpen.archive.database.open_server`.
+
+    Attributes
+    ----------
+    n_delivered : int or None
+        Entries that the server has; None until it answered first.
+    trouble : Message or None
+        Why the last attempt failed.
+    """
+
+    def __init__(self, database: Database, chain: str, address: str) -> None:
+        self._database = database
+        self._chain = chain
+        self._address = address
+        self._is_due, self._is_ending = Event(), Event()
+        self.n_delivered: int | None = None
+        self.trouble: Message | None = None
+        self._thread = Thread(target=self._run, name="delivery", daemon=True)
+        self._is_due.set()
+        self._thread.start()
+
+    def wake(self) -> None:
+        """Deliver soon."""
+        self._is_due.set()
+
+    def close(self, timeout_s: float) -> None:
+        """End, once what is being delivered is there or the time is over."""
+        self._is_ending.set()
+        self._is_due.set()
+        self._thread.join(timeout_s)
+
+    def _run(self) -> None:
+        while True:
+            self._is_due.wait(None if self.trouble is None else AGAIN_S)
+            self._is_due.clear()
+            try:
+                with closing(open_server(self._address)) as server:
+                    copied = deliver(self._database, self._chain, server)
+                self.n_delivered = copied.n_known + copied.n_new
+                self.trouble = None
+            except ArchiveError as error:
+                self.trouble = error.message
+            if self._is_ending.is_set():
+                break

@@ -1,0 +1,68 @@
+"""Where a result is entered in the archive beside it, which is only read."""
+
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from lightpen.errors import FileError, NoArchiveError
+from lightpen.formats.files import printable
+from lightpen.record.results.opening import data_folder_of
+from lightpen.record.results.result_folder import FolderArchive
+
+
+@dataclass(frozen=True)
+class ArchivePlace:
+    """Where in an archive a calibration is entered.
+
+    Attributes
+    ----------
+    number : int
+        In its chain, from 1.
+    sha256, previous : str
+        Of the entry, and of the one before it.
+    """
+
+    number: int
+    sha256: str
+    previous: str
+
+
+def entry_of_file(result: Path, sha256: str) -> ArchivePlace | None:
+    """Return where a result is entered.
+
+    Parameters
+    ----------
+    sha256 : str
+        Of the file as it was read.
+
+    Returns
+    -------
+    ArchivePlace or None
+        None of a file in no data folder, and of one that is not entered yet.
+
+    Raises
+    ------
+    ArchiveError
+        The archive is there, but cannot be read.
+    FileError
+        It is not the file that was entered.
+    """
+    data = data_folder_of(result)
+    if data is None:
+        return None
+    # A fifth of a second, which a file in no data folder need not take.
+    from lightpen.archive.chains import chain_at_home, entry_of_result
+    from lightpen.archive.database import look_into
+    from lightpen.archive.logbook import ARCHIVE
+
+    found = None
+    with suppress(NoArchiveError), closing(look_into(data / ARCHIVE)) as database:
+        if chain := chain_at_home(database):
+            place = FolderArchive(data).place_of(result)
+            found = entry_of_result(database, chain, place)
+    if found is None:
+        return None
+    entered = found.entry.event.result
+    if entered is None or entered.sha256 != sha256:
+        raise FileError("archive.another-result", file=printable(str(result)))
+    return ArchivePlace(found.entry.number, found.sha256, found.entry.previous)

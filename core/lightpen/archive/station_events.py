@@ -1,0 +1,143 @@
+"""What happens at a station besides swings: limits, verifications, cameras."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+
+from lightpen.archive.entries import Event, FileHash, Kind, this_program
+from lightpen.archive.event_extraction import ExtractedEvent
+from lightpen.errors import FileError
+from lightpen.formats.files import MEGABYTE, read_bytes
+from lightpen.record.folder.camera_calibrations import (
+    CAMERA_CALIBRATIONS,
+    WHAT,
+    read_camera_trial,
+)
+from lightpen.record.folder.verifications import (
+    TOUCHES,
+    VERIFICATIONS,
+    StoredVerification,
+    read_verification,
+)
+from lightpen.record.library.numbered_files import numbered_files
+from lightpen.record.library.supervision import LIMITS_FOLDER, read_limits_change
+from lightpen.record.results.result_folder import SIMULATED, FolderArchive
+from lightpen.record.swings.assumed import Plain
+from lightpen.record.swings.journal import JOURNAL
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import open_record
+
+LIMIT = 64 * MEGABYTE
+FOLDERS = (
+    *(LIMITS_FOLDER, CAMERA_CALIBRATIONS, VERIFICATIONS),
+    f"{SIMULATED}/{VERIFICATIONS}",
+)
+
+
+def station_files(data: Path) -> Iterator[Path]:
+    """Yield the files that tell of such things, of each kind the oldest first.
+
+    Raises
+    ------
+    FileError
+        A folder cannot be read.
+    """
+    for folder in FOLDERS:
+        yield from reversed(numbered_files(data / folder))
+
+
+def is_station_file(file: Path) -> bool:
+    """Return whether a file tells of such things."""
+    return file.parent.name in FOLDERS
+
+
+def account_of_station(results: FolderArchive, file: Path) -> ExtractedEvent:
+    """Return what a file says of limits, of a verification or of a camera.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or is damaged.
+    """
+    content = read_bytes(file, WHAT, LIMIT)
+    place = FileHash(results.place_of(file), sha256(content).hexdigest())
+    if file.parent.name == LIMITS_FOLDER:
+        return ExtractedEvent(_of_limits(file, content, place))
+    if file.parent.name == CAMERA_CALIBRATIONS:
+        event = _of_camera(file, content, place)
+    else:
+        event = _of_tip(results, file, content, place)
+    return ExtractedEvent(event, content.decode("utf-8", "surrogateescape"))
+
+
+def _of_limits(file: Path, content: bytes, place: FileHash) -> Event:
+    change = read_limits_change(content, file)
+    settings: dict[str, Plain] = {"changes_password": bool(change.password)}
+    if change.limits is not None:
+        settings |= change.limits
+    return Event(
+        kind=Kind.LIMITS,
+        at=change.at,
+        names=Names(station=change.station, operator=change.supervisor),
+        program=this_program(),
+        settings=settings,
+        result=place,
+    )
+
+
+def _of_camera(file: Path, content: bytes, place: FileHash) -> Event:
+    trial = read_camera_trial(content, file)
+    return Event(
+        kind=Kind.CAMERA,
+        at=trial.created,
+        names=Names(station=trial.station, operator=trial.operator),
+        program=str(trial.program),
+        origin=trial.origin,
+        outcome=trial.outcome,
+        settings={"board": trial.board, "camera": trial.serial},
+        result=place,
+        record_sha256=place.sha256,
+    )
+
+
+def _of_tip(
+    results: FolderArchive, file: Path, content: bytes, place: FileHash
+) -> Event:
+    """Return the verification of a tip."""
+    done = read_verification(content, file)
+    verdict = done.verdict
+    limits = {} if verdict is None else verdict.limits_mm
+    settings: dict[str, Plain] = {
+        "verified": done.verification,
+        **{f"max_{name}_mm": value for name, value in limits.items()},
+    }
+    if done.supervisor:
+        settings["supervisor"] = done.supervisor
+    return Event(
+        kind=Kind.VERIFICATION,
+        at=done.created,
+        names=Names(done.station, done.operator, done.pen, done.tip),
+        program=str(done.program),
+        origin=done.origin,
+        grade="" if verdict is None else verdict.grade,
+        why=done.why,
+        reason=done.reason,
+        outcome=done.outcome,
+        settings=settings,
+        result=place,
+        files=tuple(_touched(results, file, done)),
+        record_sha256=place.sha256,
+    )
+
+
+def _touched(
+    results: FolderArchive, file: Path, done: StoredVerification
+) -> Iterator[FileHash]:
+    """Yield the files of live touches, each image among them."""
+    for run in done.inputs.touches:
+        folder = file.parent / TOUCHES / run.folder
+        yield FileHash(results.place_of(folder / JOURNAL), run.journal_sha256)
+        with suppress(FileError):  # what is missing is found where files are looked at
+            for image in open_record(folder).images:
+                yield FileHash(results.place_of(image.file), image.sha256)

@@ -1,0 +1,29 @@
+"""How the tips of a station stand, by what its archive tells."""
+
+from datetime import datetime
+
+from lightpen.archive.database import Database
+from lightpen.archive.due import due_tips
+from lightpen.model.limits import DueRule
+from lightpen.record.library.calibration_status import CurrentResult, StationStatus
+from lightpen.record.library.tip_library import Library
+
+
+def statuses(
+    database: Database, chain: str, rule: DueRule, library: Library, now: datetime
+) -> StationStatus:
+    """Return how all tips of a station stand now.
+
+    Parameters
+    ----------
+    chain : str
+        That is at home at the station.
+    rule : DueRule
+        For tips that have none of their own.
+    """
+    in_force = {}
+    for tip in due_tips(database, chain, rule, library):
+        event = tip.entry.entry.event
+        pair = event.names.pen, event.names.tip
+        in_force[pair] = CurrentResult(tip.calibrated, tip.due, tip.is_due(now))
+    return StationStatus(library, in_force, now)

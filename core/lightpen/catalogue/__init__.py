@@ -1,0 +1,1 @@
+"""The message catalogue: code and English template, a module for each area."""

@@ -1,0 +1,312 @@
+"""Detection of the pen in an image: LEDs and pose, or why there are none.
+
+Live images and files share `detections_of`: `detect_pen` calls it for single images and
+fits the pose, `lightpen.detection.observations` for many at once.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from math import ceil, floor
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.detection.disc_moments import PixelBox
+from lightpen.detection.labelling.constellation import certain_leds
+from lightpen.detection.labelling.hypotheses import MAX_SHIFT
+from lightpen.detection.labelling.labels import (
+    Labels,
+    LabelStatus,
+    label_spots,
+    track_spots,
+)
+from lightpen.detection.pose import MIN_POSE_LEDS, fit_poses
+from lightpen.detection.reasons import MISHAPS, Reason
+from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
+from lightpen.model.camera import Camera
+from lightpen.model.ellipse import centers_from_centroids
+from lightpen.model.pen import Pen
+
+ROOM = 3.0  # radii of a disc from its centre to the border of what is read
+
+_REASONS = {  # of sharp spots without a pose
+    LabelStatus.LABELLED: Reason.TOO_FEW_LEDS,  # that are whole
+    LabelStatus.NO_SPOTS: Reason.EMPTY,
+    LabelStatus.TOO_FEW: Reason.TOO_FEW_LEDS,
+    LabelStatus.NO_FIT: Reason.NOT_THE_PEN,
+    LabelStatus.AMBIGUOUS: Reason.AMBIGUOUS,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PenDetection:
+    """The pen in one image.
+
+    Attributes
+    ----------
+    pixels : (L, 2) array
+        Ellipse centres of the LEDs that are fit for use, px; NaN elsewhere.
+    seen_pixels : (L, 2) array
+        Centres of all labelled LEDs, also of merged and cut ones, px; NaN elsewhere.
+    reason : Reason
+        Why there is no pose; `Reason.NONE` where there is one.
+    rotation, translation : (3, 3) and (3,) array
+        cam_from_pen, mm; NaN without a pose.
+    cofactors : (6, 6) array
+        Covariance of the pose's (theta, dt) for a noise of 1 px, rad and mm; NaN
+        without a pose or where it is a rough one.
+    sigma : float
+        Standard deviation of one image coordinate, by this image alone, px; NaN
+        likewise.
+    spots : Spots or None
+        All that was found in the image.
+    labels : Labels or None
+        Which spot is which LED.
+    others : tuple of PenDetection
+        In the images that the other cameras of a rig took at this moment.
+    posed_by : int
+        Which camera of the rig the pose is by, from 0.
+    """
+
+    pixels: FloatArray
+    seen_pixels: FloatArray
+    reason: Reason
+    rotation: FloatArray = field(default_factory=lambda: np.full((3, 3), np.nan))
+    translation: FloatArray = field(default_factory=lambda: np.full(3, np.nan))
+    cofactors: FloatArray = field(default_factory=lambda: np.full((6, 6), np.nan))
+    sigma: float = float("nan")
+    spots: Spots | None = None
+    labels: Labels | None = None
+    others: tuple["PenDetection", ...] = ()
+    posed_by: int = 0
+
+    @property
+    def rig_pixels(self) -> FloatArray:
+        """Centres by all cameras of a rig, (C, L, 2), px; NaN where it is not seen."""
+        return np.stack([self.pixels, *(other.pixels for other in self.others)])
+
+    @property
+    def has_pose(self) -> bool:
+        """Whether there is a pose."""
+        return self.reason is Reason.NONE
+
+    @property
+    def n_leds(self) -> int:
+        """Number of LEDs fit for use, by the camera that the pose is by."""
+        return _n_seen(self.rig_pixels[self.posed_by])
+
+    @property
+    def is_blurred(self) -> bool:
+        """Whether most of the spots are smeared, as a fast hand smears them."""
+        spots = (self, *self.others)[self.posed_by].spots
+        return spots is not None and spots.are_blurred
+
+    @property
+    def areas(self) -> FloatArray:
+        """Areas of the LEDs fit for use, (L,), px^2; NaN elsewhere.
+
+        So it is of saturated ones, which look larger than they are.
+        """
+        areas = np.full(len(self.pixels), np.nan)
+        if self.spots is None or self.labels is None:
+            return areas
+        spot = self.labels.spot
+        known = np.isfinite(self.pixels[:, 0])
+        known[known] = (self.spots.flaws[spot[known]] & SpotFlaw.SATURATED) == 0
+        areas[known] = self.spots.areas[spot[known]]
+        return areas
+
+    @property
+    def edge_width(self) -> float:
+        """Mean width of the rims of the labelled LEDs, px; NaN without any."""
+        if self.spots is None or self.labels is None:
+            return float("nan")
+        labelled = self.labels.spot[self.labels.spot >= 0]
+        widths = self.spots.edge_widths[labelled]
+        return float(widths.mean()) if len(widths) else float("nan")
+
+
+def detect_pen(
+    image: Image,
+    camera: Camera,
+    pen: Pen,
+    mask: FloatArray | None = None,
+    before: PenDetection | None = None,
+    full_scale: int | None = None,
+    *,
+    is_followed: bool = False,
+) -> PenDetection:
+    """Find the pen in an image, and its pose by maximum likelihood.
+
+    Parameters
+    ----------
+    image : (H, W) array
+        Grey image, 8 or 16 bit.
+    mask : (M, 3) array, optional
+        Circles of stray light to leave out: centre x, y and radius, px.
+    before : PenDetection, optional
+        Of the image before, which tells where to look first. Where the LEDs are there,
+        that settles it, also for an image that would be refused on its own; where they
+        are not, the image is looked at on its own.
+    full_scale : int, optional
+        Brightest value a pixel can have; see `lightpen.detection.spots.detect_spots`.
+    is_followed : bool
+        Whether the pen is all that is asked for: where its LEDs are about where they
+        were ``before``, the rest of the image is not read.
+    """
+    if not camera.fits(image):
+        return unseen(pen, Reason.WRONG_SIZE)
+    try:
+        if is_followed and before is not None and before.has_pose:
+            window = _window(camera, pen, before)
+            spots = detect_spots(image, mask, full_scale=full_scale, window=window)
+            labels = track_spots(
+                spots, camera, pen, before.rotation, before.translation
+            )
+            if np.count_nonzero(labels.whole) >= certain_leds(pen):
+                detection = detections_of([spots], [labels], camera)[0]
+                return _fitted(detection, camera, pen, is_near=True)
+        spots = detect_spots(image, mask, full_scale=full_scale)
+        labels = _label(spots, camera, pen, before)
+        detection = detections_of([spots], [labels], camera)[0]
+        return _fitted(detection, camera, pen, is_near=True)
+    except MISHAPS:
+        return unseen(pen, Reason.UNHANDLED)
+
+
+def detections_of(
+    spots: Sequence[Spots], labels: Sequence[Labels], camera: Camera
+) -> list[PenDetection]:
+    """Return the detections of images by their spots and labels.
+
+    An image is of use if its LEDs are labelled and four of them or more are whole. If
+    not, the reason is the first that holds:
+
+    * blurred, where most spots are or where there is light but no spot, since stillness
+      comes first: it may part merged LEDs, and tell alike ones apart;
+    * empty, without any spot;
+    * too few LEDs, where there are not spots enough, or not enough whole LEDs;
+    * ambiguous, or not the pen.
+
+    Parameters
+    ----------
+    spots : sequence of Spots
+        One per image.
+    labels : sequence of Labels
+        Likewise.
+
+    Returns
+    -------
+    list of Sighting
+        One per image, with the rough pose of its labels.
+    """
+    n_leds = len(labels[0].spot)
+    seen = np.full((len(labels), n_leds, 2), np.nan)
+    shapes = np.full((len(labels), n_leds, 2, 2), np.nan)
+    for i, (found, label) in enumerate(zip(spots, labels, strict=True)):
+        labelled = label.spot >= 0
+        seen[i, labelled] = found.centers[label.spot[labelled]]
+        shapes[i, labelled] = found.shapes[label.spot[labelled]]
+    seen = centers_from_centroids(camera, seen, shapes)
+    return [_detection_of(*image) for image in zip(spots, labels, seen, strict=True)]
+
+
+def detection_of_centers(
+    pixels: FloatArray, rotation: FloatArray, translation: FloatArray
+) -> PenDetection:
+    """Return the detection by LED centres that were labelled elsewhere.
+
+    Parameters
+    ----------
+    pixels : (L, 2) array
+        px; NaN where an LED was not seen.
+    rotation, translation : (3, 3) and (3,) array
+        Rough cam_from_pen, mm; NaN where no pose fits.
+    """
+    n_seen = _n_seen(pixels)
+    if n_seen == 0:
+        reason = Reason.EMPTY
+    elif n_seen < MIN_POSE_LEDS:
+        reason = Reason.TOO_FEW_LEDS
+    elif np.isnan(translation).any():
+        reason = Reason.MISFIT
+    else:
+        return PenDetection(pixels, pixels, Reason.NONE, rotation, translation)
+    return PenDetection(pixels, pixels, reason)
+
+
+def detect_from_centers(
+    camera: Camera,
+    pen: Pen,
+    pixels: FloatArray,
+    rotation: FloatArray,
+    translation: FloatArray,
+) -> PenDetection:
+    """Return the detection by labelled centres (L, 2), px, from a rough pose."""
+    detection = detection_of_centers(pixels, rotation, translation)
+    return _fitted(detection, camera, pen, is_near=False)
+
+
+def unseen(pen: Pen, reason: Reason) -> PenDetection:
+    """Return the empty detection of an unused image, with the reason."""
+    nothing = np.full((pen.n_leds, 2), np.nan)
+    return PenDetection(nothing, nothing, reason)
+
+
+def _window(camera: Camera, pen: Pen, before: PenDetection) -> PixelBox:
+    """Return where in the image the LEDs are that hardly moved, with room round."""
+    leds = pen.leds @ before.rotation.T + before.translation
+    radius = camera.fx * pen.diameter / 2 / float(leds[:, 2].min())
+    room = ceil(MAX_SHIFT + ROOM * radius)
+    pixels = camera.project(leds)
+    (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
+    around = PixelBox(floor(left), floor(top), ceil(right), ceil(bottom))
+    return around.grown(room, (camera.height, camera.width))
+
+
+def _label(
+    spots: Spots, camera: Camera, pen: Pen, before: PenDetection | None
+) -> Labels:
+    if before is not None and before.has_pose:
+        tracked = track_spots(spots, camera, pen, before.rotation, before.translation)
+        if tracked.reason is LabelStatus.LABELLED:
+            return tracked
+    return label_spots(spots, camera, pen)
+
+
+def _detection_of(spots: Spots, labels: Labels, seen: FloatArray) -> PenDetection:
+    """Return the detection of an image with labelled LEDs at (L, 2), px."""
+    pixels = np.where(labels.whole[:, None], seen, np.nan)
+    detection = partial(PenDetection, pixels, seen, spots=spots, labels=labels)
+    is_labelled = labels.reason is LabelStatus.LABELLED
+    if is_labelled and _n_seen(pixels) >= MIN_POSE_LEDS:
+        return detection(Reason.NONE, labels.R, labels.t)
+    return detection(Reason.BLURRED if spots.are_blurred else _REASONS[labels.reason])
+
+
+def _n_seen(pixels: FloatArray) -> int:
+    return int(np.isfinite(pixels[:, 0]).sum())
+
+
+def _fitted(
+    detection: PenDetection, camera: Camera, pen: Pen, *, is_near: bool
+) -> PenDetection:
+    """Return a detection with its pose, if it has one, fitted to the LEDs."""
+    if not detection.has_pose:
+        return detection
+    poses = fit_poses(
+        camera,
+        pen,
+        detection.pixels[None],
+        detection.rotation[None],
+        detection.translation[None],
+        is_near=is_near,
+    )
+    return replace(
+        detection,
+        rotation=poses.rotations[0],
+        translation=poses.translations[0],
+        cofactors=poses.covariances[0] / poses.sigma**2,
+        sigma=poses.sigma,
+    )

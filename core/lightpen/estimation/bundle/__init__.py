@@ -1,0 +1,1 @@
+"""Bundle adjustment of all that the images depend on, with priors from files."""

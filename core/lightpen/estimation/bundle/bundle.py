@@ -1,0 +1,468 @@
+"""Bundle adjustment with priors: minimises equation (2) of method.md.
+
+Beside tip, cone and rotations the unknowns are the intrinsics of each camera, its
+extrinsics in the rig, the LEDs, the pen's scale and the diameter of its discs, each
+with a prior: the value of its file, with the uncertainty that the file states or that
+is assumed in its place. Errors of the LEDs, of the seat as it follows the pen's lean
+and of a drift are random effects, whose standard deviations are estimated from the
+images (`lightpen.estimation.statistics.variance_components`).
+
+The rotations are eliminated image by image [1]_, equation (3), so that other priors
+need no new linearisation. The tip is given in the frame in which the file's LEDs fit
+the true ones best: moves of the pen as a whole are no errors of its LEDs.
+
+References
+----------
+.. [1] B. Triggs et al., "Bundle adjustment - a modern synthesis", LNCS 1883 (2000)
+   298-372, section 6.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.detection.pose import NOISE_FLOOR, robust_sigma
+from lightpen.errors import CalibrationError
+from lightpen.estimation.bundle.component_search import find_components
+from lightpen.estimation.bundle.components import NO_COMPONENTS, Components
+from lightpen.estimation.bundle.linearised import (
+    N_CONE,
+    N_TURN,
+    BundleState,
+    CameraView,
+    Eliminated,
+    NormalEquations,
+    eliminate,
+    views_at,
+)
+from lightpen.estimation.bundle.priors import Priors
+from lightpen.estimation.bundle.seat_modes import SeatModes
+from lightpen.estimation.bundle.unknowns import ParameterLayout, Unknowns
+from lightpen.estimation.contact.joint import inliers
+from lightpen.estimation.statistics.variance_components import RandomEffect, find_jitter
+from lightpen.model.information import inverse
+
+CONVERGED = 1e-5  # mm
+FINEST = 1e-4  # px; exact data that weigh more drown the priors in rounding
+FINDING_PASSES = 4  # in which standard deviations are found; then they stand
+MAX_PASSES = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """A solution of the bundle adjustment, with p unknowns.
+
+    Attributes
+    ----------
+    state : BundleState
+        With the cameras and the pen as adjusted.
+    values : (p,) array
+        Deviations from the files; tip and cone are 0.
+    components : Components
+        Standard deviations of the random effects in the fit.
+    budget_components : Components
+        The same in the uncertainty budget: less than in the fit where correlated noise
+        explains a part of them.
+    residuals : (N, C, L, 2) array
+        Observed minus modelled centres, px, the seat included; NaN where not seen.
+    used : (N, C, L) array of bool
+    sigma : float
+        Noise of one image coordinate, px.
+    information : (p, p) array
+        N of equation (14), of the images, rotations eliminated.
+    prior_information : (p, p) array
+        L of equation (14).
+    measured_information : (p, p) array
+        M of equation (14), of disc areas and the distance of two cones.
+    jitter_information : (p, p) array
+        Part of the covariance of the right side that is from a significant jitter of
+        the seat: J of equation (15).
+    insignificant_jitter : (p, p) array
+        The same of the expected jitter where it is not significant.
+    weight_sigma : float
+        Standard deviation by which LEDs were weighted, px: ``sigma``, and more where
+        noise is correlated.
+    covariance : (p, p) array
+        P of equation (14), images taken as independent.
+    """
+
+    unknowns: Unknowns
+    state: BundleState
+    values: FloatArray
+    components: Components
+    budget_components: Components
+    residuals: FloatArray
+    used: BoolArray
+    sigma: float
+    information: FloatArray
+    prior_information: FloatArray
+    measured_information: FloatArray
+    jitter_information: FloatArray
+    insignificant_jitter: FloatArray
+    weight_sigma: float
+    covariance: FloatArray
+
+    @cached_property
+    def budget_prior(self) -> FloatArray:
+        """Prior information with the components of the budget, (p, p)."""
+        if self.budget_components is self.components:
+            return self.prior_information
+        return self.unknowns.prior_information(self.budget_components)
+
+    @property
+    def layout(self) -> ParameterLayout:
+        """Layout of ``values`` and of every matrix."""
+        return self.unknowns.layout
+
+    @property
+    def led_corrections(self) -> FloatArray:
+        """Corrections of the file's LEDs, the scale apart, (L, 3), mm."""
+        moves = self.unknowns.basis @ self.values[self.layout.leds]
+        return np.asarray(moves.reshape(-1, 3))
+
+    @property
+    def drift(self) -> float:
+        """Largest distance between two positions of the drifting cone, mm."""
+        at, unknowns = self.layout, self.unknowns
+        first = (at.drift.start - at.seat[0].start) // N_CONE
+        n_forms = (at.drift.stop - at.drift.start) // N_CONE
+        by_form = self.values[at.drift].reshape(-1, N_CONE)
+        places = unknowns.forms[:, first : first + n_forms] @ by_form
+        apart = np.linalg.norm(places[:, None] - places, axis=2)
+        return float(apart.max())
+
+    @property
+    def cone_moves(self) -> FloatArray:
+        """Fitted shift of the cone of each image by seat and drift, (N, 3), mm."""
+        at = self.layout
+        by_form = self.values[at.seat[0].start : at.drift.stop].reshape(-1, N_CONE)
+        return np.asarray(self.unknowns.forms[:, : len(by_form)] @ by_form)
+
+    def part(self, *kinds: slice) -> FloatArray:
+        """Return the covariance of (tip, cone) by errors of some priors, (6, 6), mm^2.
+
+        Of equation (16), by priors and measurements of these unknowns.
+        """
+        known = self.prior_information + self.measured_information
+        own = np.zeros_like(self.covariance)
+        for at in kinds:
+            own[at, at] = known[at, at]
+        return self.propagated(own)
+
+    def component_contribution(self, at: slice) -> FloatArray:
+        """Return the covariance of (tip, cone) by LEDs or drift, (6, 6), mm^2.
+
+        Of equation (17): fitted with one variance, budgeted with another.
+        """
+        gain = self.covariance[:6, at] @ self.prior_information[at, at]
+        return np.asarray(gain @ inverse(self.budget_prior[at, at]) @ gain.T)
+
+    def propagated(self, information: FloatArray) -> FloatArray:
+        """Return P I P of tip and cone, (6, 6), mm^2, of a part I of N + L + M."""
+        gain = self.covariance[:6]
+        return np.asarray(gain @ information @ gain.T)
+
+    @property
+    def independent_noise(self) -> FloatArray:
+        """Covariance of (tip, cone) by independent noise, (6, 6): equation (15)."""
+        noise = self.propagated(self.information - self.jitter_information)
+        return noise * (self.sigma / self.weight_sigma) ** 2
+
+
+def fit_bundle(
+    pixels: FloatArray,
+    start: BundleState,
+    priors: Priors,
+    modes: SeatModes,
+    inflation: float = 1.0,
+    places: FloatArray | None = None,
+) -> Bundle:
+    """Fit tip, cone and the parameters of the files to the LED centres.
+
+    Parameters
+    ----------
+    pixels : (N, C, L, 2) array
+        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+    start : BundleState
+        With cameras and pen as their files have them.
+    modes : SeatModes
+        Of seat and drift.
+    inflation : float
+        Factor on the variance of the noise beside the priors, for correlated noise.
+    places : (6 (C - 1),) array, optional
+        Start of the extrinsics less those of the rig file; 0 unless given.
+
+    Raises
+    ------
+    CalibrationError
+        The iteration does not settle.
+    """
+    unknowns = Unknowns.of(start, priors, modes)
+    now = _started(unknowns, start, pixels, places)
+    for n_pass in range(MAX_PASSES):
+        weight_sigma = max(now.sigma * float(np.sqrt(inflation)), FINEST)
+        finding = 0 < n_pass <= FINDING_PASSES
+        # The jitter first: without it, other random effects would absorb it.
+        solved = _solve(unknowns, now, weight_sigma, finding and n_pass > 1)
+        components, used = solved.components, now.used
+        if finding:
+            jitter = _jitter_beside(unknowns, now, solved, weight_sigma)
+            components = components._replace(jitter=jitter)
+            used = inliers(_together(solved.residuals)).reshape(used.shape)
+        state = unknowns.moved(now.state, solved.values, solved.turns)
+        change = solved.values - now.values
+        if n_pass > FINDING_PASSES and np.abs(change[:6]).max() < CONVERGED:
+            return _bundle_of(unknowns, state, used, solved, weight_sigma)
+        views = views_at(state, pixels)
+        values = _held_by_state(unknowns, solved.values)
+        now = _Linearised(state, values, views, used, components, solved.sigma)
+    raise CalibrationError("bundle.not-settled", n_steps=MAX_PASSES)
+
+
+class _Linearised(NamedTuple):
+    """The images about a state of the iteration.
+
+    ``values`` (p,) are the deviations of the state from the files.
+    """
+
+    state: BundleState
+    values: FloatArray
+    views: tuple[CameraView, ...]
+    used: BoolArray
+    components: Components
+    sigma: float
+
+
+class _Solved(NamedTuple):
+    """The linear solution about a state: matrices as of `Bundle`."""
+
+    eliminated: Eliminated
+    information: FloatArray
+    prior: FloatArray
+    measured: FloatArray
+    covariance: FloatArray
+    values: FloatArray
+    turns: FloatArray
+    residuals: FloatArray
+    components: Components
+    sigma: float
+
+
+def _started(
+    unknowns: Unknowns,
+    start: BundleState,
+    pixels: FloatArray,
+    places: FloatArray | None,
+) -> _Linearised:
+    """Linearise the images at the start, with the given extrinsics."""
+    state, values = start, np.zeros(unknowns.number)
+    if places is not None:
+        values[unknowns.layout.extrinsics] = places
+        state = unknowns.moved(start, values, np.zeros((len(pixels), N_TURN)))
+    views = views_at(state, pixels)
+    residuals = np.stack([view.residuals for view in views], axis=1)
+    used = inliers(_together(residuals)).reshape(residuals.shape[:-1])
+    sigma = robust_sigma(_together(residuals), N_TURN)
+    return _Linearised(state, values, views, used, NO_COMPONENTS, sigma)
+
+
+def _solve(
+    unknowns: Unknowns, now: _Linearised, weight_sigma: float, with_components: bool
+) -> _Solved:
+    """Solve the normal equations about a state, with new components if asked for."""
+    components, used = now.components, now.used
+    jitter = components.jitter.covariance
+    eliminated = eliminate(now.views, used, weight_sigma, jitter)
+    information, gradient = unknowns.system(eliminated)
+    measured, measured_right = unknowns.measured(now.state, now.values)
+    right = gradient + information @ now.values + measured_right
+    if with_components:
+        components = find_components(
+            unknowns, information + measured, right, components
+        )
+    prior = unknowns.prior_information(components)
+    covariance = inverse(information + prior + measured)
+    values = covariance @ right
+    step, shifts = unknowns.step(values - now.values)
+    own = _follow(eliminated, step, shifts)
+    residuals = _left_over(now.views, step, shifts, own)
+    n_fitted = float(np.sum(covariance * information))
+    n_fitted += _n_eliminated(eliminated, jitter, used)
+    squares = np.where(used[..., None], residuals, 0.0) ** 2
+    n_free = max(2 * int(used.sum()) - n_fitted, 1.0)
+    sigma = max(float(np.sqrt(squares.sum() / n_free)), NOISE_FLOOR)
+    return _Solved(
+        eliminated,
+        information,
+        prior,
+        measured,
+        covariance,
+        values,
+        own[:, :N_TURN],
+        residuals,
+        components,
+        sigma,
+    )
+
+
+def _jitter_beside(
+    unknowns: Unknowns, now: _Linearised, solved: _Solved, weight_sigma: float
+) -> RandomEffect:
+    """Estimate the jitter of the seat about a solution."""
+    without = solved.eliminated
+    if solved.components.jitter.covariance is not None:
+        without = eliminate(now.views, now.used, weight_sigma)
+    seen = np.asarray(now.used.any(axis=(1, 2)))
+    spread = unknowns.sensitivity(without.cone_rows)
+    change = solved.values - now.values
+    return jitter_of(unknowns, without, spread, seen, change, solved.covariance)
+
+
+def _held_by_state(unknowns: Unknowns, values: FloatArray) -> FloatArray:
+    """Return the values without those that a state does not hold, which are 0 in it."""
+    at, held = unknowns.layout, values.copy()
+    for kind in (at.tip, at.cone, *at.seat, at.drift):
+        held[kind] = 0.0
+    return held
+
+
+def _bundle_of(
+    unknowns: Unknowns,
+    state: BundleState,
+    used: BoolArray,
+    solved: _Solved,
+    weight_sigma: float,
+) -> Bundle:
+    jitter, eliminated = solved.components.jitter, solved.eliminated
+    by_seat = eliminated.turn_by_step[:, N_TURN:]
+    rows = eliminated.cone_rows if jitter.covariance is None else by_seat
+    significant, insignificant = jitter_matrices(jitter, unknowns.sensitivity(rows))
+    return Bundle(
+        unknowns=unknowns,
+        state=state,
+        values=solved.values,
+        components=solved.components,
+        budget_components=solved.components,
+        residuals=solved.residuals,
+        used=used,
+        sigma=solved.sigma,
+        information=solved.information,
+        prior_information=solved.prior,
+        measured_information=solved.measured,
+        jitter_information=significant,
+        insignificant_jitter=insignificant,
+        weight_sigma=weight_sigma,
+        covariance=solved.covariance,
+    )
+
+
+def jitter_matrices(
+    jitter: RandomEffect, rows: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return ``jitter_information`` and ``insignificant_jitter`` of a `Bundle`.
+
+    Parameters
+    ----------
+    rows : (N, 3, p) array
+        Derivative of the seat of each image by the unknowns, where jitter is fitted;
+        else the rows of its cone in the normal equations.
+    """
+    nothing = np.zeros((rows.shape[-1],) * 2)
+    if jitter.covariance is None:
+        flat = jitter.expected_sigma * rows.reshape(-1, rows.shape[-1])
+        return nothing, flat.T @ flat
+    known = np.linalg.inv(jitter.covariance)
+    return np.einsum("nip,ij,njq->pq", rows, known, rows, optimize=True), nothing
+
+
+def _together(residuals: FloatArray) -> FloatArray:
+    """Return residuals (N, C, L, 2) with the LEDs of all cameras in one row."""
+    return residuals.reshape(len(residuals), -1, 2)
+
+
+def _follow(each: Eliminated, step: FloatArray, shifts: FloatArray) -> FloatArray:
+    """Return the step of each image's own unknowns, (N, q)."""
+    by_cone = each.turn_by_step[..., :N_CONE]
+    return np.asarray(
+        each.turn + each.turn_by_step @ step + np.einsum("nqk,nk->nq", by_cone, shifts)
+    )
+
+
+def _left_over(
+    views: tuple[CameraView, ...],
+    step: FloatArray,
+    shifts: FloatArray,
+    unknown: FloatArray,
+) -> FloatArray:
+    """Return the residuals after a step, (N, C, L, 2), px, seat and jitter removed."""
+    n_leds = views[0].residuals.shape[1]
+    by_led = step[-3 * n_leds :].reshape(n_leds, 3)
+    by_diameter = step[-3 * n_leds - 1]
+    cone = step[:N_CONE] + shifts
+    if unknown.shape[1] > N_TURN:
+        cone = cone + unknown[:, N_TURN:]
+    row, left = N_CONE, []
+    for view in views:
+        own = step[row : row + view.own.shape[-1]]
+        row += len(own)
+        left.append(
+            view.residuals
+            - np.einsum("nlik,nk->nli", view.turn, unknown[:, :N_TURN])
+            - np.einsum("nlik,nk->nli", view.cone, cone)
+            - view.own @ own
+            - view.diameter * by_diameter
+            - np.einsum("nlik,lk->nli", view.led, by_led)
+        )
+    return np.stack(left, axis=1)
+
+
+def _n_eliminated(
+    each: Eliminated, jitter: FloatArray | None, used: BoolArray
+) -> float:
+    """Return the effective number of eliminated unknowns."""
+    n_images = int(used.any(axis=(1, 2)).sum())
+    if jitter is None:
+        return float(N_TURN * n_images)
+    known = np.linalg.inv(jitter)
+    left = each.nuisance_covariance[:, N_TURN:, N_TURN:]
+    freedom = N_CONE - np.einsum("nij,ji->n", left, known)
+    return float(N_TURN * n_images + freedom.sum())
+
+
+def jitter_of(
+    unknowns: Unknowns,
+    each: NormalEquations,
+    spread: FloatArray,
+    seen: BoolArray,
+    change: FloatArray,
+    covariance: FloatArray,
+) -> RandomEffect:
+    """Estimate the jitter of the seat, which differs from image to image.
+
+    Parameters
+    ----------
+    each : NormalEquations
+        Without any jitter.
+    spread : (N, 3, p) array
+        Their rows of the cone by the unknowns.
+    seen : (N,) array of bool
+        Images that show anything.
+    change : (p,) array
+        Of the unknowns, that solves these equations.
+    covariance : (p, p) array
+        Of the unknowns.
+    """
+    step, shifts = unknowns.step(change)
+    rows = each.cone_rows[seen]
+    own = rows[..., :N_CONE]
+    right = each.cone_right - each.cone_rows @ step
+    right = right[seen] - np.einsum("nij,nj->ni", own, shifts[seen])
+    noise = np.linalg.inv(own)
+    by_image = noise @ spread[seen]
+    # One product of all images is four times as fast as one of each.
+    spread_out = by_image.reshape(-1, len(covariance)) @ covariance
+    leverage = spread_out.reshape(by_image.shape) @ np.swapaxes(by_image, 1, 2)
+    return find_jitter(own, right, leverage)

@@ -1,0 +1,37 @@
+"""Variance components of all random effects of a swing."""
+
+from typing import NamedTuple
+
+from lightpen.estimation.bundle.seat_modes import MODE_COUNTS
+from lightpen.estimation.statistics.variance_components import Component, RandomEffect
+
+NONE = Component(0.0, 0.0)
+
+
+class Components(NamedTuple):
+    """Estimated standard deviations of the random effects.
+
+    Attributes
+    ----------
+    leds : Component
+        Of one LED coordinate, mm; none where the images do not contradict the file.
+    seat : tuple of Component
+        Of the seat by each kind of mode, mm.
+    oval : Component
+        Of the two coefficients of an oval seat, see `oval_seat`, mm.
+    drift : Component
+        Of the cone over the whole range of each drift mode, mm.
+    jitter : RandomEffect
+        Of the seat from image to image.
+    """
+
+    leds: Component
+    seat: tuple[Component, ...]
+    oval: Component
+    drift: Component
+    jitter: RandomEffect
+
+
+NO_COMPONENTS = Components(
+    NONE, (NONE,) * len(MODE_COUNTS), NONE, NONE, RandomEffect(None, 0.0)
+)

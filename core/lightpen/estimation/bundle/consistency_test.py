@@ -1,0 +1,243 @@
+"""Joint test of the numbers of one file against the images.
+
+The deviation of a posterior mean from a prior mean has the covariance of the prior less
+that of the posterior: equation (8) of method.md. A number is inconsistent where
+it deviates by more than three such standard deviations. As one wrong number moves what
+is fitted for others, the smallest set of numbers is sought which, released from its
+prior, leaves no other number inconsistent; of several such sets, the likeliest.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.bundle.bundle import Bundle
+from lightpen.messages import Message
+from lightpen.model.information import inverse, known_by
+
+LIMIT = 3.0  # standard deviations
+ROUNDING = 1e-6  # of a variance
+RELEASED_WIDTH = 100.0  # times stated deviation or fitted change: no information
+TRIED_TOGETHER = 3  # numbers; more that are wrong are found one by one
+
+
+@dataclass(frozen=True, eq=False)
+class FileNumber:
+    """A named number of a file, as a linear function of the k unknowns of that file.
+
+    Attributes
+    ----------
+    value : float
+        As stated, in ``unit``.
+    by : (k,) array
+        Derivative of the number by the unknowns.
+    along : (k,) array
+        Change of the unknowns that changes the number, and no other one, by 1.
+    size : float
+        Unit of the unknowns in ``unit``.
+    camera : str
+        Of the rig, if its file states the number.
+    """
+
+    what: Message
+    unit: str
+    value: float
+    by: FloatArray
+    along: FloatArray
+    size: float = 1.0
+    camera: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Estimate:
+    """Posterior of the unknowns of a file, some numbers released."""
+
+    values: FloatArray
+    covariance: FloatArray
+    correlation_excess: FloatArray
+    gain: float  # twice the gain in log likelihood over the file's values
+
+
+@dataclass(frozen=True)
+class ImageEstimate:
+    """Estimate of a number without its prior, in the unit of the unknowns.
+
+    Attributes
+    ----------
+    change, sigma : float
+        Difference from the file, with its standard deviation.
+    stated_sigma : float
+        Standard deviation that the file states.
+    deviations : float
+        The difference in standard deviations, by equation (8).
+    """
+
+    change: float
+    sigma: float
+    stated_sigma: float
+    deviations: float
+
+
+@dataclass(frozen=True, eq=False)
+class FileFit:
+    """Prior and likelihood of the k unknowns of one file, all others marginalised.
+
+    Attributes
+    ----------
+    numbers : tuple of FileNumber
+    stated : (k, k) array
+        Covariance that the file states.
+    information, right : (k, k) and (k,) array
+        Of the images.
+    correlation_excess : (k, k) array
+        Covariance of ``right`` beyond the information, by correlated noise.
+    """
+
+    numbers: tuple[FileNumber, ...]
+    stated: FloatArray
+    information: FloatArray
+    right: FloatArray
+    correlation_excess: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        numbers: Iterable[FileNumber],
+        stated: FloatArray,
+        bundle: Bundle,
+        place: slice,
+        excess: FloatArray | None,
+    ) -> "FileFit":
+        """Return prior and likelihood of the unknowns at a place of a fit.
+
+        Parameters
+        ----------
+        stated : (k, k) array
+            Prior covariance.
+        excess : (p, p) array or None
+            See `lightpen.estimation.bundle.noise_correlation.Correlation`.
+        """
+        known = inverse(bundle.covariance[place, place])
+        by_excess = np.zeros_like(known) if excess is None else excess[place, place]
+        return cls(
+            numbers=tuple(numbers),
+            stated=inverse(known_by(stated)),
+            information=known - bundle.prior_information[place, place],
+            right=known @ bundle.values[place],
+            correlation_excess=known @ by_excess @ known,
+        )
+
+    @cached_property
+    def contradicted(self) -> tuple[int, ...]:
+        """Indices of the numbers that the images contradict."""
+        if not self._inconsistent(()):
+            return ()
+        observable = [i for i in range(len(self.numbers)) if self._is_observable(i)]
+        sets = [
+            [s for s in combinations(observable, size) if self._explains(s)]
+            for size in range(1, TRIED_TOGETHER + 1)
+        ]
+        for each in sets:
+            if each:
+                return max(each, key=lambda s: self._solved(s).gain)
+        return self._one_by_one()
+
+    @property
+    def max_deviation(self) -> float:
+        """Largest deviation of a number that is inconsistent as stated, else 0."""
+        return max(self._inconsistent(()).values(), default=0.0)
+
+    def estimate_without(self, i: int, released: tuple[int, ...]) -> ImageEstimate:
+        """Estimate a number without its prior, some others released, too."""
+        by, prior = self.numbers[i].by, self._prior_variance(i)
+        others = tuple(j for j in released if j != i)
+        free = self._solved((*others, i))
+        variance = float(by @ (free.covariance + free.correlation_excess) @ by)
+        return ImageEstimate(
+            change=float(by @ free.values),
+            sigma=float(np.sqrt(max(variance, ROUNDING * prior))),
+            stated_sigma=float(np.sqrt(prior)),
+            deviations=self._deviations(i, others),
+        )
+
+    def _prior_variance(self, i: int) -> float:
+        by = self.numbers[i].by
+        return float(by @ self.stated @ by)
+
+    def _is_observable(self, i: int) -> bool:
+        """Tell whether the images determine a number at all."""
+        by, prior = self.numbers[i].by, self._prior_variance(i)
+        return float(prior - by @ self._as_stated.covariance @ by) > ROUNDING * prior
+
+    def _deviations(self, i: int, released: tuple[int, ...]) -> float:
+        """Return the deviation of a number in standard deviations, equation (8)."""
+        by, prior, solved = (
+            self.numbers[i].by,
+            self._prior_variance(i),
+            self._solved(released),
+        )
+        learned = prior - float(by @ solved.covariance @ by)
+        if learned <= ROUNDING * prior:
+            return 0.0
+        variance = max(
+            learned + float(by @ solved.correlation_excess @ by), ROUNDING * prior
+        )
+        return abs(float(by @ solved.values)) / float(np.sqrt(variance))
+
+    def _inconsistent(self, released: tuple[int, ...]) -> dict[int, float]:
+        """Return the deviations of inconsistent numbers, some others released."""
+        rest = (i for i in range(len(self.numbers)) if i not in released)
+        each = {i: self._deviations(i, released) for i in rest}
+        return {i: deviations for i, deviations in each.items() if deviations > LIMIT}
+
+    def _is_inconsistent(self, i: int, released: tuple[int, ...]) -> bool:
+        """Tell whether a released number is inconsistent when it alone is not."""
+        others = tuple(j for j in released if j != i)
+        return self._deviations(i, others) > LIMIT
+
+    def _explains(self, released: tuple[int, ...]) -> bool:
+        """Tell whether these numbers are inconsistent, and no others beside them."""
+        return not self._inconsistent(released) and all(
+            self._is_inconsistent(i, released) for i in released
+        )
+
+    def _one_by_one(self) -> tuple[int, ...]:
+        """Return numbers to release, each the worst beside those before."""
+        released: tuple[int, ...] = ()
+        while inconsistent := self._inconsistent(released):
+            released = (*released, max(inconsistent, key=lambda i: inconsistent[i]))
+        return tuple(i for i in released if self._is_inconsistent(i, released))
+
+    @cached_property
+    def _as_stated(self) -> _Estimate:
+        return self._solved_with(self.stated)
+
+    @cached_property
+    def _solutions(self) -> dict[tuple[int, ...], _Estimate]:
+        return {(): self._as_stated}
+
+    def _solved(self, released: tuple[int, ...]) -> _Estimate:
+        key = tuple(sorted(released))
+        if key not in self._solutions:
+            freed = self.stated
+            for i in key:
+                each = self.numbers[i]
+                change = abs(float(each.by @ self._as_stated.values))
+                width = RELEASED_WIDTH * max(
+                    change, float(np.sqrt(self._prior_variance(i)))
+                )
+                freed = freed + width**2 * np.outer(each.along, each.along)
+            self._solutions[key] = self._solved_with(freed)
+        return self._solutions[key]
+
+    def _solved_with(self, stated: FloatArray) -> _Estimate:
+        covariance = inverse(self.information + inverse(stated))
+        values = covariance @ self.right
+        correlation_excess = covariance @ self.correlation_excess @ covariance
+        return _Estimate(
+            values, covariance, correlation_excess, float(self.right @ values)
+        )

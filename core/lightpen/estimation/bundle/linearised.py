@@ -1,0 +1,251 @@
+"""Equation (9) of method.md linearised about a state, and its normal equations.
+
+The image of an LED depends on the rotation of the pen, the cone, intrinsics and
+extrinsics of the camera, the diameter of the discs and the LED itself. Tip and scale of
+the pen need no columns of their own: they are combinations of those of the LEDs.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.detection.pose import disc_residuals
+from lightpen.estimation.contact.joint import TURN_RIDGE
+from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig
+
+N_TURN = 3
+N_CONE = 3
+
+
+@dataclass(frozen=True, eq=False)
+class BundleState:
+    """All parameters that the images of a swing depend on.
+
+    Attributes
+    ----------
+    tip_pen : (3,) array
+        mm.
+    cone_rig : (3,) array
+        mm.
+    rotations : (N, 3, 3) array
+        Of rig_from_pen.
+    at_second : (N,) array of bool or None
+        Images in which the tip rests in a second cone; None without one.
+    between_rig : (3,) array
+        From the first cone to the second, mm.
+    """
+
+    rig: Rig
+    pen: Pen
+    tip_pen: FloatArray
+    cone_rig: FloatArray
+    rotations: FloatArray
+    at_second: BoolArray | None = None
+    between_rig: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def cones_rig(self) -> FloatArray:
+        """Cone in which the tip of each image rests, (N, 3), mm."""
+        cones = np.tile(self.cone_rig, (len(self.rotations), 1))
+        if self.at_second is not None:
+            cones[self.at_second] += self.between_rig
+        return cones
+
+    def leds_in(self, c: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return where LEDs are in the frame of a camera, mm, and their normals.
+
+        Returns
+        -------
+        levers, points, normals : (N, L, 3) array
+            From the tip, from the camera.
+        """
+        R_c, t_c = self.rig.rotations[c], self.rig.translations[c]
+        transposed = np.swapaxes(R_c @ self.rotations, 1, 2)
+        levers = (self.pen.leds - self.tip_pen) @ transposed
+        cones = self.cones_rig @ R_c.T + t_c
+        return levers, levers + cones[:, None], self.pen.normals @ transposed
+
+
+@dataclass(frozen=True, eq=False)
+class CameraView:
+    """The images of one camera around a state.
+
+    Attributes
+    ----------
+    residuals : (N, L, 2) array
+        Observed minus modelled centres, px; NaN where an LED was not seen.
+    turn, cone, led : (N, L, 2, 3) array
+        Derivative of the modelled centres by the rotation vector of the image (left,
+        rad), the cone point and the LED itself (mm).
+    own : (N, L, 2, k) array
+        By the intrinsics of the camera and, unless it is the first of the rig, by its
+        rotation and translation in the rig.
+    diameter : (N, L, 2) array
+        By the diameter of the discs.
+    """
+
+    residuals: FloatArray
+    turn: FloatArray
+    cone: FloatArray
+    led: FloatArray
+    own: FloatArray
+    diameter: FloatArray
+
+
+def views_at(state: BundleState, pixels: FloatArray) -> tuple[CameraView, ...]:
+    """Linearise the images of each camera about a state; pixels (N, C, L, 2), px."""
+    return tuple(_view(state, c, pixels[:, c]) for c in range(state.rig.n_cameras))
+
+
+def _view(state: BundleState, c: int, pixels: FloatArray) -> CameraView:
+    rig, pen = state.rig, state.pen
+    camera, R_c, t_c = rig.cameras[c], rig.rotations[c], rig.translations[c]
+    levers, points, normals = state.leds_in(c)
+    residuals, J = disc_residuals(
+        camera, levers, points, normals, pen.diameter / 2, pixels
+    )
+    by_point = J[..., 3:]
+    normalised = points[..., :2] / points[..., 2:]
+    own = camera.intrinsics_jacobian(normalised)
+    if c > 0:
+        by_turn = np.cross((points - t_c)[:, :, None], by_point)
+        own = np.concatenate([own, by_turn, by_point], axis=3)
+    # The centre of a disc's image lies off that of the disc with the diameter squared.
+    offset = (pixels - residuals) - camera.pixels(normalised)
+    return CameraView(
+        residuals=residuals,
+        turn=J[..., :3] @ R_c,
+        cone=by_point @ R_c,
+        led=by_point @ (R_c @ state.rotations)[:, None],
+        own=own,
+        diameter=2 / pen.diameter * offset,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """Normal equations of the images of a swing, in units of the noise.
+
+    Columns: cone (3), each camera's own, diameter, LEDs (3 L).
+
+    Attributes
+    ----------
+    N : (K, K) array
+    b : (K,) array
+    cone_rows : (N, 3, K) array
+        What each image adds to the three rows of the cone.
+    cone_right : (N, 3) array
+        What it adds to their right side.
+    """
+
+    N: FloatArray
+    b: FloatArray
+    cone_rows: FloatArray
+    cone_right: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated(NormalEquations):
+    """The same with the rotations eliminated, equation (3).
+
+    Attributes
+    ----------
+    turn : (N, q) array
+        Step of the eliminated unknowns of each image where the others stand: its
+        rotation, and with jitter its seat.
+    turn_by_step : (N, q, K) array
+    nuisance_covariance : (N, q, q) array
+        Inverse of the normal matrix of the eliminated unknowns.
+    """
+
+    turn: FloatArray
+    turn_by_step: FloatArray
+    nuisance_covariance: FloatArray
+
+
+def eliminate(
+    views: tuple[CameraView, ...],
+    used: BoolArray,
+    sigma: float,
+    jitter: FloatArray | None = None,
+) -> Eliminated:
+    """Eliminate the rotation of each image, and its seat if there is jitter: (3).
+
+    Parameters
+    ----------
+    used : (N, C, L) array of bool
+    sigma : float
+        Noise of one image coordinate, px.
+    jitter : (3, 3) array or None
+        Covariance of the seat from image to image, mm^2.
+    """
+    n_images, _, n_leds = used.shape
+    sizes = [view.own.shape[-1] for view in views]
+    K = N_CONE + sum(sizes) + 1 + 3 * n_leds
+    at_diameter, at_leds = K - 3 * n_leds - 1, K - 3 * n_leds
+    N, b = np.zeros((K, K)), np.zeros(K)
+    q = N_TURN if jitter is None else N_TURN + N_CONE
+    inner = np.zeros((n_images, q, q))
+    inner_right = np.zeros((n_images, q))
+    to_inner = np.zeros((n_images, K, q))
+    cone_rows = np.zeros((n_images, N_CONE, K))
+    cone_right = np.zeros((n_images, N_CONE))
+    own_start = N_CONE
+    for c, view in enumerate(views):
+        k = sizes[c]
+        J = np.concatenate(
+            [view.turn, view.cone, view.own, view.diameter[..., None], view.led], axis=3
+        )
+        mask = used[:, c, :, None]
+        J = np.where(mask[..., None], J, 0.0) / sigma
+        r = np.where(mask, view.residuals, 0.0) / sigma
+        shared = np.r_[0:N_CONE, own_start : own_start + k, at_diameter]
+        own_start += k
+        n = N_TURN + N_CONE + k + 1  # columns that all LEDs share
+        rows = J[..., :n].reshape(n_images, 2 * n_leds, n)
+        H = np.swapaxes(rows, 1, 2) @ rows
+        g = (r.reshape(n_images, 1, -1) @ rows)[:, 0]
+        by_led = J[..., n:]
+        cross = np.swapaxes(by_led, 2, 3) @ J[..., : N_TURN + N_CONE]
+        cross = cross.reshape(n_images, 3 * n_leds, -1)
+        # All images of one LED beside each other.
+        of_led = np.swapaxes(J, 0, 1).reshape(n_leds, 2 * n_images, -1)
+        r_of_led = np.swapaxes(r, 0, 1).reshape(n_leds, 2 * n_images, 1)
+        transposed = np.swapaxes(of_led[..., n:], 1, 2)
+        N[np.ix_(shared, shared)] += H[:, 3:, 3:].sum(axis=0)
+        coupling = (transposed @ of_led[..., 3:n]).reshape(3 * n_leds, -1)
+        N[np.ix_(np.arange(at_leds, K), shared)] += coupling
+        N[np.ix_(shared, np.arange(at_leds, K))] += coupling.T
+        blocks = transposed @ of_led[..., n:]
+        for j in range(n_leds):
+            at = slice(at_leds + 3 * j, at_leds + 3 * j + 3)
+            N[at, at] += blocks[j]
+        b[shared] += g[:, 3:].sum(axis=0)
+        b[at_leds:] += (transposed @ r_of_led).ravel()
+        inner += H[:, :q, :q]
+        inner_right += g[:, :q]
+        to_inner[:, shared] += H[:, 3:, :q]
+        to_inner[:, at_leds:] += cross[..., :q]
+        cone_rows[:, :, shared] += H[:, 3:6, 3:]
+        cone_rows[:, :, at_leds:] += np.swapaxes(cross[..., N_TURN:], 1, 2)
+        cone_right += g[:, 3:6]
+    inner[:, range(N_TURN), range(N_TURN)] += TURN_RIDGE / sigma**2
+    if jitter is not None:
+        inner[:, N_TURN:, N_TURN:] += np.linalg.inv(jitter)
+    nuisance_covariance = np.asarray(np.linalg.inv(inner), dtype=np.float64)
+    gain: FloatArray = nuisance_covariance @ np.swapaxes(to_inner, 1, 2)  # (N, q, K)
+    turn = np.einsum("nij,nj->ni", nuisance_covariance, inner_right)
+    N -= np.tensordot(to_inner, gain, axes=([0, 2], [0, 1]))
+    b -= np.einsum("nki,ni->k", to_inner, turn)
+    to_cone = to_inner[:, :N_CONE]
+    return Eliminated(
+        N=0.5 * (N + N.T),
+        b=b,
+        cone_rows=cone_rows - to_cone @ gain,
+        cone_right=cone_right - np.einsum("nij,nj->ni", to_cone, turn),
+        turn=turn,
+        turn_by_step=-gain,
+        nuisance_covariance=nuisance_covariance,
+    )

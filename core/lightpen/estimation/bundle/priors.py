@@ -1,0 +1,193 @@
+"""Priors of cameras and pen: the uncertainties that files state, or assumed ones.
+
+Where a file states no uncertainty, a documented assumption takes its place, which every
+report marks as such.
+"""
+
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.bundle.disc_diameter import DiameterReading
+from lightpen.model.assumptions import Assumptions
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig
+
+REFERENCE_TEMPERATURE = 20.0  # degrees C, at which lengths are stated: ISO 1
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Prior of some unknowns.
+
+    Attributes
+    ----------
+    covariance : (k, k) array
+        Of their deviation from what the file says.
+    assumed : bool
+        Whether the file states none.
+    """
+
+    covariance: FloatArray
+    assumed: bool
+
+
+@dataclass(frozen=True)
+class ConeSeparation:
+    """A certified distance of two cones, with its standard uncertainty, mm."""
+
+    distance: float
+    sigma: float
+
+
+@dataclass(frozen=True, eq=False)
+class Priors:
+    """Priors of all unknowns but tip, cone and rotations.
+
+    Attributes
+    ----------
+    cameras : tuple of Prior
+        Of the intrinsics of each camera.
+    extrinsics : Prior or None
+        Of all cameras but the first, as `Rig.covariance`; None of a single camera.
+    scale : Prior
+        Of the pen, by its measurement: relative, of all its coordinates.
+    temperature : Prior
+        Of the same, by its temperature.
+    diameter : Prior
+        Of the discs, mm.
+    led_sigma : float or None
+        Of one LED coordinate, mm; None: to be found from the images.
+    led_covariance : (3 L, 3 L) array or None
+        Of all of them, mm^2, where more is known than ``led_sigma``.
+    form_error : float
+        Standard deviation of the seat along each axis in each mode, mm.
+    center_bias : float
+        Standard deviation of errors of a centre that repeat with the posture, px.
+    reading : DiameterReading or None
+        Of the discs by the areas of their images.
+    separation : ConeSeparation or None
+        Of the second cone from the first.
+    """
+
+    cameras: tuple[Prior, ...]
+    extrinsics: Prior | None
+    scale: Prior
+    temperature: Prior
+    diameter: Prior
+    led_sigma: float | None
+    form_error: float
+    center_bias: float
+    led_covariance: FloatArray | None = None
+    reading: DiameterReading | None = None
+    separation: ConeSeparation | None = None
+
+    @property
+    def size_covariance(self) -> FloatArray:
+        """Of the scale as it is during the swing, (1, 1)."""
+        return self.scale.covariance + self.temperature.covariance
+
+
+def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
+    """Return the priors that files state, completed by assumptions."""
+    extrinsics = None
+    if rig.n_cameras > 1:
+        extrinsics = (
+            _assumed_extrinsics(rig, assumptions)
+            if rig.covariance is None
+            else Prior(rig.covariance, assumed=False)
+        )
+    return Priors(
+        cameras=tuple(_intrinsics(camera, assumptions) for camera in rig.cameras),
+        extrinsics=extrinsics,
+        scale=(
+            _one(assumptions.scale, assumed=True)
+            if pen.scale_sigma is None
+            else _one(pen.scale_sigma, assumed=False)
+        ),
+        temperature=_temperature(pen, assumptions),
+        diameter=(
+            _one(assumptions.diameter * pen.diameter, assumed=True)
+            if pen.diameter_sigma is None
+            else _one(pen.diameter_sigma, assumed=False)
+        ),
+        led_sigma=pen.led_sigma,
+        form_error=assumptions.form_error,
+        center_bias=assumptions.center_bias,
+        led_covariance=pen.led_covariance,
+    )
+
+
+def _intrinsics(camera: Camera, assumptions: Assumptions) -> Prior:
+    if camera.covariance is not None:
+        return Prior(camera.covariance, assumed=False)
+    variances = np.zeros(len(camera.intrinsics))
+    variances[2:4] = assumptions.principal_point**2
+    variances[4:9] = np.square(
+        [
+            assumptions.k1,
+            assumptions.k2,
+            assumptions.tangential,
+            assumptions.tangential,
+            0.0,
+        ]
+    )
+    covariance = np.diag(variances)
+    focal = np.array([camera.fx, camera.fy])
+    # fx and fy share what the focal length is off by; their ratio is known far better.
+    covariance[:2, :2] = np.outer(focal, focal) * assumptions.focal_length**2
+    covariance[1, 1] += (camera.fy * assumptions.aspect) ** 2
+    return Prior(covariance, assumed=True)
+
+
+def _assumed_extrinsics(rig: Rig, assumptions: Assumptions) -> Prior:
+    one = np.repeat([assumptions.rotation, assumptions.translation], 3)
+    sigmas = np.tile(one, rig.n_cameras - 1)
+    return Prior(np.diag(sigmas**2), assumed=True)
+
+
+def thermal_growth(pen: Pen, assumptions: Assumptions) -> float:
+    """Return the thermal expansion of a pen against its file, relative, equation (10).
+
+    0 where its temperature was not measured, or the file states no expansion.
+    """
+    if pen.expansion is None:
+        return 0.0
+    return pen.expansion * _warmth(pen, assumptions)
+
+
+def _warmth(pen: Pen, assumptions: Assumptions) -> float:
+    """Return the temperature of the pen less that of its measurement, K."""
+    if assumptions.temperature_c is None:
+        return 0.0
+    measured = pen.temperature_c
+    return assumptions.temperature_c - (
+        REFERENCE_TEMPERATURE if measured is None else measured
+    )
+
+
+def _temperature(pen: Pen, assumptions: Assumptions) -> Prior:
+    """Return the prior of the thermal expansion, relative, equation (10)."""
+    is_measured = assumptions.temperature_c is not None
+    warmth = _warmth(pen, assumptions)
+    uncertainty = assumptions.temperature if is_measured else assumptions.warmth
+    if pen.expansion is None:  # nothing is corrected then
+        expansion = sigma = assumptions.expansion
+    else:
+        expansion = pen.expansion
+        sigma = (
+            assumptions.expansion_share * abs(expansion)
+            if pen.expansion_sigma is None
+            else pen.expansion_sigma
+        )
+    return _one(
+        hypot(expansion * uncertainty, sigma * warmth),
+        assumed=pen.expansion is None or not is_measured,
+    )
+
+
+def _one(sigma: float, *, assumed: bool) -> Prior:
+    return Prior(np.array([[sigma**2]]), assumed)

@@ -1,0 +1,285 @@
+"""The unknowns of a bundle adjustment: their layout, system and priors.
+
+Tip, cone, cameras, LEDs and the like are combinations of the columns of `linearised`;
+seat modes and drift shift the cone of each image by its weights, equation (4) of
+method.md.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.bundle.components import NONE, Components
+from lightpen.estimation.bundle.linearised import N_CONE, BundleState, NormalEquations
+from lightpen.estimation.bundle.priors import Priors
+from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, SeatModes
+from lightpen.model.information import EXACT, inverse, known_by
+from lightpen.model.rigid import rotation_from_vector, skew
+
+
+class ParameterLayout(NamedTuple):
+    """Indices of each kind of unknown; of the seat by kinds of modes."""
+
+    tip: slice
+    cone: slice
+    cameras: tuple[slice, ...]
+    extrinsics: slice
+    diameter: slice
+    scale: slice
+    leds: slice
+    seat: tuple[slice, ...]
+    drift: slice
+    between: slice
+
+    @property
+    def whole_seat(self) -> slice:
+        """Indices of all seat modes."""
+        return slice(self.seat[0].start, self.seat[-1].stop)
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """The unknowns of a fit as combinations of the columns of `NormalEquations`.
+
+    Attributes
+    ----------
+    layout : ParameterLayout
+        Indices of each kind.
+    mixing : (K, p0) array
+        Columns of `NormalEquations` by the unknowns common to all images.
+    forms : (N, m) array
+        Weights of the moves of the cone in each image: seat modes, drift modes, and 1
+        at the second cone.
+    oval : (21, 2) array
+        Moves in the seat modes by an oval seat.
+    basis : (3 L, 3 L - 6) array
+        Moves of LEDs but those of the pen as a whole.
+    scaling : (3 L,) array
+        Move of the LEDs by a scale of 1.
+    """
+
+    layout: ParameterLayout
+    start: BundleState
+    mixing: FloatArray
+    forms: FloatArray
+    oval: FloatArray
+    basis: FloatArray
+    scaling: FloatArray
+    priors: Priors
+
+    @classmethod
+    def of(cls, start: BundleState, priors: Priors, given: SeatModes) -> "Unknowns":
+        """Return the unknowns of a fit that starts there."""
+        rig, pen = start.rig, start.pen
+        n_leds = pen.n_leds
+        sizes = [len(camera.intrinsics) for camera in rig.cameras]
+        n_extrinsics = 6 * (rig.n_cameras - 1)
+        basis = led_basis(pen.leds)
+        counts = [3, 3, *sizes, n_extrinsics, 1, 1, basis.shape[1]]
+        counts += [3 * n_forms for n_forms in MODE_COUNTS]
+        n_drifts = given.drift.shape[1]
+        counts += [3 * n_drifts, 0 if start.at_second is None else 3]
+        ends = np.cumsum(counts).tolist()
+        slices = [slice(end - n, end) for n, end in zip(counts, ends, strict=True)]
+        tip, cone, *others = slices
+        cameras, others = others[: len(sizes)], others[len(sizes) :]
+        extrinsics, diameter, scale, leds, *seat, drift, between = others
+        layout = ParameterLayout(
+            tip=tip,
+            cone=cone,
+            cameras=tuple(cameras),
+            extrinsics=extrinsics,
+            diameter=diameter,
+            scale=scale,
+            leds=leds,
+            seat=tuple(seat),
+            drift=drift,
+            between=between,
+        )
+        scaling = (pen.leds - pen.leds.mean(axis=0)).ravel()
+        K = N_CONE + sum(sizes) + n_extrinsics + 1 + 3 * n_leds
+        mixing = np.zeros((K, layout.leds.stop))
+        at_leds = slice(K - 3 * n_leds, K)
+        mixing[at_leds, layout.tip] = -np.tile(np.eye(3), (n_leds, 1))
+        mixing[:N_CONE, layout.cone] = np.eye(3)
+        row = N_CONE
+        for c, at in enumerate(layout.cameras):
+            mixing[row : row + sizes[c], at] = np.eye(sizes[c])
+            row += sizes[c]
+            if c > 0:
+                place = layout.extrinsics.start + 6 * (c - 1)
+                mixing[row : row + 6, place : place + 6] = np.eye(6)
+                row += 6
+        mixing[row, layout.diameter] = 1.0
+        mixing[at_leds, layout.scale.start] = scaling
+        mixing[at_leds, layout.leds] = basis
+        second = () if start.at_second is None else (start.at_second.astype(float),)
+        forms = np.column_stack([given.lean, given.drift, *second])
+        return cls(layout, start, mixing, forms, given.oval, basis, scaling, priors)
+
+    @property
+    def number(self) -> int:
+        """Number of unknowns, rotations apart."""
+        return int(self.layout.between.stop)
+
+    def system(self, each: NormalEquations) -> tuple[FloatArray, FloatArray]:
+        """Return information (p, p) and gradient (p,) of the unknowns."""
+        mixing, forms = self.mixing, self.forms
+        p0, p = mixing.shape[1], self.number
+        information = np.empty((p, p))
+        information[:p0, :p0] = mixing.T @ each.N @ mixing
+        rows = np.tensordot(forms, each.cone_rows, axes=(0, 0))  # (m, 3, K)
+        information[p0:, :p0] = rows.reshape(p - p0, -1) @ mixing
+        information[:p0, p0:] = information[p0:, :p0].T
+        m = forms.shape[1]
+        products = (forms[:, :, None] * forms[:, None]).reshape(-1, m * m)
+        own = products.T @ each.cone_rows[..., :N_CONE].reshape(-1, N_CONE**2)
+        own = np.swapaxes(own.reshape(m, m, N_CONE, N_CONE), 1, 2)
+        information[p0:, p0:] = own.reshape(p - p0, p - p0)
+        gradient = np.concatenate(
+            [mixing.T @ each.b, (forms.T @ each.cone_right).ravel()]
+        )
+        return 0.5 * (information + information.T), gradient
+
+    def step(self, change: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return a change of the unknowns as a step (K,) and shifts of cones (N, 3)."""
+        p0 = self.mixing.shape[1]
+        shifts = self.forms @ change[p0:].reshape(-1, 3)
+        return self.mixing @ change[:p0], shifts
+
+    def sensitivity(self, rows: FloatArray) -> FloatArray:
+        """Return rows (N, 3, K) of the cone by the unknowns, (N, 3, p)."""
+        n_images, p0 = len(rows), self.mixing.shape[1]
+        sensitivity = np.empty((n_images, N_CONE, self.number))
+        flat = rows.reshape(-1, rows.shape[-1])
+        sensitivity[..., :p0] = (flat @ self.mixing).reshape(n_images, N_CONE, p0)
+        own = self.forms[:, None, :, None] * rows[:, :, None, :N_CONE]
+        sensitivity[..., p0:] = own.reshape(n_images, N_CONE, -1)
+        return sensitivity
+
+    def prior_information(self, components: Components) -> FloatArray:
+        """Return the prior information L with these components, (p, p)."""
+        at, priors = self.layout, self.priors
+        prior = self._of_files.copy()
+        for place, sigma in (
+            (at.leds, max(components.leds.sigma, priors.led_sigma or 0.0)),
+            (at.drift, components.drift.sigma),
+        ):
+            n = place.stop - place.start
+            prior[place, place] = np.eye(n) / max(sigma, EXACT) ** 2
+        variances, oval = self.seat_variances(components), components.oval.sigma
+        prior[at.whole_seat, at.whole_seat] = (
+            inverse(np.diag(variances) + oval**2 * self.oval @ self.oval.T)
+            if oval > 0
+            else np.diag(1 / variances)
+        )
+        of_leds = priors.led_covariance
+        if of_leds is not None and components.leds is NONE:  # the images do not deny it
+            known = self.basis.T @ of_leds @ self.basis
+            prior[at.leds, at.leds] = inverse(known + EXACT**2 * np.eye(len(known)))
+        return prior
+
+    @cached_property
+    def _of_files(self) -> FloatArray:
+        """Prior information of all but LEDs, seat and drift, (p, p)."""
+        at, priors = self.layout, self.priors
+        prior = np.zeros((self.number, self.number))
+        for place, each in zip(at.cameras, priors.cameras, strict=True):
+            prior[place, place] = known_by(each.covariance)
+        if priors.extrinsics is not None:
+            prior[at.extrinsics, at.extrinsics] = known_by(priors.extrinsics.covariance)
+        prior[at.diameter, at.diameter] = known_by(priors.diameter.covariance)
+        prior[at.scale, at.scale] = known_by(priors.size_covariance)
+        return prior
+
+    def measured(
+        self, state: BundleState, values: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return information M and right side of areas and of the cones' distance.
+
+        Parameters
+        ----------
+        values : (p,) array
+            Those at the state.
+
+        Returns
+        -------
+        information : (p, p) array
+        right : (p,) array
+        """
+        at, priors = self.layout, self.priors
+        information = np.zeros((self.number, self.number))
+        right = np.zeros(self.number)
+        if priors.reading is not None:
+            weight = priors.reading.sigma**-2
+            change = priors.reading.value - self.start.pen.diameter
+            information[at.diameter, at.diameter] = weight
+            right[at.diameter] = weight * change
+        if priors.separation is not None:
+            weight = priors.separation.sigma**-2
+            distance = float(np.linalg.norm(state.between_rig))
+            along = state.between_rig / distance
+            change = priors.separation.distance - distance
+            information[at.between, at.between] = weight * np.outer(along, along)
+            right[at.between] = weight * along * (change + along @ values[at.between])
+        return information, right
+
+    def seat_variances(self, components: Components) -> FloatArray:
+        """Return the variances of the moves in each seat mode, an oval apart, (21,)."""
+        one_wave, *others = (each.sigma for each in components.seat)
+        # One wave is hardly observable beside the tip, so it is taken to be as large
+        # as the largest other mode.
+        sigmas = np.array([max(one_wave, *others), *others])
+        by_kind = np.maximum(sigmas, max(self.priors.form_error, EXACT)) ** 2
+        return np.repeat(by_kind, N_CONE * np.array(MODE_COUNTS))
+
+    def moved(
+        self, now: BundleState, values: FloatArray, turns: FloatArray
+    ) -> BundleState:
+        """Return the state by new values and the turn of each image, (N, 3)."""
+        at, start, rig = self.layout, self.start, self.start.rig
+        cameras = tuple(
+            camera.with_intrinsics(camera.intrinsics + values[place])
+            for camera, place in zip(rig.cameras, at.cameras, strict=True)
+        )
+        places = np.concatenate([np.zeros(6), values[at.extrinsics]]).reshape(-1, 6)
+        leds = self.basis @ values[at.leds] + self.scaling * values[at.scale]
+        between = start.between_rig
+        if now.at_second is not None:
+            between = between + values[at.between]
+        return replace(
+            now,
+            rig=replace(
+                rig,
+                cameras=cameras,
+                rotations=rotation_from_vector(places[:, :3]) @ rig.rotations,
+                translations=rig.translations + places[:, 3:],
+            ),
+            pen=replace(
+                start.pen,
+                leds=start.pen.leds + leds.reshape(-1, 3),
+                diameter=start.pen.diameter + float(values[at.diameter][0]),
+            ),
+            tip_pen=now.tip_pen + values[at.tip],
+            cone_rig=now.cone_rig + values[at.cone],
+            rotations=rotation_from_vector(turns) @ now.rotations,
+            between_rig=between,
+        )
+
+
+def led_basis(leds: FloatArray) -> FloatArray:
+    """Return all moves of LEDs but those of the pen as a whole, (3 L, 3 L - 6)."""
+    return np.asarray(np.linalg.qr(whole_moves(leds), mode="complete")[0][:, 6:])
+
+
+def whole_moves(leds: FloatArray) -> FloatArray:
+    """Return the moves of LEDs by those of the pen as a whole, (3 L, 6).
+
+    Its shifts, mm, and its turns about the middle of the LEDs, rad.
+    """
+    shifts = np.tile(np.eye(3), (len(leds), 1))
+    turns = -skew(leds - leds.mean(axis=0)).reshape(-1, 3)
+    return np.concatenate([shifts, turns], axis=1)

@@ -1,0 +1,209 @@
+"""Motion of the camera during a swing by fixed lamps in view.
+
+A small motion of the camera shifts lamps and pen alike. The common shift of the lamps
+is a random walk, of the first order or of the second, whichever is likelier; its step
+is estimated beside the noise of a lamp's centre by maximum likelihood. The coefficients
+of the cosine transform are independent [1]_; each is filtered of its noise (Wiener).
+
+A lamp may move by itself, too, so the shift is removed from the images only where the
+pen shifts with it.
+
+References
+----------
+.. [1] G. Strang, "The discrete cosine transform", SIAM Review 41 (1999) 135-147.
+"""
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import Observations
+from lightpen.errors import CalibrationError
+from lightpen.estimation.contact.single_images import PosedImages, pose_images
+from lightpen.estimation.statistics.variance_components import CERTAIN
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+from lightpen.model.quantiles import chi_square_quantile
+from lightpen.model.rigid import rotation_from_vector
+
+MIN_IMAGES = 10
+LEAST = 1e-6  # px, of noise and ways; keeps exact lamps from dividing by zero
+RATIOS = np.geomspace(1e-8, 1e4, 200)  # of the variance of a step to that of a lamp
+HALF = 0.5  # of the way of the lamps, which the pen goes at least if the camera does
+WITH_LAMPS = 1.5  # times the way of the lamps, which a pen beside them may go
+FAR = 3.0  # times the usual distance; what lies farther has slipped
+
+
+@dataclass(frozen=True, eq=False)
+class CameraPath:
+    """Shift of the images of a camera by its fixed lamps.
+
+    Attributes
+    ----------
+    lamps : (K, 2) array
+        Of the lamps, px.
+    shifts : (N, 2) array
+        Shift of each image, filtered of noise, px; 0 on average.
+    noise : float
+        Standard deviation of a coordinate of the lamps in one image, px.
+    is_followed : bool
+        Whether the pen shifts with the lamps: the camera moves.
+    """
+
+    lamps: FloatArray
+    shifts: FloatArray
+    noise: float
+    is_followed: bool = False
+
+    @cached_property
+    def moved(self) -> float:
+        """Largest difference between two shifts, px; 0 without motion."""
+        apart = self.shifts[:, None] - self.shifts
+        return float(np.linalg.norm(apart, axis=2).max())
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyImages:
+    """The images of one camera with its motion removed.
+
+    Attributes
+    ----------
+    observations : Observations
+        With the motion removed.
+    path : CameraPath or None
+        None without a fixed lamp in view.
+    """
+
+    observations: Observations
+    posed: PosedImages
+    path: CameraPath | None
+
+
+def pose_steadily(camera: Camera, pen: Pen, observations: Observations) -> SteadyImages:
+    """Fit the pose of each image, with the motion of the camera removed.
+
+    Raises
+    ------
+    CalibrationError
+        The images do not determine the tip; the text says what is missing.
+    """
+    path = _way_of(observations)
+    if path is None or path.moved == 0:
+        return SteadyImages(observations, pose_images(camera, pen, observations), path)
+    with suppress(CalibrationError):  # that of a camera which moves too far
+        posed = pose_images(camera, pen, observations)
+        if _share_of_pen(camera, path, posed) < HALF:
+            return SteadyImages(observations, posed, path)
+    path = replace(path, is_followed=True)
+    still = steadied(camera, observations, path)
+    return SteadyImages(still, pose_images(camera, pen, still), path)
+
+
+def _way_of(observations: Observations) -> CameraPath | None:
+    """Return the motion of the camera by the images that show the pen.
+
+    A swing that is captured keeps no others.
+    """
+    shown = np.flatnonzero([reason.shows_pen for reason in observations.reasons])
+    path = follow_lamps(observations.lamps[shown])
+    if path is None:
+        return None
+    index = np.arange(len(observations.reasons))
+    shifts = [np.interp(index, shown, each) for each in path.shifts.T]
+    return replace(path, shifts=np.stack(shifts, axis=1))
+
+
+def steadied(
+    camera: Camera, observations: Observations, path: CameraPath | None
+) -> Observations:
+    """Return observations with the camera's motion removed, as a rotation of it."""
+    if path is None or not path.is_followed:
+        return observations
+    turns = _turns(camera, path)
+    seen = np.isfinite(observations.seen_pixels[..., 0])
+    image = np.nonzero(seen)[0]
+
+    def turned_back(pixels: FloatArray) -> FloatArray:
+        rays = np.ones((len(image), 3))
+        rays[:, :2] = camera.unproject(pixels[seen])
+        moved = np.full_like(pixels, np.nan)
+        moved[seen] = camera.project(np.einsum("nji,nj->ni", turns[image], rays))
+        return moved
+
+    return replace(
+        observations,
+        pixels=turned_back(observations.pixels),
+        seen_pixels=turned_back(observations.seen_pixels),
+    )
+
+
+def _turns(camera: Camera, path: CameraPath) -> FloatArray:
+    """Return the turn of the camera in each image, (N, 3, 3).
+
+    Up, down and sideways; lamps hardly tell how it turns about its own axis.
+    """
+    plane = camera.unproject_with_jacobian(path.lamps.mean(axis=0))
+    x, y = plane.points
+    # A small turn w moves what is seen there by this matrix times (w_x, w_y).
+    by_turn = np.array([[-x * y, 1 + x * x], [-1 - y * y, x * y]])
+    about = np.linalg.solve(by_turn, plane.jacobian @ path.shifts.T).T
+    return rotation_from_vector(np.column_stack([about, np.zeros(len(about))]))
+
+
+def follow_lamps(lamps: FloatArray) -> CameraPath | None:
+    """Estimate the motion of a camera by its lamps.
+
+    Parameters
+    ----------
+    lamps : (N, K, 2) array
+        px; NaN where an image does not show one.
+
+    Returns
+    -------
+    CameraPath or None
+        None without lamps, or with too few images.
+    """
+    n_images, n_lamps, _ = lamps.shape
+    if n_lamps == 0 or n_images < MIN_IMAGES:
+        return None
+    from scipy.fft import dct, idct  # takes 0.1 s
+
+    places = np.nanmedian(lamps, axis=0)
+    seen = np.isfinite(lamps[..., 0]).any(axis=1)
+    together = np.nanmedian((lamps - places)[seen], axis=1)
+    index = np.arange(n_images)
+    way = np.stack([np.interp(index, index[seen], each) for each in together.T], axis=1)
+    coefficients = dct(way, axis=0, norm="ortho")[1:]
+    waves = np.arange(1, n_images)
+    # Variances of a walk whose steps are 1, and of one whose steps go such a walk.
+    by_steps = 1 / (2 - 2 * np.cos(np.pi * waves / n_images))[:, None]
+    walks = by_steps ** np.array([[[1]], [[2]]])
+    ratios = np.concatenate([[0.0], RATIOS])
+    totals = 1 + ratios[:, None, None, None] * walks
+    variances = np.mean(coefficients**2 / totals, axis=(2, 3)) + LEAST**2
+    costs = coefficients.size * np.log(variances) + 2 * np.log(totals).sum(axis=(2, 3))
+    best = np.unravel_index(int(np.argmin(costs)), costs.shape)
+    shifts = np.zeros_like(way)
+    if costs[0, 0] - costs[best] > chi_square_quantile(1, CERTAIN):
+        shifts[1:] = coefficients * (1 - 1 / totals[best])
+        shifts = idct(shifts, axis=0, norm="ortho")
+    noise = float(np.sqrt(variances[best]))
+    return CameraPath(places, shifts, noise)
+
+
+def _share_of_pen(camera: Camera, path: CameraPath, posed: PosedImages) -> float:
+    """Return the share of the lamps' shift that the tip shows, too."""
+    pivot = posed.pivot
+    by_lamps = path.shifts[posed.fitted] * pivot.pivot_cam[2] / camera.fx
+    by_pen = pivot.residuals[:, :2]
+    lengths = np.linalg.norm(by_pen - np.median(by_pen, axis=0), axis=1)
+    farthest = WITH_LAMPS * np.linalg.norm(np.ptp(by_lamps, axis=0))
+    near = lengths < FAR * np.median(lengths) + farthest
+    by_lamps, by_pen = (
+        each[near] - each[near].mean(axis=0) for each in (by_lamps, by_pen)
+    )
+    together = np.sum(by_lamps * by_pen)
+    return float(together / max(np.sum(by_lamps**2), LEAST**2))

@@ -1,0 +1,169 @@
+"""The images of one camera by themselves: their poses, and which agree on a tip."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpen.arrays import BoolArray, IntArray
+from lightpen.detection.observations import Observations
+from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_poses
+from lightpen.detection.reasons import Reason, counted
+from lightpen.errors import CalibrationError
+from lightpen.estimation.pivot.pivot import PivotFit, fit_pivot
+from lightpen.messages import Message, message
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+
+MIN_IMAGES = 6  # the paper starts from six
+MAX_SIGMA = 1.0  # px, of one image coordinate; LED errors of 0.3 mm make this
+USUAL_SIGMA = 0.1  # px
+# An LED that runs along an arc during the exposure appears inside it, which moves the
+# pose of a blurred image by some hundredths of a millimetre; more is a slip.
+MAX_SMEAR = 0.15  # mm
+SMEARED = 1.25  # times the usual width of the LEDs' rims
+TRUSTED_WEIGHT = 0.2  # of the Cauchy loss, at eight standard deviations
+
+
+@dataclass(frozen=True, eq=False)
+class PosedImages:
+    """The images of one camera, each by itself.
+
+    Attributes
+    ----------
+    reasons : (N,) array of Reason
+        Why an image is left out.
+    posed : (M,) array of int
+        Images that have a pose.
+    poses : Poses
+        Of these.
+    fitted : (F,) array of int
+        Images whose pose most LEDs agree with; ``pivot`` is of these.
+    kept : (K,) array of int
+        Those among the M whose tip is where most have it.
+    pivot : PivotFit
+        Tip and cone, from poses of which most are ``kept``.
+    """
+
+    reasons: npt.NDArray[np.object_]
+    posed: IntArray
+    poses: Poses
+    fitted: IntArray
+    kept: IntArray
+    pivot: PivotFit
+
+    @property
+    def chosen(self) -> IntArray:
+        """Images that are of use, (K,)."""
+        return np.asarray(self.posed[self.kept])
+
+
+def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedImages:
+    """Fit the pose of each image, and leave out those of another tip.
+
+    Raises
+    ------
+    CalibrationError
+        The images do not determine the tip; the text says what is missing.
+    """
+    reasons = np.array(observations.reasons, dtype=object)
+    posed = np.flatnonzero(reasons == Reason.NONE)
+    require_images(posed, reasons, observations.advice)
+    poses = fit_poses(
+        camera,
+        pen,
+        observations.pixels[posed],
+        observations.rotations[posed],
+        observations.translations[posed],
+    )
+    require_fit(poses.sigma)
+    fitting = _fitting(poses)
+    reasons[posed[~fitting]] = Reason.MISFIT
+    require_images(posed[fitting], reasons, observations.advice)
+    pivot = fit_pivot(
+        poses.rotations[fitting],
+        poses.translations[fitting],
+        poses.covariances[fitting],
+    )
+    outliers = posed[fitting][~pivot.used]
+    distances = np.linalg.norm(pivot.residuals[~pivot.used], axis=1)
+    smeared = _smeared(observations)[outliers] & (distances < MAX_SMEAR)
+    reasons[outliers[smeared]] = Reason.BLURRED
+    reasons[outliers[~smeared]] = Reason.SLIPPED
+    return PosedImages(
+        reasons=reasons,
+        posed=posed,
+        poses=poses,
+        fitted=posed[fitting],
+        kept=np.flatnonzero(fitting)[pivot.used],
+        pivot=pivot,
+    )
+
+
+def require_fit(sigma: float) -> None:
+    """Refuse LEDs that lie farther off the model than any that was measured, px.
+
+    Raises
+    ------
+    CalibrationError
+        Names the files that may be of others.
+    """
+    if sigma > MAX_SIGMA:
+        raise CalibrationError(
+            "calibrate.leds-do-not-fit", sigma=sigma, usual=USUAL_SIGMA
+        )
+
+
+def _smeared(observations: Observations) -> BoolArray:
+    """Return which images have clearly wider LED rims than most."""
+    widths = observations.edge_widths
+    known = widths[np.isfinite(widths)]
+    usual = np.median(known) if len(known) else np.inf
+    return np.asarray(np.nan_to_num(widths) > SMEARED * usual)
+
+
+def _fitting(poses: Poses) -> BoolArray:
+    """Return which images have a pose that most of their LEDs agree with."""
+    n_seen = (poses.weights > 0).sum(axis=1)
+    n_trusted = (poses.weights > TRUSTED_WEIGHT).sum(axis=1)
+    return np.asarray((n_trusted >= MIN_POSE_LEDS) & (2 * n_trusted > n_seen))
+
+
+def require_images(
+    chosen: IntArray, reasons: npt.NDArray[np.object_], advice: Message | None
+) -> None:
+    """Refuse too few images.
+
+    Parameters
+    ----------
+    chosen : (M,) array of int
+        Those that are of use.
+    reasons : (N,) array of Reason
+        Why others are left out.
+    advice : Message or None
+        What may be wrong with the set as a whole.
+
+    Raises
+    ------
+    CalibrationError
+        Says how many there are, and why.
+    """
+    if len(chosen) >= MIN_IMAGES:
+        return
+    left_out = tuple(
+        counted(int(np.sum(reasons == reason)), reason)
+        for reason in Reason
+        if reason and np.any(reasons == reason)
+    )
+    usable = message(
+        "calibrate.images-usable", n_usable=len(chosen), n_images=len(reasons)
+    )
+    if left_out:
+        usable = message("calibrate.images-left-out", usable=usable, left_out=left_out)
+    more = message("calibrate.capture-more")
+    raise CalibrationError(
+        "calibrate.too-few-images",
+        usable=usable,
+        needed=MIN_IMAGES,
+        advice=advice or more,
+    )

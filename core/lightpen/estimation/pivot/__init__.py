@@ -1,0 +1,1 @@
+"""Pivot calibration from poses: closed form, two stages, pose conventions."""

@@ -1,0 +1,349 @@
+"""Pivot calibration: the tip of a pen from poses that swing about it.
+
+While the tip rests at one place every pose i gives three equations
+
+    R_i tip_pen + t_i = pivot_cam
+
+linear in the six unknowns. `fit_pivot` solves all of them together, weighted by the
+covariance of each pose where it is known, and finds the poses that do not belong.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import default_rng
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.model.coverage import require_spread
+from lightpen.model.quantiles import chi_quantile
+from lightpen.model.rigid import skew
+
+MIN_POSES = 6  # the paper starts from six images
+N_SAMPLES = 300  # of four poses: 40 % outliers leave 1e-18 of drawing no clean one
+SAMPLE_SIZE = 4
+FEW = 12  # poses, of which four fix the others too poorly to judge them
+SHARE_OF_FEW = 0.75  # of so few poses that make a sample
+OUTLIER = 1e-5  # chance that a pose which belongs is left out
+LOOSE_THRESHOLD = 8.0  # where covariances are not given: real trackers have heavy tails
+MAX_PASSES = 20
+MAX_EXCESS = 5.0  # scatter of the tip over what the covariances of the poses explain
+MAX_SCATTER = 0.2  # mm rms; less is passed whatever the covariances say
+TINY = 1e-12  # mm; exact poses have no scatter
+
+
+@dataclass(frozen=True, eq=False)
+class PivotFit:
+    """Tip of a pen, and the point that it pivots about.
+
+    Attributes
+    ----------
+    tip_pen : (3,) array
+        Tip in the pen frame, mm.
+    pivot_cam : (3,) array
+        Point the tip rested on, in the camera frame, mm.
+    covariance : (6, 6) array
+        Of (tip_pen, pivot_cam), mm^2, by noise that is independent from pose to pose.
+    residuals : (N, 3) array
+        Where each pose puts the tip, minus ``pivot_cam``, camera frame, mm.
+    distances : (N,) array
+        Length of the residuals in standard deviations, 1.73 on average.
+    used : (N,) array of bool
+        Poses that agree with the pivot; the others were left out.
+    """
+
+    tip_pen: FloatArray
+    pivot_cam: FloatArray
+    covariance: FloatArray
+    residuals: FloatArray
+    distances: FloatArray
+    used: BoolArray
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the components of the residuals of used poses, mm."""
+        return float(np.sqrt(np.mean(self.residuals[self.used] ** 2)))
+
+
+def fit_pivot(
+    rotations: FloatArray,
+    translations: FloatArray,
+    covariances: FloatArray | None = None,
+    *,
+    robust: bool = True,
+    candidates: BoolArray | None = None,
+) -> PivotFit:
+    """Fit tip and pivot to poses by linear least squares.
+
+    Without covariances all equations weigh the same: the algebraic one-step method
+    [1]_. A robust fit starts from the best of many small samples [2]_, then keeps the
+    poses within the outlier threshold until their set no longer changes.
+
+    Parameters
+    ----------
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Poses cam_from_pen, mm.
+    covariances : (N, 6, 6) array, optional
+        Of each pose's (theta, dt) in rad and mm, see `lightpen.detection.pose`.
+    robust : bool
+        Leave out poses that do not agree with the pivot of the others.
+    candidates : (N,) array of bool, optional
+        Poses that may be used; all unless given.
+
+    Raises
+    ------
+    CalibrationError
+        There are too few poses, they turn too little to fix the tip, or the tip moved
+        by far more than the covariances allow.
+
+    References
+    ----------
+    .. [1] Z. Yaniv, "Which pivot calibration?", Proc. SPIE 9415 (2015) 941527.
+    .. [2] P. J. Rousseeuw, "Least median of squares regression", J. American
+       Statistical Association 79 (1984) 871-880.
+    """
+    require_poses(rotations)
+    equations = _Equations(rotations, translations, covariances)
+    if candidates is None:
+        candidates = np.ones(len(rotations), dtype=bool)
+    if not robust:
+        return equations.fit(candidates, candidates)
+    used = candidates & equations.inliers(
+        _best_sample(equations.of(candidates)), candidates
+    )
+    for _ in range(MAX_PASSES):
+        require_poses(rotations[used])
+        inliers = candidates & equations.inliers(equations.solve_weighted(used), used)
+        if np.array_equal(inliers, used):
+            break
+        used = inliers
+    fit = equations.fit(used, inliers)
+    if covariances is not None:
+        _require_steadiness(fit)
+    return fit
+
+
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    rotations: FloatArray
+    translations: FloatArray
+    covariances: FloatArray | None
+
+    def of(self, chosen: BoolArray) -> "_Equations":
+        """Return the equations of the chosen poses."""
+        covariances = None if self.covariances is None else self.covariances[chosen]
+        return _Equations(
+            self.rotations[chosen], self.translations[chosen], covariances
+        )
+
+    def fit(self, used: BoolArray, inliers: BoolArray) -> PivotFit:
+        """Solve over the used poses."""
+        solution = self.solve_weighted(used)
+        residuals = self.residuals(solution)
+        distances = self.distances(solution)
+        n_free = 3 * int(used.sum()) - 6
+        variance = max(float(np.sum(distances[used] ** 2)) / n_free, TINY**2)
+        if self.covariances is None:
+            distances = distances / np.sqrt(variance)
+        else:
+            variance = max(variance, 1.0)
+        H, _ = self.normal_equations(used[None], solution[:3])
+        return PivotFit(
+            tip_pen=solution[:3],
+            pivot_cam=solution[3:],
+            covariance=variance * np.linalg.inv(H[0]),
+            residuals=residuals,
+            distances=distances,
+            used=inliers,
+        )
+
+    def solve_weighted(self, used: BoolArray) -> FloatArray:
+        """Return the solution (6,) over the used poses."""
+        solution = self.solve(used[None])[0]
+        if self.covariances is not None:
+            for _ in range(2):  # the weights depend on the tip, and hardly at that
+                solution = self.solve(used[None], solution[:3])[0]
+        return np.asarray(solution)
+
+    def inliers(self, solution: FloatArray, used: BoolArray) -> BoolArray:
+        """Return which poses are inliers.
+
+        The median distance of the used poses sets the unit, so that a model that fits
+        worse than the covariances say (geometry errors, a worn cone) does not cost good
+        poses.
+        """
+        distances = self.distances(solution)
+        unit = float(np.median(distances[used])) / median_distance()
+        if self.covariances is None:
+            return np.asarray(distances <= LOOSE_THRESHOLD * max(unit, TINY))
+        return np.asarray(distances <= outlier_distance() * max(unit, 1.0))
+
+    def solve(self, used: BoolArray, tip_pen: FloatArray | None = None) -> FloatArray:
+        """Return the solutions (S, 6) over S sets of poses, ``used`` (S, N)."""
+        H, g = self.normal_equations(used, tip_pen)
+        # A sample of too similar poses is singular: any finite answer will do.
+        H = H + 1e-12 * np.trace(H, axis1=1, axis2=2)[:, None, None] * np.eye(6)
+        solutions: FloatArray = np.linalg.solve(H, g[..., None])[..., 0]
+        return solutions
+
+    def normal_equations(
+        self, used: BoolArray, tip_pen: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray]:
+        A = contact_matrix(self.rotations)
+        # Shifted by the mean translation, which keeps the numbers small.
+        center = self.translations.mean(axis=0)
+        b = center - self.translations
+        WA = A
+        if self.covariances is not None and tip_pen is not None:
+            covariances = tip_covariances(self.rotations, self.covariances, tip_pen)
+            WA = np.linalg.inv(covariances) @ A
+        H_each = np.swapaxes(WA, 1, 2) @ A
+        g_each = np.einsum("nki,nk->ni", WA, b)
+        H = np.einsum("sn,nij->sij", used.astype(float), H_each)
+        g = np.einsum("sn,ni->si", used.astype(float), g_each)
+        shift = np.concatenate([np.zeros(3), center])
+        return H, g + H @ shift
+
+    def residuals(self, solution: FloatArray) -> FloatArray:
+        """Return where each pose puts the tip minus the pivot, (N, 3), mm."""
+        return contact_residuals(
+            self.rotations, self.translations, solution[:3], solution[3:]
+        )
+
+    def distances(self, solution: FloatArray) -> FloatArray:
+        """Return the lengths of the residuals, in standard deviations if known."""
+        residuals = self.residuals(solution)
+        if self.covariances is None:
+            return np.asarray(np.linalg.norm(residuals, axis=1))
+        covariances = tip_covariances(self.rotations, self.covariances, solution[:3])
+        return in_deviations(residuals, covariances)
+
+
+def contact_matrix(rotations: FloatArray) -> FloatArray:
+    """Return [R_i, -I], (N, 3, 6): the equations of tip and pivot are A x = -t_i."""
+    minus_identity = np.broadcast_to(-np.eye(3), rotations.shape)
+    return np.concatenate([rotations, minus_identity], axis=2)
+
+
+def contact_residuals(
+    rotations: FloatArray,
+    translations: FloatArray,
+    tip_pen: FloatArray,
+    pivot_cam: FloatArray,
+) -> FloatArray:
+    """Return R_i tip_pen + t_i - pivot_cam, (N, 3), mm, by which the equations miss."""
+    return rotations @ tip_pen + translations - pivot_cam
+
+
+def outlier_distance() -> float:
+    """Return the distance in standard deviations from which on a pose is an outlier."""
+    return chi_quantile(3, OUTLIER)
+
+
+def median_distance() -> float:
+    """Return the median distance of poses that belong, standard deviations."""
+    return chi_quantile(3, 0.5)
+
+
+def in_deviations(residuals: FloatArray, covariances: FloatArray) -> FloatArray:
+    """Return the lengths (N,) of residuals in standard deviations, 1.73 on average.
+
+    Parameters
+    ----------
+    residuals : (N, 3) array
+        mm.
+    covariances : (N, 3, 3) array or (3, 3) array
+        mm^2.
+    """
+    whitened = np.linalg.solve(covariances, residuals[..., None])[..., 0]
+    squares: FloatArray = np.einsum("ni,ni->n", residuals, whitened)
+    return np.sqrt(squares)
+
+
+def tip_covariances(
+    rotations: FloatArray, covariances: FloatArray, tip_pen: FloatArray
+) -> FloatArray:
+    """Return the covariances (N, 3, 3) of where poses put the tip, camera frame, mm^2.
+
+    Parameters
+    ----------
+    rotations : (N, 3, 3) array
+        Of cam_from_pen.
+    covariances : (N, 6, 6) array
+        Of each pose's (theta, dt), rad and mm.
+    tip_pen : (3,) array
+        mm.
+    """
+    J = np.concatenate(
+        [-skew(rotations @ tip_pen), np.broadcast_to(np.eye(3), rotations.shape)],
+        axis=2,
+    )
+    result: FloatArray = J @ covariances @ np.swapaxes(J, 1, 2)
+    return result
+
+
+def agreeing_solution(
+    rotations: FloatArray, translations: FloatArray, share: float
+) -> FloatArray:
+    """Return tip and pivot (6,), mm, on which a share of the poses agrees best.
+
+    All poses weigh the same: least trimmed squares by concentration [1]_.
+
+    Parameters
+    ----------
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Poses cam_from_pen, mm.
+
+    References
+    ----------
+    .. [1] P. J. Rousseeuw, K. Van Driessen, "Computing LTS regression for large data
+       sets", Data Mining and Knowledge Discovery 12 (2006) 29-45.
+    """
+    equations = _Equations(rotations, translations, None)
+    n_kept = int(np.ceil(share * len(rotations)))
+    solution = _best_sample(equations, share)
+    for _ in range(MAX_PASSES):
+        nearest = np.argsort(equations.distances(solution))[:n_kept]
+        kept = np.zeros(len(rotations), dtype=bool)
+        kept[nearest] = True
+        concentrated = equations.solve(kept[None])[0]
+        if np.array_equal(concentrated, solution):
+            break
+        solution = concentrated
+    return solution
+
+
+def _best_sample(equations: _Equations, share: float = 0.5) -> FloatArray:
+    """Return the solution of the sample to which a share of the poses is nearest."""
+    n_poses = len(equations.rotations)
+    rng = default_rng(0)  # the same poses give the same tip
+    size = SAMPLE_SIZE if n_poses > FEW else int(np.ceil(SHARE_OF_FEW * n_poses))
+    order = np.argsort(rng.random((N_SAMPLES, n_poses)), axis=1)
+    members = np.zeros((N_SAMPLES, n_poses), dtype=bool)
+    np.put_along_axis(members, order[:, :size], True, axis=1)
+    solutions = equations.solve(members)
+    tips = np.einsum("nij,sj->sni", equations.rotations, solutions[:, :3])
+    residuals = tips + equations.translations - solutions[:, None, 3:]
+    reached = np.quantile(np.linalg.norm(residuals, axis=2), share, axis=1)
+    return np.asarray(solutions[np.argmin(reached)])
+
+
+def require_poses(rotations: FloatArray) -> None:
+    """Refuse rotations (N, 3, 3) that are too few or turn too little to fix the tip.
+
+    Raises
+    ------
+    CalibrationError
+        Says what is missing.
+    """
+    n_poses = len(rotations)
+    if n_poses < MIN_POSES:
+        raise CalibrationError("pivot.too-few-poses", n_poses=n_poses, needed=MIN_POSES)
+    require_spread(rotations)
+
+
+def _require_steadiness(fit: PivotFit) -> None:
+    scatter = float(np.sqrt(np.mean(np.sum(fit.residuals[fit.used] ** 2, axis=1))))
+    excess = float(np.median(fit.distances[fit.used])) / median_distance()
+    if excess > MAX_EXCESS and scatter > MAX_SCATTER:
+        raise CalibrationError("pivot.tip-moved", scatter=scatter, excess=excess)

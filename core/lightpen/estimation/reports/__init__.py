@@ -1,0 +1,1 @@
+"""Calibrations as records and text, their verdicts and warnings."""

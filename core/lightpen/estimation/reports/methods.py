@@ -1,0 +1,55 @@
+"""Tip and cone by each of the methods that find them from the same images."""
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+
+Method: TypeAlias = Literal["joint", "two-stage"]
+METHODS: tuple[Method, ...] = ("joint", "two-stage")
+
+
+@dataclass(frozen=True, eq=False)
+class MethodResult:
+    """Tip and cone by one of the methods.
+
+    Attributes
+    ----------
+    tip_pen, cone_cam : (3,) array
+        mm.
+    covariance : (6, 6) array
+        Of both, mm^2.
+    rms_mm : float
+        Root mean square distance of the tip of single images from the cone point.
+    """
+
+    tip_pen: FloatArray
+    cone_cam: FloatArray
+    covariance: FloatArray
+    rms_mm: float
+
+    @property
+    def expanded_uncertainty(self) -> FloatArray:
+        """U (k = 2) of tip and cone, (6,), mm."""
+        return COVERAGE_FACTOR * np.sqrt(np.diag(self.covariance))
+
+
+def result_of(calibration: Calibration, method: str) -> MethodResult:
+    """Return tip and cone by ``"joint"`` or ``"two-stage"``."""
+    if method == "two-stage":
+        fit = calibration.two_stage
+        return MethodResult(
+            fit.tip_pen, fit.cone_cam, calibration.two_stage_covariance, fit.rms
+        )
+    joint = calibration.joint
+    deviations = calibration.tips_cam[calibration.used] - joint.cone_cam
+    return MethodResult(
+        joint.tip_pen,
+        joint.cone_cam,
+        calibration.budget.covariance,
+        float(np.sqrt(np.mean(np.sum(deviations**2, axis=1)))),
+    )

@@ -1,0 +1,403 @@
+"""A calibration as its record."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.reasons import Reason
+from lightpen.estimation.bundle.consistency_findings import COEFFICIENTS
+from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.reports.calibration_record import (
+    AdjustedParameter,
+    AdjustmentRecord,
+    CalibrationRecord,
+    CameraPlace,
+    CameraRecord,
+    ContradictionRecord,
+    ContributionRecord,
+    Convergence,
+    CoverageRecord,
+    DirectionRecord,
+    Estimate,
+    FrameRecord,
+    ImageCounts,
+    InputsRecord,
+    InstrumentRecord,
+    LampRecord,
+    LedRecord,
+    MethodRecord,
+    OtherCameraRecord,
+    RigRecord,
+    SecondConeRecord,
+    SpotRecord,
+    UncertaintyRecord,
+    VerdictLimits,
+    VerdictRecord,
+)
+from lightpen.estimation.reports.methods import METHODS, Method, result_of
+from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
+from lightpen.estimation.reports.verdict import judge
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR, ContributionName
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.estimation.uncertainty.second_cone import SecondCone
+from lightpen.formats.hashes import Inputs
+from lightpen.formats.json_records import THIS_PROGRAM, file_entry, plain
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.local_time import local_now
+from lightpen.model.coverage import DIRECTION_NAMES
+from lightpen.model.limits import SwingLimits
+
+
+def calibration_record(
+    calibration: Calibration, inputs: Inputs, method: Method, limits: SwingLimits
+) -> CalibrationRecord:
+    """Return the record of a calibration.
+
+    Parameters
+    ----------
+    method : str
+        ``"joint"`` or ``"two-stage"``, of the tip.
+    limits : SwingLimits
+        By which the calibration is judged.
+    """
+    result = result_of(calibration, method)
+    tip, nominal = result.tip_pen, inputs.nominal_tip
+    budget = calibration.budget
+    several = len(calibration.cameras) > 1
+    return CalibrationRecord(
+        program=THIS_PROGRAM,
+        created=local_now().replace(microsecond=0),
+        origin=inputs.origin,
+        method=method,
+        tip_pen_mm=plain(tip),
+        cone_cam_mm=plain(result.cone_cam),
+        covariance=plain(result.covariance),
+        expanded_uncertainty_mm=plain(result.expanded_uncertainty[:3]),
+        cone_expanded_uncertainty_mm=plain(result.expanded_uncertainty[3:]),
+        coverage_factor=COVERAGE_FACTOR,
+        nominal_tip_mm=plain(nominal),
+        change_from_nominal_mm=None if nominal is None else plain(tip - nominal),
+        rms_px=plain(calibration.joint.rms),
+        rms_mm=plain(result.rms_mm),
+        sigma_px=plain(calibration.joint.sigma),
+        images=ImageCounts(
+            total=len(calibration.used),
+            used=int(calibration.used.sum()),
+            dropped=count_dropped(calibration.reasons),
+        ),
+        methods={name: _method(calibration, name) for name in METHODS},
+        verdict=_verdict(calibration, limits),
+        warnings=tuple(map(StoredMessage.of, warnings_of(calibration))),
+        uncertainty=_uncertainty(calibration),
+        adjusted=_adjusted(calibration),
+        assumptions=calibration.assumptions,
+        fixed_lamps=_lamps(calibration),
+        second_cone=_second_cone(calibration.second),
+        instrument=_instrument(calibration.instrument),
+        weakest_direction=DirectionRecord(
+            vector_pen=plain(budget.weakest_direction),
+            expanded_uncertainty_mm=plain(budget.weakest_uncertainty),
+        ),
+        coverage=_coverage(calibration),
+        leds=_leds(calibration),
+        rig=_rig(calibration) if several else None,
+        inputs=_inputs(inputs),
+        frames=tuple(_frames(calibration)),
+    )
+
+
+def _inputs(inputs: Inputs) -> InputsRecord:
+    rig = inputs.rig
+    return InputsRecord(
+        camera=file_entry(inputs.camera),
+        pen=file_entry(inputs.pen),
+        observations=tuple(map(file_entry, inputs.observations)),
+        units=inputs.units,
+        led_diameter_mm=inputs.led_diameter,
+        rig=None if rig is None else file_entry(rig.rig),
+        cameras=() if rig is None else tuple(map(file_entry, rig.cameras)),
+    )
+
+
+def _verdict(calibration: Calibration, limits: SwingLimits) -> VerdictRecord:
+    verdict = judge(calibration, limits)
+    reason = StoredMessage.of(verdict.reason)
+    return VerdictRecord(
+        code=reason.code,
+        text=reason.text,
+        values=reason.values,
+        grade=verdict.grade,
+        next_step=verdict.next_step,
+        limits=VerdictLimits(
+            max_uncertainty_mm=limits.max_uncertainty,
+            min_images=limits.min_images,
+            min_per_field=limits.min_per_field,
+        ),
+    )
+
+
+def _method(calibration: Calibration, name: str) -> MethodRecord:
+    result, two_stage = result_of(calibration, name), calibration.two_stage
+    steps = Convergence(
+        x_mm=plain(two_stage.iterates),
+        objective_mm2=plain(two_stage.objectives),
+        alpha=plain(two_stage.step_lengths),
+        increment_mm=plain(two_stage.increments),
+    )
+    return MethodRecord(
+        tip_pen_mm=plain(result.tip_pen),
+        cone_cam_mm=plain(result.cone_cam),
+        covariance=plain(result.covariance),
+        expanded_uncertainty_mm=plain(result.expanded_uncertainty[:3]),
+        rms_mm=plain(result.rms_mm),
+        convergence=steps if name == "two-stage" else None,
+    )
+
+
+def _uncertainty(calibration: Calibration) -> UncertaintyRecord:
+    budget, halves = calibration.budget, calibration.halves
+    found = {share.name: share.standard_uncertainty for share in budget.shares}
+    by_name = {
+        f"{name.value.replace(' ', '_')}_mm": plain(found.get(name))
+        for name in ContributionName
+    }
+
+    def std(covariance: FloatArray | None) -> FloatArray | None:
+        return None if covariance is None else np.sqrt(np.diag(covariance)[:3])
+
+    return UncertaintyRecord(
+        shares=tuple(
+            ContributionRecord(
+                name=share.name,
+                standard_uncertainty_mm=plain(share.standard_uncertainty),
+                weakest_expanded_uncertainty_mm=plain(budget.weakest_share(share)),
+                assumed=share.assumed,
+            )
+            for share in budget.shares
+        ),
+        **by_name,
+        independent_noise_mm=plain(std(budget.independent_noise)),
+        blocks_mm=plain(std(budget.blocks)),
+        block_ratio=plain(budget.block_ratio),
+        correlation_factor=plain(budget.correlation_factor),
+        lag1_autocorrelation=plain(budget.autocorrelation),
+        led_sigma_mm=plain(calibration.led_sigma),
+        halves_difference_mm=plain(halves.difference),
+        halves_expanded_uncertainty_mm=plain(halves.expanded_uncertainty),
+    )
+
+
+def _adjusted(calibration: Calibration) -> AdjustmentRecord:
+    """Return what the images made of the files."""
+    priors, reading = calibration.priors, calibration.priors.reading
+    return AdjustmentRecord(
+        intrinsics=adjusted_intrinsics(calibration, 0),
+        intrinsics_uncertainty_assumed=priors.cameras[0].assumed,
+        scale_uncertainty_before=plain(
+            np.sqrt(calibration.stated.scale.covariance[0, 0])
+        ),
+        scale_uncertainty_assumed=priors.scale.assumed,
+        temperature_uncertainty_assumed=priors.temperature.assumed,
+        pen_growth=plain(calibration.growth),
+        disc_diameter_mm=plain(calibration.bundle.state.pen.diameter),
+        disc_diameter_by_areas_mm=(
+            None
+            if reading is None
+            else Estimate(plain(reading.value), plain(reading.sigma))
+        ),
+        contradictions=tuple(
+            ContradictionRecord(
+                what=str(each.what),
+                unit=each.unit,
+                stated=plain(each.stated),
+                stated_expanded_uncertainty=plain(each.stated_uncertainty),
+                wanted=plain(each.estimated),
+                wanted_expanded_uncertainty=plain(each.estimated_uncertainty),
+                standard_deviations=plain(each.deviations),
+                camera=each.camera,
+            )
+            for each in calibration.contradictions
+        ),
+    )
+
+
+def _lamps(calibration: Calibration) -> tuple[LampRecord, ...]:
+    """Return what each camera's fixed lamps tell."""
+    names = calibration.bundle.state.rig.names or ("",)
+    return tuple(
+        LampRecord(
+            camera=name,
+            places_px=plain(images.path.lamps),
+            noise_px=plain(images.path.noise),
+            moved_px=plain(images.path.moved),
+            is_taken_out=bool(images.path.is_followed),
+            shifts_px=plain(images.path.shifts),
+        )
+        for name, images in zip(names, calibration.cameras, strict=True)
+        if images.path is not None
+    )
+
+
+def _second_cone(second: SecondCone | None) -> SecondConeRecord | None:
+    if second is None:
+        return None
+    return SecondConeRecord(
+        cone_cam_mm=plain(second.cone_cam),
+        images_used=int(second.n_used),
+        stated_distance_mm=plain(second.separation.distance),
+        stated_standard_uncertainty_mm=plain(second.separation.sigma),
+        distance_mm=plain(second.distance),
+        expanded_uncertainty_without_mm=plain(second.uncertainty_without),
+        expanded_uncertainty_with_mm=plain(second.uncertainty_with),
+    )
+
+
+def _instrument(instrument: Instrument) -> InstrumentRecord:
+    rig = instrument.rig
+    others = zip(rig.cameras, rig.rotations, rig.translations, strict=True)
+    return InstrumentRecord(
+        intrinsics=plain(instrument.camera.intrinsics),
+        disc_diameter_mm=plain(instrument.pen.diameter),
+        leds_mm=plain(instrument.pen.leds),
+        covariance=plain(instrument.covariance),
+        other_cameras=tuple(
+            OtherCameraRecord(
+                intrinsics=plain(camera.intrinsics),
+                cam_from_rig_rotation=plain(rotation),
+                cam_from_rig_translation_mm=plain(translation),
+            )
+            for camera, rotation, translation in list(others)[1:]
+        ),
+    )
+
+
+def _coverage(calibration: Calibration) -> CoverageRecord:
+    coverage = calibration.coverage
+    bound = np.sqrt(np.diag(calibration.budget.independent_noise)[:3])
+    return CoverageRecord(
+        directions=DIRECTION_NAMES,
+        leaning=plain(coverage.counts[0]),
+        leaning_far=plain(coverage.counts[1]),
+        upright=int(coverage.n_upright),
+        missing=tuple(coverage.missing),
+        tilt_deg=plain(np.degrees([coverage.tilts.min(), coverage.tilts.max()])),
+        turn_deg=plain(np.degrees([coverage.turns.min(), coverage.turns.max()])),
+        spread_deg=plain(np.degrees(coverage.spread)),
+        spread_axes_pen=plain(coverage.axes),
+        predicted_bound_mm=plain(bound),
+    )
+
+
+def _leds(calibration: Calibration) -> tuple[LedRecord, ...]:
+    leds = calibration.leds
+    return tuple(
+        LedRecord(
+            led=j + 1,
+            seen=int(leds.n_seen[j]),
+            used=int(leds.n_used[j]),
+            rms_px=plain(leds.rms[j]),
+            mean_px=plain(leds.mean[j]),
+            displacement_mm=plain(leds.displacement[j]),
+            displaced=j + 1 in leds.displaced,
+            correction_mm=plain(calibration.bundle.led_corrections[j]),
+        )
+        for j in range(len(leds.rms))
+    )
+
+
+def _frames(calibration: Calibration) -> Iterator[FrameRecord]:
+    names = calibration.bundle.state.rig.names
+    tips = plain(calibration.tips_cam)
+    for c, images in enumerate(calibration.cameras):
+        observations = images.observations
+        pixels, areas = plain(observations.seen_pixels), plain(observations.areas)
+        fit = np.isfinite(observations.pixels[..., 0]).tolist()
+        rms, widths = plain(images.rms), plain(observations.edge_widths)
+        leds_used, lamps = images.leds_used.tolist(), plain(observations.lamps)
+        for i, reason in enumerate(images.reasons):
+            if reason is Reason.ABSENT:
+                continue
+            told = observations.details[i]
+            detail = None if told is None else StoredMessage.of(told)
+            yield FrameRecord(
+                camera=names[c] if names else "",
+                moment=i + 1 if names else 0,
+                file=observations.names[i],
+                used=reason is Reason.NONE,
+                reason=reason,
+                detail="" if detail is None else detail.text,
+                detail_code="" if detail is None else detail.code,
+                detail_values={} if detail is None else detail.values,
+                rms_px=rms[i],
+                tip_cam_mm=tips[i],
+                edge_width_px=widths[i],
+                lamps_px=lamps[i],
+                leds=tuple(
+                    SpotRecord(j + 1, x, y, areas[i][j], fit[i][j], leds_used[i][j])
+                    for j, (x, y) in enumerate(pixels[i])
+                    if x is not None
+                ),
+            )
+
+
+def adjusted_intrinsics(
+    calibration: Calibration, c: int
+) -> dict[str, AdjustedParameter]:
+    """Return what the images made of the intrinsics of the c-th camera."""
+    camera = calibration.bundle.state.rig.cameras[c]
+    place = calibration.bundle.layout.cameras[c]
+    deviations = np.sqrt(np.diag(calibration.bundle.covariance)[place])
+    before = np.sqrt(np.diag(calibration.stated.cameras[c].covariance))
+    names = ("fx", "fy", "cx", "cy", *COEFFICIENTS)
+    columns = map(plain, (camera.intrinsics, deviations, before))
+    return {
+        name: AdjustedParameter(*values)
+        for name, *values in zip(names, *columns, strict=False)
+    }
+
+
+def _rig(calibration: Calibration) -> RigRecord:
+    """Return what the images of several cameras say of each."""
+    names = calibration.bundle.state.rig.names
+    return RigRecord(
+        tuple(
+            CameraRecord(
+                name=name,
+                images=ImageCounts(
+                    total=len(images.reasons) - images.reasons.count(Reason.ABSENT),
+                    used=int(images.used.sum()),
+                    dropped=count_dropped(images.reasons),
+                ),
+                moments_without_image=images.reasons.count(Reason.ABSENT),
+                rms_px=plain(images.total_rms),
+                intrinsics=adjusted_intrinsics(calibration, c),
+                intrinsics_uncertainty_assumed=calibration.priors.cameras[c].assumed,
+                cam_from_rig=_camera_place(calibration, c),
+            )
+            for c, (name, images) in enumerate(
+                zip(names, calibration.cameras, strict=True)
+            )
+        )
+    )
+
+
+def _camera_place(calibration: Calibration, c: int) -> CameraPlace:
+    bundle, prior = calibration.bundle, calibration.stated.extrinsics
+    rig = bundle.state.rig
+    rotation, translation = plain(rig.rotations[c]), plain(rig.translations[c])
+    if c == 0 or prior is None:
+        return CameraPlace(rotation, translation)
+    own = slice(6 * (c - 1), 6 * c)
+    place = bundle.layout.extrinsics
+    lag = calibration.lags[c - 1]
+    return CameraPlace(
+        rotation,
+        translation,
+        change_from_file=plain(bundle.values[place][own]),
+        standard_uncertainty=plain(np.sqrt(np.diag(bundle.covariance)[place][own])),
+        standard_uncertainty_before=plain(np.sqrt(np.diag(prior.covariance)[own])),
+        uncertainty_assumed=prior.assumed,
+        lag_images=None if lag is None else plain(lag.value),
+        lag_standard_uncertainty=None if lag is None else plain(lag.sigma),
+    )

@@ -1,0 +1,136 @@
+"""What the user should look into, whatever the tip of a calibration is worth."""
+
+from collections import Counter
+
+import numpy as np
+
+from lightpen.detection.reasons import Reason
+from lightpen.estimation.bundle.linearised import N_CONE
+from lightpen.estimation.bundle.seat_modes import MODE_COUNTS
+from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.contact.single_images import USUAL_SIGMA
+from lightpen.messages import Message, message
+from lightpen.model.rig import of_camera
+from lightpen.swing_messages import not_simultaneous
+
+
+def lamp_warnings(calibration: Calibration) -> list[Message]:
+    """Return what is told of lamps that moved in the images."""
+    rig, warnings = calibration.bundle.state.rig, []
+    for c, images in enumerate(calibration.cameras):
+        path = images.path
+        if path is None or path.moved == 0:
+            continue
+        if path.is_followed:
+            told = message("warning.camera-moved", shift=path.moved)
+        else:
+            x, y = path.lamps[0]
+            told = message("warning.lamp-moved", x=x, y=y, shift=path.moved)
+        warnings.append(of_camera(rig.names[c], told) if rig.names else told)
+    return warnings
+
+
+def warnings_of(calibration: Calibration) -> list[Message]:
+    """Return what the user should look into, one sentence or two each."""
+    leds, sigma = calibration.leds, calibration.joint.sigma
+    warnings = [
+        *_rig_warnings(calibration),
+        *(each.message for each in calibration.contradictions),
+        *lamp_warnings(calibration),
+        *_seat_warnings(calibration),
+    ]
+    warnings += [
+        message("warning.led-unseen", led=int(led) + 1)
+        for led in np.flatnonzero(leds.n_seen == 0)
+    ]
+    warnings += [
+        message(
+            "warning.led-displaced",
+            led=led,
+            distance=float(np.linalg.norm(leds.displacement[led - 1])),
+        )
+        for led in leds.displaced
+    ]
+    if sigma > USUAL_SIGMA:
+        warnings.append(
+            message("warning.large-residuals", sigma=sigma, usual=USUAL_SIGMA)
+        )
+    return warnings
+
+
+def _seat_warnings(calibration: Calibration) -> list[Message]:
+    """Return what is told of a tip that did not rest where the model has it."""
+    bundle, found = calibration.bundle, calibration.bundle.budget_components
+    warnings = []
+    jitter = found.jitter.covariance
+    # Ball and cone that are as round as assumed move the tip by so much as well.
+    by_form = calibration.priors.form_error * float(np.sqrt(N_CONE * sum(MODE_COUNTS)))
+    distance = 0.0 if jitter is None else float(np.sqrt(np.trace(jitter)))
+    if distance > by_form:
+        warnings.append(message("warning.seat-jitter", distance=distance))
+    forms = (*found.seat, found.oval)
+    if any(form.is_significant for form in forms):
+        warnings.append(
+            message("warning.seat-form", distance=max(form.sigma for form in forms))
+        )
+    if found.drift.is_significant:
+        warnings.append(message("warning.drift", distance=bundle.drift))
+    stated = calibration.priors.led_sigma
+    if stated is not None and found.leds.is_significant:
+        warnings.append(
+            message(
+                "warning.led-file-contradicted", found=found.leds.sigma, stated=stated
+            )
+        )
+    return warnings
+
+
+def late_cameras(calibration: Calibration) -> list[Message]:
+    """Return what is told of cameras that took their images later than the first."""
+    names = calibration.bundle.state.rig.names[1:]
+    return [
+        not_simultaneous(name, lag.value)
+        for name, lag in zip(names, calibration.lags, strict=True)
+        if lag is not None and lag.is_noticeable
+    ]
+
+
+def _rig_warnings(calibration: Calibration) -> list[Message]:
+    """Return what the user of several cameras should look into."""
+    rig = calibration.bundle.state.rig
+    warnings = late_cameras(calibration)
+    if rig.n_cameras == 1:
+        return warnings
+    n_moments = len(calibration.reasons)
+    names = np.array([images.observations.names for images in calibration.cameras])
+    for c, images in enumerate(calibration.cameras):
+        absent = np.array([why is Reason.ABSENT for why in images.reasons])
+        if absent.any():
+            others = names[:, absent][:, 0]
+            warnings.append(
+                message(
+                    "warning.no-partner",
+                    camera=rig.names[c],
+                    n_absent=int(absent.sum()),
+                    n_moments=n_moments,
+                    example=str(next(name for name in others if name)),
+                )
+            )
+        n_apart = images.reasons.count(Reason.OTHER_MOMENT)
+        if n_apart:
+            first = images.reasons.index(Reason.OTHER_MOMENT)
+            warnings.append(
+                message(
+                    "warning.other-moment",
+                    camera=rig.names[c],
+                    n_apart=n_apart,
+                    n_moments=n_moments,
+                    example=images.observations.names[first],
+                )
+            )
+    return warnings
+
+
+def count_dropped(reasons: tuple[Reason, ...]) -> Counter[Reason]:
+    """Return how many images do not take part, by reason."""
+    return Counter(why for why in reasons if why and why is not Reason.ABSENT)

@@ -1,0 +1,248 @@
+"""A calibration as text for the screen."""
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.reasons import Reason
+from lightpen.estimation.calibrate import Calibration, CameraImages
+from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
+from lightpen.estimation.reports.methods import METHODS, Method, MethodResult, result_of
+from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
+from lightpen.estimation.reports.verdict import Verdict
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.model.origin import Origin
+
+MAX_NAMED = 5  # images
+WIDTH = 10  # characters of a camera's name
+
+
+def calibration_text(
+    calibration: Calibration,
+    method: Method,
+    nominal_tip: FloatArray | None,
+    verdict: Verdict,
+    origin: Origin | None = None,
+) -> str:
+    """Return a calibration as text for the screen, the verdict on it last.
+
+    Parameters
+    ----------
+    origin : Origin, optional
+        What the images are of, where that is known.
+    """
+    results = {name: result_of(calibration, name) for name in METHODS}
+    chosen = results[method]
+    lines = [_heading("Tip in the pen frame, mm", "xyz")]
+    for name in (method, *(other for other in METHODS if other != method)):
+        lines.append(_numbers(name, results[name].tip_pen))
+        part = ", of image noise" if name == "two-stage" else ""
+        lines.append(
+            _numbers(f"  U (k = 2){part}", results[name].expanded_uncertainty[:3])
+        )
+    if nominal_tip is not None:
+        lines.append(_numbers("nominal", nominal_tip))
+        lines.append(_numbers("change from nominal", chosen.tip_pen - nominal_tip))
+    names = calibration.bundle.state.rig.names
+    frame = f"frame of {names[0]}" if names else "camera frame"
+    lines += ["", _heading(f"Cone in the {frame}, mm", "uvw")]
+    lines.append(_numbers(method, chosen.cone_cam))
+    lines.append(_numbers("  U (k = 2)", chosen.expanded_uncertainty[3:]))
+    lines += [
+        "",
+        *_origin_lines(origin),
+        *_image_lines(calibration),
+        *_lamp_lines(calibration),
+        "",
+        *_quality_lines(calibration, chosen),
+    ]
+    warnings = warnings_of(calibration)
+    if warnings:
+        lines += ["", *map(str, warnings)]
+    lines += [
+        "",
+        f"Verdict      {verdict.grade.upper()}: {verdict.reason}",
+        f"             {verdict.next_step.message}",
+    ]
+    return "\n".join(lines)
+
+
+def pivot_text(calibration: PivotCalibration) -> str:
+    """Return a pivot calibration as text for the screen."""
+    fit, uncertainty = calibration.fit, calibration.expanded_uncertainty
+    factor = np.sqrt(calibration.correlation_factor)
+    warnings = map(str, calibration.warnings)
+    return "\n".join(
+        [
+            _heading("Tip in the frame of the poses, mm", "xyz"),
+            _numbers("tip", fit.tip_pen),
+            _numbers("  U (k = 2)", uncertainty[:3]),
+            "",
+            _heading("Pivot in the camera frame, mm", "uvw"),
+            _numbers("pivot", fit.pivot_cam),
+            _numbers("  U (k = 2)", uncertainty[3:]),
+            "",
+            f"Poses        {fit.used.sum()} of {len(fit.used)} used",
+            f"Residuals    {fit.rms:.3f} mm rms an axis",
+            f"Correlation  U is {factor:.1f} times that of independent noise",
+            f"U covers     {COVERED}",
+            f"  leaves out {NOT_COVERED}",
+            *(["", *warnings] if calibration.warnings else []),
+        ]
+    )
+
+
+def _origin_lines(origin: Origin | None) -> list[str]:
+    if origin is None:
+        return []
+    remark = ": this is the tip of no real pen" if origin is Origin.SIMULATED else ""
+    return [f"Origin       {origin.upper()}{remark}"]
+
+
+def _image_lines(calibration: Calibration) -> list[str]:
+    n_used = int(calibration.used.sum())
+    n_images = len(calibration.used)
+    if len(calibration.cameras) > 1:
+        moments = f"Moments      {n_used} of {n_images} used"
+        return [moments, *_rig_lines(calibration)]
+    images = calibration.cameras[0]
+    lines = [f"Images       {n_used} of {n_images} used"]
+    lines += [
+        f"  dropped    {count} {reason}: {_named_images(images, reason)}"
+        for reason, count in count_dropped(images.reasons).items()
+    ]
+    return lines
+
+
+def _quality_lines(calibration: Calibration, chosen: MethodResult) -> list[str]:
+    budget, halves = calibration.budget, calibration.halves
+    joint = calibration.joint
+    tilt = np.degrees(calibration.coverage.tilts)
+    lines = [
+        f"Residuals    {joint.rms:.4f} px rms, tip of single images "
+        f"{chosen.rms_mm:.4f} mm rms",
+        f"Weakest      {_direction(budget.weakest_direction)}, "
+        f"U = {budget.weakest_uncertainty:.4f} mm",
+        _numbers("Odd - even images", halves.difference),
+        _numbers("  U (k = 2)", halves.expanded_uncertainty),
+    ]
+    lines += [
+        _numbers(
+            f"U from {share.name}" + (", assumed" if share.assumed else ""),
+            COVERAGE_FACTOR * share.standard_uncertainty,
+        )
+        for share in budget.shares
+    ]
+    lines.append(
+        f"Repeatability between blocks of images: {np.sqrt(budget.block_ratio):.2f} "
+        f"times that of independent noise, autocorrelation "
+        f"{budget.autocorrelation:.2f}"
+    )
+    lines.append(
+        f"Postures     tilt {tilt.min():.0f} to {tilt.max():.0f} degrees, turn "
+        f"{np.degrees(np.ptp(calibration.coverage.turns)):.0f} degrees"
+    )
+    if calibration.coverage.missing:
+        lines.append(f"  never leant {', '.join(calibration.coverage.missing)}")
+    lines += _pen_lines(calibration)
+    if calibration.led_sigma > 0:
+        lines.append(
+            f"LED file     off by {calibration.led_sigma:.4f} mm (standard "
+            "deviation of a coordinate), corrected as far as the images tell"
+        )
+    return lines
+
+
+def _pen_lines(calibration: Calibration) -> list[str]:
+    lines = []
+    if calibration.growth != 0:
+        lines.append(
+            f"Temperature  the pen is {1e6 * calibration.growth:+.1f} ppm larger than "
+            "its file says, which is corrected"
+        )
+    reading = calibration.priors.reading
+    if reading is not None:
+        lines.append(
+            f"Discs        {reading.value:.2f} mm wide by their areas, U = "
+            f"{COVERAGE_FACTOR * reading.sigma:.2f} mm"
+        )
+    else:
+        lines.append(
+            f"Discs        {calibration.bundle.state.pen.diameter:.2f} mm wide by the "
+            "LED file; LED centres alone do not tell"
+        )
+    second = calibration.second
+    if second is not None:
+        lines += [
+            f"Second cone  {second.n_used} images used, {second.distance:.4f} mm from "
+            f"the first; certified {second.separation.distance:.4f} mm, U = "
+            f"{COVERAGE_FACTOR * second.separation.sigma:.4f} mm",
+            _numbers("  U without the distance", second.uncertainty_without),
+            _numbers("  U with it", second.uncertainty_with),
+        ]
+    return lines
+
+
+def _heading(title: str, axes: str) -> str:
+    return f"{title:<30}" + "".join(f"{axis:>13}" for axis in axes)
+
+
+def _numbers(title: str, values: FloatArray) -> str:
+    return f"  {title:<28}" + "".join(f"{value:13.4f}" for value in values)
+
+
+def _direction(vector: FloatArray) -> str:
+    axis = int(np.argmax(np.abs(vector)))
+    if abs(vector[axis]) > 0.95:
+        return f"along the pen's {'xyz'[axis]} axis"
+    return "along ({:.2f}, {:.2f}, {:.2f}) of the pen".format(*vector)
+
+
+def _rig_lines(calibration: Calibration) -> list[str]:
+    """Return lines of text on the images of each camera, and where it stands."""
+    lines = []
+    rig = calibration.bundle.state.rig
+    moves = calibration.bundle.values[calibration.bundle.layout.extrinsics]
+    for c, (name, images) in enumerate(
+        zip(rig.names, calibration.cameras, strict=True)
+    ):
+        n_images = len(images.reasons) - images.reasons.count(Reason.ABSENT)
+        lines.append(
+            f"  {name:<{WIDTH}} {images.used.sum()} of {n_images} images used, "
+            f"{images.total_rms:.4f} px rms"
+        )
+        for reason, count in count_dropped(images.reasons).items():
+            lines.append(
+                f"    dropped  {count} {reason}: {_named_images(images, reason)}"
+            )
+        if c > 0:
+            turn, shift = moves[6 * c - 6 : 6 * c - 3], moves[6 * c - 3 : 6 * c]
+            lines.append(
+                f"    stands   {np.linalg.norm(shift):.3f} mm and "
+                f"{np.degrees(np.linalg.norm(turn)):.4f} degrees off the rig file"
+            )
+    return lines
+
+
+def _named_images(images: CameraImages, reason: str) -> str:
+    """Return the names of the images left out for a reason, the first few of them."""
+    names = [
+        name
+        for name, why in zip(images.observations.names, images.reasons, strict=True)
+        if why == reason
+    ]
+    return ", ".join(names[:MAX_NAMED]) + (", ..." if len(names) > MAX_NAMED else "")
+
+
+def _lamp_lines(calibration: Calibration) -> list[str]:
+    """Return lines of text on the fixed lamps in view."""
+    lines = []
+    for images in calibration.cameras:
+        path = images.path
+        if path is None:
+            continue
+        told = f"they stay in place to {path.noise:.3f} px"
+        if path.moved > 0:
+            told = f"they move by {path.moved:.2f} px, "
+            told += "which is taken out" if path.is_followed else "the pen does not"
+        lines.append(f"Fixed lamps  {len(path.lamps)} in view; {told}")
+    return lines

@@ -1,0 +1,332 @@
+"""The verdict on a calibration: good, to be looked at, or to be repeated, and why."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.contact.led_quality import DISPLACED
+from lightpen.estimation.contact.single_images import USUAL_SIGMA
+from lightpen.estimation.reports.report_warnings import late_cameras
+from lightpen.estimation.uncertainty.budget import (
+    IMAGES_SHRINK,
+    POSTURES,
+    ContributionName,
+    SplitHalfCheck,
+)
+from lightpen.messages import Message, message
+from lightpen.model.coverage import dial_counts
+from lightpen.model.limits import SwingLimits
+from lightpen.swing_messages import (
+    Code,
+    camera_moved,
+    change_beyond_limit,
+    file_contradicted,
+    file_uncertain,
+    halves_differ,
+    last_unknown,
+    led_displaced,
+    leds_misfit,
+    leds_off,
+    many_dropped,
+    tip_changed,
+    tip_is_good,
+    too_few_images,
+    too_little_tilt,
+    uncertain,
+)
+
+FAR_OFF = 3.0  # times the limit of U: no result to work with
+FAR_MOVED = 3.0  # times the limit of U: cone against camera, though it is taken out
+MANY_DROPPED = 0.2  # of the images that show the pen
+HALVES_GATE = 1.5  # times U (k = 2) of their difference: 3 standard deviations
+FAR_FROM_NOMINAL = 3.0  # mm; pens of one design differ by some 2
+CHANGE_GATE = 1.2  # times U (k = 2) of a change: 95 % of three axes by chance alone
+AXES = "xyz"
+TINY = 1e-12  # mm
+
+_ADVICE = {
+    ContributionName.CENTERS: message("share.centers"),
+    ContributionName.LEDS: message("share.leds"),
+    ContributionName.SCALE: message("share.scale"),
+    ContributionName.FORM: message("share.form"),
+    ContributionName.TEMPERATURE: message("share.temperature"),
+    ContributionName.DISTANCE: message("share.distance"),
+    ContributionName.DIAMETER: message("share.diameter"),
+    ContributionName.CAMERA: message("share.camera"),
+    ContributionName.EXTRINSICS: message("share.rig"),
+}
+
+
+class Grade(StrEnum):
+    """What to do with a calibration."""
+
+    PASS = "pass"
+    CHECK = "check"
+    REPEAT = "repeat"
+
+
+class NextStep(StrEnum):
+    """What to do after a verdict."""
+
+    ACCEPT = "accept"
+    CAPTURE_MORE = "capture more"
+    REPEAT = "repeat"
+    CHECK_FILES = "check files"
+    CHECK_CAMERA = "check camera file"
+    CHECK_LEDS = "check LED file"
+    CHECK_RIG = "check rig file"
+    SEE_TO_CAUSE = "see to the cause"
+    CHECK_TIP = "check tip"
+    CLAMP = "clamp"
+
+    @property
+    def message(self) -> Message:
+        """It in words."""
+        return _TOLD[self]
+
+
+_TOLD = {
+    NextStep.ACCEPT: message("next-step.accept"),
+    NextStep.CAPTURE_MORE: message("next-step.capture-more"),
+    NextStep.REPEAT: message("next-step.repeat"),
+    NextStep.CHECK_FILES: message("next-step.check-files"),
+    NextStep.CHECK_CAMERA: message("next-step.check-camera"),
+    NextStep.CHECK_LEDS: message("next-step.check-leds"),
+    NextStep.CHECK_RIG: message("next-step.check-rig"),
+    NextStep.SEE_TO_CAUSE: message("next-step.see-to-cause"),
+    NextStep.CHECK_TIP: message("next-step.check-tip"),
+    NextStep.CLAMP: message("next-step.clamp"),
+}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A grade, and the reason that counts most."""
+
+    grade: Grade
+    reason: Message
+
+    @property
+    def can_be_accepted(self) -> bool:
+        """Whether its tip may be put in force."""
+        return self.grade is not Grade.REPEAT
+
+    @property
+    def next_step(self) -> NextStep:
+        """The one thing to do that answers the reason."""
+        causes = (_BY_CAUSE.get(part.code) for part in self.reason.parts())
+        return next(filter(None, causes), _NEXT_STEPS[Code(self.reason.code)])
+
+
+# By what a reason names, which its code alone does not tell.
+_BY_CAUSE = {
+    _ADVICE[ContributionName.CAMERA].code: NextStep.CHECK_CAMERA,
+    _ADVICE[ContributionName.EXTRINSICS].code: NextStep.CHECK_RIG,
+    _ADVICE[ContributionName.LEDS].code: NextStep.CHECK_LEDS,
+    _ADVICE[ContributionName.SCALE].code: NextStep.CHECK_LEDS,
+    _ADVICE[ContributionName.DIAMETER].code: NextStep.CHECK_LEDS,
+    _ADVICE[ContributionName.CENTERS].code: NextStep.SEE_TO_CAUSE,
+    _ADVICE[ContributionName.FORM].code: NextStep.SEE_TO_CAUSE,
+    _ADVICE[ContributionName.TEMPERATURE].code: NextStep.SEE_TO_CAUSE,
+    _ADVICE[ContributionName.DISTANCE].code: NextStep.SEE_TO_CAUSE,
+    "warning.camera-file-contradicted": NextStep.CHECK_CAMERA,
+    "warning.camera-file-of-rig-contradicted": NextStep.CHECK_CAMERA,
+    "warning.rig-file-contradicted": NextStep.CHECK_RIG,
+    "warning.pen-file-contradicted": NextStep.CHECK_LEDS,
+}
+
+_NEXT_STEPS = {
+    Code.GOOD: NextStep.ACCEPT,
+    Code.UNCERTAIN: NextStep.CAPTURE_MORE,
+    Code.TOO_FEW_IMAGES: NextStep.CAPTURE_MORE,
+    Code.TOO_LITTLE_TILT: NextStep.CAPTURE_MORE,
+    Code.HALVES_DIFFER: NextStep.REPEAT,
+    Code.MANY_DROPPED: NextStep.REPEAT,
+    Code.LEDS_OFF: NextStep.CHECK_LEDS,
+    Code.LED_DISPLACED: NextStep.CHECK_LEDS,
+    Code.LEDS_MISFIT: NextStep.CHECK_FILES,
+    Code.FILE_UNCERTAIN: NextStep.CHECK_FILES,
+    Code.FILE_ASSUMED: NextStep.CHECK_FILES,
+    Code.FILE_CONTRADICTED: NextStep.CHECK_FILES,
+    Code.NOT_SIMULTANEOUS: NextStep.REPEAT,
+    Code.CAMERA_MOVED: NextStep.CLAMP,
+    Code.TIP_CHANGED: NextStep.CHECK_TIP,
+    Code.CHANGE_BEYOND_LIMIT: NextStep.CHECK_TIP,
+    Code.LAST_UNKNOWN: NextStep.CHECK_TIP,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """How far a tip lies from an earlier one.
+
+    Attributes
+    ----------
+    difference : (3,) array
+        Now minus then, pen frame, mm.
+    expanded_uncertainty : (3,) array
+        U (k = 2) of the difference, of two independent calibrations, mm.
+    """
+
+    difference: FloatArray
+    expanded_uncertainty: FloatArray
+
+    @property
+    def distance(self) -> float:
+        """How far apart the tips lie, mm."""
+        return float(np.linalg.norm(self.difference))
+
+    @property
+    def is_unexplained(self) -> bool:
+        """Whether it is more than both uncertainties explain."""
+        beyond = np.abs(self.difference) > CHANGE_GATE * self.expanded_uncertainty
+        return bool(beyond.any())
+
+    def told(self, date: str) -> Message:
+        """Return it in words, beside an earlier tip of this date."""
+        lengths = np.abs(self.difference)
+        axis = int(np.argmax(lengths / np.maximum(self.expanded_uncertainty, TINY)))
+        return tip_changed(
+            *(self.distance, date, AXES[axis], float(lengths[axis])),
+            float(self.expanded_uncertainty[axis]),
+        )
+
+
+def repeats(doubt: Message, reason: Message) -> bool:
+    """Return whether a doubt only says again what is the reason of the verdict."""
+    if (doubt.code, reason.code) == ("warning.led-displaced", Code.LED_DISPLACED):
+        return doubt.values["led"] == reason.values["led"]
+    return doubt.code == reason.code
+
+
+def change_since(
+    tip_pen: FloatArray,
+    uncertainty: FloatArray,
+    tip_then: FloatArray,
+    uncertainty_then: FloatArray,
+) -> Change:
+    """Compare a tip with an earlier one: both (3,), pen frame, with U (k = 2), mm."""
+    return Change(tip_pen - tip_then, np.hypot(uncertainty, uncertainty_then))
+
+
+def change_doubt(change: Change, date: str, limit: float | None) -> Message | None:
+    """Return what there is to look into about a change, if anything.
+
+    Parameters
+    ----------
+    date : str
+        Of the result in force before.
+    limit : float or None
+        Of the tip for the distance from there, mm; None if it has none.
+    """
+    if limit is not None and change.distance > limit:
+        return change_beyond_limit(change.distance, date, limit)
+    return change.told(date) if change.is_unexplained else None
+
+
+def judge_change(
+    verdict: Verdict, change: Change | None, date: str, limit: float | None = None
+) -> Verdict:
+    """Judge a tip that would pass by how far it lies from the one before.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        On the tip by itself; what is wrong with that counts more.
+    change : Change or None
+        Since the result in force; None if there is none.
+    date : str
+        Of that result.
+    limit : float, optional
+        As of `change_doubt`.
+    """
+    if verdict.grade is not Grade.PASS or change is None:
+        return verdict
+    doubt = change_doubt(change, date, limit)
+    return verdict if doubt is None else Verdict(Grade.CHECK, doubt)
+
+
+def judge_unknown(verdict: Verdict, why: Message) -> Verdict:
+    """Judge a tip that would pass where the one before cannot be read."""
+    if verdict.grade is not Grade.PASS:
+        return verdict
+    return Verdict(Grade.CHECK, last_unknown(why))
+
+
+def distance_from_nominal(
+    tip_pen: FloatArray, nominal_tip: FloatArray | None
+) -> float | None:
+    """Return how far a tip lies from its place by design, mm, if that is too far."""
+    if nominal_tip is None:
+        return None
+    distance = float(np.linalg.norm(tip_pen - nominal_tip))
+    return distance if distance > FAR_FROM_NOMINAL else None
+
+
+def halves_agree(halves: SplitHalfCheck) -> bool:
+    """Return whether the odd and the even images differ no more than by chance."""
+    within = np.abs(halves.difference) <= HALVES_GATE * halves.expanded_uncertainty
+    return bool(within.all())
+
+
+def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
+    """Judge a calibration by what its tip is worth, not by its residuals alone.
+
+    Only images that show the pen count. What else there is depends on how long a
+    camera ran before and after, and a swing that is captured does not keep it.
+    """
+    uncertainty = calibration.budget.weakest_uncertainty
+    limit = limits.max_uncertainty
+    budget = calibration.budget
+    largest = budget.largest_share
+    by_largest = budget.weakest_share(largest)
+    n_images = sum(reason.shows_pen for reason in calibration.reasons)
+    n_used = int(calibration.used.sum())
+    is_same_in_more = largest.name is ContributionName.CENTERS and n_used >= POSTURES
+    if largest.name in IMAGES_SHRINK and not is_same_in_more:
+        reason = uncertain(uncertainty, limit)
+    elif largest.name is ContributionName.LEDS and calibration.led_sigma > DISPLACED:
+        reason = leds_off(calibration.led_sigma, by_largest)
+    else:  # more images hardly change it
+        advice = _ADVICE[largest.name]
+        reason = file_uncertain(uncertainty, limit, by_largest, advice, largest.assumed)
+    if uncertainty > FAR_OFF * limit:
+        return Verdict(Grade.REPEAT, reason)
+    differences = np.abs(calibration.halves.difference)
+    by_chance = HALVES_GATE * calibration.halves.expanded_uncertainty
+    # A difference that is certain but smaller than what is allowed does not matter.
+    apart = (differences > by_chance) & (differences > limit)
+    if apart.any():
+        worst = int(np.argmax(np.where(apart, differences, 0)))
+        usual = calibration.halves.expanded_uncertainty[worst]
+        differ = halves_differ(float(differences[worst]), float(usual))
+        return Verdict(Grade.CHECK, differ)
+    late = late_cameras(calibration)
+    if late:
+        return Verdict(Grade.CHECK, late[0])
+    if calibration.contradictions:
+        worst_one = max(calibration.contradictions, key=lambda each: each.deviations)
+        return Verdict(Grade.CHECK, file_contradicted(worst_one.message))
+    if calibration.moved > FAR_MOVED * limit:
+        return Verdict(Grade.CHECK, camera_moved(calibration.moved))
+    if calibration.joint.sigma > USUAL_SIGMA:
+        misfit = leds_misfit(calibration.joint.sigma, USUAL_SIGMA)
+        return Verdict(Grade.CHECK, misfit)
+    if calibration.leds.displaced:
+        lengths = np.linalg.norm(calibration.leds.displacement, axis=1)
+        led = max(calibration.leds.displaced, key=lambda each: lengths[each - 1])
+        return Verdict(Grade.CHECK, led_displaced(led, float(lengths[led - 1])))
+    if n_images - n_used > MANY_DROPPED * n_images:
+        return Verdict(Grade.CHECK, many_dropped(n_images - n_used, n_images))
+    if uncertainty > limit:
+        return Verdict(Grade.CHECK, reason)
+    if n_images < limits.min_images:
+        return Verdict(Grade.CHECK, too_few_images(n_images, limits.min_images))
+    bare = np.flatnonzero(dial_counts(calibration.joint.rotations)[1:].sum(axis=0) == 0)
+    if len(bare) and limits.min_per_field:
+        n_images = limits.min_per_field * len(bare)
+        return Verdict(Grade.CHECK, too_little_tilt(n_images, map(int, bare)))
+    return Verdict(Grade.PASS, tip_is_good(uncertainty))

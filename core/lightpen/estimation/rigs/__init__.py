@@ -1,0 +1,1 @@
+"""Several cameras: extrinsics, conventions, synchrony and common pen poses."""

@@ -1,0 +1,236 @@
+"""Check that the cameras of a rig took their images at the same moments.
+
+Two cameras that stand fast see the pen turn alike. A camera that takes its images later
+sees a moving pen turned on by the lag times its speed; one whose images are paired with
+those of other moments sees it turned anyhow.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.contact.single_images import PosedImages
+from lightpen.estimation.pivot.pivot import median_distance
+from lightpen.model.rigid import nearest_rotation, vector_from_rotation
+
+MIN_PAIRS = 6  # moments that two cameras see
+NEAR = 4.0  # times the median turn: pairs by which the cameras are told
+ROUNDS = 3
+APART = 8.0  # times the median turn: images of other moments
+MANY = 0.25  # of the moments; a pairing that is wrong and no single image
+MAX_SHIFT = 10  # images by which the order of one camera may be off
+EXPLAINED = 0.3  # of the scatter of a wrong order, that the right one leaves
+UNEXPLAINED = 5.0  # times what the poses are uncertain by
+UNSTEADY = 0.02  # rad; no file of a camera scatters poses by that
+SLOW = 0.3  # rad from one image to the next, up to which a motion counts as even
+MIN_SLOW = 20  # images of such motion that tell a lag
+SIGNIFICANT = 5.0  # standard deviations
+NOTICEABLE = 2e-4  # rad: 0.04 mm at the far end of a pen
+
+
+@dataclass(frozen=True, eq=False)
+class PenRotations:
+    """Rotations of the pen at N moments, as one camera or several saw them.
+
+    Attributes
+    ----------
+    rotations : (N, 3, 3) array
+    variances : (N,) array
+        Of the three axes of each together, rad^2.
+    known : (N,) array of bool
+        Where there is one.
+    """
+
+    rotations: FloatArray
+    variances: FloatArray
+    known: BoolArray
+
+    @classmethod
+    def of(cls, images: PosedImages) -> "PenRotations":
+        """Return the rotations by the images of one camera."""
+        n, chosen = len(images.reasons), images.chosen
+        poses = images.poses.of(images.kept)
+        rotations, variances = np.tile(np.eye(3), (n, 1, 1)), np.zeros(n)
+        known = np.zeros(n, dtype=bool)
+        rotations[chosen] = poses.rotations
+        variances[chosen] = np.trace(poses.covariances[:, :3, :3], axis1=1, axis2=2)
+        known[chosen] = True
+        return cls(rotations, variances, known)
+
+    def shifted(self, n_moments: int) -> "PenRotations":
+        """Return them so many moments later."""
+        known = np.roll(self.known, n_moments)
+        known[: max(n_moments, 0)] = False
+        known[len(known) + min(n_moments, 0) :] = False
+        return PenRotations(
+            np.roll(self.rotations, n_moments, axis=0),
+            np.roll(self.variances, n_moments),
+            known,
+        )
+
+    def completed(self, other: "PenRotations", rotation: FloatArray) -> "PenRotations":
+        """Return them with those of a camera that is turned so where there are none."""
+        new = other.known & ~self.known
+        return PenRotations(
+            np.where(new[:, None, None], rotation.T @ other.rotations, self.rotations),
+            np.where(new, other.variances, self.variances),
+            self.known | new,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class RelativeRotation:
+    """How one camera is turned against another, by P moments that both see.
+
+    Attributes
+    ----------
+    rotation : (3, 3) array
+        From the one to the other.
+    pairs : (P,) array of int
+        The moments.
+    off : (P, 3) array
+        Turns by which each lies off it, in the frame of the one, rad.
+    usual : float
+        Length of such turns by what the poses are uncertain by, rad.
+    """
+
+    rotation: FloatArray
+    pairs: IntArray
+    off: FloatArray
+    usual: float
+
+    @property
+    def scatter(self) -> float:
+        """Median disagreement, rad."""
+        return float(np.median(np.linalg.norm(self.off, axis=1)))
+
+    @property
+    def apart(self) -> IntArray:
+        """Moments at which the cameras did not see the same posture."""
+        far = max(APART * max(self.scatter, self.usual), NOTICEABLE)
+        return np.asarray(self.pairs[np.linalg.norm(self.off, axis=1) > far])
+
+
+@dataclass(frozen=True)
+class TimeLag:
+    """By how much one camera is later than another.
+
+    Attributes
+    ----------
+    value, sigma : float
+        In times between two images; with its standard deviation.
+    turn : float
+        That it makes of the usual motion, rad.
+    """
+
+    value: float
+    sigma: float
+    turn: float
+
+    @property
+    def is_noticeable(self) -> bool:
+        """Whether it is there, and not small beside the noise of a pose."""
+        return (
+            abs(self.value) > SIGNIFICANT * self.sigma and abs(self.turn) > NOTICEABLE
+        )
+
+
+def relative_turn(one: PenRotations, other: PenRotations) -> RelativeRotation:
+    """Return how the other camera is turned, robust against poses that are wrong."""
+    pairs = np.flatnonzero(one.known & other.known)
+    each = other.rotations[pairs] @ np.swapaxes(one.rotations[pairs], 1, 2)
+    rotation = nearest_rotation(np.median(each, axis=0))
+    for _ in range(ROUNDS):
+        far = np.linalg.norm(vector_from_rotation(rotation.T @ each), axis=1)
+        rotation = nearest_rotation(each[far <= NEAR * np.median(far)].mean(axis=0))
+    variances = one.variances[pairs] + other.variances[pairs]
+    return RelativeRotation(
+        rotation=rotation,
+        pairs=pairs,
+        off=vector_from_rotation(rotation.T @ each),
+        usual=float(np.sqrt(np.median(variances) / 3)) * median_distance(),
+    )
+
+
+def require_same_moments(
+    one: PenRotations, other: PenRotations, name: str
+) -> RelativeRotation:
+    """Return how the other camera is turned, if its images are of the same moments.
+
+    Parameters
+    ----------
+    name : str
+        Of the other camera.
+
+    Raises
+    ------
+    CalibrationError
+        They are not, or too few moments are seen by both.
+    """
+    n_pairs = int(np.sum(one.known & other.known))
+    if n_pairs < MIN_PAIRS:
+        raise CalibrationError(
+            "rig.few-pairs",
+            n_pairs=n_pairs,
+            n_moments=len(one.known),
+            camera=name,
+            needed=MIN_PAIRS,
+        )
+    found = relative_turn(one, other)
+    if found.scatter > UNEXPLAINED * found.usual or len(found.apart) > MANY * n_pairs:
+        _refuse_other_order(one, other, name)
+    if found.scatter > UNSTEADY or len(found.apart) > MANY * n_pairs:
+        raise CalibrationError(
+            "rig.other-moments",
+            camera=name,
+            n_apart=int(np.sum(np.linalg.norm(found.off, axis=1) > UNSTEADY)),
+            n_pairs=n_pairs,
+        )
+    return found
+
+
+def measure_lag(
+    one: PenRotations, other: PenRotations, found: RelativeRotation
+) -> TimeLag | None:
+    """Measure by how much the other camera is later.
+
+    Returns
+    -------
+    Lag or None
+        None where the pen turns too far between two images to tell.
+    """
+    inner = found.pairs[(found.pairs > 0) & (found.pairs < len(one.known) - 1)]
+    inner = inner[one.known[inner - 1] & one.known[inner + 1]]
+    before, after = one.rotations[inner - 1], one.rotations[inner + 1]
+    speeds = vector_from_rotation(after @ np.swapaxes(before, 1, 2)) / 2
+    off = found.off[np.isin(found.pairs, inner)]
+    slow = np.linalg.norm(speeds, axis=1) < SLOW
+    slow &= np.linalg.norm(off, axis=1) <= NEAR * max(found.scatter, NOTICEABLE)
+    if slow.sum() < max(MIN_SLOW, 0.5 * len(found.pairs)):
+        return None
+    speeds, off = speeds[slow], off[slow]
+    total = float(np.sum(speeds**2))
+    value = float(np.sum(speeds * off)) / total
+    left = float(np.sum((off - value * speeds) ** 2)) / (off.size - 1)
+    return TimeLag(
+        value=value,
+        sigma=float(np.sqrt(left / total)),
+        turn=value * float(np.sqrt(total / len(speeds))),
+    )
+
+
+def _refuse_other_order(one: PenRotations, other: PenRotations, name: str) -> None:
+    """Refuse images that fit if all are paired some moments earlier or later."""
+    scatters = {}
+    for shift in range(-MAX_SHIFT, MAX_SHIFT + 1):
+        moved = other.shifted(shift)
+        if np.sum(one.known & moved.known) >= MIN_PAIRS:
+            scatters[shift] = relative_turn(one, moved).scatter
+    best = min(scatters, key=lambda shift: scatters[shift])
+    if not best or scatters[best] > EXPLAINED * scatters[0]:
+        return
+    raise CalibrationError(
+        "rig.other-order", camera=name, own=max(-best, 0) + 1, others=max(best, 0) + 1
+    )

@@ -1,0 +1,1 @@
+"""Statistics of a fit: variance components, correlation, information, workers."""

@@ -1,0 +1,1 @@
+"""Uncertainty of a tip: budget, prediction, and the instrument it leaves."""

@@ -1,0 +1,192 @@
+"""Cameras, pen and tip after a calibration, with their joint covariance.
+
+Errors that the calibration leaves are common to every point that is measured
+afterwards, and correlated: an error of the focal length comes with one of the LEDs and
+one of the tip. So the covariance is that of all parameters together.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.bundle.adjustment import Adjustment
+from lightpen.estimation.bundle.bundle import Bundle
+from lightpen.estimation.bundle.priors import Priors, priors_of
+from lightpen.estimation.bundle.unknowns import led_basis
+from lightpen.estimation.uncertainty.budget import Budget, ContributionName
+from lightpen.model.assumptions import USUAL, Assumptions
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig
+
+
+class Parameters(NamedTuple):
+    """Indices of each kind of parameter in the covariance of an instrument.
+
+    Attributes
+    ----------
+    cameras : tuple of slice
+        Intrinsics of each camera.
+    extrinsics : slice
+        Where all cameras but the first stand, as `Rig.covariance` has it.
+    """
+
+    tip: slice
+    cameras: tuple[slice, ...]
+    extrinsics: slice
+    diameter: slice
+    leds: slice
+
+    @property
+    def number(self) -> int:
+        """How many there are."""
+        return int(self.leds.stop)
+
+
+def parameters_of(rig: Rig, pen: Pen) -> Parameters:
+    """Return the indices of the parameters of cameras and a pen."""
+    sizes = [3, *(len(camera.intrinsics) for camera in rig.cameras)]
+    sizes += [6 * (rig.n_cameras - 1), 1, 3 * pen.n_leds]
+    ends = np.cumsum(sizes).tolist()
+    tip, *cameras, extrinsics, diameter, leds = (
+        slice(end - size, end) for size, end in zip(sizes, ends, strict=True)
+    )
+    return Parameters(tip, tuple(cameras), extrinsics, diameter, leds)
+
+
+@dataclass(frozen=True, eq=False)
+class Instrument:
+    """A camera, or several of a rig, and a pen with its tip.
+
+    Attributes
+    ----------
+    tip_pen : (3,) array
+        mm.
+    covariance : (q, q) array
+        Of tip, cameras, diameter and LEDs, as `parameters` has them.
+    sigma : float
+        Noise of one image coordinate during the calibration, px.
+    """
+
+    rig: Rig
+    pen: Pen
+    tip_pen: FloatArray
+    covariance: FloatArray
+    sigma: float
+
+    @property
+    def camera(self) -> Camera:
+        """The camera, of several the first, in whose frame points are measured."""
+        return self.rig.cameras[0]
+
+    @property
+    def parameters(self) -> Parameters:
+        """Indices of each kind of parameter in the covariance."""
+        return parameters_of(self.rig, self.pen)
+
+
+def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
+    """Return the instrument as adjusted by a swing."""
+    bundle, unshrunk = adjustment.bundle, adjustment.unshrunk
+    state = bundle.state
+    spread = _with_budget_noise(unshrunk, budget)
+    shrinkage_shift = unshrunk.values - bundle.values
+    shrinkage_shift[:6] = adjustment.shrinkage_shift
+    spread = spread + np.outer(shrinkage_shift, shrinkage_shift)
+    mixing = _mixing(bundle)
+    return Instrument(
+        rig=state.rig,
+        pen=state.pen,
+        tip_pen=state.tip_pen,
+        covariance=mixing @ spread @ mixing.T,
+        sigma=bundle.sigma,
+    )
+
+
+def instrument_of_files(
+    rig: Rig,
+    pen: Pen,
+    tip_pen: FloatArray,
+    tip_covariance: FloatArray,
+    sigma: float,
+    assumptions: Assumptions = USUAL,
+) -> Instrument:
+    """Return the instrument of files as they are, its tip independent of them.
+
+    Parameters
+    ----------
+    tip_pen : (3,) array
+        mm.
+    tip_covariance : (3, 3) array
+        mm^2.
+    sigma : float
+        Noise of one image coordinate, px.
+    """
+    at = parameters_of(rig, pen)
+    priors = priors_of(rig, pen, assumptions)
+    covariance = np.zeros((at.number, at.number))
+    covariance[at.tip, at.tip] = tip_covariance
+    _put_cameras(covariance, at, priors)
+    covariance[at.diameter, at.diameter] = priors.diameter.covariance
+    scaling = (pen.leds - pen.leds.mean(axis=0)).ravel()
+    basis = led_basis(pen.leds)
+    covariance[at.leds, at.leds] = (
+        (pen.led_sigma or 0.0) ** 2 * basis @ basis.T
+        if pen.led_covariance is None
+        else pen.led_covariance
+    )
+    covariance[at.leds, at.leds] += priors.scale.covariance * np.outer(scaling, scaling)
+    return Instrument(rig, pen, tip_pen, covariance, sigma)
+
+
+def with_rig(instrument: Instrument, rig: Rig) -> Instrument:
+    """Return the instrument with other cameras than those of its swing."""
+    old, at = instrument.parameters, parameters_of(rig, instrument.pen)
+    moved = np.zeros((at.number, old.number))
+    for kind in ("tip", "diameter", "leds"):
+        place = getattr(old, kind)
+        moved[getattr(at, kind), place] = np.eye(place.stop - place.start)
+    covariance = moved @ instrument.covariance @ moved.T
+    _put_cameras(covariance, at, priors_of(rig, instrument.pen, USUAL))
+    return Instrument(
+        rig, instrument.pen, instrument.tip_pen, covariance, instrument.sigma
+    )
+
+
+def _put_cameras(covariance: FloatArray, at: Parameters, priors: Priors) -> None:
+    """Put the priors of cameras into a covariance."""
+    for place, prior in zip(at.cameras, priors.cameras, strict=True):
+        covariance[place, place] = prior.covariance
+    if priors.extrinsics is not None:
+        covariance[at.extrinsics, at.extrinsics] = priors.extrinsics.covariance
+
+
+def _with_budget_noise(bundle: Bundle, budget: Budget) -> FloatArray:
+    """Return the covariance (p, p) of all unknowns with the noise of the budget."""
+    noise = next(
+        (each for each in budget.shares if each.name is ContributionName.NOISE), None
+    )
+    covariance = bundle.covariance
+    if noise is None:
+        return covariance
+    images = covariance @ (bundle.information - bundle.jitter_information)
+    images = images @ covariance
+    by_tip = float(np.trace(noise.covariance[:3, :3]) / np.trace(images[:3, :3]))
+    return np.asarray(covariance + (by_tip - 1) * images)
+
+
+def _mixing(bundle: Bundle) -> FloatArray:
+    """Return the parameters of an instrument by the unknowns of a bundle, (q, p)."""
+    unknowns, state = bundle.unknowns, bundle.state
+    at = parameters_of(state.rig, state.pen)
+    of = unknowns.layout
+    mixing = np.zeros((at.number, unknowns.number))
+    kinds = ("tip", "extrinsics", "diameter")
+    alike = [(getattr(at, kind), getattr(of, kind)) for kind in kinds]
+    for place, column in (*alike, *zip(at.cameras, of.cameras, strict=True)):
+        mixing[place, column] = np.eye(place.stop - place.start)
+    mixing[at.leds, of.leds] = unknowns.basis
+    mixing[at.leds, of.scale.start] = unknowns.scaling
+    return mixing

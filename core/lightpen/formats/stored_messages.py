@@ -1,0 +1,68 @@
+"""Messages as files keep them: code and values, to be worded in any language later."""
+
+from collections.abc import Mapping
+from typing import Any, Self, TypeAlias, Union
+
+from msgspec import Struct
+
+from lightpen.messages import Message, Translate, Value, in_english
+
+StoredValue: TypeAlias = Union[
+    str, int, float, "StoredMessage", tuple["StoredMessage", ...], None
+]
+
+
+class StoredMessage(Struct, frozen=True):
+    """A message, with its words in English for those who read the file.
+
+    Attributes
+    ----------
+    code : str
+        Of its template in `lightpen.catalogue`.
+    values : mapping of str to StoredValue
+        By field of the template; what is not a number is None.
+    """
+
+    code: str
+    text: str
+    values: Mapping[str, StoredValue]
+
+    @classmethod
+    def of(cls, told: Message) -> Self:
+        """Return what is kept of a message."""
+        values = {name: _stored(value) for name, value in told.values.items()}
+        return cls(told.code, str(told), values)
+
+    def worded(self, translate: Translate = in_english) -> str:
+        """Return the words in the language of a translation.
+
+        The text is returned where the catalogue has no such message any more.
+        """
+        try:
+            return _message(self).text(translate)
+        except (LookupError, TypeError, ValueError):
+            return self.text
+
+
+def _stored(value: Any) -> StoredValue:
+    if isinstance(value, Message):
+        return StoredMessage.of(value)
+    if isinstance(value, tuple):
+        return tuple(map(StoredMessage.of, value))
+    if isinstance(value, str | int):
+        return value
+    number = float(value)
+    return number if number - number == 0 else None
+
+
+def _message(stored: StoredMessage) -> Message:
+    values = {name: _value(value) for name, value in stored.values.items()}
+    return Message(stored.code, values)
+
+
+def _value(stored: StoredValue) -> Value:
+    if isinstance(stored, StoredMessage):
+        return _message(stored)
+    if isinstance(stored, tuple):
+        return tuple(map(_message, stored))
+    return float("nan") if stored is None else stored

@@ -1,0 +1,445 @@
+"""The live pipeline: detects spots and pen in camera images and passes them on.
+
+One thread processes the images. While nothing is captured it takes the newest and skips
+those in between; during a swing or a verification it takes all of them in order, of two
+cameras those of one moment together. Where nothing moves it takes two a second, within
+a swing or a verification only after a while; without a viewer, none. A recording that
+has been replayed to its end counts as at rest.
+"""
+
+import logging
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
+from functools import partial, reduce
+from threading import Event, Thread
+from typing import Protocol
+
+from lightpen.cameras.clock import Clock
+from lightpen.cameras.pairing import FramePairs, held_up
+from lightpen.cameras.protocol import (
+    CameraSettings,
+    DeviceLost,
+    EndOfImages,
+    Frame,
+    FramesDelayed,
+    FrameTimeout,
+    ImageCamera,
+    Stats,
+)
+from lightpen.cameras.worker import LONGEST_STOP, CameraWorker
+from lightpen.cameras.worker_events import Failed, FaultRaised, FrameReady, WorkerEvent
+from lightpen.detection.pen_detection import PenDetection, detect_pen
+from lightpen.detection.reasons import MISHAPS
+from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.detection.spots import Spots, detect_spots, have_moved
+from lightpen.errors import LightpenError
+from lightpen.streaming.server import PoseStream
+from lightpen.swing.runner import SwingRunner
+from lightpen.swing.state import Phase, SwingSetup
+from lightpen.verification.runner import VerificationRunner
+
+LONGEST_WAIT = 0.1  # s until the start of a swing is noticed
+UNHURRIED = 0.5  # s from image to image while nothing moves
+LIVELY_NS = 2_000_000_000  # after the last motion, in which every image is taken
+# The same during a capture, longer than the pen is held still for it.
+PATIENT_NS = 10_000_000_000
+MAY_REST = (Phase.CAPTURING, Phase.PAUSED)  # a pen at rest changes nothing
+
+_logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class LiveImage:
+    """An image with its detections.
+
+    Attributes
+    ----------
+    spots : Spots
+        All bright spots that are not masked.
+    detection : PenDetection or None
+        None without intrinsics or pen, or if the image is not of the camera's size.
+    camera : int
+        Index of the camera.
+    """
+
+    frame: Frame
+    spots: Spots
+    detection: PenDetection | None
+    camera: int = 0
+
+
+class LiveListener(Protocol):
+    """Listener, called on the pipeline's thread or on that of a camera."""
+
+    def on_image(self, image: LiveImage) -> None:
+        """Handle a processed image."""
+
+    def on_camera(self, event: WorkerEvent, camera: int) -> None:
+        """Handle an event, other than an image, of the camera with this index."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Capture:
+    """What takes every image: a swing, a verification, or neither."""
+
+    swing: SwingSetup | None = None
+    verification: RegionOfInterest | None = None
+
+    @property
+    def wanted(self) -> SwingSetup | RegionOfInterest | None:
+        """What is detected for it."""
+        return self.swing or self.verification
+
+
+class Live:
+    """Processes the images of one camera, or of two beside each other, until stopped.
+
+    Parameters
+    ----------
+    cameras : sequence of ImageCamera
+        Not open yet, and from now on called from here only.
+    settings : CameraSettings
+        Applied when they are opened.
+    runner : SwingRunner
+        Takes every image, except during a verification.
+    clock : Clock, optional
+        Of the cameras.
+    known : mapping of str to CameraSettings
+        Settings by serial number, in place of ``settings``.
+    verifier : VerificationRunner, optional
+        Takes every image during a verification.
+    stream : PoseStream, optional
+        Sends detections of the first camera; while it has clients, every image is
+        processed.
+    """
+
+    def __init__(
+        self,
+        cameras: Sequence[ImageCamera],
+        settings: CameraSettings,
+        listener: LiveListener,
+        runner: SwingRunner,
+        clock: Clock | None = None,
+        known: Mapping[str, CameraSettings] | None = None,
+        verifier: VerificationRunner | None = None,
+        stream: PoseStream | None = None,
+    ) -> None:
+        self._workers = tuple(
+            CameraWorker(
+                camera, settings, partial(self._on_event, c), clock=clock, known=known
+            )
+            for c, camera in enumerate(cameras)
+        )
+        self._pairs = FramePairs()
+        self._has_refused = False
+        self._listener = listener
+        self._runner = runner
+        self._verifier = verifier
+        self._stream = stream
+        self._region = RegionOfInterest()
+        self._wanted: RegionOfInterest | SwingSetup = self._region
+        self._last: dict[int, PenDetection] = {}  # by camera
+        self._is_watched = True
+        self._scene = Spots.none()
+        self._moved_ns: int | None = None
+        self._seen_ns = 0
+        self._seen_seq = 0
+        self._pass_seq = 0  # where the replay of a recording began
+        self._stage: object = None
+        self._measures = False
+        self._ready = Event()
+        self._stopping = Event()
+        self._thread = Thread(target=self._run, name="looking", daemon=True)
+
+    def worker(self, camera: int = 0) -> CameraWorker:
+        """Return the worker of a camera."""
+        return self._workers[camera]
+
+    @property
+    def stats(self) -> Stats:
+        """Counters of the images of all cameras."""
+        stats = reduce(Stats.and_then, (worker.stats for worker in self._workers))
+        return replace(stats, unpaired=self._pairs.n_unpaired)
+
+    @property
+    def lag_ms(self) -> float | None:
+        """Lag of the second camera, ms; None until it is known."""
+        return self._pairs.lag_ms
+
+    def start(self) -> None:
+        """Open the cameras and start processing; once only."""
+        for worker in self._workers:
+            worker.start()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Close the cameras and end all threads.
+
+        Raises
+        ------
+        DeviceLost
+            A call of the camera did not return.
+        """
+        self._stopping.set()
+        self._ready.set()
+        if self._thread.ident is not None:
+            self._thread.join(LONGEST_STOP)
+        with ExitStack() as stack:  # one that does not stop keeps none from it
+            for worker in self._workers:
+                stack.callback(worker.stop)
+
+    def set_region(self, region: RegionOfInterest) -> None:
+        """Set what is detected from the next image on; a swing keeps its own."""
+        self._region = region
+        self._pass_seq = self._seen_seq
+
+    def set_watched(self, watched: bool) -> None:
+        """Set whether images are viewed; a capture goes on anyway."""
+        self._is_watched = watched
+
+    def hurry(self) -> None:
+        """Process every image for a while, as after a motion."""
+        if self._moved_ns is not None:
+            self._moved_ns = self._seen_ns
+
+    def _run(self) -> None:
+        try:
+            while not self._stopping.is_set():
+                captured = self._captured()
+                self._notice_stage()
+                rest = self._rest()
+                is_paired = self._measures and len(self._workers) > 1
+                for worker in self._workers:  # two that rest rarely meet a moment
+                    worker.set_rest(0.0 if is_paired and rest is not None else rest)
+                if self._measures:
+                    self._take_next(captured, rest if is_paired else None)
+                else:
+                    self._take_newest()
+        finally:
+            if not self._stopping.is_set():
+                self._give_up()
+
+    def _give_up(self) -> None:
+        """Report an internal error and close the cameras; the swing stays as it is."""
+        self._listener.on_camera(Failed(LightpenError("live.bug")), 0)
+        for worker in self._workers:
+            with suppress(DeviceLost):  # `stop` tells it
+                worker.stop()
+
+    def _captured(self) -> _Capture:
+        """Return what is captured now; the workers deliver all images for it."""
+        status, verified = self._runner.status, self._verified()
+        is_swing = verified is None and status.is_capturing
+        captured = _Capture(status.setup if is_swing else None, verified)
+        if self._measures is not (captured.wanted is not None):
+            self._measures = captured.wanted is not None
+            for worker in self._workers:
+                worker.measure(self._measures)
+            self._pairs.forget()
+        return captured
+
+    def _verified(self) -> RegionOfInterest | None:
+        """Return what a verification detects; None without one."""
+        status = None if self._verifier is None else self._verifier.status
+        return status.region if status is not None and status.is_touching else None
+
+    def _rest(self) -> float | None:
+        """Return the pause after each image, s; None to stop."""
+        if self._stream is not None and self._stream.is_heard:
+            return 0.0
+        if self._moved_ns is None:  # the first image gives the size
+            return 0.0
+        still_ns = self._seen_ns - self._moved_ns
+        status = self._runner.status
+        waits = status.state is None or status.state.phase is Phase.WAIT
+        is_swung = status.is_capturing and not (waits or status.is_paused_by_user)
+        if self._verified() is None and is_swung:
+            assert status.setup is not None
+            assert status.state is not None
+            is_begun = status.state.phase in MAY_REST
+            if status.setup.is_recording or not is_begun:
+                return 0.0
+        if self._verified() is not None or is_swung:
+            return 0.0 if still_ns < PATIENT_NS else UNHURRIED
+        if not self._is_watched:
+            return None
+        return 0.0 if still_ns < LIVELY_NS else UNHURRIED
+
+    def _notice_stage(self) -> None:
+        """Treat a new phase or task as a motion."""
+        status = self._runner.status
+        verified = None if self._verifier is None else self._verifier.status
+        stage = (
+            None if status.state is None else status.state.phase,
+            verified is not None and verified.is_touching and verified.task,
+        )
+        if stage != self._stage:
+            self._stage = stage
+            self.hurry()
+
+    def _notice(self, image: LiveImage) -> None:
+        """Note the time of the last motion, however slow."""
+        self._seen_ns = image.frame.host_ts_ns
+        self._seen_seq = image.frame.seq
+        is_first = self._moved_ns is None
+        has_moved = not self._is_passed() and have_moved(self._scene, image.spots)
+        if is_first or has_moved:
+            self._moved_ns = self._seen_ns
+            self._scene = image.spots
+
+    def _is_passed(self) -> bool:
+        """Tell whether a recording was replayed to its end, and nothing is captured."""
+        caps = self._workers[0].caps
+        if self._measures or caps is None or caps.n_images is None:
+            return False
+        return self._seen_seq - self._pass_seq >= caps.n_images
+
+    def _tell_others(self, image: LiveImage) -> None:
+        """Send detections to the clients of the stream."""
+        if self._stream is not None:
+            self._stream.take(image.frame, image.detection)
+
+    def _take_newest(self) -> None:
+        """Process the newest image of each camera."""
+        self._ready.wait(LONGEST_WAIT)
+        self._ready.clear()
+        for c, worker in enumerate(self._workers):
+            frame = worker.latest()
+            if frame is None:
+                continue
+            self._pairs.note(c, frame)
+            image = self._look(frame, self._region, c)
+            if c == 0:
+                self._notice(image)
+                self._tell_others(image)
+                self._hand_over(frame, image.detection, None)
+            self._listener.on_image(image)
+
+    def _take_next(self, captured: _Capture, rest: float | None) -> None:
+        """Process the next image, of two cameras those of the next moment.
+
+        Parameters
+        ----------
+        rest : float or None
+            Moments within this time of the last one are skipped, s.
+        """
+        wanted = captured.wanted or self._region
+        frame = self._next_frame()
+        if frame is None:
+            return
+        if rest is not None and frame.host_ts_ns - self._seen_ns < rest * 1e9:
+            return
+        frames = (frame, *frame.others)[: len(wanted.regions)]
+        is_swing = captured.swing is not None
+        images = [
+            self._look(each, wanted, c, is_followed=is_swing)
+            for c, each in enumerate(frames)
+        ]
+        self._notice(images[0])
+        self._tell_others(images[0])
+        detections = [i.detection for i in images if i.detection is not None]
+        detection = None
+        if len(detections) == len(images):
+            detection = replace(detections[0], others=tuple(detections[1:]))
+        if self._verifier is not None and captured.verification is not None:
+            self._verifier.take(frame, detection, captured.verification)
+        else:
+            self._hand_over(frame, detection, captured.swing)
+        for image in images:
+            self._listener.on_image(image)
+
+    def _next_frame(self) -> Frame | None:
+        """Return the next image, with that of the other camera at its moment."""
+        try:
+            if len(self._workers) == 1:
+                return self._workers[0].next_frame(LONGEST_WAIT)
+            return self._next_pair()
+        except FrameTimeout:
+            return None
+        except EndOfImages:
+            self._stopping.wait(LONGEST_WAIT)
+            return None
+
+    def _next_pair(self) -> Frame | None:
+        counts = {w.caps.n_images if w.caps else None for w in self._workers}
+        if len(counts) > 1 and None not in counts:
+            self._refuse_recordings()
+            return None
+        n_images = counts.pop() if len(counts) == 1 else None
+        moment = self._pairs.take(n_images)
+        if moment is None:
+            self._add_next()
+            moment = self._pairs.take(n_images)
+        moved_ms = self._pairs.moved_ms()
+        if moved_ms is not None:
+            self._listener.on_camera(FaultRaised(FramesDelayed(held_up(moved_ms))), 1)
+        return moment
+
+    def _add_next(self) -> None:
+        """Take the next frame of the camera whose turn it is."""
+        wanted = self._pairs.wanted
+        try:
+            frame = self._workers[wanted].next_frame(LONGEST_WAIT)
+        except FrameTimeout:  # what the other has sent goes on, and finds no partner
+            wanted = 1 - wanted
+            frame = self._workers[wanted].next_frame(0.0)
+        self._pairs.add(wanted, frame)
+
+    def _refuse_recordings(self) -> None:
+        """Report once that two recordings are not of the same moments."""
+        if not self._has_refused:
+            self._has_refused = True
+            self._listener.on_camera(Failed(LightpenError("live.other-recording")), 1)
+        self._stopping.wait(LONGEST_WAIT)
+
+    def _hand_over(
+        self, frame: Frame, detection: PenDetection | None, setup: SwingSetup | None
+    ) -> None:
+        caps = self._workers[0].caps
+        n_images = None if caps is None else caps.n_images
+        self._runner.take(frame, detection, setup, n_images, self.stats)
+
+    def _look(
+        self,
+        frame: Frame,
+        wanted: RegionOfInterest | SwingSetup,
+        c: int,
+        *,
+        is_followed: bool = False,
+    ) -> LiveImage:
+        """Detect spots, and the pen where it can be."""
+        if wanted is not self._wanted:
+            self._wanted = wanted
+            self._last.clear()
+        regions = wanted.regions
+        # Cameras may just come or go.
+        region = regions[c] if c < len(regions) else RegionOfInterest()
+        camera, pen, mask = region.camera, region.pen, region.mask
+        if camera is None or pen is None or not camera.fits(frame.image):
+            try:
+                spots = detect_spots(frame.image, mask, full_scale=frame.full_scale)
+                return LiveImage(frame, spots, None, c)
+            except MISHAPS:
+                return LiveImage(frame, Spots.none(), None, c)
+        detection = detect_pen(
+            frame.image,
+            camera,
+            pen,
+            mask,
+            self._last.get(c),
+            frame.full_scale,
+            is_followed=is_followed,
+        )
+        self._last[c] = detection
+        spots = Spots.none() if detection.spots is None else detection.spots
+        return LiveImage(frame, spots, detection, c)
+
+    def _on_event(self, c: int, event: WorkerEvent) -> None:
+        if isinstance(event, FrameReady):
+            self._ready.set()
+        else:
+            if isinstance(event, FaultRaised | Failed):
+                what = event.error.message
+                _logger.warning("fault of camera %d: %s: %s", c + 1, what.code, what)
+            self._listener.on_camera(event, c)

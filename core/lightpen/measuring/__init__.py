@@ -1,0 +1,1 @@
+"""Geometric features of parts by probed points, with their uncertainty."""

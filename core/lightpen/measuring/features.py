@@ -1,0 +1,222 @@
+"""Features of least squares of the orthogonal distances, with the full covariance.
+
+The sum of the squared distances is minimised by Gauss-Newton steps with
+Levenberg-Marquardt's damping; the frame of the feature moves along, so the unknowns are
+small motions of it. At the solution the unknowns follow the points by
+
+    dp = -(J^T J)^-1 J^T G dX
+
+with the derivatives ``J`` of the distances by the unknowns and ``G`` by the points. It
+propagates the covariance of all points, common parts included, to the feature.
+
+References
+----------
+.. [1] A. B. Forbes, "Least-squares best-fit geometric elements", NPL Report DITC 140/89
+   (1989).
+.. [2] ISO 10360-6:2001, Estimation of errors in computing Gaussian associated features.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.measuring.starts import Start, starts
+from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind, FeatureModel
+from lightpen.model.rigid import rotation_from_vector, skew
+
+MAX_STEPS = 200
+ROUGHLY, CONVERGED = 1e-9, 1e-15  # of the extent of the points
+SHRINKS = 0.5  # a step before rounding by this at least
+LARGEST_DAMPING = 1e8
+ROUNDING = 1e-12  # relative, of a sum of squares: within it, no step is worse
+UNDETERMINED = 1e-7  # of the largest singular value, columns scaled
+FRAMED = {FeatureKind.POINT, FeatureKind.SPHERE}  # their axes mean nothing
+PLACE, AXIS = slice(0, 3), slice(3, 6)
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """A fitted feature.
+
+    Attributes
+    ----------
+    kind : FeatureKind
+    origin : (3,) array
+        mm: centre of point, circle, slot, sphere; of line, plane, cylinder and cone the
+        point nearest to the mean of the points.
+    axes : (3, 3) array
+        Of its frame, as columns; z is the axis of cylinder and cone, the direction of a
+        line, the normal of plane, circle and slot, x the direction of a slot.
+    sizes : (S,) array
+        As `FeatureModel.sizes` names them; the radius of a cone is that at its origin.
+    distances : (N, K) array
+        Of the points from it, mm.
+    by_points : (6 + S, 3 N) array
+        Derivative of origin, axis and sizes by the points.
+    """
+
+    kind: FeatureKind
+    origin: FloatArray
+    axes: FloatArray
+    sizes: FloatArray
+    distances: FloatArray
+    by_points: FloatArray
+
+    @property
+    def axis(self) -> FloatArray:
+        """Direction of the line, axis or normal, (3,)."""
+        return self.axes[:, 2]
+
+    @property
+    def values(self) -> FloatArray:
+        """Origin, axis and sizes, (6 + S,)."""
+        return np.concatenate([self.origin, self.axis, self.sizes])
+
+    @property
+    def form_error(self) -> float:
+        """Peak-to-valley distance, mm; of a line twice the largest."""
+        if self.kind in {FeatureKind.LINE, FeatureKind.POINT}:
+            return 2 * float(np.linalg.norm(self.distances, axis=1).max())
+        return float(np.ptp(self.distances[:, 0]))
+
+    def size(self, name: str) -> float:
+        """Return a size by its name."""
+        return float(self.sizes[SURFACES[self.kind].sizes.index(name)])
+
+
+def fit_feature(kind: FeatureKind, points: FloatArray) -> Feature:
+    """Fit a feature of a kind to points.
+
+    Parameters
+    ----------
+    points : (N, 3) array
+        mm.
+
+    Raises
+    ------
+    CalibrationError
+        The points are too few, or do not determine the feature.
+    """
+    surface = SURFACES[kind]
+    if len(points) < surface.min_points:
+        raise CalibrationError(
+            "measuring.too-few",
+            kind=NAMES[kind],
+            n_points=len(points),
+            needed=surface.min_points,
+        )
+    solved = [_solve(surface, points, start, ROUGHLY) for start in starts(kind, points)]
+    best = min(solved, key=lambda each: _cost(surface, points, each))
+    return _feature(kind, points, _solve(surface, points, best, CONVERGED))
+
+
+def _cost(surface: FeatureModel, points: FloatArray, at: Start) -> float:
+    origin, axes, sizes = at
+    values = surface.distances((points - origin) @ axes, sizes).values
+    return float(np.sum(values**2))
+
+
+def _jacobian(
+    surface: FeatureModel, points: FloatArray, at: Start
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return distances (M,), their derivatives (M, U), and by the points (N, K, 3)."""
+    origin, axes, sizes = at
+    q = (points - origin) @ axes
+    values, by_point, by_sizes = surface.distances(q, sizes)
+    by_frame = np.concatenate([-by_point, -np.cross(q[:, None], by_point)], axis=2)
+    J = np.concatenate([by_frame[..., surface.free], by_sizes], axis=2)
+    return values.ravel(), J.reshape(-1, surface.n_unknowns), by_point @ axes.T
+
+
+def _moved(surface: FeatureModel, at: Start, step: FloatArray) -> Start:
+    origin, axes, sizes = at
+    n_free = len(surface.free)
+    motion = np.zeros(6)
+    motion[list(surface.free)] = step[:n_free]
+    return (
+        origin + axes @ motion[:3],
+        axes @ rotation_from_vector(motion[3:]),
+        sizes + step[n_free:],
+    )
+
+
+def _solve(
+    surface: FeatureModel, points: FloatArray, start: Start, converged: float
+) -> Start:
+    """Return the feature of least squares from a start."""
+    extent = max(float(np.ptp(points, axis=0).max()), np.finfo(float).tiny)
+    at, damping, before = start, 1e-6, np.inf
+    cost = _cost(surface, points, at)
+    for _ in range(MAX_STEPS):
+        values, J, _by_points = _jacobian(surface, points, at)
+        scale = np.linalg.norm(J, axis=0) + np.finfo(float).tiny
+        damped = np.vstack([J / scale, np.sqrt(damping) * np.eye(J.shape[1])])
+        wanted = np.concatenate([-values, np.zeros(J.shape[1])])
+        step = np.linalg.lstsq(damped, wanted)[0] / scale
+        after = _moved(surface, at, step)
+        cost_after = _cost(surface, points, after)
+        length = float(np.abs(step * scale).max()) / (extent * np.sqrt(len(points)))
+        # At the end rounding alone is left: steps are small and shrink no more.
+        small = length <= converged or SHRINKS * before < length < ROUGHLY
+        before = length
+        if cost_after <= cost * (1 + ROUNDING):
+            at, cost, damping = after, cost_after, damping / 10
+        else:
+            damping *= 10
+        if small or damping > LARGEST_DAMPING:
+            break
+    return at
+
+
+def _feature(kind: FeatureKind, points: FloatArray, at: Start) -> Feature:
+    """Return a solved feature with its derivatives, in its standard form."""
+    surface = SURFACES[kind]
+    origin, axes, sizes = _standard(kind, points, at)
+    values, J, by_point = _jacobian(surface, points, (origin, axes, sizes))
+    scale = np.linalg.norm(J, axis=0)
+    if not (scale > 0).all() or _condition(J / scale) > 1 / UNDETERMINED:
+        raise CalibrationError("measuring.undetermined", kind=NAMES[kind])
+    n, k, _ = by_point.shape
+    G = np.zeros((n, k, n, 3))
+    G[np.arange(n), :, np.arange(n)] = by_point
+    unknowns = -np.linalg.pinv(J) @ G.reshape(n * k, 3 * n)
+    n_free = len(surface.free)
+    motion = np.zeros((6, 3 * n))
+    motion[list(surface.free)] = unknowns[:n_free]
+    by_points = np.concatenate(
+        [axes @ motion[:3], -skew(axes[:, 2]) @ axes @ motion[3:], unknowns[n_free:]]
+    )
+    return Feature(kind, origin, axes, sizes, values.reshape(n, k), by_points)
+
+
+def _condition(J: FloatArray) -> float:
+    singular = np.linalg.svd(J, compute_uv=False)
+    return float(singular[0] / max(singular[-1], np.finfo(float).tiny))
+
+
+def _standard(kind: FeatureKind, points: FloatArray, at: Start) -> Start:
+    """Return a feature with a unique frame and positive sizes."""
+    origin, axes, sizes = at
+    middle = points.mean(axis=0)
+    z = axes[:, 2]
+    if kind in {FeatureKind.LINE, FeatureKind.CYLINDER, FeatureKind.CONE}:
+        shift = float((middle - origin) @ z)
+        origin = origin + shift * z
+        if kind is FeatureKind.CONE:
+            sizes = np.array([sizes[0] + shift * np.tan(sizes[1]), sizes[1]])
+    elif kind is FeatureKind.PLANE:
+        origin = middle - float((middle - origin) @ z) * z
+    if kind is FeatureKind.CONE:
+        if sizes[1] < 0:
+            axes, sizes = axes * (1, -1, -1), sizes * (1, -1)
+    elif kind not in FRAMED and z[int(np.argmax(np.abs(z)))] < 0:
+        axes = axes * (1, -1, -1)
+    return origin, axes, sizes
+
+
+def joint_values(features: Sequence[Feature]) -> FloatArray:
+    """Return the values of several features, one after the other."""
+    return np.concatenate([feature.values for feature in features])

@@ -1,0 +1,129 @@
+"""Where the fits of features begin: algebraic solutions.
+
+Cylinder and cone are quadrics about an axis along z, ``x^2 + y^2 = 2 a x + 2 b y + c
++ d z + e z^2``, linear in the unknowns once the direction of the axis is given.
+Directions over a half sphere are tried, and each of the best few starts a fit.
+"""
+
+from collections.abc import Iterator
+from itertools import islice
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.measuring.surfaces import FeatureKind
+
+N_DIRECTIONS = 200  # over the half sphere: some 10 degrees apart
+N_NEAR = 15  # directions about a principal axis
+RIDGE = 1e-12
+N_STARTS = 4  # fits that begin at the best of them
+APART = 0.995  # cosine between two starts
+LEAST_ANGLE = 1e-3  # rad, of a cone at its start
+TINY = float(np.finfo(float).tiny)
+Start = tuple[FloatArray, FloatArray, FloatArray]
+"""Origin (3,), axes (3, 3) as columns, sizes (S,)."""
+
+
+def frame_about(axis: FloatArray) -> FloatArray:
+    """Return right-handed axes (3, 3), as columns, with z along a vector (3,)."""
+    z = axis / np.linalg.norm(axis)
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def starts(kind: FeatureKind, points: FloatArray) -> Iterator[Start]:
+    """Yield where fits of a feature to points (N, 3) may begin."""
+    middle = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
+    match kind:
+        case FeatureKind.POINT:
+            yield middle, np.eye(3), np.zeros(0)
+        case FeatureKind.LINE:
+            yield middle, frame_about(axes[0]), np.zeros(0)
+        case FeatureKind.PLANE:
+            yield middle, frame_about(axes[2]), np.zeros(0)
+        case FeatureKind.SPHERE:
+            center, radius = _algebraic(points - middle)
+            yield middle + center, np.eye(3), np.array([radius])
+        case FeatureKind.CIRCLE:
+            frame = frame_about(axes[2])
+            center, radius = _algebraic((points - middle) @ frame[:, :2])
+            yield middle + frame[:, :2] @ center, frame, np.array([radius])
+        case FeatureKind.SLOT:
+            along, normal = axes[0], axes[2]
+            frame = np.column_stack([along, np.cross(normal, along), normal])
+            local = (points - middle) @ frame
+            half = np.ptp(local, axis=0) / 2
+            center = middle + frame @ (local.min(axis=0) + half)
+            length = max(2 * (half[0] - half[1]), half[1] / 2)
+            yield center, frame, np.array([half[1], length])
+        case FeatureKind.CYLINDER | FeatureKind.CONE:
+            found = _by_direction(kind, points - middle, middle, axes)
+            yield from islice(found, N_STARTS)
+
+
+def _algebraic(points: FloatArray) -> tuple[FloatArray, float]:
+    """Return centre and radius of the algebraic circle or sphere (Kasa 1976)."""
+    A = np.column_stack([2 * points, np.ones(len(points))])
+    *center, rest = np.linalg.lstsq(A, np.sum(points**2, axis=1))[0]
+    return np.array(center), float(np.sqrt(max(rest + np.dot(center, center), 0)))
+
+
+def _directions(axes: FloatArray) -> FloatArray:
+    """Return directions evenly over a half sphere, and closer about principal axes.
+
+    The former lie on Fibonacci's spiral; the latter are for flat cones and short arcs.
+    """
+    k = np.arange(N_DIRECTIONS) + 0.5
+    z = k / N_DIRECTIONS
+    turn = np.pi * (1 + np.sqrt(5)) * k
+    across = np.sqrt(1 - z**2)
+    evenly = np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
+    near = [
+        evenly[::-1][:N_NEAR] @ np.diag((each, each, 1)) @ frame_about(axis).T
+        for axis in axes
+        for each in (0.0, 0.1, 0.4)
+    ]
+    directions = np.concatenate([evenly, *near])
+    return np.asarray(directions / np.linalg.norm(directions, axis=1)[:, None])
+
+
+def _by_direction(
+    kind: FeatureKind, points: FloatArray, middle: FloatArray, axes: FloatArray
+) -> Iterator[Start]:
+    directions = _directions(axes)
+    frames = np.stack([frame_about(each) for each in directions])
+    x, y, z = np.moveaxis(points @ frames, -1, 0)  # (D, N) each
+    columns = [x, y, np.ones_like(x)]
+    if kind is FeatureKind.CONE:
+        columns += [z, z**2]
+    A = np.stack(columns, axis=-1)
+    A /= np.linalg.norm(A, axis=1, keepdims=True) + TINY
+    squares = x**2 + y**2
+    # Normal equations do for a start; a direction that determines nothing is damped.
+    normal = np.swapaxes(A, 1, 2) @ A + RIDGE * np.eye(A.shape[2])
+    solved = np.linalg.solve(normal, np.swapaxes(A, 1, 2) @ squares[..., None])
+    norms = np.linalg.norm(np.stack(columns[:2], axis=-1), axis=1) + TINY
+    a, b = (solved[:, :2, 0] / norms / 2).T
+    rho = np.hypot(x - a[:, None], y - b[:, None])
+    slope, radius = np.zeros(len(x)), rho.mean(axis=1)
+    if kind is FeatureKind.CONE:
+        own = z - z.mean(axis=1, keepdims=True)
+        slope = np.sum(own * rho, axis=1) / (np.sum(own**2, axis=1) + TINY)
+        radius = radius - slope * z.mean(axis=1)
+    distances = rho - radius[:, None] - slope[:, None] * z
+    misfits = np.sum(distances**2, axis=1) / (1 + slope**2)
+    taken: list[FloatArray] = []
+    for i in np.argsort(misfits).tolist():
+        if any(abs(directions[i] @ other) > APART for other in taken):
+            continue
+        taken.append(directions[i])
+        origin = middle + frames[i] @ np.array([a[i], b[i], 0.0])
+        if kind is FeatureKind.CYLINDER:
+            yield origin, frames[i], radius[i : i + 1]
+            continue
+        angle = np.arctan(slope[i])
+        if abs(angle) < LEAST_ANGLE:
+            angle = LEAST_ANGLE
+        yield origin, frames[i], np.array([radius[i], angle])

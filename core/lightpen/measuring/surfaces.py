@@ -1,0 +1,193 @@
+"""The kinds of features, each as distances in a frame of its own.
+
+A feature has a frame (origin and axes) and sizes. A point at ``q`` in that frame has
+one to three distances from the feature, each zero on it. Moving the frame by ``t`` and
+rotating it by ``w`` (both in the frame) changes ``q`` by ``-t - w x q``. The gradient
+``g`` of a distance by ``q`` gives its derivatives by the frame: ``-g`` and ``-q x g``.
+Motions that leave a feature unchanged, as along a cylinder axis, are not free.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.messages import message
+
+TINY = 1e-300  # mm; a point on an axis has no direction from it
+
+
+class FeatureKind(Enum):
+    """The kinds of features; the values are those of a measuring plan."""
+
+    POINT = "point"
+    LINE = "line"
+    PLANE = "plane"
+    CIRCLE = "circle"
+    SLOT = "slot"
+    SPHERE = "sphere"
+    CYLINDER = "cylinder"
+    CONE = "cone"
+
+
+class Distances(NamedTuple):
+    """How far N points are from a feature, by K distances each.
+
+    Attributes
+    ----------
+    values : (N, K) array
+        mm.
+    by_point : (N, K, 3) array
+        Gradient by the point, frame of the feature.
+    by_sizes : (N, K, S) array
+        Derivative by the sizes of the feature.
+    """
+
+    values: FloatArray
+    by_point: FloatArray
+    by_sizes: FloatArray
+
+
+@dataclass(frozen=True)
+class FeatureModel:
+    """What a kind of feature is.
+
+    Attributes
+    ----------
+    distances : callable
+        Of points (N, 3) in the frame of the feature, with its sizes (S,).
+    free : tuple of int
+        Which translations along x y z (0 to 2) and rotations (3 to 5) change it.
+    sizes : tuple of str
+        Names; lengths in mm, angles in rad.
+    """
+
+    distances: Callable[[FloatArray, FloatArray], Distances]
+    free: tuple[int, ...]
+    sizes: tuple[str, ...] = ()
+
+    @property
+    def n_unknowns(self) -> int:
+        """The number of free motions and sizes."""
+        return len(self.free) + len(self.sizes)
+
+    @property
+    def min_points(self) -> int:
+        """The number of points that determine it."""
+        n_distances = self.distances(
+            np.eye(3)[:1], np.ones(len(self.sizes))
+        ).values.size
+        return -(-self.n_unknowns // n_distances)
+
+
+def _no_sizes(n: int, k: int) -> FloatArray:
+    return np.zeros((n, k, 0))
+
+
+def _point(q: FloatArray, _: FloatArray) -> Distances:
+    n = len(q)
+    return Distances(q, np.broadcast_to(np.eye(3), (n, 3, 3)), _no_sizes(n, 3))
+
+
+def _line(q: FloatArray, _: FloatArray) -> Distances:
+    n = len(q)
+    return Distances(
+        q[:, :2], np.broadcast_to(np.eye(3)[:2], (n, 2, 3)), _no_sizes(n, 2)
+    )
+
+
+def _plane(q: FloatArray, _: FloatArray) -> Distances:
+    n = len(q)
+    return Distances(
+        q[:, 2:], np.broadcast_to(np.eye(3)[2:], (n, 1, 3)), _no_sizes(n, 1)
+    )
+
+
+def _radial(across: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the lengths (N,) of vectors (N, D), and their directions."""
+    lengths = np.linalg.norm(across, axis=1)
+    return lengths, across / np.maximum(lengths, TINY)[:, None]
+
+
+def _sphere(q: FloatArray, sizes: FloatArray) -> Distances:
+    lengths, outwards = _radial(q)
+    return Distances(
+        (lengths - sizes[0])[:, None], outwards[:, None], np.full((len(q), 1, 1), -1.0)
+    )
+
+
+def _cylinder(q: FloatArray, sizes: FloatArray) -> Distances:
+    lengths, outwards = _radial(q[:, :2])
+    gradient = np.column_stack([outwards, np.zeros(len(q))])
+    return Distances(
+        (lengths - sizes[0])[:, None], gradient[:, None], np.full((len(q), 1, 1), -1.0)
+    )
+
+
+def _cone(q: FloatArray, sizes: FloatArray) -> Distances:
+    radius, half_angle = sizes
+    cos, sin = np.cos(half_angle), np.sin(half_angle)
+    lengths, outwards = _radial(q[:, :2])
+    gradient = np.column_stack([cos * outwards, np.full(len(q), -sin)])
+    by_angle = -(lengths - radius) * sin - q[:, 2] * cos
+    return Distances(
+        ((lengths - radius) * cos - q[:, 2] * sin)[:, None],
+        gradient[:, None],
+        np.stack([np.full(len(q), -cos), by_angle], axis=1)[:, None],
+    )
+
+
+def _with_height(in_plane: Distances, q: FloatArray) -> Distances:
+    """Return distances of a flat outline with those from its plane."""
+    n, _, n_sizes = in_plane.by_sizes.shape
+    return Distances(
+        np.column_stack([in_plane.values, q[:, 2]]),
+        np.concatenate(
+            [in_plane.by_point, np.broadcast_to(np.eye(3)[2:], (n, 1, 3))], axis=1
+        ),
+        np.concatenate([in_plane.by_sizes, np.zeros((n, 1, n_sizes))], axis=1),
+    )
+
+
+def _circle(q: FloatArray, sizes: FloatArray) -> Distances:
+    return _with_height(_cylinder(q, sizes), q)
+
+
+def _slot(q: FloatArray, sizes: FloatArray) -> Distances:
+    """Of the outline of two half circles, along x, and the lines between them."""
+    radius, length = sizes
+    end = np.clip(q[:, 0], -length / 2, length / 2)
+    lengths, outwards = _radial(np.column_stack([q[:, 0] - end, q[:, 1]]))
+    gradient = np.column_stack([outwards, np.zeros(len(q))])
+    beyond = np.sign(q[:, 0]) * (np.abs(q[:, 0]) >= length / 2)
+    by_sizes = np.stack([np.full(len(q), -1.0), -beyond * outwards[:, 0] / 2], axis=1)
+    in_plane = Distances(
+        (lengths - radius)[:, None], gradient[:, None], by_sizes[:, None]
+    )
+    return _with_height(in_plane, q)
+
+
+SURFACES = {
+    FeatureKind.POINT: FeatureModel(_point, (0, 1, 2)),
+    FeatureKind.LINE: FeatureModel(_line, (0, 1, 3, 4)),
+    FeatureKind.PLANE: FeatureModel(_plane, (2, 3, 4)),
+    FeatureKind.CIRCLE: FeatureModel(_circle, (0, 1, 2, 3, 4), ("radius",)),
+    FeatureKind.SLOT: FeatureModel(_slot, (0, 1, 2, 3, 4, 5), ("radius", "length")),
+    FeatureKind.SPHERE: FeatureModel(_sphere, (0, 1, 2), ("radius",)),
+    FeatureKind.CYLINDER: FeatureModel(_cylinder, (0, 1, 3, 4), ("radius",)),
+    FeatureKind.CONE: FeatureModel(_cone, (0, 1, 3, 4), ("radius", "half_angle")),
+}
+
+NAMES = {
+    FeatureKind.POINT: message("measuring.point"),
+    FeatureKind.LINE: message("measuring.line"),
+    FeatureKind.PLANE: message("measuring.plane"),
+    FeatureKind.CIRCLE: message("measuring.circle"),
+    FeatureKind.SLOT: message("measuring.slot"),
+    FeatureKind.SPHERE: message("measuring.sphere"),
+    FeatureKind.CYLINDER: message("measuring.cylinder"),
+    FeatureKind.CONE: message("measuring.cone"),
+}

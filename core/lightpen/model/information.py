@@ -1,0 +1,32 @@
+"""Information: the inverse of a covariance, and back."""
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+
+EXACT = 1e-6  # standard deviation of what is taken as exact, in its own unit
+
+
+def known_by(covariance: FloatArray) -> FloatArray:
+    """Return the information (k, k) in what a file states with this covariance (k, k).
+
+    Variances are enlarged by 1e-6, since what is stated as exact may be rounded.
+    """
+    floor = np.maximum(np.diag(covariance) * EXACT, EXACT**2)
+    return inverse(covariance + np.diag(floor))
+
+
+def inverse(matrix: FloatArray) -> FloatArray:
+    """Return the inverse (k, k) of a covariance or an information (k, k).
+
+    By Cholesky's decomposition, scaled first, as the unknowns have different units.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The matrix is not positive definite.
+    """
+    scale = 1 / np.sqrt(np.diag(matrix))
+    # As scipy.linalg.cho_solve, whose import takes 0.03 s.
+    root = np.linalg.inv(np.linalg.cholesky(matrix * np.outer(scale, scale))) * scale
+    return np.asarray(root.T @ root)

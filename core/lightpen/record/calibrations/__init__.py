@@ -1,0 +1,1 @@
+"""Calibration records: read back, stated, recomputed."""

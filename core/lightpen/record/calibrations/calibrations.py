@@ -1,0 +1,250 @@
+"""A calibration read back from its file: what `lightpen calibrate` wrote, or a result.
+
+Both hold the same record of the calibration, and tell when they were changed since. The
+file alone is read; nothing that a running program knows besides comes into it.
+"""
+
+from dataclasses import dataclass
+from datetime import datetime
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.errors import FileError, UsageError
+from lightpen.estimation.reports.calibration_record import CalibrationRecord
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.own_json import DamagedError, has_checksum, parse_checked
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.messages import message
+from lightpen.model.origin import Origin
+from lightpen.record.results.results import TipChange, has_head, parse_result
+from lightpen.record.swings.names import Names
+
+WHAT = message("file.calibration")
+LIMIT = 64 * MEGABYTE
+NOBODY = Names()
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationFile:
+    """A calibration as its file has it.
+
+    Attributes
+    ----------
+    sha256 : str
+        Of the whole file.
+    calibration : CalibrationRecord
+        The record.
+    grade : Grade
+        Verdict on it when it was accepted, else by itself.
+    why : StoredMessage
+        What the grade is for.
+    doubts : tuple of StoredMessage
+        What else there was to look into.
+    origin : Origin or None
+        None where it does not say.
+    names : Names
+        Empty of a record that nobody accepted.
+    accepted : datetime or None
+        None of such a record, too.
+    reason : str
+        Why it was accepted though it was to be checked, or put in force again, in the
+        words of who did.
+    change : TipChange or None
+        Since the tip that was in force before.
+    restores : str or None
+        Hash of the entry of the archive whose tip is in force again by it.
+    """
+
+    path: Path
+    sha256: str
+    calibration: CalibrationRecord
+    grade: Grade
+    why: StoredMessage
+    doubts: tuple[StoredMessage, ...]
+    origin: Origin | None
+    names: Names = NOBODY
+    accepted: datetime | None = None
+    reason: str = ""
+    change: TipChange | None = None
+    restores: str | None = None
+
+    @property
+    def when(self) -> datetime:
+        """When it was accepted, or else computed."""
+        return self.accepted or self.calibration.created
+
+    @property
+    def name(self) -> str:
+        """Name of the file, fit to be shown."""
+        return printable(self.path.name)
+
+    @property
+    def tip_pen(self) -> FloatArray:
+        """Tip, pen frame, (3,), mm."""
+        return np.array(self.calibration.tip_pen_mm)
+
+    @property
+    def uncertainty(self) -> FloatArray:
+        """U (k = 2) of the tip along x, y and z, (3,), mm."""
+        return np.array(self.calibration.expanded_uncertainty_mm)
+
+    @property
+    def cone_cam(self) -> FloatArray:
+        """Centre of the cone, frame of the first camera, (3,), mm."""
+        return np.array(self.calibration.cone_cam_mm)
+
+    @property
+    def nominal_tip(self) -> FloatArray | None:
+        """Tip by design, pen frame, (3,), mm."""
+        nominal = self.calibration.nominal_tip_mm
+        return None if nominal is None else np.array(nominal)
+
+    @property
+    def is_of_rig(self) -> bool:
+        """Whether several cameras looked; the frames are then of all of them."""
+        return self.calibration.rig is not None
+
+    @property
+    def camera_hashes(self) -> tuple[str, ...]:
+        """SHA-256 of the camera file, or of a rig file and those of its cameras."""
+        inputs = self.calibration.inputs
+        if inputs.rig is None:
+            return (inputs.camera.sha256,)
+        return (inputs.rig.sha256, *(each.sha256 for each in inputs.cameras))
+
+    @property
+    def camera_sha256(self) -> str:
+        """SHA-256 of the camera file, of a rig that of the first camera."""
+        return self.calibration.inputs.camera.sha256
+
+    @property
+    def pen_sha256(self) -> str:
+        """SHA-256 of the pen file."""
+        return self.calibration.inputs.pen.sha256
+
+    @property
+    def displacements(self) -> FloatArray:
+        """Of each LED from its place in the pen file, (L, 3), mm; NaN if not known."""
+        return floats([led.displacement_mm for led in self.calibration.leds])
+
+
+@dataclass(frozen=True, eq=False)
+class ShownImages:
+    """What the images of a calibration showed.
+
+    Attributes
+    ----------
+    pixels : (N, L, 2) array
+        LED centres, px; NaN where not seen.
+    fit : (N, L) array of bool
+        Which of them were fit for use.
+    areas : (N, L) array
+        Of the LEDs, px^2; NaN where not known.
+    edge_widths : (N,) array
+        Of the rims of the LEDs, px; NaN where not known.
+    lamps : (N, K, 2) array
+        Fixed lamps, px; NaN where not seen.
+    """
+
+    pixels: FloatArray
+    fit: BoolArray
+    areas: FloatArray
+    edge_widths: FloatArray
+    lamps: FloatArray
+
+
+def shown_images(record: CalibrationRecord) -> ShownImages:
+    """Return what the images of a record of one camera showed."""
+    frames = record.frames
+    shape = len(frames), len(record.leds)
+    seen, fit = np.full((*shape, 3), np.nan), np.zeros(shape, dtype=bool)
+    for i, frame in enumerate(frames):
+        for led in frame.leds:
+            seen[i, led.led - 1] = floats((led.x_px, led.y_px, led.area_px2))
+            fit[i, led.led - 1] = led.fit
+    return ShownImages(
+        pixels=seen[..., :2],
+        fit=fit,
+        areas=seen[..., 2],
+        edge_widths=floats([frame.edge_width_px for frame in frames]),
+        lamps=floats([frame.lamps_px for frame in frames]).reshape(len(frames), -1, 2),
+    )
+
+
+def floats(numbers: object) -> FloatArray:
+    """Return numbers of a record as an array, NaN where one could not be found."""
+    return np.array(numbers, dtype=np.float64)
+
+
+def read_calibration(path: Path) -> CalibrationFile:
+    """Read a calibration.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or is not as it was written.
+    UsageError
+        It is no calibration.
+    """
+    return parse_calibration(read_bytes(path, WHAT, LIMIT), path)
+
+
+def parse_calibration(data: bytes, path: Path) -> CalibrationFile:
+    """Return the calibration that a file holds.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file, for messages.
+
+    Raises
+    ------
+    FileError
+        It is not as it was written.
+    UsageError
+        It is no calibration.
+    """
+    digest = sha256(data).hexdigest()
+    if has_head(data):
+        result = parse_result(data, path, Path)
+        return CalibrationFile(
+            path,
+            digest,
+            result.calibration,
+            grade=result.grade,
+            why=result.why or result.calibration.verdict,
+            doubts=result.doubts,
+            origin=result.origin,
+            names=result.names,
+            accepted=result.accepted,
+            reason=result.reason,
+            change=result.change,
+            restores=result.restores,
+        )
+    record = _parse_record(data, path)
+    verdict = record.verdict
+    return CalibrationFile(
+        path,
+        digest,
+        record,
+        grade=verdict.grade,
+        why=verdict,
+        doubts=tuple(each for each in record.warnings if each.code != verdict.code),
+        origin=record.origin,
+    )
+
+
+def _parse_record(data: bytes, path: Path) -> CalibrationRecord:
+    name = printable(str(path))
+    try:
+        has_checksum(data)
+    except DamagedError as error:
+        raise FileError("calibration-file.changed", path=name) from error
+    try:
+        return parse_checked(data, CalibrationRecord)
+    except DamagedError as error:
+        raise UsageError("calibration-file.other", path=name) from error

@@ -1,0 +1,136 @@
+"""The images of a calibration posed again, by what its file states and nothing else.
+
+Camera and pen are as the calibration left them, so that the poses, and what is left of
+each LED, are those of its fit but for the cone that holds the tip in one place. LEDs
+face along the pen's z axis: a file does not keep how they are turned.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.detection.pose import MIN_POSE_LEDS, fit_poses, start_poses
+from lightpen.estimation.contact.single_images import MIN_IMAGES
+from lightpen.estimation.reports.calibration_record import (
+    CalibrationRecord,
+    InstrumentRecord,
+)
+from lightpen.estimation.running_tip import RunningTip, fit_running_tip
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR, ContributionName
+from lightpen.model.camera import Camera
+from lightpen.model.coverage import MIN_SPREAD, posture_spread
+from lightpen.model.pen import Pen
+from lightpen.model.posture import directions_of, tilts_of
+
+N_COEFFICIENTS = (5, 8)  # of distortion that a camera may have
+
+
+@dataclass(frozen=True, eq=False)
+class ReestimatedPoses:
+    """What the images show that take part.
+
+    Attributes
+    ----------
+    numbers : (M,) array of int
+        Images up to which a tip is known, counted among all from 1.
+    tips : (M, 3) array
+        The tip by the images up to there, mm.
+    uncertainties : (M, 3) array
+        U (k = 2) of it: noise by these images, all else as by all of them, mm.
+    tilts, directions : (N,) array
+        How the pen leant, as `lightpen.model.posture.Posture` has it, rad.
+    points, residuals : (K, 2) array
+        Where LEDs were seen, and what is left there, px.
+    """
+
+    numbers: IntArray
+    tips: FloatArray
+    uncertainties: FloatArray
+    tilts: FloatArray
+    directions: FloatArray
+    points: FloatArray
+    residuals: FloatArray
+
+
+def reestimate_poses(calibration: CalibrationRecord) -> ReestimatedPoses | None:
+    """Pose the images of a calibration again.
+
+    Returns
+    -------
+    Retraced or None
+        None of several cameras or two cones, and where the file does not keep enough.
+    """
+    fitted = calibration.instrument
+    if fitted is None or calibration.rig is not None or calibration.second_cone:
+        return None
+    if len(fitted.intrinsics) - 4 not in N_COEFFICIENTS:
+        return None
+    used = [i for i, image in enumerate(calibration.frames) if image.used]
+    pixels = np.full((len(used), len(fitted.leds_mm), 2), np.nan)
+    for row, i in enumerate(used):
+        for spot in calibration.frames[i].leds:
+            if spot.used:
+                pixels[row, spot.led - 1] = spot.x_px, spot.y_px
+    enough = np.isfinite(pixels[..., 0]).sum(axis=1) >= MIN_POSE_LEDS
+    numbers, pixels = np.array(used, dtype=np.int64)[enough] + 1, pixels[enough]
+    if len(numbers) < MIN_IMAGES:
+        return None
+    camera, pen = _camera(fitted, pixels), _pen(fitted)
+    rotations, translations = start_poses(camera, pen, pixels)
+    if not np.isfinite(translations).all():
+        return None
+    poses = fit_poses(camera, pen, pixels, rotations, translations)
+    first = _first(poses.rotations)
+    if first is None:
+        return None
+    running = fit_running_tip(
+        *(poses.rotations, poses.translations, poses.covariances),
+        np.array(calibration.tip_pen_mm),
+        first,
+    )
+    seen = np.isfinite(pixels[..., 0])
+    return ReestimatedPoses(
+        numbers=numbers[first - 1 :],
+        tips=running.tips,
+        uncertainties=_uncertainties(calibration, running),
+        tilts=tilts_of(poses.rotations),
+        directions=directions_of(poses.rotations),
+        points=pixels[seen],
+        residuals=poses.residuals[seen],
+    )
+
+
+def _camera(fitted: InstrumentRecord, pixels: FloatArray) -> Camera:
+    """Return the camera; of its images no more is known than where LEDs were."""
+    fx, fy, cx, cy, *distortion = fitted.intrinsics
+    width, height = np.ceil(np.nanmax(pixels, axis=(0, 1))).astype(int).tolist()
+    return Camera(width + 1, height + 1, fx, fy, cx, cy, np.array(distortion))
+
+
+def _pen(fitted: InstrumentRecord) -> Pen:
+    leds = np.array(fitted.leds_mm)
+    normals = np.tile([0.0, 0.0, 1.0], (len(leds), 1))
+    return Pen(leds, normals, fitted.disc_diameter_mm)
+
+
+def _first(rotations: FloatArray) -> int | None:
+    """Return with how many of the poses (N, 3, 3) the tip begins to be fixed."""
+    for n_images in range(MIN_IMAGES, len(rotations) + 1):
+        spread, _ = posture_spread(rotations[:n_images])
+        if spread[0] >= MIN_SPREAD:
+            return n_images
+    return None
+
+
+def _uncertainties(calibration: CalibrationRecord, running: RunningTip) -> FloatArray:
+    """Return U (k = 2) of a running tip, (M, 3), mm; the last is that of the record."""
+    alone = np.sqrt(np.diagonal(running.covariances, axis1=1, axis2=2))
+    variances = {
+        share.name: np.square(share.standard_uncertainty_mm)
+        for share in calibration.uncertainty.shares
+    }
+    noise = variances.pop(ContributionName.NOISE, np.zeros(3))
+    others = sum(variances.values(), np.zeros(3))
+    grown = noise * np.square(alone / alone[-1])
+    return np.asarray(COVERAGE_FACTOR * np.sqrt(grown + others))

@@ -1,0 +1,229 @@
+"""A calibration as a Digital Calibration Certificate of PTB, schema 3.2.1 [1]_.
+
+The form is that of a certificate, and it says itself that it is none: it holds the
+record of a calibration, without accreditation and without a statement of conformity.
+
+References
+----------
+.. [1] S. Hackel et al., "The Digital Calibration Certificate", PTB-Mitteilungen 127
+   (2017) 4, 75-81; https://www.ptb.de/dcc
+"""
+
+import re
+from dataclasses import dataclass
+from datetime import datetime
+from itertools import combinations_with_replacement
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+from lightpen.estimation.reports.verdict import AXES
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.record.calibrations.calibrations import CalibrationFile
+from lightpen.record.calibrations.decision_rule import decision_rule
+
+VERSION = "3.2.1"
+DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
+PLACE = f"{DCC}/v{VERSION}/dcc.xsd"
+INSTANCE = "http://www.w3.org/2001/XMLSchema-instance"
+PREFIXES = {"dcc": DCC, "si": SI, "xsi": INSTANCE}
+LANGUAGE = "en"
+MILLIMETRE, SQUARE_MILLIMETRE = r"\milli\metre", r"\milli\metre\tothe{2}"
+PROBABILITY = 0.95
+UNSTATED = "not stated"
+NO_CERTIFICATE = (
+    "Calibration record of a light pen and its tip. It is no certificate of an "
+    "accredited laboratory, states no conformity, and relates only to the items named."
+)
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """Who calibrates, as the schema requires it.
+
+    Attributes
+    ----------
+    country : str
+        ISO 3166-1, two letters.
+    """
+
+    name: str
+    email: str
+    city: str
+    country: str
+
+
+def is_country(code: str) -> bool:
+    """Return whether a text has the form of a country code of ISO 3166-1."""
+    return re.fullmatch("[A-Z]{2}", code) is not None
+
+
+def dcc_text(file: CalibrationFile, laboratory: Laboratory) -> str:
+    """Return a calibration as XML."""
+    for prefix, uri in PREFIXES.items():
+        ElementTree.register_namespace(prefix, uri)
+    root = Element(
+        _dcc("digitalCalibrationCertificate"),
+        {"schemaVersion": VERSION, f"{{{INSTANCE}}}schemaLocation": f"{DCC} {PLACE}"},
+    )
+    _add_administrative_data(root, file, laboratory)
+    results = _sub(root, "measurementResults")
+    _add_result(_sub(results, "measurementResult"), file)
+    ElementTree.indent(root)
+    text = ElementTree.tostring(root, encoding="unicode", xml_declaration=False)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
+
+
+def _add_administrative_data(
+    root: Element, file: CalibrationFile, laboratory: Laboratory
+) -> None:
+    data, names = _sub(root, "administrativeData"), file.names
+    program = file.calibration.program
+    _add_software(_sub(data, "dccSoftware"), program.name, program.version)
+    core = _sub(data, "coreData")
+    _value(core, "countryCodeISO3166_1", laboratory.country)
+    _value(core, "usedLangCodeISO639_1", LANGUAGE)
+    _value(core, "mandatoryLangCodeISO639_1", LANGUAGE)
+    _value(core, "uniqueIdentifier", f"lightpen-{file.sha256}")
+    identified = _sub(core, "identifications")
+    _identify(identified, "SHA-256 of the JSON record", file.sha256)
+    _identify(identified, "JSON record", file.name)
+    calibrated = f"{file.calibration.created:%Y-%m-%d}"
+    _value(core, "beginPerformanceDate", calibrated)
+    _value(core, "endPerformanceDate", calibrated)
+    _value(core, "performanceLocation", "laboratory")
+    items = _sub(data, "items")
+    _add_item(items, "Light pen", "Serial number", names.pen)
+    _add_item(items, "Probe tip", "Identification", names.tip)
+    _add_contact(_sub(_sub(data, "calibrationLaboratory"), "contact"), laboratory)
+    person = _sub(_sub(data, "respPersons"), "respPerson")
+    _text(_sub(person, "person"), "name", names.operator or UNSTATED)
+    _value(person, "role", "operator")
+    _value(person, "mainSigner", "true")
+    _add_contact(_sub(data, "customer"), laboratory)
+    statements = _sub(data, "statements")
+    said = _sub(_sub(statements, "statement"), "declaration")
+    _content(said, NO_CERTIFICATE)
+
+
+def _add_result(result: Element, file: CalibrationFile) -> None:
+    calibration, names = file.calibration, file.names
+    _text(result, "name", "Position of the tip in the frame of the pen")
+    method = _sub(_sub(result, "usedMethods"), "usedMethod")
+    _text(method, "name", "Pivot calibration by a swing about a fixed cone")
+    images = calibration.images
+    _rich(
+        method,
+        "description",
+        f"Estimator: {calibration.method}. {images.used} of {images.total} images "
+        f"used; residuals {calibration.rms_px:.4f} px rms. Station: "
+        f"{names.station or UNSTATED}; cone: {names.cone or UNSTATED}; images: "
+        f"{calibration.origin or file.origin or UNSTATED}.",
+        *map(str, decision_rule(calibration.verdict.limits)),
+    )
+    program = calibration.program
+    _add_software(_sub(result, "usedSoftware"), program.name, program.version)
+    equipment = _sub(result, "measuringEquipments")
+    inputs = calibration.inputs
+    for name, given in (("Camera file", inputs.camera), ("LED file", inputs.pen)):
+        _add_file(equipment, name, given.file, given.sha256)
+    data = _sub(_sub(result, "results"), "result")
+    _text(data, "name", "Centre of the tip")
+    verdict = f"Verdict: {file.grade.value}. {file.why.text}"
+    listed = _sub(data, "data")
+    _rich(listed, "text", *filter(None, (verdict, file.reason)))
+    tip, spread = calibration.tip_pen_mm, calibration.expanded_uncertainty_mm
+    for axis, value, uncertainty in zip(AXES, tip, spread, strict=True):
+        real = _quantity(listed, f"Tip {axis}", value, MILLIMETRE, calibration.created)
+        expanded = SubElement(real, _si("expandedUnc"))
+        SubElement(expanded, _si("uncertainty")).text = repr(uncertainty)
+        SubElement(expanded, _si("coverageFactor")).text = f"{COVERAGE_FACTOR:g}"
+        SubElement(expanded, _si("coverageProbability")).text = f"{PROBABILITY:g}"
+        SubElement(expanded, _si("distribution")).text = "normal"
+    for i, k in combinations_with_replacement(range(len(AXES)), 2):
+        name = f"Covariance of tip {AXES[i]} and {AXES[k]}"
+        _quantity(listed, name, calibration.covariance[i][k], SQUARE_MILLIMETRE)
+
+
+def _add_software(parent: Element, name: str, release: str) -> None:
+    software = _sub(parent, "software")
+    _text(software, "name", name)
+    _value(software, "release", release)
+
+
+def _add_item(items: Element, what: str, by: str, name: str) -> None:
+    item = _sub(items, "item")
+    _text(item, "name", what)
+    _text(_sub(item, "manufacturer"), "name", UNSTATED)
+    _identify(_sub(item, "identifications"), by, name or UNSTATED, "owner")
+
+
+def _add_file(equipment: Element, what: str, name: str, sha256: str) -> None:
+    part = _sub(equipment, "measuringEquipment")
+    _text(part, "name", what)
+    identified = _sub(part, "identifications")
+    _identify(identified, "File", name)
+    _identify(identified, "SHA-256", sha256)
+
+
+def _add_contact(contact: Element, laboratory: Laboratory) -> None:
+    _text(contact, "name", laboratory.name)
+    _value(contact, "eMail", laboratory.email)
+    location = _sub(contact, "location")
+    _value(location, "city", laboratory.city)
+    _value(location, "countryCode", laboratory.country)
+
+
+def _identify(
+    parent: Element, what: str, name: str, issuer: str = "calibrationLaboratory"
+) -> None:
+    identification = _sub(parent, "identification")
+    _value(identification, "issuer", issuer)
+    _value(identification, "value", name)
+    _text(identification, "name", what)
+
+
+def _quantity(
+    data: Element, name: str, value: float, unit: str, at: datetime | None = None
+) -> Element:
+    quantity = _sub(data, "quantity")
+    _text(quantity, "name", name)
+    real = SubElement(quantity, _si("real"))
+    SubElement(real, _si("value")).text = repr(value)
+    SubElement(real, _si("unit")).text = unit
+    if at is not None:
+        SubElement(real, _si("dateTime")).text = at.isoformat(timespec="seconds")
+    return real
+
+
+def _text(parent: Element, tag: str, words: str) -> None:
+    _content(_sub(parent, tag), words)
+
+
+def _rich(parent: Element, tag: str, *paragraphs: str) -> None:
+    rich = _sub(parent, tag)
+    for words in paragraphs:
+        _content(rich, words)
+
+
+def _content(parent: Element, words: str) -> None:
+    _value(parent, "content", words).set("lang", LANGUAGE)
+
+
+def _value(parent: Element, tag: str, words: str) -> Element:
+    """Add a text as XML can hold it: without control characters or outer blanks."""
+    element = _sub(parent, tag)
+    plain = "".join(c if c.isprintable() else " " for c in words)
+    element.text = " ".join(plain.split()) or UNSTATED
+    return element
+
+
+def _sub(parent: Element, tag: str) -> Element:
+    return SubElement(parent, _dcc(tag))
+
+
+def _dcc(tag: str) -> str:
+    return f"{{{DCC}}}{tag}"
+
+
+def _si(tag: str) -> str:
+    return f"{{{SI}}}{tag}"

@@ -1,0 +1,247 @@
+"""The formats in which a calibration is exported, in one table.
+
+Another format is a function from `CalibrationFile` to text and an entry of `FORMATS`,
+which the command ``lightpen export`` and the menu of the wizard offer. All state the
+tip, its origin (live, recorded, simulated) and its grade. Transforms keep the axes of
+the pen: the tip is the origin of a frame parallel to the pen frame.
+"""
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import yaml
+
+from lightpen.estimation.reports.verdict import AXES
+from lightpen.formats.files import printable
+from lightpen.formats.json_records import record_bytes
+from lightpen.local_time import local_time
+from lightpen.messages import Message, message
+from lightpen.record.calibrations.calibrations import CalibrationFile
+from lightpen.record.exports.dcc import Laboratory, dcc_text
+
+MILLIMETRES = 1000.0  # in a metre, the unit of ROS
+N_DECIMALS = 6  # of a length in mm in a file for statistics
+PEN_FRAME, TIP_FRAME = "pen", "tip"
+
+
+@dataclass(frozen=True)
+class ExportFormat:
+    """A format of exported calibrations.
+
+    Attributes
+    ----------
+    name : str
+        As the command line has it.
+    suffix : str
+        End of the names of its files.
+    text : callable
+        Returns the content of a file for a `CalibrationFile`, which holds tip,
+        covariance, origin, grade, names and acceptance.
+    needs_laboratory : bool
+        Whether `text` takes a `Laboratory`, too.
+    """
+
+    name: str
+    label: Message
+    suffix: str
+    text: Callable[..., str]
+    description: Message
+    needs_laboratory: bool = False
+
+    def content(
+        self, file: CalibrationFile, laboratory: Laboratory | None = None
+    ) -> bytes:
+        """Return the content of a file, in UTF-8."""
+        if not self.needs_laboratory:
+            text = self.text(file)
+        elif laboratory is None:
+            raise ValueError(f"The format {self.name} needs a `laboratory`.")
+        else:
+            text = self.text(file, laboratory)
+        return text.encode("utf-8", "backslashreplace")
+
+
+def _remark(file: CalibrationFile) -> str:
+    """Return origin, grade and acceptance, for a comment."""
+    accepted = file.accepted
+    return (
+        f"origin: {file.origin or 'not stated'}; "
+        f"grade: {file.grade.value}; "
+        f"accepted: {'no' if accepted is None else accepted.isoformat()}"
+    )
+
+
+def _json(file: CalibrationFile) -> str:
+    return record_bytes(file.calibration).decode()
+
+
+def _tip(file: CalibrationFile) -> str:
+    """Return a table of one row: names, origin, tip and U (k = 2), time and grade."""
+    calibration = file.calibration
+    names, accepted = file.names, file.accepted
+    row = {
+        "station": names.station,
+        "operator": names.operator,
+        "pen": names.pen,
+        "tip": names.tip,
+        "cone": names.cone,
+        "origin": file.origin or "",
+        "ball_diameter_mm": names.ball_diameter or "",
+    }
+    row |= {f"tip_{a}_mm": x for a, x in zip(AXES, calibration.tip_pen_mm, strict=True)}
+    spread = zip(AXES, calibration.expanded_uncertainty_mm, strict=True)
+    row |= {f"expanded_uncertainty_{axis}_mm": U for axis, U in spread}
+    row["calibrated"] = calibration.created.isoformat()
+    row["accepted"] = "" if accepted is None else accepted.isoformat()
+    row["grade"] = file.grade.value
+    return _table([list(row), list(row.values())])
+
+
+def _images(file: CalibrationFile) -> str:
+    """Return a row for each image: whether it is used, and how well it fits."""
+    head = ["image", "file", "used", "reason", "rms_px"]
+    head += [*(f"tip_{axis}_cam_mm" for axis in "uvw"), "camera", "origin", "grade"]
+    rows: list[Sequence[object]] = [head]
+    numbers = Counter[str]()
+    for image in file.calibration.frames:
+        numbers[image.camera] += 1
+        fit = (image.reason, image.rms_px, *image.tip_cam_mm)
+        of_all = (image.camera, file.origin or "", file.grade.value)
+        rows.append([numbers[image.camera], image.file, image.used, *fit, *of_all])
+    return _table(rows)
+
+
+def _text(file: CalibrationFile) -> str:
+    """Return x, y, z in mm, separated by tabs, and a comment."""
+    tip = "\t".join(map(repr, file.calibration.tip_pen_mm))
+    return _lines(tip, f"# {_remark(file)}")
+
+
+def _itk(file: CalibrationFile) -> str:
+    """Return an ITK transform that 3D Slicer opens as that of the tip to the pen.
+
+    ITK's axes point left and to the back where Slicer's point right and to the front,
+    and its transforms go from the parent: of a shift only the last entry changes sign.
+    """
+    x, y, z = file.calibration.tip_pen_mm
+    return _lines(
+        "#Insight Transform File V1.0",
+        f"# {_remark(file)}",
+        "#Transform 0",
+        "Transform: AffineTransform_double_3_3",
+        f"Parameters: 1 0 0 0 1 0 0 0 1 {x!r} {y!r} {-z!r}",
+        "FixedParameters: 0 0 0",
+    )
+
+
+def _plus(file: CalibrationFile) -> str:
+    """Return the line of a device set of PLUS, for its ``CoordinateDefinitions``."""
+    x, y, z = file.calibration.tip_pen_mm
+    when = file.when.strftime("%m%d%y_%H%M%S")
+    matrix = f"1 0 0 {x!r} 0 1 0 {y!r} 0 0 1 {z!r} 0 0 0 1"
+    return _lines(
+        f'<Transform From="StylusTip" To="Stylus" Matrix="{matrix}" Date="{when}" />',
+        f"<!-- {_remark(file)} -->",
+    )
+
+
+def _ros(file: CalibrationFile) -> str:
+    """Return a ``geometry_msgs/TransformStamped`` of ROS as YAML, in metres."""
+    metres = [x / MILLIMETRES for x in file.calibration.tip_pen_mm]
+    seconds = file.when.timestamp()
+    stamp = {"sec": int(seconds), "nanosec": int(seconds % 1 * 1e6) * 1000}
+    transform = {
+        "header": {"stamp": stamp, "frame_id": PEN_FRAME},
+        "child_frame_id": TIP_FRAME,
+        "transform": {
+            "translation": dict(zip(AXES, metres, strict=True)),
+            "rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+        },
+    }
+    comment = f"# {_remark(file)}\n"
+    return comment + yaml.safe_dump(transform, sort_keys=False)
+
+
+def _qdas(file: CalibrationFile) -> str:
+    """Return a file of Q-DAS (AQDEF): x, y and z of the tip, and U of each.
+
+    Each calibration is one value of six characteristics of a part, the pen with its
+    tip, so that the files of many make the series.
+    """
+    calibration = file.calibration
+    pen, tip = (printable(file.names.pen), printable(file.names.tip))
+    when = f"{local_time(file.when):%d.%m.%Y/%H:%M:%S}"
+    values = [*calibration.tip_pen_mm, *calibration.expanded_uncertainty_mm]
+    titles = map("".join, product(("Tip ", "U (k=2) of tip "), AXES))
+    lines = [
+        f"K0100 {len(values)}",
+        f"K1001 {pen}",
+        f"K1002 Light pen {pen}, tip {tip}",
+        f"K1003 {tip}",
+        f"K1900 {_remark(file)}",
+    ]
+    for i, title in enumerate(titles, start=1):
+        lines += [f"K2001/{i} {i}", f"K2002/{i} {title}"]
+        lines += [f"K2022/{i} {N_DECIMALS}", f"K2142/{i} mm"]
+    for i, value in enumerate(values, start=1):
+        lines += [f"K0001/{i} {value:.{N_DECIMALS}f}", f"K0002/{i} 0"]  # 0: valid
+        lines.append(f"K0004/{i} {when}")
+    return _lines(*lines)
+
+
+def _table(rows: Sequence[Sequence[object]]) -> str:
+    lines = io.StringIO()
+    csv.writer(lines, lineterminator="\n").writerows(rows)
+    return lines.getvalue()
+
+
+def _lines(*lines: str) -> str:
+    return "\n".join(lines) + "\n"
+
+
+FORMATS = (
+    ExportFormat(
+        "json",
+        message("export.json"),
+        "_calibration.json",
+        _json,
+        message("content.json"),
+    ),
+    ExportFormat(
+        "csv", message("export.csv"), "_tip.csv", _tip, message("content.csv")
+    ),
+    ExportFormat(
+        "images",
+        message("export.images"),
+        "_images.csv",
+        _images,
+        message("content.images"),
+    ),
+    ExportFormat(
+        "text", message("export.text"), "_tip.txt", _text, message("content.text")
+    ),
+    ExportFormat(
+        "slicer", message("export.slicer"), "_tip.tfm", _itk, message("content.slicer")
+    ),
+    ExportFormat(
+        "plus", message("export.plus"), "_plus.xml", _plus, message("content.plus")
+    ),
+    ExportFormat(
+        "ros", message("export.ros"), "_tip.yaml", _ros, message("content.ros")
+    ),
+    ExportFormat(
+        "qdas", message("export.qdas"), "_tip.dfq", _qdas, message("content.qdas")
+    ),
+    ExportFormat(
+        "dcc",
+        message("export.dcc"),
+        "_dcc.xml",
+        dcc_text,
+        message("content.dcc"),
+        needs_laboratory=True,
+    ),
+)

@@ -1,0 +1,1 @@
+"""The data folder: verifications, camera calibrations, presence, clean-up."""

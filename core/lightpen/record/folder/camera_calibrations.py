@@ -1,0 +1,126 @@
+"""Calibrations of cameras in a data folder: a file for each, which is never changed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from msgspec import Struct
+
+from lightpen.errors import FileError
+from lightpen.formats.files import MEGABYTE, printable
+from lightpen.formats.hashes import InputFile
+from lightpen.formats.json_records import (
+    ProgramName,
+    plain,
+    record_bytes,
+    record_heading,
+)
+from lightpen.formats.own_json import (
+    DamagedError,
+    ZonedTime,
+    parse_checked,
+    require_usual,
+)
+from lightpen.intrinsics.calibration import CameraCalibration
+from lightpen.intrinsics.report import intrinsics_record
+from lightpen.intrinsics.views import BoardTolerances
+from lightpen.messages import message
+from lightpen.model.origin import Origin
+from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.library.numbered_files import add_numbered
+from lightpen.record.swings.names import Names
+
+CAMERA_CALIBRATIONS = "camera-calibrations"
+WHAT = message("file.camera-calibration")
+LIMIT = 64 * MEGABYTE
+
+
+@dataclass(frozen=True, eq=False)
+class CameraTrial:
+    """An attempt to calibrate a camera by a board.
+
+    Attributes
+    ----------
+    serial : str
+        Of the camera; empty where the images are from a folder.
+    images : mapping of str to str
+        SHA-256 of each view by its name: of its file, or of the pixels of a live image.
+    found : CameraCalibration or None
+        None of one that was abandoned.
+    camera_file : InputFile or None
+        That was written; None of one that was not accepted.
+    """
+
+    outcome: TrialOutcome
+    board: str
+    serial: str
+    origin: Origin | None
+    images: Mapping[str, str]
+    found: CameraCalibration | None = None
+    camera_file: InputFile | None = None
+
+
+class StoredTrial(Struct, frozen=True):
+    """What the file of an attempt says, but for what was found."""
+
+    program: ProgramName
+    created: ZonedTime
+    outcome: TrialOutcome
+    station: str
+    operator: str
+    board: str
+    serial: str
+    origin: Origin | None = None
+
+    def __post_init__(self) -> None:
+        require_usual(self.created)
+
+
+def keep_camera_trial(
+    data: Path, trial: CameraTrial, names: Names, now: datetime
+) -> Path:
+    """Keep what became of the calibration of a camera, and return its file.
+
+    Raises
+    ------
+    FileError
+        It cannot be written.
+    """
+    found, file = trial.found, trial.camera_file
+    intrinsics = None
+    if found is not None:
+        intrinsics = plain(intrinsics_record(found, (), BoardTolerances()))
+    record = {
+        **record_heading(now),
+        "outcome": trial.outcome.value,
+        "station": names.station,
+        "operator": names.operator,
+        "board": trial.board,
+        "serial": trial.serial,
+        "origin": trial.origin,
+        "camera_file": None if file is None else _entry(file.path.name, file.sha256),
+        "calibration": intrinsics,
+        "inputs": {"images": [_entry(*image) for image in trial.images.items()]},
+    }
+    return add_numbered(data / CAMERA_CALIBRATIONS, record_bytes(record))
+
+
+def read_camera_trial(content: bytes, file: Path) -> StoredTrial:
+    """Return what the file of an attempt says.
+
+    Raises
+    ------
+    FileError
+        It is damaged.
+    """
+    try:
+        return parse_checked(content, StoredTrial)
+    except DamagedError as error:
+        raise FileError(
+            "camera-calibration.damaged", file=printable(str(file))
+        ) from error
+
+
+def _entry(name: str, sha256: str) -> dict[str, str]:
+    return {"file": name, "sha256": sha256}

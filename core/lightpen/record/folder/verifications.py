@@ -1,0 +1,100 @@
+"""What the files of verifications say of who verified what, and what it came to."""
+
+from pathlib import Path
+
+from msgspec import Struct, field
+
+from lightpen.errors import FileError
+from lightpen.formats.files import printable
+from lightpen.formats.json_records import ProgramName
+from lightpen.formats.own_json import (
+    DamagedError,
+    ZonedTime,
+    parse_checked,
+    require_usual,
+)
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.model.origin import Origin
+from lightpen.record.folder.outcome import TrialOutcome
+
+VERIFICATIONS = "verifications"
+TOUCHES = "touches"  # in that folder: the images of live touches, run by run
+UNDER_WAY = "under way"  # likewise: what is not concluded yet
+CONCLUSION = "conclusion"
+
+
+class _Verdict(StoredMessage, frozen=True, kw_only=True):
+    grade: str
+    limits_mm: dict[str, float] = field(default_factory=dict)
+
+
+class StoredProbingRun(Struct, frozen=True):
+    """Where the images of a run of live touches are kept, in the folder of touches."""
+
+    folder: str
+    journal_sha256: str
+
+
+class _Inputs(Struct, frozen=True):
+    touches: tuple[StoredProbingRun, ...] = ()
+
+
+class StoredVerification(Struct, frozen=True):
+    """A verification in a data folder.
+
+    Attributes
+    ----------
+    verification : str
+        What was verified; "conclusion" of what says how all of it ended.
+    ended : TrialOutcome or None
+        Of a conclusion.
+    reason, supervisor : str
+        Of a conclusion, where a tip is used though it did not pass.
+    """
+
+    program: ProgramName
+    created: ZonedTime
+    verification: str
+    station: str = ""
+    operator: str = ""
+    pen: str = ""
+    tip: str = ""
+    origin: Origin | None = None
+    verdict: _Verdict | None = None
+    ended: TrialOutcome | None = field(name="outcome", default=None)
+    reason: str = ""
+    supervisor: str = ""
+    inputs: _Inputs = _Inputs()
+
+    def __post_init__(self) -> None:
+        require_usual(self.created)
+
+    @property
+    def outcome(self) -> TrialOutcome:
+        """What became of it."""
+        if self.ended is not None:
+            return self.ended
+        has_passed = self.verdict is None or self.verdict.grade == "pass"
+        return TrialOutcome.ACCEPTED if has_passed else TrialOutcome.REFUSED
+
+    @property
+    def why(self) -> StoredMessage | None:
+        """What its grade is for."""
+        verdict = self.verdict
+        if verdict is None:
+            return None
+        return StoredMessage(verdict.code, verdict.text, verdict.values)
+
+
+def read_verification(content: bytes, file: Path) -> StoredVerification:
+    """Return what the file of a verification says.
+
+    Raises
+    ------
+    FileError
+        It is damaged.
+    """
+    try:
+        return parse_checked(content, StoredVerification)
+    except DamagedError as error:
+        raise FileError("verification.damaged", file=printable(str(file))) from error

@@ -1,0 +1,1 @@
+"""The asset register of pens, tips and cones, and supervision of limits."""

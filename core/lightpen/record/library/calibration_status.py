@@ -1,0 +1,89 @@
+"""How the tips of a station stand: valid, overdue, not calibrated, or retired."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import date, datetime
+from enum import StrEnum
+
+from lightpen.local_time import local_time
+from lightpen.record.library.tip_library import Item, ItemKind, Library
+
+
+class TipStatus(StrEnum):
+    """Whether something may be measured with."""
+
+    VALID = "valid"
+    OVERDUE = "overdue"
+    UNCALIBRATED = "not calibrated"
+    RETIRED = "retired"
+
+
+@dataclass(frozen=True)
+class CurrentResult:
+    """A tip in force: since when, until when by its age, and whether it is due."""
+
+    calibrated: datetime
+    due: datetime
+    is_due: bool
+
+
+@dataclass(frozen=True)
+class StationStatus:
+    """How all tips, pens and cones of a station stand.
+
+    Attributes
+    ----------
+    library : Library
+        As it is now.
+    in_force : mapping of (pen, tip) to CurrentResult
+        Tips of real pens in force at the station.
+    now : datetime or None
+        When they stand so; None where nothing was read yet.
+    """
+
+    library: Library = field(default_factory=Library)
+    in_force: Mapping[tuple[str, str], CurrentResult] = field(default_factory=dict)
+    now: datetime | None = None
+
+    def of_tip(self, pen: str, tip: str) -> TipStatus | None:
+        """Return how a tip of a pen stands; None as long as that is not known."""
+        if self.now is None or not (pen and tip):
+            return None
+        listed = self.library.tips.get(tip)
+        if listed is not None and listed.is_retired:
+            return TipStatus.RETIRED
+        found = self.in_force.get((pen, tip))
+        if found is None:
+            return TipStatus.UNCALIBRATED
+        is_over = listed is not None and listed.is_overdue(self._today(self.now))
+        return TipStatus.OVERDUE if is_over or found.is_due else TipStatus.VALID
+
+    def of_item(self, kind: ItemKind, name: str) -> TipStatus | None:
+        """Return how a pen or cone, or the ball of a tip, stands by itself.
+
+        None of one that is not in the library.
+        """
+        item: Item | None = self.library.item(kind, name)
+        if item is None or self.now is None:
+            return None
+        if item.is_retired:
+            return TipStatus.RETIRED
+        is_over = item.is_overdue(self._today(self.now))
+        return TipStatus.OVERDUE if is_over else TipStatus.VALID
+
+    def pens_of(self, tip: str) -> tuple[str, ...]:
+        """Return the pens for which a tip is in force."""
+        return tuple(pen for pen, each in self.in_force if each == tip)
+
+    def due(self, pen: str, tip: str) -> date | None:
+        """Return the last day on which a tip in force may be used, by its age."""
+        found = self.in_force.get((pen, tip))
+        days = [] if found is None else [self._today(found.due)]
+        listed = self.library.tips.get(tip)
+        if listed is not None and listed.due is not None:
+            days.append(listed.due)
+        return min(days, default=None)
+
+    @staticmethod
+    def _today(moment: datetime) -> date:
+        return local_time(moment).date()

@@ -1,0 +1,265 @@
+"""Changing the tip library: each change checked, signed where it must be, and kept."""
+
+import math
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from msgspec import structs
+
+from lightpen.errors import FileError, NameTakenError, UsageError
+from lightpen.formats import upgrades
+from lightpen.formats.files import MEGABYTE, create_whole, printable, read_bytes
+from lightpen.formats.image_headers import read_image_header
+from lightpen.formats.json_records import record_bytes
+from lightpen.formats.upgrades import newest_format
+from lightpen.messages import Message, message
+from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
+from lightpen.record.library.numbered_files import add_numbered, make_folder
+from lightpen.record.library.supervision import (
+    Signature,
+    read_supervision,
+    require_supervisor,
+)
+from lightpen.record.library.tip_library import (
+    KIND_WORDS,
+    LARGEST_BALL,
+    LARGEST_CHANGE,
+    LIBRARY,
+    LONGEST_ID,
+    PICTURES,
+    AnyItem,
+    AxisOrigin,
+    Item,
+    ItemKind,
+    Library,
+    LibraryChange,
+    ListedTip,
+    Picture,
+    read_library,
+)
+
+LARGEST_PLACE = 10_000.0  # mm
+LARGEST_PICTURE = 8 * MEGABYTE
+PICTURE = message("file.picture")
+
+
+@dataclass(frozen=True)
+class Author:
+    """Who changes the library.
+
+    Attributes
+    ----------
+    reason : str
+        In their words; may be empty.
+    signature : Signature or None
+        Of a supervisor, where there is a password.
+    """
+
+    station: str = ""
+    operator: str = ""
+    reason: str = ""
+    signature: Signature | None = None
+
+
+def add_item(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
+    """Add an item, and return the library with it.
+
+    Raises
+    ------
+    UsageError
+        Its id is in use or no id, or an entry makes no sense.
+    AcceptanceError
+        There is a password, and no supervisor has signed.
+    FileError
+        It cannot be kept; the library stays as it was.
+    """
+    item = _sensible(item)
+    there = read_library(data).alike(item.kind, item.id)
+    if there is not None:
+        raise UsageError(_in_use(there))
+    return _keep(data, item, by, now)
+
+
+def change_item(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
+    """Put another version of an item in its place, and return the library.
+
+    One that is as it was is not kept once more.
+
+    Raises
+    ------
+    UsageError
+        It is not in the library, or an entry makes no sense.
+    AcceptanceError, FileError
+        As of `add_item`.
+    """
+    item, library = _sensible(item), read_library(data)
+    there = library.item(item.kind, item.id)
+    if there is None:
+        raise UsageError(no_such_item(item.kind, item.id))
+    return library if there == item else _keep(data, item, by, now)
+
+
+def retire_item(
+    data: Path,
+    kind: ItemKind,
+    name: str,
+    by: Author,
+    now: datetime,
+    *,
+    is_retired: bool = True,
+) -> Library:
+    """Retire an item, or bring it back, and return the library.
+
+    Raises
+    ------
+    UsageError
+        It is not in the library.
+    AcceptanceError, FileError
+        As of `add_item`.
+    """
+    item = known_item(read_library(data), kind, name)
+    return change_item(data, structs.replace(item, is_retired=is_retired), by, now)
+
+
+def known_item(library: Library, kind: ItemKind, name: str) -> AnyItem:
+    """Return an item of a library.
+
+    Raises
+    ------
+    UsageError
+        It is not in there.
+    """
+    found = library.item(kind, name)
+    if found is None:
+        raise UsageError(no_such_item(kind, name))
+    return found
+
+
+def read_picture(file: Path) -> bytes:
+    """Return the content of a file that holds a picture.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or is no picture.
+    """
+    content = read_bytes(file, PICTURE, LARGEST_PICTURE)
+    read_image_header(BytesIO(content), printable(str(file)))
+    return content
+
+
+def read_kept_picture(data: Path, picture: Picture) -> bytes:
+    """Return the content of a picture in the data folder.
+
+    Raises
+    ------
+    FileError
+        As of `read_picture`, or it is not the one that was kept.
+    """
+    file = data / picture.place
+    content = read_picture(file)
+    if sha256(content).hexdigest() != picture.sha256:
+        raise FileError("library.other-picture", path=printable(str(file)))
+    return content
+
+
+def keep_picture(data: Path, file: Path) -> Picture:
+    """Copy a picture into the data folder, by its hash, and return where it is.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, is no picture, or cannot be kept.
+    """
+    content = read_picture(file)
+    digest = sha256(content).hexdigest()
+    kept = data / LIBRARY / PICTURES / f"{digest[:16]}{file.suffix.lower()}"
+    make_folder(kept.parent)
+    with suppress(NameTakenError):  # the same picture, of another item
+        create_whole(kept, content)
+    return Picture(kept.relative_to(data).as_posix(), digest)
+
+
+def given_axis(direction: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return the axis of a stylus along a direction, of length 1.
+
+    Raises
+    ------
+    UsageError
+        It is no direction.
+    """
+    length = float(np.linalg.norm(direction))
+    if not (math.isfinite(length) and length > 0):
+        raise UsageError("library.no-direction")
+    x, y, z = (part / length for part in direction)
+    return x, y, z
+
+
+def no_such_item(kind: ItemKind, name: str) -> Message:
+    """Return that an item is not in the library."""
+    return message("library.no-such-item", kind=KIND_WORDS[kind], id=printable(name))
+
+
+def _keep(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
+    supervisor = ""
+    supervision = read_supervision(data)
+    if supervision.is_guarded:
+        signature = by.signature or Signature("", "")
+        require_supervisor(supervision, signature)
+        supervisor = signature.name.strip()
+    change = LibraryChange(
+        format=newest_format(upgrades.LIBRARY),
+        at=now,
+        item=item,
+        station=by.station,
+        operator=by.operator,
+        supervisor=supervisor,
+        reason=by.reason.strip(),
+    )
+    add_numbered(data / LIBRARY, record_bytes(change))
+    return read_library(data)
+
+
+def _sensible(item: AnyItem) -> AnyItem:
+    """Return an item as it is kept; refuse what makes no sense."""
+    name = item.id.strip()
+    if not (name and name.isprintable() and len(name) <= LONGEST_ID):
+        raise UsageError(
+            "library.bad-id", id=printable(name[: 2 * LONGEST_ID]), most=LONGEST_ID
+        )
+    item = structs.replace(item, id=name, note=item.note.strip())
+    return _sensible_tip(item) if isinstance(item, ListedTip) else item
+
+
+def _sensible_tip(tip: ListedTip) -> ListedTip:
+    ball, change = tip.ball_diameter_mm, tip.max_change_mm
+    if ball is not None and not 0 < ball <= LARGEST_BALL:
+        raise UsageError("library.absurd-ball", diameter=ball, most=LARGEST_BALL)
+    if change is not None and not 0 < change <= LARGEST_CHANGE:
+        raise UsageError("library.absurd-change", limit=change, most=LARGEST_CHANGE)
+    for count, most in ((tip.max_days, MOST_DAYS), (tip.max_swings, MOST_SWINGS)):
+        if count is not None and not 1 <= count <= most:
+            raise UsageError("library.absurd-count", count=count, most=most)
+    nominal = tip.nominal_tip_mm
+    if nominal is not None and not np.abs(nominal).max() <= LARGEST_PLACE:
+        raise UsageError(
+            "library.absurd-nominal", tip=printable(tip.id), most=LARGEST_PLACE
+        )
+    axis, origin = tip.stylus_axis, tip.axis_origin
+    if axis is None:
+        return structs.replace(tip, axis_origin=None)
+    return structs.replace(
+        tip, stylus_axis=given_axis(axis), axis_origin=origin or AxisOrigin.GIVEN
+    )
+
+
+def _in_use(there: Item) -> Message:
+    kind, name = KIND_WORDS[there.kind], printable(there.id)
+    if there.is_retired:
+        return message("library.id-of-retired", kind=kind, id=name)
+    return message("library.id-in-use", kind=kind, id=name)

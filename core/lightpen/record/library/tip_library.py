@@ -1,0 +1,312 @@
+"""The library of pens, tips and cones: what there is, by which limits, due when.
+
+Each change is a file of its own in the data folder, numbered in their order and never
+changed, as limits are: it holds the whole of one item as it is from then on, and who
+changed it. The newest file of an item counts, so what the library says follows from
+its history alone, and each of these files is owed an entry of the archive. An item is
+retired, never removed: results name it.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import date
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, ClassVar, TypeAlias, TypeVar
+
+import numpy as np
+from msgspec import Meta, Struct, to_builtins
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError
+from lightpen.formats import upgrades
+from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.own_json import (
+    DamagedError,
+    Digest,
+    Vector,
+    ZonedTime,
+    require_usual,
+)
+from lightpen.formats.upgrades import LaterFormatError, parse_upgraded
+from lightpen.messages import Message, message
+from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
+from lightpen.record.library.numbered_files import numbered_files
+from lightpen.record.swings.assumed import Plain
+
+LIBRARY = "library"
+PICTURES = "pictures"  # folder in that one
+WHAT = message("file.library")
+LONGEST_ID = 200  # characters
+LARGEST_BALL = 100.0  # mm
+LARGEST_CHANGE = 10.0  # mm
+
+Id: TypeAlias = Annotated[str, Meta(min_length=1, max_length=LONGEST_ID)]
+ItemT = TypeVar("ItemT", bound="Item")
+
+
+class ItemKind(StrEnum):
+    """What is in the library."""
+
+    PEN = "pen"
+    TIP = "tip"
+    CONE = "cone"
+
+
+KIND_WORDS: Mapping[ItemKind, Message] = {
+    ItemKind.PEN: message("library.pen"),
+    ItemKind.TIP: message("library.tip"),
+    ItemKind.CONE: message("library.cone"),
+}
+
+
+class AxisOrigin(StrEnum):
+    """How the axis of a stylus was found."""
+
+    GIVEN = "given"
+    SPIN = "spin"
+
+
+class Picture(Struct, frozen=True):
+    """A picture of an item: its file, from the data folder, and its hash."""
+
+    place: str
+    sha256: Digest
+
+
+class Item(Struct, frozen=True, kw_only=True):
+    """What every item has.
+
+    Attributes
+    ----------
+    id : str
+        By which it is named everywhere; on its label as a barcode.
+    due : date or None
+        Last day on which it may be used before it is looked after: of a pen, when its
+        LEDs are to be measured again, of a tip its ball, of a cone its seat.
+    """
+
+    kind: ClassVar[ItemKind]
+
+    id: Id
+    due: date | None = None
+    note: str = ""
+    is_retired: bool = False
+
+    def is_overdue(self, today: date) -> bool:
+        """Return whether its due date is over."""
+        return self.due is not None and today > self.due
+
+
+class ListedPen(Item, frozen=True, kw_only=True, tag="pen"):
+    """A pen, by its serial number."""
+
+    kind: ClassVar[ItemKind] = ItemKind.PEN
+
+
+class ListedCone(Item, frozen=True, kw_only=True, tag="cone"):
+    """A cone."""
+
+    kind: ClassVar[ItemKind] = ItemKind.CONE
+
+
+class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
+    """A tip, on whatever pen.
+
+    Attributes
+    ----------
+    ball_diameter_mm : float or None
+        None where it is not known.
+    nominal_tip_mm : triple of float or None
+        Its centre by design, pen frame; None leaves that of the LED file in force.
+    stylus_axis : triple of float or None
+        Direction from the ball along its stylus into the pen, pen frame, of length 1.
+    axis_origin : AxisOrigin or None
+        None without an axis.
+    max_change_mm : float or None
+        Distance from the tip in force before that a calibration may find; None for no
+        limit but the uncertainty of the change.
+    max_days, max_swings : int or None
+        Its own `DueRule`; None for that of the station.
+    picture : Picture or None
+    """
+
+    kind: ClassVar[ItemKind] = ItemKind.TIP
+
+    ball_diameter_mm: Annotated[float, Meta(gt=0, le=LARGEST_BALL)] | None = None
+    nominal_tip_mm: Vector | None = None
+    stylus_axis: Vector | None = None
+    axis_origin: AxisOrigin | None = None
+    max_change_mm: Annotated[float, Meta(gt=0, le=LARGEST_CHANGE)] | None = None
+    max_days: Annotated[int, Meta(ge=1, le=MOST_DAYS)] | None = None
+    max_swings: Annotated[int, Meta(ge=1, le=MOST_SWINGS)] | None = None
+    picture: Picture | None = None
+
+    @property
+    def nominal_tip(self) -> FloatArray | None:
+        """Its centre by design, (3,), pen frame, mm."""
+        point = self.nominal_tip_mm
+        return None if point is None else np.array(point, dtype=np.float64)
+
+    def rule(self, usual: DueRule) -> DueRule:
+        """Return how long it may be in force, by its own rule or the usual one."""
+        return DueRule(
+            self.max_days or usual.max_days, self.max_swings or usual.max_swings
+        )
+
+
+AnyItem: TypeAlias = ListedPen | ListedTip | ListedCone
+
+
+class LibraryChange(Struct, frozen=True, kw_only=True):
+    """One change, as its file holds it.
+
+    Attributes
+    ----------
+    operator : str
+        Who made it.
+    supervisor : str
+        Who signed it, where a supervisor had to.
+    item : ListedPen, ListedTip or ListedCone
+        As it is from then on.
+    reason : str
+        In the words of who made it; may be empty.
+    """
+
+    format: int
+    at: ZonedTime
+    item: AnyItem
+    station: str = ""
+    operator: str = ""
+    supervisor: str = ""
+    reason: str = ""
+
+    def __post_init__(self) -> None:
+        require_usual(self.at)
+
+
+@dataclass(frozen=True)
+class Library:
+    """All items as they are now, retired ones as well.
+
+    Attributes
+    ----------
+    pens, tips, cones : mapping of str to item
+        By their ids, in the order in which they came.
+    """
+
+    pens: Mapping[str, ListedPen] = field(default_factory=dict)
+    tips: Mapping[str, ListedTip] = field(default_factory=dict)
+    cones: Mapping[str, ListedCone] = field(default_factory=dict)
+
+    def items(self, kind: ItemKind) -> Mapping[str, AnyItem]:
+        """Return the items of a kind by their ids."""
+        if kind is ItemKind.PEN:
+            return self.pens
+        return self.tips if kind is ItemKind.TIP else self.cones
+
+    def item(self, kind: ItemKind, name: str) -> AnyItem | None:
+        """Return an item by its id, if it is in the library."""
+        return self.items(kind).get(name)
+
+    def tip_of_code(self, code: str) -> ListedTip | None:
+        """Return the tip of a barcode; a scanner may have turned its case round."""
+        exact = self.tips.get(code)
+        return exact or _alike(self.tips, code)
+
+    def rule_of(self, tip: str, usual: DueRule) -> DueRule:
+        """Return how long a tip may be in force."""
+        listed = self.tips.get(tip)
+        return usual if listed is None else listed.rule(usual)
+
+    def alike(self, kind: ItemKind, name: str) -> AnyItem | None:
+        """Return the item that a name cannot be told from: but for case, the same."""
+        return _alike(self.items(kind), name)
+
+
+def read_library(data: Path) -> Library:
+    """Return the library of a data folder; empty where there is none.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or was changed: an older limit must not count again in
+        silence.
+    """
+    found: dict[ItemKind, dict[str, AnyItem]] = {kind: {} for kind in ItemKind}
+    for _, change in library_changes(data):
+        found[change.item.kind][change.item.id] = change.item
+    return Library(
+        pens=dict(_of(found, ListedPen)),
+        tips=dict(_of(found, ListedTip)),
+        cones=dict(_of(found, ListedCone)),
+    )
+
+
+def item_entries(item: AnyItem) -> dict[str, Plain]:
+    """Return an item as the settings of an entry have it: plain values by their names.
+
+    What is not known of it is left out.
+    """
+    entries: dict[str, Plain] = {"item": item.kind.value}
+    for name, value in to_builtins(item).items():
+        if name == "type" or value is None:
+            continue
+        if isinstance(value, dict):  # a picture
+            value = value["place"]
+        is_vector = isinstance(value, list | tuple)
+        entries[name] = " ".join(map(repr, value)) if is_vector else value
+    return entries
+
+
+def library_changes(data: Path) -> Iterator[tuple[Path, LibraryChange]]:
+    """Yield the changes of a library with their files, the oldest first.
+
+    Raises
+    ------
+    FileError
+        As of `read_library`.
+    """
+    for file in library_files(data):
+        yield file, read_change(file)
+
+
+def library_files(data: Path) -> tuple[Path, ...]:
+    """Return the files of all changes, the oldest first.
+
+    Raises
+    ------
+    FileError
+        The folder cannot be read.
+    """
+    return tuple(reversed(numbered_files(data / LIBRARY)))
+
+
+def read_change(file: Path) -> LibraryChange:
+    """Return the change that a file holds.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, was changed, or is of a later version of the program.
+    """
+    text = read_bytes(file, WHAT, MEGABYTE)
+    try:
+        return parse_upgraded(text, LibraryChange, upgrades.LIBRARY)
+    except LaterFormatError as error:
+        raise FileError("library.later-version", file=printable(str(file))) from error
+    except DamagedError as error:
+        raise FileError("library.damaged", file=printable(str(file))) from error
+
+
+def _of(
+    found: Mapping[ItemKind, Mapping[str, AnyItem]], shape: type[ItemT]
+) -> Iterator[tuple[str, ItemT]]:
+    for name, item in found[shape.kind].items():
+        if isinstance(item, shape):
+            yield name, item
+
+
+def _alike(items: Mapping[str, ItemT], name: str) -> ItemT | None:
+    folded = name.casefold()
+    return next((item for i, item in items.items() if i.casefold() == folded), None)

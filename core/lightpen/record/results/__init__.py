@@ -1,0 +1,1 @@
+"""Accepted results: files, acceptance, assessment against the current tip."""

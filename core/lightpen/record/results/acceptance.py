@@ -1,0 +1,219 @@
+"""Putting the tip of a swing in force: one transaction of archive and record.
+
+The result is stored first, whole or not at all, and then the swing is concluded. What
+is stored says which images of which swing it is of, so that a program killed between
+the two leaves nothing undecided: the tip is in force, and whoever finds the swing
+without its verdict next concludes it.
+
+The grade decides how: a tip that passes is accepted as it is, one that is to be checked
+only with a reason, which is stored, and one that is to be repeated not at all. Where a
+supervisor has laid down a password, one beyond the limit of U is accepted by a
+supervisor only.
+"""
+
+import logging
+from contextlib import suppress
+from dataclasses import replace
+from datetime import datetime
+
+from lightpen.errors import AcceptanceError, FileError
+from lightpen.estimation.reports.report import calibration_record
+from lightpen.estimation.reports.verdict import Grade, Verdict
+from lightpen.formats.files import printable
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.record.library.supervision import (
+    Signature,
+    Supervision,
+    require_supervisor,
+)
+from lightpen.record.results.assessment import SwingAssessment, assess
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.results.results import Result, TipChange
+from lightpen.record.swings.interrupted import InterruptedSwings
+from lightpen.record.swings.reading import (
+    Record,
+    open_record,
+    recorded_limits,
+    recorded_names,
+    recorded_origin,
+)
+from lightpen.record.swings.solving import Solution, record_inputs
+from lightpen.record.swings.writing import RecordWriter
+from lightpen.swing_messages import Code
+
+BEYOND_LIMIT = {
+    *(Code.UNCERTAIN, Code.FILE_UNCERTAIN, Code.FILE_ASSUMED),
+    Code.CHANGE_BEYOND_LIMIT,
+}
+
+_logger = logging.getLogger(__name__)
+
+
+def accept(
+    archive: FolderArchive,
+    solution: Solution,
+    now: datetime,
+    reason: str = "",
+    signature: Signature | None = None,
+) -> Result:
+    """Put the tip of a recorded swing in force, and conclude the swing.
+
+    Killed at any moment, it leaves either the result before in force and the swing to
+    be gone on with, or the new result. Accepting the same images of a swing again gives
+    the result that is stored.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of a record, as it is on the disk.
+    now : datetime
+        With its time zone.
+    reason : str
+        Why it is accepted though it is to be checked.
+    signature : Signature, optional
+        Of a supervisor, where it takes one.
+
+    Raises
+    ------
+    AcceptanceError
+        The tip is to be repeated, or to be checked and there is no reason, or no
+        supervisor where it takes one.
+    FileError
+        Another program writes to the record, it has changed since it was solved, or the
+        result cannot be stored; what was in force before stays so.
+    """
+    record = open_record(solution.source.folder)
+    with RecordWriter.resume(record) as writer:
+        _require_same_images(record, solution)
+        result = _stored_result(archive, record)
+        if result is None:
+            assessment = assess(archive, record, solution)
+            require_in_use(archive, recorded_names(record).tip)
+            _require_acceptable(assessment.verdict, reason)
+            supervisor = _supervisor(archive.supervision(), assessment, signature)
+            result = replace(
+                _result(record, solution, assessment, now, reason.strip()),
+                supervisor=supervisor,
+            )
+            archive.store(result)
+            _logger.info("result stored of %s", record.folder)
+        _conclude(writer, record, result)
+    return result
+
+
+def conclude_accepted(
+    archive: FolderArchive, found: InterruptedSwings
+) -> InterruptedSwings:
+    """Conclude the interrupted swings whose tip was accepted; return the others.
+
+    Raises
+    ------
+    FileError
+        The archive cannot be read at all.
+    """
+    interrupted = []
+    for record in found.interrupted:
+        result = _stored_result(archive, record)
+        if result is None:
+            interrupted.append(record)
+            continue
+        with suppress(FileError), RecordWriter.resume(record) as writer:
+            _conclude(writer, record, result)
+    return replace(found, interrupted=tuple(interrupted))
+
+
+def takes_supervisor(supervision: Supervision, assessment: SwingAssessment) -> bool:
+    """Return whether only a supervisor can accept a tip: it is beyond the limit."""
+    told = assessment.verdict.reason, *assessment.doubts
+    is_beyond = any(each.code in BEYOND_LIMIT for each in told)
+    return supervision.is_guarded and is_beyond
+
+
+def _supervisor(
+    supervision: Supervision, assessment: SwingAssessment, signature: Signature | None
+) -> str:
+    """Return the supervisor who accepts a tip; empty where it takes none."""
+    if not takes_supervisor(supervision, assessment):
+        return ""
+    if signature is None:
+        raise AcceptanceError("acceptance.no-supervisor", why=assessment.verdict.reason)
+    require_supervisor(supervision, signature)
+    return signature.name.strip()
+
+
+def require_in_use(archive: FolderArchive, name: str) -> None:
+    """Refuse a tip that was retired: whoever retired it knows why.
+
+    A library that cannot be read is told of with the verdict.
+
+    Raises
+    ------
+    AcceptanceError
+        It is retired.
+    """
+    tip = None
+    with suppress(FileError):
+        tip = archive.library().tips.get(name)
+    if tip is not None and tip.is_retired:
+        raise AcceptanceError("acceptance.retired", tip=tip.id)
+
+
+def _require_acceptable(verdict: Verdict, reason: str) -> None:
+    """Let a tip pass whose grade allows it to be accepted so."""
+    if verdict.grade is Grade.REPEAT:
+        raise AcceptanceError("acceptance.repeat", why=verdict.reason)
+    if verdict.grade is Grade.CHECK and not reason.strip():
+        raise AcceptanceError("acceptance.no-reason", why=verdict.reason)
+
+
+def _result(
+    record: Record,
+    solution: Solution,
+    assessment: SwingAssessment,
+    now: datetime,
+    reason: str,
+) -> Result:
+    last, change, since = assessment.last, assessment.change, None
+    if last is not None and change is not None:
+        since = TipChange.of(last, change, assessment.max_change)
+    return Result(
+        names=recorded_names(record),
+        accepted=now,
+        grade=assessment.verdict.grade,
+        record=record.folder,
+        images=_images_of(record),
+        calibration=calibration_record(
+            *(solution.calibration, record_inputs(solution.source), "joint"),
+            recorded_limits(record),
+        ),
+        origin=recorded_origin(record),
+        reason=reason,
+        why=StoredMessage.of(assessment.verdict.reason),
+        doubts=tuple(map(StoredMessage.of, assessment.doubts)),
+        change=since,
+    )
+
+
+def _stored_result(archive: FolderArchive, record: Record) -> Result | None:
+    """Return the result of a record with the images that take part in it now."""
+    result = archive.of_record(record.folder)
+    if result is None or result.images != _images_of(record):
+        return None
+    return result
+
+
+def _conclude(writer: RecordWriter, record: Record, result: Result) -> None:
+    """Write the verdict; where that fails, the archive tells it the next time."""
+    if record.verdict != result.grade:
+        with suppress(FileError):
+            writer.conclude(result.grade)
+
+
+def _images_of(record: Record) -> tuple[int, ...]:
+    return tuple(record.numbers.tolist())
+
+
+def _require_same_images(record: Record, solution: Solution) -> None:
+    is_same = record.all_numbers.tolist() == solution.numbers.tolist()
+    if not is_same or set(record.taken_out) != set(solution.taken_out):
+        raise FileError("acceptance.changed", folder=printable(str(record.folder)))

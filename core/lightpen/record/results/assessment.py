@@ -1,0 +1,152 @@
+"""A solved swing beside what is in force: its verdict, and what to look into."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import date
+from itertools import chain
+
+import numpy as np
+
+from lightpen.errors import FileError
+from lightpen.estimation.reports.report_warnings import warnings_of
+from lightpen.estimation.reports.verdict import (
+    Change,
+    Verdict,
+    change_doubt,
+    change_since,
+    distance_from_nominal,
+    judge,
+    judge_change,
+    judge_unknown,
+    repeats,
+)
+from lightpen.local_time import local_time
+from lightpen.messages import Message, message
+from lightpen.model.coverage import dial_counts
+from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
+from lightpen.record.library.tip_library import KIND_WORDS, Library
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import (
+    Record,
+    is_of_recording,
+    recorded_limits,
+    recorded_names,
+    recorded_origin,
+)
+from lightpen.record.swings.solving import Solution
+from lightpen.swing_messages import last_unknown, too_little_tilt
+
+
+@dataclass(frozen=True, eq=False)
+class SwingAssessment:
+    """What a solved swing is worth.
+
+    Attributes
+    ----------
+    last : Result or None
+        In force for this pen and tip; None if there is none, or it cannot be read.
+    change : Change or None
+        Since that.
+    max_change : float or None
+        Limit of the tip for the distance from that, mm; None if it has none.
+    doubts : tuple of Message
+        What to look into besides the reason of the verdict, what matters most first.
+    """
+
+    verdict: Verdict
+    last: Result | None
+    change: Change | None
+    doubts: tuple[Message, ...]
+    max_change: float | None = None
+
+
+def assess(
+    archive: FolderArchive, record: Record, solution: Solution
+) -> SwingAssessment:
+    """Judge a solved swing by itself, and beside what is in force.
+
+    Parameters
+    ----------
+    record : Record
+        Of the solution.
+    """
+    names, origin = recorded_names(record), recorded_origin(record)
+    limits = recorded_limits(record)
+    verdict = judge(solution.calibration, limits)
+    last, limit, unknown = None, None, None
+    library = Library()
+    try:
+        library = archive.library()
+        listed = library.tips.get(names.tip)
+        limit = None if listed is None else listed.max_change_mm
+        last = _last(archive, names, origin)
+    except FileError as error:
+        unknown = error.message
+        verdict = judge_unknown(verdict, unknown)
+    change, doubt = None, None
+    if last is not None:
+        date = f"{local_time(last.accepted):%Y-%m-%d}"
+        change = _change(solution, last)
+        doubt = change_doubt(change, date, limit)
+        verdict = judge_change(verdict, change, date, limit)
+    all_doubts = chain(
+        [] if unknown is None else [last_unknown(unknown)],
+        [] if doubt is None else [doubt],
+        _overdue(library, names, local_time(record.header.created).date()),
+        _far_from_nominal(solution),
+        _bare_sides(solution, limits) if is_of_recording(record) else [],
+        warnings_of(solution.calibration),
+    )
+    doubts = tuple(each for each in all_doubts if not repeats(each, verdict.reason))
+    return SwingAssessment(verdict, last, change, doubts, limit)
+
+
+def _last(archive: FolderArchive, names: Names, origin: Origin | None) -> Result | None:
+    is_simulated = origin is Origin.SIMULATED
+    return archive.in_force(names.pen, names.tip, is_simulated=is_simulated)
+
+
+def _change(solution: Solution, last: Result) -> Change:
+    calibration = solution.calibration
+    return change_since(
+        calibration.joint.tip_pen,
+        calibration.budget.expanded_uncertainty[:3],
+        last.tip_pen,
+        last.uncertainty,
+    )
+
+
+def _overdue(library: Library, names: Names, day: date) -> Iterator[Message]:
+    """Tell what should have been looked after before the day of the swing."""
+    for item in (
+        library.pens.get(names.pen),
+        library.tips.get(names.tip),
+        library.cones.get(names.cone),
+    ):
+        if item is not None and item.is_overdue(day):
+            yield message(
+                "doubt.overdue",
+                kind=KIND_WORDS[item.kind],
+                id=item.id,
+                due=str(item.due),
+            )
+
+
+def _far_from_nominal(solution: Solution) -> list[Message]:
+    nominal = solution.source.pen.nominal_tip
+    distance = distance_from_nominal(solution.calibration.joint.tip_pen, nominal)
+    if distance is None:
+        return []
+    return [message("doubt.far-from-nominal", distance=distance)]
+
+
+def _bare_sides(solution: Solution, limits: SwingLimits) -> list[Message]:
+    """Name the postures that recorded images lack: nobody was asked to lean there."""
+    counts = dial_counts(solution.calibration.joint.rotations)[1:].sum(axis=0)
+    bare = np.flatnonzero(counts == 0)
+    if not (len(bare) and limits.min_per_field):
+        return []
+    return [too_little_tilt(limits.min_per_field * len(bare), map(int, bare))]

@@ -1,0 +1,50 @@
+"""What is opened from outside the program: a swing, by any file that leads to it.
+
+A record is a folder, and no system opens a folder with a program of its own choice: in
+each lies a small file whose name does. A result leads to the swing that it comes from.
+"""
+
+from pathlib import Path
+
+from lightpen.errors import FileError
+from lightpen.formats.files import printable
+from lightpen.record.results.result_folder import RESULTS, SIMULATED, FolderArchive
+from lightpen.record.swings.reading import is_record
+
+
+def swing_folder(path: Path) -> Path:
+    """Return the folder of the swing that a path leads to.
+
+    Parameters
+    ----------
+    path : Path
+        The folder itself, a file in it, or a result.
+
+    Raises
+    ------
+    FileError
+        It leads to no swing, or the result or its swing cannot be read.
+    """
+    place = path.absolute()
+    for folder in (place, place.parent):
+        if is_record(folder):
+            return folder
+    data = data_folder_of(place)
+    if data is not None:
+        recorded = FolderArchive(data).read(place).record
+        if is_record(recorded):
+            return recorded
+        raise FileError(
+            "opening.swing-moved",
+            file=printable(str(path)),
+            folder=printable(str(recorded)),
+        )
+    raise FileError("opening.no-swing", path=printable(str(path)))
+
+
+def data_folder_of(result: Path) -> Path | None:
+    """Return the data folder that a file is a result of; None if it is in none."""
+    place = result.absolute()
+    if place.parent.name != RESULTS or place.suffix != ".json":
+        return None
+    return place.parents[2 if place.parents[1].name == SIMULATED else 1]

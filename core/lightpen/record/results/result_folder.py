@@ -1,0 +1,287 @@
+"""The archive as a folder: one file a result, beside the records of the swings.
+
+A file is written once and never changed. Its name is a number: the order of acceptance.
+Where its swing is recorded is written as a path from the data folder, so that the whole
+of it can be moved, or copied to another machine. Results of simulated pens are in a
+folder of their own.
+"""
+
+import logging
+from collections.abc import Iterator
+from contextlib import suppress
+from datetime import datetime
+from pathlib import Path
+
+from lightpen.errors import FileError
+from lightpen.formats.files import MEGABYTE, printable, read_bytes, unreadable
+from lightpen.messages import message
+from lightpen.record.library.numbered_files import add_numbered, numbered_files
+from lightpen.record.library.supervision import Supervision, read_supervision
+from lightpen.record.library.tip_library import Library, read_library
+from lightpen.record.results.results import (
+    Result,
+    ResultHeading,
+    Withdrawal,
+    has_head,
+    parse_heading,
+    parse_result,
+    parse_withdrawal,
+    result_bytes,
+    withdrawal_bytes,
+)
+
+RECORDS, RESULTS = "records", "results"
+SIMULATED = "simulated"  # that the files of the simulated pen, and its results, are in
+WHAT = message("file.result")
+LIMIT = 64 * MEGABYTE
+HEAD = 16_384  # bytes, in which the first entries of a result end, or it is read whole
+
+_logger = logging.getLogger(__name__)
+
+
+class FolderArchive:
+    """Keeps every result that was accepted; the newest of a pen and tip is in force.
+
+    Results are added and never changed or removed: one that is taken back is kept, and
+    the one before is in force again. Those of a simulated pen are kept apart, and none
+    of them is in force for a real one. All methods may take as long as a disk or a
+    network does, and may be called from any thread. Of a result of another pen, tip or
+    swing only the first entries are read, so that thousands of them cost little.
+
+    Parameters
+    ----------
+    data : Path
+        Folder of the records and the results; it need not exist.
+    """
+
+    def __init__(self, data: Path) -> None:
+        self._data = data.absolute()
+
+    @property
+    def folder(self) -> Path:
+        """That the files of real pens are in."""
+        return self._data / RESULTS
+
+    def store(self, result: Result) -> None:
+        """Put a result in force.
+
+        When this returns, the result is kept whatever happens next; when it raises, or
+        is killed, it is kept whole or not at all.
+
+        Raises
+        ------
+        FileError
+            It cannot be kept; what was in force before stays so.
+        """
+        root = self._root(result.is_simulated)
+        data = result_bytes(result, self.place_of(result.record))
+        parse_result(data, root, Path)  # what cannot be read again is never in force
+        add_numbered(root, data)
+
+    def revoke(self, result: Result, operator: str, now: datetime) -> None:
+        """Let the result before a result in force be in force again.
+
+        It is one step, as `store`.
+
+        Parameters
+        ----------
+        operator : str
+            Who takes it back.
+
+        Raises
+        ------
+        FileError
+            It is not in force any more, or what takes it back cannot be kept.
+        """
+        names = result.names
+        is_simulated = result.is_simulated
+        file = self.file_in_force(names.pen, names.tip, is_simulated=is_simulated)
+        if file is None or not _is_same(self.read(file), result):
+            raise FileError("results.not-in-force", tip=names.tip, pen=names.pen)
+        add_numbered(file.parent, withdrawal_bytes(result, file.stem, operator, now))
+        _logger.info("result withdrawn: %s, by %r", file, operator)
+
+    def in_force(
+        self, pen: str, tip: str, *, is_simulated: bool = False
+    ) -> Result | None:
+        """Return the last accepted result of a pen and a tip, or None.
+
+        Parameters
+        ----------
+        is_simulated : bool
+            Whether of a simulated pen; else of a real one.
+
+        Raises
+        ------
+        FileError
+            A result that may be the one in force cannot be read. An older one must not
+            come into force again in silence.
+        """
+        file = self.file_in_force(pen, tip, is_simulated=is_simulated)
+        return None if file is None else self.read(file)
+
+    def file_in_force(
+        self, pen: str, tip: str, *, is_simulated: bool = False
+    ) -> Path | None:
+        """Return the file of what `in_force` returns."""
+        for file, heading in self._standing(self._root(is_simulated)):
+            if heading.pen in (pen, None) and heading.tip in (tip, None):
+                return file
+        return None
+
+    def tips(self, pen: str, *, is_simulated: bool = False) -> tuple[str, ...]:
+        """Return the tips of a pen that have a result in force, the newest first.
+
+        Results that cannot be read are passed over.
+
+        Raises
+        ------
+        FileError
+            The archive cannot be read at all.
+        """
+        root = self._root(is_simulated)
+        found = [
+            heading.tip
+            for _, heading in self._standing(root, passes_over_damage=True)
+            if heading.pen == pen
+        ]
+        return tuple(filter(None, dict.fromkeys(found)))
+
+    def files_of_pen(self, pen: str, *, is_simulated: bool = False) -> tuple[Path, ...]:
+        """Return the results of a pen that are not taken back, the newest first.
+
+        Raises
+        ------
+        FileError
+            The archive cannot be read at all.
+        """
+        root = self._root(is_simulated)
+        return tuple(
+            file
+            for file, heading in self._standing(root, passes_over_damage=True)
+            if heading.pen == pen
+        )
+
+    def supervision(self) -> Supervision:
+        """Return what supervisors have laid down."""
+        return read_supervision(self._data)
+
+    def library(self) -> Library:
+        """Return the pens, tips and cones that are known."""
+        return read_library(self._data)
+
+    def of_record(self, folder: Path) -> Result | None:
+        """Return the last accepted result of the swing in a folder, or None.
+
+        Results that cannot be read or that were taken back are passed over.
+
+        Raises
+        ------
+        FileError
+            The archive cannot be read at all.
+        """
+        for root in self._roots():
+            for file, heading in self._standing(root, passes_over_damage=True):
+                place = heading.record
+                with suppress(FileError):
+                    if place is not None and self._data / place == folder.absolute():
+                        return self.read(file)
+        return None
+
+    def all_files(self) -> tuple[Path, ...]:
+        """Return the files of all results and takings back, the oldest first.
+
+        Raises
+        ------
+        FileError
+            The archive cannot be read at all.
+        """
+        roots = reversed(self._roots())
+        return tuple(file for root in roots for file in reversed(numbered_files(root)))
+
+    def content(self, file: Path) -> Result | Withdrawal:
+        """Return what one of `all_files` holds.
+
+        Raises
+        ------
+        FileError
+            It cannot be read, or is damaged.
+        """
+        if _read_heading(file).takes_back is None:
+            return self.read(file)
+        return parse_withdrawal(read_bytes(file, WHAT, LIMIT), file)
+
+    def place_of(self, path: Path) -> str:
+        """Return where a file or folder is, from the data folder if it is in there."""
+        absolute = path.absolute()
+        inside = absolute.is_relative_to(self._data)
+        return (absolute.relative_to(self._data) if inside else absolute).as_posix()
+
+    def file_of(self, result: Result) -> Path:
+        """Return the file of a result that is not taken back.
+
+        Raises
+        ------
+        FileError
+            There is none any more.
+        """
+        place, root = self.place_of(result.record), self._root(result.is_simulated)
+        for file, heading in self._standing(root, passes_over_damage=True):
+            if heading.record == place and _is_same(self.read(file), result):
+                return file
+        names = result.names
+        raise FileError(
+            "results.gone", tip=names.tip, pen=names.pen, folder=printable(str(root))
+        )
+
+    def _root(self, is_simulated: bool) -> Path:
+        return (self._data / SIMULATED if is_simulated else self._data) / RESULTS
+
+    def _roots(self) -> tuple[Path, Path]:
+        """Return where results are."""
+        return self._root(True), self.folder
+
+    def _standing(
+        self, root: Path, *, passes_over_damage: bool = False
+    ) -> Iterator[tuple[Path, ResultHeading]]:
+        """Yield the results that are not taken back, the newest first."""
+        revoked = set[str]()
+        for file in numbered_files(root):
+            try:
+                heading = _read_heading(file)
+            except FileError:
+                if passes_over_damage:
+                    continue
+                raise
+            if heading.takes_back is not None:
+                revoked.add(heading.takes_back)
+            elif file.stem not in revoked:
+                yield file, heading
+
+    def read(self, file: Path) -> Result:
+        """Return the result in a file of the archive.
+
+        Raises
+        ------
+        FileError
+            It cannot be read.
+        """
+        located = self._data.joinpath  # where an absolute folder stays what it is
+        return parse_result(read_bytes(file, WHAT, LIMIT), file, located)
+
+
+def _is_same(one: Result, other: Result) -> bool:
+    """Return whether two results are of the same acceptance."""
+    return (one.accepted, one.record) == (other.accepted, other.record)
+
+
+def _read_heading(file: Path) -> ResultHeading:
+    """Read the first entries of a result, all of them if it has no calibration."""
+    try:
+        with file.open("rb") as stream:
+            start = stream.read(HEAD)
+    except OSError as error:
+        raise unreadable(file, WHAT, error) from error
+    if not has_head(start):
+        start = read_bytes(file, WHAT, LIMIT)
+    return parse_heading(start, file)

@@ -1,0 +1,425 @@
+"""An accepted calibration, the taking back of one, and how each is written.
+
+A result is one JSON object. Its first entries, the head, say who accepted what and
+when, and which swing it comes from; they end with their checksum. The last entry,
+``calibration``, is the whole record of the calibration, as
+`lightpen.estimation.reports.report` makes it; its checksum is in the head, so that a
+head is known to be sound without the rest. A result that is taken back stays: what
+takes it back is a file of its own, a head without a calibration.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from hashlib import sha256
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import numpy as np
+from msgspec import Meta, Struct
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError
+from lightpen.estimation.reports.calibration_record import CalibrationRecord
+from lightpen.estimation.reports.verdict import Change, Grade
+from lightpen.formats.files import printable
+from lightpen.formats.json_records import json_bytes
+from lightpen.formats.own_json import (
+    DamagedError,
+    Digest,
+    Vector,
+    ZonedTime,
+    in_shape,
+    parse_checked,
+    parse_own_json,
+    require_path,
+    require_usual,
+    with_checksum,
+)
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.formats.upgrades import (
+    RESULT,
+    WITHDRAWAL,
+    LaterFormatError,
+    newest_format,
+    parse_upgraded,
+    upgraded,
+)
+from lightpen.model.origin import Origin
+from lightpen.record.swings.names import Names
+
+CALIBRATION = b',\n  "calibration": '  # ends the head; JSON has no line end in a text
+END = b"\n}\n"
+
+
+class ResultHeading(Struct):
+    """What tells whether a result is the one that is looked for.
+
+    Attributes
+    ----------
+    pen, tip, record : str or None
+        None where a later version does not say; else as `Names` and `Result`.
+    origin : str or None
+        What its images are of; None where it does not say.
+    takes_back : str or None
+        Name of the result's file, without suffix, that is taken back; None of a result.
+    """
+
+    format: Annotated[int, Meta(ge=1)]
+    pen: str | None = None
+    tip: str | None = None
+    record: str | None = None
+    takes_back: str | None = None
+    origin: str | None = None
+
+    def __post_init__(self) -> None:
+        require_path(self.record or "")
+
+
+class Withdrawal(Struct, frozen=True):
+    """What takes a result back.
+
+    Attributes
+    ----------
+    takes_back : str
+        Name of the result's file, without suffix.
+    operator : str
+        Who takes it back.
+    """
+
+    takes_back: str
+    at: ZonedTime
+    operator: str
+    pen: str
+    tip: str
+
+    def __post_init__(self) -> None:
+        require_usual(self.at)
+
+
+class TipChange(Struct, frozen=True):
+    """How far a tip lies from the one that was in force before, when it was accepted.
+
+    That one is the tip as found, the one that was accepted the tip as left.
+
+    Attributes
+    ----------
+    accepted : datetime
+        When the tip as found was.
+    difference_mm : triple of float
+        Now minus then, pen frame.
+    expanded_uncertainty_mm : triple of float
+        U (k = 2) of the difference.
+    as_found_mm, as_found_expanded_uncertainty_mm : triple of float
+        The tip that was in force until then, pen frame, and its U (k = 2).
+    limit_mm : float or None
+        Of the tip for its distance from there; None if it had none.
+    """
+
+    accepted: ZonedTime
+    difference_mm: Vector
+    expanded_uncertainty_mm: Vector
+    as_found_mm: Vector
+    as_found_expanded_uncertainty_mm: Vector
+    limit_mm: float | None = None
+
+    @classmethod
+    def of(cls, last: "Result", change: Change, limit: float | None = None) -> Self:
+        """Return what is kept of a change since the result in force."""
+        return cls(
+            last.accepted,
+            _vector(change.difference),
+            _vector(change.expanded_uncertainty),
+            _vector(last.tip_pen),
+            _vector(last.uncertainty),
+            limit,
+        )
+
+    @property
+    def distance_mm(self) -> float:
+        """How far apart the tips lie."""
+        return math.hypot(*self.difference_mm)
+
+    @property
+    def is_within(self) -> bool | None:
+        """Whether the tip as found was within its limit; None if it had none."""
+        return None if self.limit_mm is None else self.distance_mm <= self.limit_mm
+
+
+def _vector(values: FloatArray) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+class _Head(Struct):
+    format: int
+    accepted: ZonedTime
+    station: str
+    operator: str
+    pen: str
+    tip: str
+    cone: str
+    ball_diameter_mm: float | None
+    grade: Grade
+    record: str
+    images: tuple[int, ...] | None
+    origin: Origin | None
+    reason: str
+    supervisor: str
+    why: StoredMessage | None
+    doubts: tuple[StoredMessage, ...]
+    change: TipChange | None
+    restores: Digest | None
+    calibration_sha256: Digest
+
+    def __post_init__(self) -> None:
+        require_usual(self.accepted)
+        require_path(self.record)
+
+
+class _Whole(_Head):
+    calibration: CalibrationRecord
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """An accepted calibration.
+
+    Attributes
+    ----------
+    accepted : datetime
+        With its time zone.
+    grade : Grade
+        Verdict at acceptance.
+    record : Path
+        Folder of the swing that it comes from.
+    images : tuple of int or None
+        Numbers of the images of the swing that were not taken out; None of one that
+        puts an older tip in force again.
+    origin : Origin or None
+        What its images are of; None where neither it nor its swing says.
+    reason : str
+        Why it was accepted though its grade is no pass, in the words of who did.
+    supervisor : str
+        Who accepted it beyond the limit of its station; empty where nobody had to.
+    why : StoredMessage or None
+        What its grade is for.
+    doubts : tuple of StoredMessage
+        What else there was to look into.
+    change : TipChange or None
+        Since the result that was in force; None if there was none.
+    restores : str or None
+        Hash of the entry in the archive whose tip it puts in force again.
+    """
+
+    names: Names
+    accepted: datetime
+    grade: Grade
+    record: Path
+    images: tuple[int, ...] | None
+    calibration: CalibrationRecord
+    origin: Origin | None = None
+    reason: str = ""
+    why: StoredMessage | None = None
+    doubts: tuple[StoredMessage, ...] = ()
+    change: TipChange | None = None
+    supervisor: str = ""
+    restores: str | None = None
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether it is of no real pen."""
+        return self.origin is Origin.SIMULATED
+
+    @property
+    def nominal_tip(self) -> FloatArray | None:
+        """The tip by design that it was compared with, (3,), mm."""
+        nominal = self.calibration.nominal_tip_mm
+        return None if nominal is None else np.array(nominal)
+
+    @property
+    def tip_pen(self) -> FloatArray:
+        """Tip, pen frame, (3,), mm."""
+        return np.array(self.calibration.tip_pen_mm)
+
+    @property
+    def uncertainty(self) -> FloatArray:
+        """U (k = 2) of the tip along x, y and z, (3,), mm."""
+        return np.array(self.calibration.expanded_uncertainty_mm)
+
+
+def result_bytes(result: Result, record: str) -> bytes:
+    """Return a result as JSON.
+
+    Parameters
+    ----------
+    record : str
+        Where the folder of its swing is, as it is to be written.
+    """
+    names = result.names
+    rest = CALIBRATION + json_bytes(result.calibration).rstrip(b"\n") + END
+    head = _Head(
+        format=newest_format(RESULT),
+        accepted=result.accepted,
+        station=names.station,
+        operator=names.operator,
+        pen=names.pen,
+        tip=names.tip,
+        cone=names.cone,
+        ball_diameter_mm=names.ball_diameter,
+        grade=result.grade,
+        record=record,
+        images=result.images,
+        origin=result.origin,
+        reason=result.reason,
+        supervisor=result.supervisor,
+        why=result.why,
+        doubts=result.doubts,
+        change=result.change,
+        restores=result.restores,
+        calibration_sha256=sha256(rest).hexdigest(),
+    )
+    return with_checksum(json_bytes(head)).removesuffix(b"}") + rest
+
+
+def withdrawal_bytes(result: Result, name: str, operator: str, now: datetime) -> bytes:
+    """Return what takes a result back, as JSON.
+
+    Parameters
+    ----------
+    name : str
+        Of the result's file, without suffix.
+    operator : str
+        Who takes it back.
+    """
+    return with_checksum(
+        json_bytes(
+            {
+                "format": newest_format(WITHDRAWAL),
+                "takes_back": name,
+                "at": now.isoformat(),
+                "operator": operator,
+                "pen": result.names.pen,
+                "tip": result.names.tip,
+            }
+        )
+    )
+
+
+def has_head(start: bytes) -> bool:
+    """Return whether the start of a result, as much as was read, has its head."""
+    return CALIBRATION in start
+
+
+def parse_heading(start: bytes, file: Path) -> ResultHeading:
+    """Return whose result a file holds, by its start with the head, or the whole of it.
+
+    Parameters
+    ----------
+    file : Path
+        For the sentence.
+
+    Raises
+    ------
+    FileError
+        It is damaged.
+    """
+    try:
+        return parse_checked(_head_of(start), ResultHeading)
+    except DamagedError as error:
+        raise _damaged(file) from error
+
+
+def parse_withdrawal(data: bytes, file: Path) -> Withdrawal:
+    """Return what a file holds that takes a result back.
+
+    Parameters
+    ----------
+    file : Path
+        For the sentence.
+
+    Raises
+    ------
+    FileError
+        It is damaged.
+    """
+    try:
+        return parse_upgraded(data, Withdrawal, WITHDRAWAL)
+    except LaterFormatError as error:
+        raise _of_later_version(file, error.number, WITHDRAWAL) from error
+    except DamagedError as error:
+        raise _damaged(file) from error
+
+
+def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Result:
+    """Return the result that a file holds.
+
+    Parameters
+    ----------
+    file : Path
+        For the sentence.
+    locate : callable
+        Returns the folder of a swing by what is written.
+
+    Raises
+    ------
+    FileError
+        It is damaged, or written by a later version of the program.
+    """
+    try:
+        head = _head_of(data)
+        parse_checked(head, ResultHeading)
+        whole = parse_own_json(data, dict[str, Any])
+        entries = in_shape(upgraded(whole, RESULT), _Whole)
+        _require_digest(data[len(head) - 1 :], entries.calibration_sha256)
+        return Result(
+            names=Names(
+                station=entries.station,
+                operator=entries.operator,
+                pen=entries.pen,
+                tip=entries.tip,
+                cone=entries.cone,
+                ball_diameter=entries.ball_diameter_mm,
+            ),
+            accepted=entries.accepted,
+            grade=entries.grade,
+            record=locate(entries.record),
+            images=entries.images,
+            calibration=entries.calibration,
+            origin=entries.origin,
+            reason=entries.reason,
+            supervisor=entries.supervisor,
+            why=entries.why,
+            doubts=entries.doubts,
+            change=entries.change,
+            restores=entries.restores,
+        )
+    except LaterFormatError as error:
+        raise _of_later_version(file, error.number, RESULT) from error
+    except DamagedError as error:
+        raise _damaged(file) from error
+
+
+def _head_of(data: bytes) -> bytes:
+    """Return what comes before the calibration, as JSON of its own."""
+    head, found, _ = data.partition(CALIBRATION)
+    return head + b"}" if found else data
+
+
+def _require_digest(rest: bytes, digest: str | None) -> None:
+    if sha256(rest).hexdigest() != digest:
+        raise DamagedError("The checksum of the calibration is another one.")
+
+
+def _damaged(file: Path) -> FileError:
+    return FileError("results.damaged", file=printable(str(file)))
+
+
+def _of_later_version(file: Path, number: int, kind: str) -> FileError:
+    return FileError(
+        "results.later-version",
+        file=printable(str(file)),
+        number=number,
+        known=newest_format(kind),
+    )

@@ -1,0 +1,1 @@
+"""A swing on disk: header, journal, images, and its solution."""

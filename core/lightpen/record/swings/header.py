@@ -1,0 +1,251 @@
+"""The header of a record: who, where, with what a swing was captured.
+
+It is written last when a record is made. Beside it stand copies, byte by byte, of the
+files it names. Header and copies each have their checksum.
+"""
+
+import json
+from collections.abc import Mapping
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from msgspec import Struct, field, to_builtins
+from msgspec.structs import replace
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError
+from lightpen.formats.camera_files import CAMERA_FILE
+from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.own_json import (
+    DamagedError,
+    Digest,
+    Length,
+    Vector,
+    ZonedTime,
+    require_path,
+    require_usual,
+    with_checksum,
+)
+from lightpen.formats.pen_files import PEN_FILE
+from lightpen.formats.rig_files import RIG_FILE
+from lightpen.formats.upgrades import (
+    SWING,
+    LaterFormatError,
+    newest_format,
+    parse_upgraded,
+)
+from lightpen.messages import Message, message
+from lightpen.model.limits import SwingLimits
+from lightpen.record.swings.assumed import Plain, recorded_assumptions
+
+HEADER = "header.json"
+HEADER_LIMIT = MEGABYTE
+COPY_LIMIT = 4 * MEGABYTE
+CAMERA_STEM, PEN_STEM, RIG_STEM = "camera", "pen", "rig"
+COPIES = {CAMERA_STEM: CAMERA_FILE, PEN_STEM: PEN_FILE, RIG_STEM: RIG_FILE}
+
+
+class FileCopy(Struct, frozen=True, omit_defaults=True):
+    """A file that a record has a copy of.
+
+    Attributes
+    ----------
+    data : bytes
+        Of a record that is to be made; the header does not hold it.
+    """
+
+    name: str
+    sha256: Digest
+    data: bytes = b""
+
+    def __post_init__(self) -> None:
+        require_path(self.name)
+
+    @classmethod
+    def of(cls, path: Path, what: Message) -> Self:
+        """Read a file; ``what`` it is, for the messages."""
+        data = read_bytes(path, what, COPY_LIMIT)
+        return cls(path.name, sha256(data).hexdigest(), data)
+
+
+class RigCopies(Struct, frozen=True):
+    """What a record keeps of a rig besides its first camera.
+
+    Attributes
+    ----------
+    rig_file : FileCopy
+    camera_files : tuple of FileCopy
+        The files of the other cameras.
+    masks_px : tuple of tuples
+        Stray light in the images of each of them, as `Header.mask_px`.
+    """
+
+    rig_file: FileCopy
+    camera_files: tuple[FileCopy, ...]
+    masks_px: tuple[tuple[Vector, ...], ...]
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.camera_files) == len(self.masks_px):
+            raise ValueError("Each of the other cameras has a file and a mask.")
+
+
+class Header(Struct, frozen=True, kw_only=True):
+    """What a swing was captured with.
+
+    Attributes
+    ----------
+    created : datetime
+        With its time zone.
+    program : str
+        Name and version.
+    units : str or None
+        Of a pen file that does not say.
+    led_diameter_mm, nominal_tip_mm : float, triple of float or None
+        In place of those of the pen file.
+    mask_px : tuple of triples
+        Circles of stray light: centre x, y and radius.
+    settings : mapping
+        What else the program wants to keep: exposure, limits, camera serial.
+    rig : RigCopies or None
+        Of a swing before several cameras.
+    """
+
+    format: int = field(default_factory=partial(newest_format, SWING))
+    created: ZonedTime
+    program: str = ""
+    station: str = ""
+    operator: str = ""
+    tip: str = ""
+    cone: str = ""
+    camera_file: FileCopy
+    pen_file: FileCopy
+    units: str | None = None
+    led_diameter_mm: Length | None = None
+    nominal_tip_mm: Vector | None = None
+    mask_px: tuple[Vector, ...] = ()
+    settings: Mapping[str, Plain] = {}
+    rig: RigCopies | None = None
+
+    def __post_init__(self) -> None:
+        require_usual(self.created)
+        limits_in(self.settings)
+        recorded_assumptions(self.settings)
+
+    @property
+    def n_cameras(self) -> int:
+        """Number of cameras."""
+        return 1 if self.rig is None else 1 + len(self.rig.camera_files)
+
+    @property
+    def nominal_tip(self) -> FloatArray | None:
+        """Tip by design in place of that of the pen file, pen frame, (3,), mm."""
+        tip = self.nominal_tip_mm
+        return None if tip is None else np.array(tip, dtype=np.float64)
+
+    @property
+    def masks(self) -> tuple[FloatArray, ...]:
+        """Circles of stray light before each camera, (M, 3), px."""
+        all_masks = self.mask_px, *(() if self.rig is None else self.rig.masks_px)
+        return tuple(np.array(mask, dtype=float).reshape(-1, 3) for mask in all_masks)
+
+
+def header_bytes(header: Header) -> bytes:
+    """Return a header as it is written, without the content of the files."""
+    rig = header.rig
+    if rig is not None:
+        rig = replace(
+            rig,
+            rig_file=replace(rig.rig_file, data=b""),
+            camera_files=tuple(replace(file, data=b"") for file in rig.camera_files),
+        )
+    entries = replace(
+        header,
+        camera_file=replace(header.camera_file, data=b""),
+        pen_file=replace(header.pen_file, data=b""),
+        rig=rig,
+    )
+    text = json.dumps(to_builtins(entries), indent=1, ensure_ascii=False)
+    # The bytes of a file name that is no text become JSON escapes.
+    return with_checksum(text.encode("utf-8", "backslashreplace"))
+
+
+def read_header(folder: Path) -> Header:
+    """Read the header of a record, and see that the copies are as it says.
+
+    Raises
+    ------
+    FileError
+        It is damaged, or of a later version of the program, or one of the copies is not
+        as it was recorded.
+    """
+    path = folder / HEADER
+    data = read_bytes(path, message("file.header"), HEADER_LIMIT)
+    try:
+        header = parse_upgraded(data, Header, SWING)
+    except LaterFormatError as error:
+        raise _of_later_version(path, error.number) from error
+    except DamagedError as error:
+        raise damaged_file(path) from error
+    for name, copy in header_copies(header).items():
+        stem = name.partition(".")[0].partition("-")[0]
+        data = read_bytes(folder / name, COPIES[stem], COPY_LIMIT)
+        if sha256(data).hexdigest() != copy.sha256:
+            raise FileError("record.file-changed", path=printable(str(folder / name)))
+    return header
+
+
+def header_copies(header: Header) -> Mapping[str, FileCopy]:
+    """Return the copies that a record keeps, by their files from its folder."""
+    by_stem = {CAMERA_STEM: header.camera_file, PEN_STEM: header.pen_file}
+    if header.rig is not None:
+        by_stem[RIG_STEM] = header.rig.rig_file
+        for c, file in enumerate(header.rig.camera_files, start=1):
+            by_stem[camera_stem(c)] = file
+    return {copy_name(stem, file): file for stem, file in by_stem.items()}
+
+
+def copy_name(stem: str, file: FileCopy) -> str:
+    """Return the file of a copy, from the folder of its record."""
+    return stem + Path(file.name).suffix.lower()
+
+
+def camera_stem(c: int) -> str:
+    """Return what the copy of the file of the c-th camera is called."""
+    return CAMERA_STEM if c == 0 else f"{CAMERA_STEM}-{c + 1}"
+
+
+def damaged_file(path: Path) -> FileError:
+    """Return the error of a file of a record, other than an image or a copy."""
+    return FileError("record.damaged", path=printable(str(path)))
+
+
+def _of_later_version(path: Path, number: int) -> FileError:
+    return FileError(
+        "record.later-version",
+        path=printable(str(path)),
+        number=number,
+        known=newest_format(SWING),
+    )
+
+
+def limits_in(settings: Mapping[str, Plain]) -> SwingLimits:
+    """Return the limits in the settings of a header; `ValueError` if there are none."""
+    usual = SwingLimits()
+    return SwingLimits(
+        max_uncertainty=number_in(
+            settings, "max_uncertainty_mm", usual.max_uncertainty
+        ),
+        min_images=int(number_in(settings, "min_images", usual.min_images)),
+        max_images=int(number_in(settings, "max_images", usual.max_images)),
+        min_per_field=int(number_in(settings, "min_per_field", usual.min_per_field)),
+        spacing=number_in(settings, "spacing_rad", usual.spacing),
+    )
+
+
+def number_in(settings: Mapping[str, Plain], key: str, usual: float) -> float:
+    """Return a number of a record's settings, or what is usual."""
+    value = settings.get(key)
+    return value if isinstance(value, int | float) else usual

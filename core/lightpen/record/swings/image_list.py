@@ -1,0 +1,69 @@
+"""What a review lists of a solved swing: its images, the worst first."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.detection.reasons import Reason
+from lightpen.record.swings.solving import Solution
+
+
+@dataclass(frozen=True)
+class ImageRow:
+    """One image of a solved swing.
+
+    Attributes
+    ----------
+    number : int
+        In the record.
+    misfit : float
+        Root mean square residual with the tip in the cone, px; NaN without the pen.
+    n_leds : int
+        LEDs that were seen, by all cameras together.
+    reason : Reason
+        Why it does not take part; `Reason.NONE` where it does.
+    is_taken_out : bool
+        Whether it was taken out and may be put back. Else an image that does not take
+        part was left out by the computation, and would be again.
+    """
+
+    number: int
+    misfit: float
+    n_leds: int
+    reason: Reason
+    is_taken_out: bool
+
+    @property
+    def is_used(self) -> bool:
+        """Whether it takes part."""
+        return self.reason is Reason.NONE
+
+
+def worst_first(solution: Solution) -> tuple[ImageRow, ...]:
+    """Return all images of a solved swing by misfit, those without the pen first.
+
+    An image keeps its place when it is taken out or put back, but for what that changes
+    of the fit.
+    """
+    misfits = solution.misfits
+    seen = (solution.observations, *solution.others)
+    n_leds = sum(np.isfinite(each.seen_pixels[..., 0]).sum(axis=1) for each in seen)
+    order = np.argsort(-np.nan_to_num(misfits, nan=np.inf), kind="stable")
+    return tuple(
+        ImageRow(
+            number=int(solution.numbers[i]),
+            misfit=float(misfits[i]),
+            n_leds=int(n_leds[i]),
+            reason=solution.calibration.reasons[i],
+            is_taken_out=int(solution.numbers[i]) in solution.taken_out,
+        )
+        for i in order.tolist()
+    )
+
+
+def count_left_out(solution: Solution) -> Mapping[Reason, int]:
+    """Return how many images do not take part, by reason, the most frequent first."""
+    counts = Counter(reason for reason in solution.calibration.reasons if reason)
+    return dict(counts.most_common())

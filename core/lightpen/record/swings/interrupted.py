@@ -1,0 +1,149 @@
+"""An interrupted swing: found, read back to go on with it, or set aside for good."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from lightpen.errors import FileError
+from lightpen.formats.files import printable
+from lightpen.formats.system_reasons import strerror
+from lightpen.messages import Message, message
+from lightpen.record.swings.header import HEADER
+from lightpen.record.swings.journal import JOURNAL, last_verdict
+from lightpen.record.swings.lock import is_locked
+from lightpen.record.swings.reading import DISCARDED, IMAGES, Record, open_record
+from lightpen.record.swings.writing import RecordWriter
+
+
+@dataclass(frozen=True)
+class DamagedSwing:
+    """A swing without a verdict that cannot be read.
+
+    Attributes
+    ----------
+    message : Message
+        What is damaged, and what to do.
+    """
+
+    folder: Path
+    message: Message
+
+
+@dataclass(frozen=True, eq=False)
+class InterruptedSwings:
+    """The swings in a folder that have no verdict, each kind the newest first.
+
+    Attributes
+    ----------
+    interrupted : tuple of Record
+        Those that wait to be gone on with; they have images.
+    under_way : tuple of Record
+        Those that somebody writes to just now.
+    """
+
+    interrupted: tuple[Record, ...] = ()
+    under_way: tuple[Record, ...] = ()
+    damaged: tuple[DamagedSwing, ...] = ()
+
+
+def find_unfinished(root: Path) -> InterruptedSwings:
+    """Return the swings in a folder that have no verdict.
+
+    Of a concluded record only the end is read, so that thousands of them cost little. A
+    folder in which there is nothing of a swing is passed over, be it that a record was
+    just being made when the program was killed.
+
+    Raises
+    ------
+    FileError
+        The folder of the records itself cannot be read.
+    """
+    try:
+        folders = list(root.iterdir()) if root.is_dir() else []
+    except OSError as error:
+        raise FileError(
+            "unfinished.folder-unreadable",
+            folder=printable(str(root)),
+            reason=strerror(error),
+        ) from error
+    interrupted, under_way, damaged = [], [], []
+    for folder in sorted(folders, reverse=True):
+        try:
+            record = _read_unfinished(folder)
+            if record is None:
+                continue
+            if is_locked(folder / JOURNAL):
+                under_way.append(record)
+            else:
+                interrupted.append(record)
+        except OSError as error:
+            unreadable = message(
+                "unfinished.swing-unreadable",
+                folder=printable(str(folder)),
+                reason=strerror(error),
+            )
+            damaged.append(DamagedSwing(folder, unreadable))
+        except FileError as error:
+            damaged.append(DamagedSwing(folder, error.message))
+    return InterruptedSwings(
+        _newest_first(interrupted), _newest_first(under_way), tuple(damaged)
+    )
+
+
+def discard_swing(folder: Path) -> None:
+    """Conclude an interrupted swing without a verdict; its images are kept.
+
+    Raises
+    ------
+    FileError
+        The record cannot be read or written.
+    """
+    with RecordWriter.resume(open_record(folder)) as writer:
+        writer.conclude(DISCARDED)
+
+
+def discard_damaged(folder: Path) -> None:
+    """Conclude a swing that cannot be read, without a verdict; its files are kept.
+
+    Nothing but the verdict is added, so that whoever restores the damaged file has the
+    swing as it was.
+
+    Raises
+    ------
+    FileError
+        The record cannot be written.
+    """
+    with RecordWriter.of_damaged(folder) as writer:
+        writer.conclude(DISCARDED)
+
+
+def _read_unfinished(folder: Path) -> Record | None:
+    """Return the record in a folder if it has images and no verdict, else None."""
+    journal = folder / JOURNAL
+    try:
+        if last_verdict(folder) is not None:
+            return None
+        has_lines = journal.stat().st_size > 0
+    except (FileNotFoundError, NotADirectoryError):
+        has_lines = False
+    n_images = sum(1 for _ in (folder / IMAGES).glob("*.png"))
+    if n_images == 0 and not has_lines:
+        return None
+    for name in (HEADER, JOURNAL):
+        if not (folder / name).exists():
+            raise FileError(
+                "unfinished.file-missing", folder=printable(str(folder)), name=name
+            )
+    record = open_record(folder)
+    # A crash leaves no more than one image without a line.
+    if not record.images and n_images > 1:
+        raise FileError(
+            "unfinished.unknown-images",
+            journal=printable(str(journal)),
+            n_images=n_images,
+        )
+    return record if record.images and record.verdict is None else None
+
+
+def _newest_first(records: list[Record]) -> tuple[Record, ...]:
+    records.sort(key=lambda record: record.header.created.timestamp(), reverse=True)
+    return tuple(records)

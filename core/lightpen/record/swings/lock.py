@@ -1,0 +1,70 @@
+"""One program at a time writes to a record.
+
+The lock is one of the operating system on the open journal: it goes when the process
+ends, however it ends, and there is no file of its own that could be left behind. It
+keeps writers from each other; reading needs no lock and is never kept out. A disk of
+the network that knows no locks is written to as if nobody else did.
+"""
+
+from pathlib import Path
+from typing import IO
+
+from lightpen.errors import FileError
+from lightpen.formats.file_locks import NO_LOCKS, locked, unlock
+from lightpen.formats.files import printable
+
+PATIENCE = 0.5  # s for one who only looks, or is about to close, to let go
+
+
+def lock_journal(journal: IO[bytes], folder: Path) -> None:
+    """Keep other writers out until the journal is unlocked, or the process ends.
+
+    Parameters
+    ----------
+    journal : file
+        Open to be written.
+    folder : Path
+        Of its record, for the sentence.
+
+    Raises
+    ------
+    FileError
+        Another program writes to the record.
+    OSError
+        The disk fails.
+    """
+    if not _is_taken_over(journal.fileno(), shared=False):
+        raise FileError("record.locked", folder=printable(str(folder)))
+
+
+def unlock_journal(journal: IO[bytes]) -> None:
+    """Let other writers in."""
+    try:
+        unlock(journal.fileno())
+    except OSError as error:
+        if error.errno not in NO_LOCKS:
+            raise
+
+
+def is_locked(path: Path) -> bool:
+    """Return whether anybody writes to the record of a journal.
+
+    Raises
+    ------
+    OSError
+        The journal cannot be read.
+    """
+    with path.open("rb") as journal:
+        if not _is_taken_over(journal.fileno(), shared=True):
+            return True
+        unlock_journal(journal)
+    return False
+
+
+def _is_taken_over(descriptor: int, shared: bool) -> bool:
+    try:
+        return locked(descriptor, shared=shared, patience_s=PATIENCE)
+    except OSError as error:
+        if error.errno in NO_LOCKS:
+            return True
+        raise

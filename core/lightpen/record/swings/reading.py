@@ -1,0 +1,322 @@
+"""A swing on disk, image by image, so that a crash loses at most the image in flight.
+
+A record is a folder:
+
+==================== ===================================================================
+``header.json``      who, where, with what; written last when the record is made, so
+                     that a folder without it is no record
+``camera.*``         copy of the camera file, byte by byte
+``camera-2.*``       and of those of the other cameras of a rig
+``rig.*``            copy of the rig file, where there is one
+``pen.*``            copy of the pen file
+``images/*.png``     the kept images, lossless, numbered from 1
+``images-2/*.png``   those of the same moments by the second camera
+``journal.jsonl``    what happened, see `lightpen.record.swings.journal`
+``swing.lightpen``   opens the swing in the program; holds nothing that is needed
+==================== ===================================================================
+
+The images of the touches of a verification are kept in such a record, too; each then
+says of which touch it is.
+
+`lightpen.record.swings.writing` puts an image on the disk before its line, and its line
+before it acknowledges the image; `lightpen.record.swings.lock` keeps a second program
+from writing meanwhile. An image without a line is what a crash leaves: it was not
+acknowledged and is passed over. Header, lines and images each have their checksum.
+Everything needed to calibrate again is in the images and the two files; the centres in
+the journal spare reading the images when an interrupted swing goes on.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.cameras.protocol import Stats
+from lightpen.formats.files import FOLDER, unreadable
+from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
+from lightpen.record.swings.header import (
+    HEADER,
+    Header,
+    header_copies,
+    limits_in,
+    number_in,
+    read_header,
+)
+from lightpen.record.swings.journal import (
+    JOURNAL,
+    ExcludedLine,
+    ImageLine,
+    Line,
+    MoreLine,
+    OutLine,
+    SecondaryImage,
+    VerdictLine,
+    damaged_line,
+    length_of,
+    parse_lines,
+    read_lines,
+)
+from lightpen.record.swings.names import Names
+
+IMAGES = "images"
+OPENER = "swing.lightpen"  # by its suffix the system knows the program
+DISCARDED = "discarded"
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedImage:
+    """An acknowledged image.
+
+    Attributes
+    ----------
+    time : float
+        s, by the clock of the session that took it.
+    device_time_ns : int or None
+        By the clock of the camera.
+    pixels : (L, 2) array
+        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+    rotation, translation : (3, 3) and (3,) array
+        cam_from_pen, mm.
+    stats : Stats
+        What became of the camera's images since the swing began.
+    others : tuple of SecondaryImage
+        Of the other cameras of a rig at this moment.
+    touch : int
+        Of a verification that it belongs to, from 1; 0 of a swing.
+    """
+
+    number: int
+    file: Path
+    sha256: str
+    time: float
+    device_time_ns: int | None
+    pixels: FloatArray
+    rotation: FloatArray
+    translation: FloatArray
+    stats: Stats = field(default_factory=Stats)
+    others: tuple[SecondaryImage, ...] = ()
+    touch: int = 0
+
+    @property
+    def rig_pixels(self) -> FloatArray:
+        """Centres by all cameras, (C, L, 2), px; NaN where an LED was not seen."""
+        return np.stack([self.pixels, *(_points(each.pixels) for each in self.others)])
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A swing as it is on disk.
+
+    Attributes
+    ----------
+    images : tuple of RecordedImage
+        All that were acknowledged, in the order of capture.
+    taken_out : mapping of int to str
+        Numbers of images that do not take part, and why.
+    verdict : str or None
+        The last one; None if the swing was interrupted.
+    more : pair of int or None
+        Least and greatest number of images that were asked for after a verdict.
+    length : int
+        Of what was read of the journal, bytes.
+    """
+
+    folder: Path
+    header: Header
+    images: tuple[RecordedImage, ...]
+    taken_out: Mapping[int, str]
+    verdict: str | None
+    more: tuple[int, int] | None
+    length: int
+
+    @property
+    def used_images(self) -> tuple[RecordedImage, ...]:
+        """The images that take part."""
+        return tuple(i for i in self.images if i.number not in self.taken_out)
+
+    @property
+    def all_numbers(self) -> IntArray:
+        """Numbers of all images."""
+        return np.array([i.number for i in self.images], dtype=np.int64)
+
+    @property
+    def numbers(self) -> IntArray:
+        """Numbers of the images that take part, (N,)."""
+        return np.array([i.number for i in self.used_images], dtype=np.int64)
+
+    @property
+    def stats(self) -> Stats:
+        """What became of the camera's images up to the last one that was kept."""
+        return self.images[-1].stats if self.images else Stats()
+
+    @property
+    def next_number(self) -> int:
+        """Number that the next image gets."""
+        return self.images[-1].number + 1 if self.images else 1
+
+
+def open_record(folder: Path) -> Record:
+    """Open a record, also one whose writer was killed.
+
+    Raises
+    ------
+    FileError
+        The folder is no record, or its files are damaged other than by a crash, or
+        written by a later version of the program.
+    """
+    header = read_header(folder)
+    lines = read_lines(folder)
+    parsed = parse_lines(lines, folder)
+    last = 0
+    for number, line in enumerate(parsed, start=1):
+        if isinstance(line, ImageLine):
+            others = (len(other.pixels) for other in line.others)
+            n_seen = [len(line.pixels), *others]
+            is_whole = n_seen == header.n_cameras * [_n_leds(parsed)]
+            if line.number <= last or not is_whole:
+                raise damaged_line(folder, number)
+            last = line.number
+    return _record(folder, header, parsed, length_of(lines))
+
+
+def _n_leds(lines: Sequence[Line]) -> int:
+    """Return how many LEDs the first image tells of."""
+    return next(len(line.pixels) for line in lines if isinstance(line, ImageLine))
+
+
+def _record(folder: Path, header: Header, lines: Sequence[Line], length: int) -> Record:
+    """Return what a record comes to, line by line."""
+    images: list[RecordedImage] = []
+    taken_out: dict[int, str] = {}
+    verdict, more = None, None
+    for line in lines:
+        match line:
+            case ImageLine():
+                images.append(_recorded_image(folder, line))
+                verdict = None
+            case OutLine():
+                taken_out.update(dict.fromkeys(line.numbers, line.reason))
+            case ExcludedLine():
+                taken_out = {n: why for why, ns in line.reasons.items() for n in ns}
+            case VerdictLine():
+                verdict = line.verdict
+            case MoreLine():
+                more = line.min_images, line.max_images
+    return Record(folder, header, tuple(images), taken_out, verdict, more, length)
+
+
+def record_files(record: Record) -> tuple[Path, ...]:
+    """Return all files that a record of a swing consists of."""
+    header = record.header
+    names = (HEADER, JOURNAL, OPENER, *header_copies(header))
+    images = (
+        record.folder / image_name(image.number, c)
+        for image in record.images
+        for c in range(header.n_cameras)
+    )
+    return (*(record.folder / name for name in names), *images)
+
+
+def is_record(folder: Path) -> bool:
+    """Return whether a folder is a record.
+
+    Raises
+    ------
+    FileError
+        The folder may not be looked into.
+    """
+    try:
+        return (folder / HEADER).is_file() and (folder / JOURNAL).is_file()
+    except OSError as error:
+        raise unreadable(folder, FOLDER, error) from error
+
+
+def missing_parts(folder: Path) -> tuple[str, ...]:
+    """Return what a folder lacks that looks like a record; nothing of any other."""
+    parts = (HEADER, JOURNAL, IMAGES)
+    missing = tuple(name for name in parts if not (folder / name).exists())
+    return missing if len(missing) < len(parts) else ()
+
+
+def unacknowledged_images(record: Record) -> tuple[str, ...]:
+    """Return the images in the folder of a record that its journal does not name.
+
+    A crash, or a journal that was cut, leaves them; they take no part.
+
+    Returns
+    -------
+    tuple of str
+        Files, from the folder of the record, in their order.
+    """
+    cameras = range(record.header.n_cameras)
+    known = {image_name(image.number, c) for image in record.images for c in cameras}
+    found = (
+        f"{images_folder(c)}/{path.name}"
+        for c in cameras
+        for path in (record.folder / images_folder(c)).glob("*.png")
+    )
+    return tuple(sorted(set(found) - known))
+
+
+def images_folder(c: int) -> str:
+    """Return the folder of the images of the c-th camera, from that of its record."""
+    return IMAGES if c == 0 else f"{IMAGES}-{c + 1}"
+
+
+def image_name(number: int, c: int = 0) -> str:
+    """Return the file of an image of the c-th camera, from the folder of its record."""
+    return f"{images_folder(c)}/{number:06d}.png"
+
+
+def _recorded_image(folder: Path, line: ImageLine) -> RecordedImage:
+    return RecordedImage(
+        number=line.number,
+        file=folder / image_name(line.number),
+        sha256=line.sha256,
+        time=line.time,
+        device_time_ns=line.device_time_ns,
+        pixels=_points(line.pixels),
+        rotation=np.array(line.rotation, dtype=np.float64),
+        translation=np.array(line.translation, dtype=np.float64),
+        stats=line.camera or Stats(),
+        others=line.others,
+        touch=line.touch,
+    )
+
+
+def _points(pixels: Sequence[tuple[float, float] | None]) -> FloatArray:
+    """Return LED centres (L, 2), px; NaN where an LED was not seen."""
+    points = [(np.nan, np.nan) if p is None else p for p in pixels]
+    return np.array(points, dtype=np.float64).reshape(-1, 2)
+
+
+def recorded_names(record: Record) -> Names:
+    """Return who calibrated what in a record."""
+    header = record.header
+    return Names(
+        station=header.station,
+        operator=header.operator,
+        pen=str(header.settings.get("pen", "")),
+        tip=header.tip,
+        cone=header.cone,
+        ball_diameter=number_in(header.settings, "ball_diameter_mm", 0.0) or None,
+    )
+
+
+def recorded_origin(record: Record) -> Origin | None:
+    """Return what the images of a record are of; None if it does not say."""
+    said = record.header.settings.get("origin")
+    return Origin(said) if said in set(Origin) else None
+
+
+def is_of_recording(record: Record) -> bool:
+    """Return whether the images of a record were recorded before its swing."""
+    return record.header.settings.get("source") == Origin.RECORDED
+
+
+def recorded_limits(record: Record) -> SwingLimits:
+    """Return what a record's swing needed, and when it was to end."""
+    return limits_in(record.header.settings)

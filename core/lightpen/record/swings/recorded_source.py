@@ -1,0 +1,135 @@
+"""What a calibration is computed from, as a record keeps it."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.errors import FileError
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.decoding import IMAGE_FILE, MAX_FILE_SIZE, decode_image
+from lightpen.formats.files import read_bytes
+from lightpen.formats.images import ImageSource
+from lightpen.formats.pen_files import read_pen
+from lightpen.formats.rig_files import read_rig
+from lightpen.model.assumptions import USUAL, Assumptions
+from lightpen.model.camera import Camera
+from lightpen.model.origin import Origin
+from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig
+from lightpen.record.swings.assumed import recorded_assumptions
+from lightpen.record.swings.header import (
+    CAMERA_STEM,
+    PEN_STEM,
+    RIG_STEM,
+    camera_stem,
+    copy_name,
+)
+from lightpen.record.swings.reading import Record, image_name, recorded_origin
+
+
+@dataclass(frozen=True, eq=False)
+class RecordSource:
+    """What a calibration is computed from.
+
+    Attributes
+    ----------
+    folder : Path
+        Of the record.
+    images : ImageSource
+        All images, in the order of capture; a damaged one raises `FileError` when
+        loaded.
+    rig : Rig or None
+        Of several cameras.
+    other_images : tuple of ImageSource
+        Of the other cameras of a rig, of the same moments.
+    masks : tuple of (M, 3) array
+        Circles of stray light before each camera: centre x, y and radius, px.
+    assumptions : Assumptions
+        What stands in for what the files do not state.
+    origin : Origin or None
+        What the images are of; None where the record does not say.
+    units, led_diameter
+        As of `Header`.
+    """
+
+    folder: Path
+    images: ImageSource
+    camera: Camera
+    pen: Pen
+    masks: tuple[FloatArray, ...]
+    camera_files: tuple[Path, ...]
+    pen_file: Path
+    assumptions: Assumptions = USUAL
+    origin: Origin | None = None
+    units: str | None = None
+    led_diameter: float | None = None
+    rig: Rig | None = None
+    rig_file: Path | None = None
+    other_images: tuple[ImageSource, ...] = ()
+
+
+def source(record: Record) -> RecordSource:
+    """Return what the calibration of a record is computed from, now as ever.
+
+    Raises
+    ------
+    FileError
+        The copy of the camera or pen file cannot be read.
+    """
+    header = record.header
+    camera_file = record.folder / copy_name(CAMERA_STEM, header.camera_file)
+    pen_file = record.folder / copy_name(PEN_STEM, header.pen_file)
+
+    rig_file, rig = None, None
+    camera_files: tuple[Path, ...] = (camera_file,)
+    if header.rig is not None:
+        rig_file = record.folder / copy_name(RIG_STEM, header.rig.rig_file)
+        camera_files += tuple(
+            record.folder / copy_name(camera_stem(c), file)
+            for c, file in enumerate(header.rig.camera_files, start=1)
+        )
+        rig = read_rig(rig_file, camera_files).rig
+    images = [_images_of(record, c) for c in range(len(camera_files))]
+    return RecordSource(
+        folder=record.folder,
+        images=images[0],
+        camera=read_camera(camera_file) if rig is None else rig.cameras[0],
+        pen=read_pen(
+            pen_file, header.units, header.led_diameter_mm, header.nominal_tip
+        ),
+        masks=header.masks,
+        camera_files=camera_files,
+        pen_file=pen_file,
+        assumptions=recorded_assumptions(header.settings),
+        origin=recorded_origin(record),
+        units=header.units,
+        led_diameter=header.led_diameter_mm,
+        rig=rig,
+        rig_file=rig_file,
+        other_images=tuple(images[1:]),
+    )
+
+
+def _images_of(record: Record, c: int) -> ImageSource:
+    """Return the images of the c-th camera."""
+    files = tuple(record.folder / image_name(i.number, c) for i in record.images)
+    hashes = [
+        image.sha256 if c == 0 else image.others[c - 1].sha256
+        for image in record.images
+    ]
+
+    def loaders() -> Iterator[Callable[[], Image]]:
+        for file, digest in zip(files, hashes, strict=True):
+            yield partial(_load, file, digest)
+
+    return ImageSource(tuple(file.name for file in files), files, loaders)
+
+
+def _load(file: Path, digest: str) -> Image:
+    data = read_bytes(file, IMAGE_FILE, MAX_FILE_SIZE)
+    if sha256(data).hexdigest() != digest:
+        raise FileError("record.image-changed", name=file.name)
+    return decode_image(data, file.name)

@@ -1,0 +1,367 @@
+"""Writing the record of a swing, as `lightpen.record.swings.reading` describes it."""
+
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from datetime import datetime
+from hashlib import sha256
+from io import FileIO
+from itertools import chain, count
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.cameras.protocol import Stats
+from lightpen.errors import FileError
+from lightpen.formats.decoding import encode_png
+from lightpen.formats.files import printable, sync_folder, why_unwritten, write_whole
+from lightpen.formats.part_files import sweep_parts
+from lightpen.record.swings.header import HEADER, Header, header_bytes, header_copies
+from lightpen.record.swings.journal import (
+    JOURNAL,
+    ExcludedLine,
+    ImageLine,
+    Line,
+    MoreLine,
+    OutLine,
+    SecondaryImage,
+    VerdictLine,
+    line_bytes,
+    sound_length,
+)
+from lightpen.record.swings.lock import lock_journal, unlock_journal
+from lightpen.record.swings.names import Names, folder_name
+from lightpen.record.swings.reading import (
+    OPENER,
+    Record,
+    image_name,
+    images_folder,
+    open_record,
+)
+
+OPENER_TEXT = b"Open this file to see the swing of this folder in Lightpen.\n"
+
+
+@dataclass(frozen=True, eq=False)
+class SecondaryView:
+    """What another camera of a rig saw at the moment of an image.
+
+    Attributes
+    ----------
+    image : (H, W) array
+        Grey image, 8 or 16 bit.
+    pixels : (L, 2) array
+        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+    device_time_ns : int or None
+        By the clock of the camera.
+    """
+
+    image: Image
+    pixels: FloatArray
+    device_time_ns: int | None
+
+
+class RecordWriter:
+    """Appends to a record; every method returns when its data is on the disk.
+
+    No other writer can be made of the record, by this program or another, until it is
+    closed.
+    """
+
+    def __init__(self, folder: Path, next_number: int, length: int) -> None:
+        self._folder = folder
+        self._next_number = next_number
+        self._length = length
+        self._journal = _own_journal(folder, length)
+
+    @classmethod
+    def create(cls, folder: Path, header: Header, *, is_swing: bool = True) -> Self:
+        """Make a record in a folder that does not exist or is empty.
+
+        Parameters
+        ----------
+        is_swing : bool
+            Whether the system is to open it with the program; touches are no swing.
+
+        Raises
+        ------
+        FileError
+            The folder holds something, or cannot be written.
+        """
+        if folder.is_dir() and any(folder.iterdir()):
+            raise FileError("record.not-empty", folder=printable(str(folder)))
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / JOURNAL).touch(exist_ok=False)
+        except OSError as error:
+            raise _unwritable(folder, error) from error
+        with ExitStack() as stack:
+            writer = cls(folder, 1, 0)  # locked from here on
+            stack.callback(writer.close)
+            copies = header_copies(header)
+            try:
+                for c in range(header.n_cameras):
+                    (folder / images_folder(c)).mkdir()
+            except OSError as error:
+                raise _unwritable(folder, error) from error
+            for name, copy in copies.items():
+                if not copy.data:  # of a header that was read
+                    raise ValueError(f"The content of {name} is missing.")
+                write_whole(folder / name, copy.data)
+            write_whole(folder / HEADER, header_bytes(header))
+            if is_swing:
+                write_whole(folder / OPENER, OPENER_TEXT)
+            _sync_folder(folder)
+            _sync_folder(folder.parent)
+            stack.pop_all()
+        return writer
+
+    @classmethod
+    def resume(cls, record: Record) -> Self:
+        """Go on with a record; what a crash left behind is written over.
+
+        Raises
+        ------
+        FileError
+            Another program writes to the record or did so since it was read, or it
+            cannot be written.
+        """
+        writer = cls(record.folder, record.next_number, record.length)
+        for c in range(record.header.n_cameras):
+            sweep_parts(record.folder / images_folder(c))
+        return writer
+
+    @classmethod
+    def of_damaged(cls, folder: Path) -> Self:
+        """Write into the journal of a record that cannot be read, to conclude it.
+
+        Raises
+        ------
+        FileError
+            Another program writes to the record, or it cannot be written.
+        """
+        length = sound_length(folder) if (folder / JOURNAL).exists() else 0
+        return cls(folder, 1, length)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def next_number(self) -> int:
+        """Number that the next image gets."""
+        return self._next_number
+
+    def append(
+        self,
+        image: Image,
+        pixels: FloatArray,
+        rotation: FloatArray,
+        translation: FloatArray,
+        time: float,
+        device_time_ns: int | None = None,
+        stats: Stats | None = None,
+        others: Sequence[SecondaryView] = (),
+        touch: int = 0,
+    ) -> int:
+        """Record one image, or those of a moment.
+
+        Parameters
+        ----------
+        image : (H, W) array
+            Grey image, 8 or 16 bit.
+        pixels : (L, 2) array
+            Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+        rotation, translation : (3, 3) and (3,) array
+            cam_from_pen, mm.
+        time : float
+            s.
+        device_time_ns : int, optional
+            By the clock of the camera.
+        stats : Stats, optional
+            What became of the camera's images since the swing began.
+        others : sequence of SecondaryView, optional
+            Of the other cameras of a rig, in their order.
+        touch : int
+            Of a verification that it belongs to, from 1.
+
+        Returns
+        -------
+        int
+            Number of the image: the acknowledgement that it is on the disk.
+
+        Raises
+        ------
+        FileError
+            The image could not be written. All images before it are safe.
+        """
+        number = self._next_number
+        digest = self._write_image(image, number, 0)
+        other_images = tuple(
+            SecondaryImage(
+                self._write_image(other.image, number, c),
+                other.device_time_ns,
+                tuple(map(_point, other.pixels)),
+            )
+            for c, other in enumerate(others, start=1)
+        )
+        self._write_line(
+            ImageLine(
+                number=number,
+                sha256=digest,
+                time=time,
+                device_time_ns=device_time_ns,
+                pixels=tuple(map(_point, pixels)),
+                rotation=rotation.tolist(),
+                translation=translation.tolist(),
+                camera=stats,
+                others=other_images,
+                touch=touch,
+            )
+        )
+        self._next_number = number + 1
+        return number
+
+    def _write_image(self, image: Image, number: int, c: int) -> str:
+        """Put an image of the c-th camera on the disk, and return its checksum."""
+        data = encode_png(image)
+        path = self._folder / image_name(number, c)
+        write_whole(path, data)
+        _sync_folder(path.parent)
+        return sha256(data).hexdigest()
+
+    def take_out(self, numbers: Sequence[int], reason: str) -> None:
+        """Leave images out of the calibration; they stay on the disk."""
+        self._write_line(OutLine(tuple(numbers), str(reason)))
+
+    def set_taken_out(self, taken_out: Mapping[int, str]) -> None:
+        """Leave these images out of the calibration, for a reason each, and no others.
+
+        It is one line, so that a kill leaves all of an edit or nothing.
+        """
+        reasons: dict[str, tuple[int, ...]] = {}
+        for number, reason in sorted(taken_out.items()):
+            reasons[reason] = (*reasons.get(reason, ()), number)
+        self._write_line(ExcludedLine(reasons))
+
+    def ask_for_more(self, min_images: int, max_images: int) -> None:
+        """Note that the swing goes on after a verdict, and to how many images."""
+        self._write_line(MoreLine(min_images, max_images))
+
+    def conclude(self, verdict: str) -> None:
+        """Write the verdict: the swing is no longer interrupted."""
+        self._write_line(VerdictLine(str(verdict)))
+
+    def close(self) -> None:
+        """Close the journal and let other writers in."""
+        if self._journal.closed:
+            return
+        with self._journal, suppress(OSError):  # closing does it, too
+            unlock_journal(self._journal)
+
+    def _write_line(self, entries: Line) -> None:
+        line = line_bytes(entries)
+        length = len(line)
+        try:
+            # What a crash or a write that failed left of a line.
+            self._journal.truncate(self._length)
+            while line:
+                line = line[self._journal.write(line) :]
+            os.fsync(self._journal.fileno())
+        except OSError as error:
+            with suppress(OSError):
+                self._journal.truncate(self._length)
+            raise _unwritable(self._folder / JOURNAL, error) from error
+        self._length += length
+
+
+def make_record_folder(root: Path, names: Names, now: datetime) -> Path:
+    """Make a folder for a record, with a name that none had.
+
+    Of two programs that do so in the same second each gets its own.
+
+    Parameters
+    ----------
+    root : Path
+        That the records are in.
+
+    Raises
+    ------
+    FileError
+        No folder can be made there.
+    """
+    name = folder_name(names, now)
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        for tail in chain([""], map("-{}".format, count(2))):
+            with suppress(FileExistsError):
+                (folder := root / (name + tail)).mkdir()
+                break
+    except OSError as error:
+        raise _unwritable(root, error) from error
+    return folder
+
+
+def note_taken_out(folder: Path, taken_out: Mapping[int, str]) -> None:
+    """Note which images of a record take part from now on.
+
+    Parameters
+    ----------
+    taken_out : mapping of int to str
+        Numbers of all images that do not, and why.
+
+    Raises
+    ------
+    FileError
+        The record cannot be written.
+    """
+    record = open_record(folder)
+    with RecordWriter.resume(record) as writer:
+        if record.taken_out != taken_out:
+            writer.set_taken_out(taken_out)
+
+
+def _own_journal(folder: Path, length: int) -> FileIO:
+    """Open a journal of so many whole bytes for this writer alone."""
+    path = folder / JOURNAL
+    with ExitStack() as stack:
+        try:
+            journal = stack.enter_context(path.open("ab", buffering=0))
+            lock_journal(journal, folder)
+            if sound_length(folder) != length:
+                raise FileError(
+                    "record.changed-meanwhile", folder=printable(str(folder))
+                )
+        except OSError as error:
+            raise _unwritable(path, error) from error
+        stack.pop_all()
+    return journal
+
+
+def _point(point: FloatArray) -> tuple[float, float] | None:
+    return (float(point[0]), float(point[1])) if np.isfinite(point).all() else None
+
+
+def _unwritable(path: Path, error: OSError) -> FileError:
+    return FileError(
+        "record.unwritable", path=printable(str(path)), reason=why_unwritten(error)
+    )
+
+
+def _sync_folder(folder: Path) -> None:
+    """Put the names in a folder on the disk."""
+    try:
+        sync_folder(folder)
+    except OSError as error:
+        raise _unwritable(folder, error) from error

@@ -1,0 +1,1 @@
+"""Threads that own long procedures: serial queue, background tasks, faults."""

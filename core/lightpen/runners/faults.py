@@ -1,0 +1,63 @@
+"""What could not be done, told until its cause is gone."""
+
+import logging
+from enum import Enum
+from typing import Protocol
+
+from lightpen.errors import LightpenError
+from lightpen.messages import Message
+from lightpen.runners.serial_queue import Act
+
+_logger = logging.getLogger(__name__)
+
+
+class FaultListener(Protocol):
+    """Who is told; must return soon."""
+
+    def on_fault(self, message: Message) -> None:
+        """Take a sentence to be read: something could not be done."""
+
+    def on_fault_cleared(self, message: Message) -> None:
+        """Take the sentence of a trouble whose cause is gone."""
+
+
+class FaultReporter:
+    """Tells one trouble at a time, and when it is over.
+
+    A trouble that can end by itself has a cause, of whatever kinds its owner knows.
+    """
+
+    def __init__(self, listener: FaultListener) -> None:
+        self._listener = listener
+        self._told: Message | None = None
+        self._cause: Enum | None = None
+
+    @property
+    def is_any(self) -> bool:
+        """Whether one is told and not over."""
+        return self._told is not None
+
+    def trying(self, act: Act) -> None:
+        """Do something that may fail; then it is told, and all stays as it was."""
+        try:
+            act()
+        except LightpenError as error:
+            self.tell(error.message)
+
+    def tell(self, trouble: Message, cause: Enum | None = None) -> None:
+        """Tell a trouble in place of the one before."""
+        self._told, self._cause = trouble, cause
+        _logger.warning("fault raised: %s: %s", trouble.code, trouble)
+        self._listener.on_fault(trouble)
+
+    def end(self) -> None:
+        """Tell that the trouble is over, whatever it came of."""
+        told, self._told = self._told, None
+        if told is not None:
+            _logger.info("fault cleared: %s", told.code)
+            self._listener.on_fault_cleared(told)
+
+    def end_of(self, cause: Enum) -> None:
+        """Tell that the trouble is over, if it came of this."""
+        if self._cause is cause:
+            self.end()

@@ -1,0 +1,247 @@
+"""One thread that does what it is asked for in turn, and tasks that run beside it."""
+
+from collections.abc import Callable
+from functools import partial
+from queue import SimpleQueue
+from threading import Event, Thread
+from time import monotonic
+from typing import Protocol, TypeAlias, TypeVar
+
+from lightpen.errors import Cancelled, LightpenError
+from lightpen.messages import Message
+
+LONGEST_WAIT = 0.1  # s, after which nobody waits any more for a queue that ended
+
+T = TypeVar("T")
+Act: TypeAlias = Callable[[], None]
+Report: TypeAlias = Callable[[float], None]
+
+
+class SerialQueue:
+    """Does acts one after the other, in a thread of its own.
+
+    The thread outlives a bug: the act in which it happened is not completed, the crash
+    goes to `threading.excepthook`, and the next act is done.
+
+    Parameters
+    ----------
+    name : str
+        Of the thread.
+    on_bug : callable
+        Done next after an act that ended by a bug; not after a bug of its own.
+    """
+
+    def __init__(self, name: str, on_bug: Act) -> None:
+        self._name = name
+        self._on_bug = on_bug
+        self._acts: SimpleQueue[Act] = SimpleQueue()
+        self._ending = Event()
+        self._tasks: list[Task] = []
+        self._begin()
+
+    def ask(self, act: Act) -> None:
+        """Have something done, from any thread; nothing is done after `end`."""
+        self._acts.put(act)
+
+    def ask_and_wait(self, act: Act) -> None:
+        """Have something done, and return when it is, or when the queue has ended."""
+        is_done = Event()
+
+        def act_and_tell() -> None:
+            try:
+                act()
+            finally:
+                is_done.set()
+
+        self.ask(act_and_tell)
+        while not is_done.wait(LONGEST_WAIT) and not self._ending.is_set():
+            pass
+
+    def start(
+        self,
+        work: Callable[[Report], T],
+        then: Callable[[T], None],
+        otherwise: Callable[[Message], None],
+        on_bug: Act,
+        on_progress: Report = lambda fraction: None,
+    ) -> "Task":
+        """Compute something beside the queue; what comes of it is done in its turn.
+
+        Parameters
+        ----------
+        work : callable
+            Calls its argument now and then with the fraction done, 0 to 1; a cancelled
+            task ends there.
+        then : callable
+            Takes what ``work`` returned.
+        otherwise : callable
+            Takes why it could not be done.
+        on_bug : callable
+            Done if it ended by a bug.
+        on_progress : callable, optional
+            Takes the fraction done, on the thread of the task.
+        """
+        task = Task()
+
+        def report(fraction: float) -> None:
+            if task.is_cancelled:
+                raise Cancelled
+            on_progress(fraction)
+
+        def run() -> None:
+            outcome: Act = on_bug
+            try:
+                outcome = partial(then, work(report))
+            except Cancelled:
+                outcome = task.cancel
+            except LightpenError as error:
+                outcome = partial(otherwise, error.message)
+            finally:
+                self.ask(lambda: None if task.is_cancelled else outcome())
+
+        self._tasks = [each for each in self._tasks if each.is_running]
+        self._tasks.append(task)
+        task.run(run, f"{self._name} task")
+        return task
+
+    def end(self, last: Act = lambda: None) -> None:
+        """Do what was asked for so far and the last, and end.
+
+        Nothing comes between that and the end. Running tasks are cancelled.
+        """
+        self.ask(partial(self._end, last))
+
+    def await_end(self, timeout_s: float) -> bool:
+        """Wait until the thread and all tasks have ended; return whether they have."""
+        deadline = monotonic() + timeout_s
+        if not self._ending.wait(timeout_s):  # until then a bug may change the thread
+            return False
+        self._thread.join(max(0.0, deadline - monotonic()))
+        for task in self._tasks:
+            task.join(max(0.0, deadline - monotonic()))
+        is_running = any(task.is_running for task in self._tasks)
+        return not (self._thread.is_alive() or is_running)
+
+    def _begin(self, *, after_bug: bool = False) -> None:
+        self._thread = Thread(
+            target=self._run, args=(after_bug,), name=self._name, daemon=True
+        )
+        self._thread.start()
+
+    def _run(self, after_bug: bool) -> None:
+        act = self._on_bug if after_bug else self._acts.get()
+        try:
+            while True:
+                act()
+                if self._ending.is_set():
+                    return
+                act = self._acts.get()
+        finally:
+            if not self._ending.is_set():
+                self._begin(after_bug=act is not self._on_bug)
+
+    def _end(self, last: Act) -> None:
+        try:
+            last()
+        finally:
+            self._ending.set()
+            for task in self._tasks:
+                task.cancel()
+
+
+class Task:
+    """A computation beside a `SerialQueue`, which starts it."""
+
+    def __init__(self) -> None:
+        self._cancelled = Event()
+        self._thread: Thread | None = None
+
+    def run(self, function: Act, name: str) -> None:
+        """Run in a thread of its own; once only."""
+        self._thread = Thread(target=function, name=name, daemon=True)
+        self._thread.start()
+
+    def cancel(self) -> None:
+        """Stop at the next report; nothing of it is done any more."""
+        self._cancelled.set()
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether its outcome is not wanted any more."""
+        return self._cancelled.is_set()
+
+    @property
+    def is_running(self) -> bool:
+        """Whether its thread has not ended."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def join(self, timeout_s: float) -> None:
+        """Wait for its end."""
+        if self._thread is not None:
+            self._thread.join(timeout_s)
+
+
+class StartThread(Protocol):
+    """Has something computed elsewhere; see `SerialQueue.start`."""
+
+    def __call__(
+        self,
+        work: Callable[[Report], T],
+        then: Callable[[T], None],
+        otherwise: Callable[[Message], None],
+        on_bug: Act,
+        on_progress: Report,
+    ) -> Task:
+        """Return the task; one of the three callables is called in its turn."""
+
+
+class BackgroundTask:
+    """At most one computation beside a queue; its owner is told what came of it.
+
+    Parameters
+    ----------
+    start : StartThread
+        Of the queue.
+    on_bug : callable
+        Done when the computation ended by a bug; it is then still there.
+    on_progress : callable
+        Takes the fraction done, 0 to 1, on the thread of the computation.
+    """
+
+    def __init__(self, start: StartThread, on_bug: Act, on_progress: Report) -> None:
+        self._start = start
+        self._on_bug = on_bug
+        self._on_progress = on_progress
+        self._task: Task | None = None
+
+    @property
+    def is_there(self) -> bool:
+        """Whether something is computed whose outcome is awaited."""
+        return self._task is not None
+
+    def begin(
+        self,
+        work: Callable[[Report], T],
+        then: Callable[[T], None],
+        otherwise: Callable[[Message], None],
+    ) -> None:
+        """Have something computed, as `SerialQueue.start` has it.
+
+        When the outcome is told, it is there no more.
+        """
+
+        def succeed(outcome: T) -> None:
+            self._task = None
+            then(outcome)
+
+        def fail(why: Message) -> None:
+            self._task = None
+            otherwise(why)
+
+        self._task = self._start(work, succeed, fail, self._on_bug, self._on_progress)
+
+    def drop(self) -> None:
+        """Cancel what is computed; its outcome is not told any more."""
+        task, self._task = self._task, None
+        if task is not None:
+            task.cancel()

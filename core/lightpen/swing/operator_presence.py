@@ -1,0 +1,68 @@
+"""Presence of the operator: automatic begin, pause and resumption of swings."""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+from lightpen.messages import Message
+from lightpen.swing.preparation import Preparation
+
+
+@dataclass(frozen=True, eq=False)
+class OperatorPresence:
+    """Presence of the operator, and the choices for the next swing.
+
+    Until the operator has come or left, a swing begins and pauses by commands.
+
+    Attributes
+    ----------
+    is_here : bool
+        Whether the operator waits for a swing, which begins when nothing is missing.
+    is_away : bool
+        Whether the operator has left: the capture is paused meanwhile.
+    paused_by_leaving : bool
+        Whether it is paused for that reason alone, and resumes by itself.
+    choices : Preparation or None
+        Present choices.
+    begun_with : Preparation or None
+        Choices when the swing began, or confirmed since.
+    refusal : Message or None
+        Why no swing could begin; none is tried until it is None.
+    """
+
+    is_here: bool = False
+    is_away: bool = False
+    paused_by_leaving: bool = False
+    choices: Preparation | None = None
+    begun_with: Preparation | None = None
+    refusal: Message | None = None
+
+    @property
+    def is_due(self) -> bool:
+        """Whether a swing is to begin with the next image."""
+        is_wanted = self.is_here and self.refusal is None
+        return (
+            is_wanted and self.choices is not None and not self.choices.missing_inputs()
+        )
+
+    @property
+    def has_other_choices(self) -> bool:
+        """Whether the choices differ from those of the present swing."""
+        if self.choices is None or self.begun_with is None:
+            return False
+        return not self.begun_with.swings_like(self.choices)
+
+    def come(self) -> Self:
+        """Return it with the operator present and refusals cleared."""
+        return replace(
+            self, is_here=True, is_away=False, paused_by_leaving=False, refusal=None
+        )
+
+    def left(self) -> Self:
+        """Return it with the operator absent."""
+        return replace(self, is_here=False, is_away=True)
+
+    def begun(self) -> Self:
+        """Return it with a swing begun with the present choices."""
+        return replace(
+            self, begun_with=self.choices, paused_by_leaving=False, refusal=None
+        )

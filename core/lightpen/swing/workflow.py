@@ -1,0 +1,631 @@
+"""The workflow of a swing: effects of commands, images and solutions on its status.
+
+Nothing here knows threads: the owner makes all calls in turn, and runs long
+computations elsewhere.
+"""
+
+import logging
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+from typing import TypeVar
+
+from lightpen.archive.lazy_logbook import LazyLogbook
+from lightpen.cameras.protocol import Frame, Stats
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.reasons import Reason
+from lightpen.errors import AcceptanceError, LightpenError
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.messages import Message, message
+from lightpen.record.library.supervision import Signature
+from lightpen.record.results.acceptance import accept
+from lightpen.record.results.assessment import SwingAssessment, assess
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.interrupted import discard_swing
+from lightpen.record.swings.reading import (
+    Record,
+    open_record,
+    recorded_names,
+    recorded_origin,
+)
+from lightpen.record.swings.solving import Solution, solve_again, solve_record
+from lightpen.record.swings.writing import (
+    RecordWriter,
+    make_record_folder,
+    note_taken_out,
+)
+from lightpen.runners.faults import FaultReporter
+from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread, Task
+from lightpen.swing.operator_presence import OperatorPresence
+from lightpen.swing.preparation import Preparation
+from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
+from lightpen.swing.rig_sighting import seen_by_rig
+from lightpen.swing.rules import (
+    Transition,
+    advance_swing,
+    conclude,
+    finish,
+    has_enough,
+    pause,
+    resume,
+    stillness,
+)
+from lightpen.swing.state import (
+    Phase,
+    SwingEvent,
+    SwingEventKind,
+    SwingSetup,
+    SwingState,
+)
+from lightpen.swing.status import Activity, SwingListener, SwingStatus
+from lightpen.swing.swing_recorder import SwingRecorder
+from lightpen.swing_messages import no_tip
+
+T = TypeVar("T")
+
+_logger = logging.getLogger(__name__)
+
+
+class SwingWorkflow:
+    """One swing after another, from the first image to acceptance.
+
+    A command that is not possible in the present state is ignored.
+
+    Parameters
+    ----------
+    records : Path
+        Folder that a new swing's record is made in.
+    archive : FolderArchive
+        Of the accepted results.
+    now : callable
+        Returns date and time with the time zone.
+    logbook : LazyLogbook or None
+        For the outcome of swings; without one, it is in the files alone.
+    """
+
+    def __init__(
+        self,
+        records: Path,
+        archive: FolderArchive,
+        listener: SwingListener,
+        now: Callable[[], datetime],
+        start: StartThread,
+        logbook: LazyLogbook | None,
+    ) -> None:
+        self._records = records
+        self._archive = archive
+        self._listener = listener
+        self._now = now
+        self._faults = FaultReporter(listener)
+        self._entries = _LogbookEntries(logbook, start, self._faults.tell)
+        self._status = SwingStatus()
+        self._presence = OperatorPresence()
+        self._recorder: SwingRecorder | None = None
+        self._record: Record | None = None  # as it was when it was entered
+        self._wanted: Mapping[int, str] = {}  # images that are to be taken out
+        self._tried: Mapping[int, str] = {}  # of them, those being computed without
+        self._task = BackgroundTask(start, self.cancel, listener.on_progress)
+        self._stopped_at: SwingStatus | None = None  # by a bug
+
+    @property
+    def status(self) -> SwingStatus:
+        """The status as published last."""
+        return self._status
+
+    def recover(self) -> None:
+        """Pause after an internal error, with the swing as it was.
+
+        Images are ignored until the status changes: all of them may cause it.
+        """
+        if not self._task.is_there:  # it may have ended by this bug
+            self._status = replace(self._status, activity=Activity.NONE)
+        try:
+            self.pause()
+            self._republish()
+            self._faults.tell(message("swing.bug"))
+        finally:
+            self._stopped_at = self._status
+
+    def _publish(self, status: SwingStatus, *events: SwingEvent) -> None:
+        """Set the status and notify."""
+        is_open = status.is_capturing or _is_judged(status)
+        has_others = is_open and self._presence.has_other_choices
+        before = self._status
+        self._status = replace(
+            status, refusal=self._presence.refusal, has_other_choices=has_others
+        )
+        _log_change(before, self._status, events)
+        self._listener.on_swing(self._status, events)
+
+    def _republish(self) -> None:
+        self._publish(self._status)
+
+    def go_on(self, swing: Resumable) -> None:
+        """Resume a swing that was read back, or report why it cannot be."""
+        self._faults.trying(lambda: self._enter(swing))
+
+    # Presence of the operator
+
+    def choose(self, preparation: Preparation) -> None:
+        """Set the choices for the next swing; another source ends this one."""
+        before = self._presence.choices
+        self._presence = replace(self._presence, choices=preparation)
+        is_other = before is not None and before.sources != preparation.sources
+        if is_other and self._status.is_capturing:
+            self.abandon()
+        self._republish()
+
+    def keep_choices(self) -> None:
+        """Continue with the choices that the swing began with."""
+        presence = self._presence
+        self._presence = replace(presence, begun_with=presence.choices)
+        self._republish()
+
+    def come(self) -> None:
+        """Begin with the next image, or resume a swing that was paused by leaving."""
+        was_paused = self._presence.paused_by_leaving
+        self._presence = self._presence.come()
+        if self._status.result is not None:  # nothing more belongs to that swing
+            self.abandon()
+        if was_paused:
+            self._change(lambda state: Transition(resume(state)))
+        self._republish()
+
+    def leave(self) -> None:
+        """Begin no swing, and pause the capture."""
+        self._presence = self._presence.left()
+        self._hold_back()
+
+    def _hold_back(self) -> None:
+        """Pause a swing without an operator."""
+        status = self._status
+        goes_on = status.is_capturing and not status.is_paused_by_user
+        if goes_on and self._presence.is_away:
+            self._presence = replace(self._presence, paused_by_leaving=True)
+            self._change(lambda state: Transition(pause(state)))
+
+    def try_again(self) -> None:
+        """Forget why no swing could begin."""
+        self._presence = replace(self._presence, refusal=None)
+        self._republish()
+
+    # Capture
+
+    def begin(self, preparation: Preparation) -> None:
+        """Begin a new swing, or report why it cannot begin."""
+        try:
+            folder = make_record_folder(self._records, preparation.names, self._now())
+            RecordWriter.create(folder, preparation.header()).close()
+            self._enter(read_resumable(folder))  # so with the files as recorded
+        except LightpenError as error:
+            self._presence = replace(self._presence, refusal=error.message)
+            self._faults.tell(error.message)
+            self._republish()
+
+    def _enter(self, swing: Resumable) -> None:
+        """Enter a new swing, or resume an old one, as read from the disk."""
+        status, record = self._status, swing.record
+        if status.is_capturing and record.folder == status.record_folder:
+            return  # it goes on already
+        names = recorded_names(record)
+        recorder = SwingRecorder(record)
+        self._task.drop()
+        self._close_record()
+        self._recorder, self._record = recorder, record
+        if record.folder != status.record_folder:
+            self._presence = self._presence.begun()
+        self._faults.end()
+        self._publish(
+            SwingStatus(
+                setup=swing.setup,
+                state=swing.state,
+                record_folder=record.folder,
+                names=names,
+                origin=recorded_origin(record),
+            )
+        )
+        self._hold_back()
+        if not swing.setup.is_recording and has_enough(swing.setup, swing.state):
+            self.finish()  # it was interrupted after its last image
+
+    def take(
+        self,
+        frame: Frame,
+        detection: PenDetection | None,
+        setup: SwingSetup | None,
+        n_images: int | None,
+        stats: Stats | None,
+    ) -> None:
+        """Process an image; see `SwingRunner.take`."""
+        status, choices = self._status, self._presence.choices
+        if status is self._stopped_at:
+            return
+        if detection is not None and setup is not None:
+            detection = seen_by_rig(setup.rig, setup.pen, detection)
+        if status.state is None:
+            if self._presence.is_due and choices is not None:
+                self.begin(choices)
+        elif detection is None:
+            pass
+        elif status.state.phase is Phase.VERDICT:
+            if status.setup is not None and not status.setup.is_recording:
+                self._watch(status.state, detection, frame)
+        elif status.is_capturing and setup is status.setup:
+            self._capture(status.state, detection, frame, n_images, stats)
+
+    def _capture(
+        self,
+        before: SwingState,
+        detection: PenDetection,
+        frame: Frame,
+        n_images: int | None,
+        stats: Stats | None,
+    ) -> None:
+        setup, recorder = self._status.setup, self._recorder
+        assert setup is not None
+        assert recorder is not None
+        try:
+            transition = recorder.capture(
+                setup, before, frame, detection, n_images, stats
+            )
+        except LightpenError as error:
+            self._become(Transition(pause(before)), has_fault=True)
+            self._faults.tell(error.message)
+            return
+        if transition is None:
+            return
+        if any(event.what is SwingEventKind.KEPT for event in transition.events):
+            self._faults.end()
+        self._become(transition)
+
+    def _watch(self, before: SwingState, detection: PenDetection, frame: Frame) -> None:
+        """Watch for the confirmation: the pen held upright and still."""
+        setup = self._status.setup
+        assert setup is not None
+        state = advance_swing(setup, before, detection, frame.host_ts_ns * 1e-9).state
+        says_yes = stillness(state) == 1.0 and stillness(before) < 1.0
+        events = (SwingEvent(SwingEventKind.CONFIRMED),) if says_yes else ()
+        self._publish(replace(self._status, state=state), *events)
+
+    def pause(self) -> None:
+        """Pause for the user."""
+        self._presence = replace(self._presence, paused_by_leaving=False)
+        self._change(lambda state: Transition(pause(state)))
+
+    def resume(self) -> None:
+        """Resume after a pause by the user."""
+        self._presence = replace(self._presence, paused_by_leaving=False)
+        self._change(lambda state: Transition(resume(state)))
+
+    def _change(self, act: Callable[[SwingState], Transition]) -> None:
+        """Apply a command to a swing that is being captured."""
+        status = self._status
+        if status.is_capturing and status.state is not None:
+            self._become(act(status.state))
+
+    def _become(self, transition: Transition, *, has_fault: bool = False) -> None:
+        state = transition.state
+        ends = state.phase is Phase.SOLVING
+        status = replace(self._status, state=state)
+        if ends:
+            self._close_record()
+            status = replace(status, activity=Activity.SOLVING)
+        has_fault = has_fault or (status.has_fault and status.is_paused_by_user)
+        self._publish(replace(status, has_fault=has_fault), *transition.events)
+        if ends:
+            self.solve()
+
+    def abandon(self) -> None:
+        """Leave the swing as it is on the disk."""
+        self._task.drop()
+        self._close_record()
+        self._publish(SwingStatus(setup=self._status.setup))
+
+    def set_aside(self) -> None:
+        """Discard the swing, or report why that cannot be recorded."""
+        self._faults.trying(self._discard)
+
+    def _discard(self) -> None:
+        status = self._status
+        if status.record_folder is None or status.result is not None:
+            return
+        if self._recorder is None:
+            discard_swing(status.record_folder)
+        else:
+            self._recorder.discard()
+        self.abandon()
+        self._faults.trying(lambda: self._entries.enter_set_aside(status, self._now()))
+
+    def start_over(self) -> None:
+        """Discard the swing, unless it is accepted, and begin a new one."""
+        if self._status.result is None:
+            self.set_aside()
+        else:
+            self.abandon()
+        self.try_again()
+
+    def capture_more(self) -> None:
+        """Read the images of a swing that has its verdict, and capture more."""
+        status = self._status
+        folder, state = status.record_folder, status.state
+        if folder is None or state is None or status.result is not None:
+            return
+        if state.phase is not Phase.VERDICT or status.is_reading:
+            return
+        if status.setup is None or status.setup.is_recording:
+            return
+        self.cancel()
+        self._start(
+            Activity.READING,
+            lambda _: read_for_more(folder),
+            self._on_read,
+            self._on_unread,
+        )
+
+    def _on_read(self, swing: Resumable) -> None:
+        try:
+            self._enter(swing)
+        except LightpenError as error:
+            self._on_unread(error.message)
+
+    def _on_unread(self, why: Message) -> None:
+        self._faults.tell(why)
+        self._publish(replace(self._status, activity=Activity.NONE))
+
+    def _close_record(self) -> None:
+        recorder, self._recorder = self._recorder, None
+        if recorder is not None:
+            recorder.close()
+
+    # Solution
+
+    def solve(self) -> None:
+        """Start computing the tip."""
+        status, folder = self._status, self._status.record_folder
+        if folder is None or self._task.is_there:
+            return
+        if not status.is_capturing and status.result is None:
+            self._compute(lambda report: solve_record(open_record(folder), report))
+
+    def finish(self) -> None:
+        """End the capture with the present images."""
+        self._change(finish)
+
+    def take_out(self, numbers: Iterable[int]) -> None:
+        """Exclude images and compute the tip again."""
+        self._want({**self._wanted, **dict.fromkeys(numbers, str(Reason.TAKEN_OUT))})
+
+    def put_back(self, numbers: Iterable[int]) -> None:
+        """Include images again and compute the tip again."""
+        back = set(numbers)
+        self._want({n: why for n, why in self._wanted.items() if n not in back})
+
+    def _want(self, taken_out: Mapping[int, str]) -> None:
+        """Solve without these images, now or after the present computation."""
+        status = self._status
+        if status.solution is None or status.result is not None or status.is_reading:
+            return
+        self._wanted = taken_out
+        if not self._task.is_there:
+            self._solve_again(status.solution)
+
+    def _solve_again(self, solution: Solution) -> None:
+        wanted = self._wanted
+        self._compute(lambda _: solve_again(solution, wanted))
+
+    def _compute(self, work: Callable[[Report], Solution]) -> None:
+        archive, record = self._archive, self._record
+        assert record is not None
+
+        def solved(report: Report) -> _Solved:
+            solution = work(report)
+            return _Solved(solution, assess(archive, record, solution))
+
+        self._tried = self._wanted
+        self._start(Activity.SOLVING, solved, self._on_solved, self._on_unsolved)
+
+    def _start(
+        self,
+        activity: Activity,
+        work: Callable[[Report], T],
+        then: Callable[[T], None],
+        otherwise: Callable[[Message], None],
+    ) -> None:
+        self._task.begin(work, then, otherwise)
+        self._publish(replace(self._status, activity=activity))
+
+    def cancel(self) -> None:
+        """Stop computing and reading."""
+        if not self._task.is_there:
+            return
+        self._task.drop()
+        if self._status.solution is not None:
+            self._wanted = self._status.solution.taken_out
+        self._publish(replace(self._status, activity=Activity.NONE))
+
+    def _on_solved(self, solved: "_Solved") -> None:
+        solution = solved.solution
+        status = self._status
+        before, folder, state = status.solution, status.record_folder, status.state
+        assert folder is not None
+        assert state is not None
+        if before is None:
+            self._wanted = solution.taken_out
+        elif before.taken_out != solution.taken_out:
+            try:
+                note_taken_out(folder, solution.taken_out)
+            except LightpenError as error:
+                self._keep_solution(before, error.message)
+                return
+        self._faults.end()
+        verdict = solved.assessment.verdict
+        goes_on = self._wanted != solution.taken_out
+        activity = Activity.SOLVING if goes_on else Activity.NONE
+        status = replace(
+            status,
+            solution=solution,
+            assessment=solved.assessment,
+            result=None,
+            activity=activity,
+        )
+        self._conclude(status, verdict.reason, verdict.grade is not Grade.REPEAT)
+        if goes_on:
+            self._solve_again(solution)
+
+    def _on_unsolved(self, why: Message) -> None:
+        solution = self._status.solution
+        if solution is None:
+            status = replace(self._status, activity=Activity.NONE)
+            self._conclude(status, no_tip(why), passed=False)
+            return
+        if set(self._tried) > set(solution.taken_out):
+            why = message("swing.images-stay-in", why=why)
+        self._keep_solution(solution, why)
+
+    def _keep_solution(self, solution: Solution, why: Message) -> None:
+        """Keep the solution and its images, and report why."""
+        if self._wanted != self._tried:  # the user went on meanwhile
+            self._solve_again(solution)
+            return
+        self._wanted = solution.taken_out
+        self._faults.tell(why)
+        self._publish(replace(self._status, activity=Activity.NONE))
+
+    def _conclude(self, status: SwingStatus, reason: Message, passed: bool) -> None:
+        assert status.state is not None
+        is_first = status.state.phase is not Phase.VERDICT
+        transition = conclude(status.state, reason, passed)
+        status = replace(status, state=transition.state)
+        self._publish(status, *(transition.events if is_first else ()))
+
+    def accept(self, reason: str, signature: Signature | None = None) -> None:
+        """Accept the tip, or report why it cannot be."""
+        self._faults.trying(lambda: self._store(reason, signature))
+
+    def _store(self, reason: str, signature: Signature | None) -> None:
+        status, solution = self._status, self._status.solution
+        if solution is None or self._task.is_there or status.result is not None:
+            return
+        self._publish(replace(status, activity=Activity.ACCEPTING))
+        try:
+            now = self._now()
+            result = accept(self._archive, solution, now, reason, signature)
+            status = replace(status, result=result)
+            self._faults.end()
+            self._faults.trying(self._entries.enter_owed)
+        except AcceptanceError:  # something else has come into force meanwhile
+            record = open_record(solution.source.folder)
+            assessment = assess(self._archive, record, solution)
+            status = replace(status, assessment=assessment)
+            raise
+        finally:
+            self._publish(status)
+
+    def revoke(self, result: Result, operator: str) -> None:
+        """Revoke a result in favour of the one before, or report why not."""
+        self._faults.trying(lambda: self._withdraw(result, operator))
+
+    def _withdraw(self, result: Result, operator: str) -> None:
+        self._archive.revoke(result, operator, self._now())
+        status, own = self._status, self._status.result
+        if own is not None and own.record == result.record:
+            status = replace(status, result=None)
+        self._faults.trying(self._entries.enter_owed)
+        self._publish(replace(status, revoked=result))
+
+    def open_logbook(self) -> None:
+        """Enter what is in the files only, in the background."""
+        self._entries.catch_up()
+
+    def shut_down(self) -> None:
+        """Leave the swing as it is on the disk, and close the archive."""
+        self.abandon()
+        self._entries.stop()
+        self._faults.trying(self._entries.close)
+
+
+def _log_change(
+    before: SwingStatus, now: SwingStatus, events: tuple[SwingEvent, ...]
+) -> None:
+    for event in events:
+        _logger.debug("event: %s %s", event.what, event.numbers or "")
+    if now.record_folder != before.record_folder and now.record_folder is not None:
+        _logger.info("swing started or continued: %s", now.record_folder)
+    elif now.record_folder is None and before.record_folder is not None:
+        _logger.info("swing left: %s", before.record_folder)
+    phases = [status.state and status.state.phase for status in (before, now)]
+    if phases[0] is not phases[1]:
+        _logger.info("phase: %s", phases[1])
+    if now.assessment is not None and now.assessment is not before.assessment:
+        verdict = now.assessment.verdict
+        _logger.info("verdict: %s: %s", verdict.grade, verdict.reason)
+    result = now.result
+    if result is not None and result is not before.result:
+        _logger.info("accepted: tip %s, reason %r", result.names.tip, result.reason)
+
+
+def _is_judged(status: SwingStatus) -> bool:
+    """Tell whether a swing has its verdict, but is not accepted."""
+    state = status.state
+    is_accepted = status.result is not None
+    return state is not None and state.phase is Phase.VERDICT and not is_accepted
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """A solution and its assessment."""
+
+    solution: Solution
+    assessment: SwingAssessment
+
+
+class _LogbookEntries:
+    """Enters the outcome of swings in the logbook, where there is one."""
+
+    def __init__(
+        self,
+        logbook: LazyLogbook | None,
+        start: StartThread,
+        tell_fault: Callable[[Message], None],
+    ) -> None:
+        self._logbook = logbook
+        self._start = start
+        self._tell_fault = tell_fault
+        self._catching_up: Task | None = None
+
+    def catch_up(self) -> None:
+        """Enter what is in the files only, in the background."""
+        if self._logbook is not None:
+            self._catching_up = self._start(
+                self._logbook.enter_owed,
+                self._on_caught_up,
+                self._tell_fault,
+                lambda: None,
+                lambda fraction: None,
+            )
+
+    def _on_caught_up(self, faults: tuple[Message, ...]) -> None:
+        for trouble in faults:
+            self._tell_fault(trouble)
+
+    def enter_owed(self) -> None:
+        """Enter what is in the files only."""
+        if self._logbook is not None:
+            self._logbook.enter_owed()
+
+    def enter_set_aside(self, swing: SwingStatus, now: datetime) -> None:
+        """Enter a discarded swing."""
+        if self._logbook is not None:
+            self._logbook.enter_set_aside(swing.solution, swing.assessment, now)
+
+    def stop(self) -> None:
+        """Stop catching up."""
+        if self._catching_up is not None:
+            self._catching_up.cancel()
+
+    def close(self) -> None:
+        """Close the logbook."""
+        if self._logbook is not None:
+            self._logbook.close()

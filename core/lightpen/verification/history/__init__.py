@@ -1,0 +1,1 @@
+"""Results over time: trend of a tip, health of a pen, improved LED files."""

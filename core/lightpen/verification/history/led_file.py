@@ -1,0 +1,249 @@
+"""A better LED file from several swings of one pen.
+
+Each swing measures camera, disc diameter, scale and LEDs by the information of its
+images, ``N_k x = b_k``, with its own tip, cone, seat and drift eliminated. The sum over
+the swings, with what the files state counted once, gives them together [1]_. A swing
+that took no part has to confirm it: its images must fit the new LEDs, held as they are,
+better than the old ones.
+
+References
+----------
+.. [1] B. Triggs et al., "Bundle adjustment - a modern synthesis", LNCS 1883 (2000)
+   298-372, section 6.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.detection.observations import observe_centers
+from lightpen.errors import CalibrationError, UsageError
+from lightpen.estimation.bundle.bundle import Bundle
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.contact.camera_motion import steadied
+from lightpen.estimation.contact.joint import JointFit, fit_joint
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.formats.files import printable
+from lightpen.formats.observation_files import Centers
+from lightpen.model.camera import Camera
+from lightpen.model.information import inverse
+from lightpen.model.pen import Pen
+from lightpen.model.quantiles import normal_quantile
+from lightpen.record.calibrations.calibrations import CalibrationFile, shown_images
+from lightpen.verification.history.pen_health import MOVED, examine_pen, require_one_pen
+from lightpen.verification.tasks.length import Scale
+
+MIN_POOLED = 3  # swings, beside the one held out
+CONFIRMED = 0.01  # chance that such a gain is none
+FINEST = 1e-4  # mm, to which no LED file is known beforehand
+
+
+@dataclass(frozen=True, eq=False)
+class ImprovedPen:
+    """A pen whose LEDs several swings have put right.
+
+    Attributes
+    ----------
+    pen : Pen
+        With the covariance of its LEDs.
+    moves : (L, 3) array
+        New less old places of the LEDs, mm.
+    pooled : tuple of str
+        Names of the swings.
+    held_out : str
+        Name of the swing that confirms it.
+    sigma_before, sigma_after : float
+        Residuals of that swing with the old and the new LEDs, px.
+    """
+
+    pen: Pen
+    moves: FloatArray
+    pooled: tuple[str, ...]
+    held_out: str
+    sigma_before: float
+    sigma_after: float
+
+
+def calibrate_again(
+    calibration: CalibrationFile, camera: Camera, pen: Pen
+) -> Calibration:
+    """Calibrate from the LED centres that a calibration keeps.
+
+    Raises
+    ------
+    UsageError
+        They are of several cameras.
+    CalibrationError
+        They do not determine the tip.
+    """
+    if calibration.is_of_rig:
+        raise UsageError("led-file.of-rig", path=printable(str(calibration.path)))
+    shown = shown_images(calibration.calibration)
+    numbers = np.arange(1, len(shown.pixels) + 1)
+    centers = Centers(numbers, shown.pixels, calibration.path)
+    measured = replace(
+        observe_centers(centers, camera, pen),
+        areas=shown.areas,
+        edge_widths=shown.edge_widths,
+        lamps=shown.lamps,
+    )
+    return calibrate(camera, pen, measured, calibration.calibration.assumptions)
+
+
+def improve_pen(
+    calibrations: Sequence[CalibrationFile],
+    camera: Camera,
+    pen: Pen,
+    scale: Scale | None = None,
+    report: Callable[[float], None] = lambda fraction: None,
+) -> ImprovedPen:
+    """Improve the LEDs of a pen by several swings; the last one has to confirm it.
+
+    Parameters
+    ----------
+    scale : Scale, optional
+        Of the pen by certified lengths.
+    report : callable, optional
+        Called with the fraction done, 0 to 1; what it raises ends the work.
+
+    Raises
+    ------
+    UsageError
+        The swings are of different pens.
+    CalibrationError
+        There are too few, an LED moved between them, or the last one does not confirm
+        the new LEDs.
+    """
+    require_one_pen(calibrations)
+    if len(calibrations) < MIN_POOLED + 1:
+        raise CalibrationError(
+            "led-file.too-few", n_swings=len(calibrations), needed=MIN_POOLED
+        )
+    _require_unchanged(calibrations, pen)
+    *pooled, held_out = calibrations
+    again = []
+    for n, calibration in enumerate(calibrations, start=1):
+        again.append(calibrate_again(calibration, camera, pen))
+        report(n / len(calibrations))
+    improved, confirming = _pooled(again[:-1], pen, scale), again[-1]
+    before, after = (_fit_held(confirming, each) for each in (pen, improved))
+    if not _is_better(before, after):
+        raise CalibrationError(
+            "led-file.not-confirmed",
+            swing=held_out.path.name,
+            before=before.sigma,
+            after=after.sigma,
+        )
+    return ImprovedPen(
+        pen=improved,
+        moves=improved.leds - pen.leds,
+        pooled=tuple(each.path.name for each in pooled),
+        held_out=held_out.path.name,
+        sigma_before=before.sigma,
+        sigma_after=after.sigma,
+    )
+
+
+def _require_unchanged(calibrations: Sequence[CalibrationFile], pen: Pen) -> None:
+    """Refuse swings of before and after an LED moved: no one file is of both."""
+    health = examine_pen(calibrations, None, pen.leds)
+    if not health.moved:
+        return
+    led = health.moved[0]
+    distances = [
+        float(np.nan_to_num(np.linalg.norm(swing.shifts[led - 1])))
+        for swing in health.swings
+    ]
+    raise CalibrationError(
+        "led-file.changed-meanwhile",
+        led=led,
+        distance=max(distances),
+        first=health.swings[0].name,
+        swing=health.swings[int(np.argmax(np.array(distances) > MOVED))].name,
+    )
+
+
+def _pooled(calibrations: Sequence[Calibration], pen: Pen, scale: Scale | None) -> Pen:
+    first = calibrations[0].bundle
+    at = first.layout
+    shared = (*at.cameras, at.extrinsics, at.diameter, at.scale, at.leds)
+    common = np.r_[shared].astype(np.int64)
+    information = first.prior_information[np.ix_(common, common)].copy()
+    leds = np.flatnonzero(np.isin(common, np.r_[at.leds]))
+    information[np.ix_(leds, leds)] = 0.0
+    typical = float(np.median([each.led_sigma for each in calibrations]))
+    known = pen.led_sigma or max(typical, FINEST)
+    information[leds, leds] = 1 / known**2
+    right = np.zeros(len(common))
+    for calibration in calibrations:
+        own, own_right = _of_images(calibration.bundle, common)
+        information += own
+        right += own_right
+    at_scale = int(np.flatnonzero(common == at.scale.start)[0])
+    if scale is not None:
+        # What the length added to what was known of the scale before it.
+        before, after = scale.uncertainty_before, scale.uncertainty
+        added = COVERAGE_FACTOR**2 * (1 / after**2 - 1 / before**2)
+        information[at_scale, at_scale] += added
+        right[at_scale] += (scale.factor - 1) * COVERAGE_FACTOR**2 / after**2
+    covariance = inverse(information)
+    values = covariance @ right
+    unknowns = first.unknowns
+    moves = unknowns.basis @ values[leds] + unknowns.scaling * values[at_scale]
+    led_covariance = unknowns.basis @ covariance[np.ix_(leds, leds)] @ unknowns.basis.T
+    at_diameter = int(np.flatnonzero(common == at.diameter.start)[0])
+    return replace(
+        pen,
+        leds=pen.leds + moves.reshape(-1, 3),
+        diameter=pen.diameter + float(values[at_diameter]),
+        led_sigma=float(np.sqrt(np.trace(led_covariance) / len(led_covariance))),
+        led_covariance=led_covariance,
+        scale_sigma=float(np.sqrt(covariance[at_scale, at_scale])),
+        diameter_sigma=float(np.sqrt(covariance[at_diameter, at_diameter])),
+    )
+
+
+def _of_images(bundle: Bundle, common: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return information and right side of what swings share, by one of them."""
+    both = bundle.information + bundle.prior_information
+    right = both @ bundle.values
+    own = np.setdiff1d(np.arange(len(both)), common)
+    cross = bundle.information[np.ix_(common, own)]
+    gain = np.linalg.solve(both[np.ix_(own, own)], cross.T).T
+    information = bundle.information[np.ix_(common, common)] - gain @ cross.T
+    return 0.5 * (information + information.T), right[common] - gain @ right[own]
+
+
+def _fit_held(calibration: Calibration, pen: Pen) -> JointFit:
+    """Fit tip and cone of a swing with LEDs held as they are."""
+    joint, camera = calibration.joint, calibration.instrument.camera
+    path = calibration.cameras[0].path
+    seen = steadied(camera, calibration.observations, path)
+    return fit_joint(
+        camera,
+        pen,
+        seen.pixels[calibration.used],
+        joint.rotations[joint.used.any(axis=1)],
+        joint.tip_pen,
+        joint.cone_cam,
+    )
+
+
+def _is_better(before: JointFit, after: JointFit) -> bool:
+    """Return whether the images of a swing fit better by more than chance.
+
+    Both fits are of the same images: their difference, image by image, has far less
+    scatter than either.
+    """
+    both = before.used & after.used
+    squares = [
+        np.sum(np.where(both[..., None], fit.residuals, 0.0) ** 2, axis=(1, 2))
+        for fit in (before, after)
+    ]
+    gains = squares[0] - squares[1]
+    return bool(
+        gains.mean()
+        > normal_quantile(CONFIRMED) * gains.std(ddof=1) / np.sqrt(len(gains))
+    )

@@ -1,0 +1,210 @@
+"""The LEDs of a pen over its swings: whether one was knocked, or all grew together.
+
+Each calibration gives the displacement of each LED from its place in the file, except
+a move of the whole pen and, with one camera, its scale. What changed from the first
+swing on is stated by LED after the best move and scale of all are removed.
+
+The scale shows elsewhere. With a pen that grew by e since its LEDs were measured all
+distances come out smaller by e: a cone that stayed where it was seems to come nearer
+along its line of sight, ``w / f`` smaller, at the same place in the image.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError, UsageError
+from lightpen.formats.files import printable
+from lightpen.messages import Message, message
+from lightpen.model.camera import Camera
+from lightpen.model.rigid import skew
+from lightpen.record.calibrations.calibrations import CalibrationFile
+from lightpen.verification.tasks.assessment import (
+    VerificationAssessment,
+    accepted,
+    check,
+    refused,
+)
+
+MIN_SWINGS = 2
+MOVED = 0.02  # mm, from which on an LED has moved
+STANDS_OUT = 5.0  # times the median change of all LEDs
+GROWN = 6e-5  # relative; two swings with 0.03 px of noise differ by up to half of it
+SAME_PLACE = 0.5  # px, in which a cone stays that did not move
+ALUMINIUM = 23e-6  # relative growth per K
+ROUNDS = 20
+MEASURE_AGAIN = message("pen-health.measure-again")
+MEASURE_LENGTH = message("pen-health.measure-length")
+KEEP_FILE = message("pen-health.keep-file")
+
+
+@dataclass(frozen=True, eq=False)
+class SwingOfPen:
+    """The state of a pen by one swing, relative to the first.
+
+    Attributes
+    ----------
+    name : str
+    shifts : (L, 3) array
+        Of the LEDs since the first swing, pen frame, mm; NaN where not seen.
+    growth : float or None
+        Of the pen since the first swing, relative; None where the cone or the camera
+        moved in between.
+    """
+
+    name: str
+    shifts: FloatArray
+    growth: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class PenHealth:
+    """A pen over its swings.
+
+    Attributes
+    ----------
+    moved : tuple of int
+        Numbers of the LEDs that moved, from 1.
+    growth : float or None
+        Largest change of the pen's size, relative; None where it is not determined.
+    """
+
+    swings: tuple[SwingOfPen, ...]
+    moved: tuple[int, ...]
+    growth: float | None
+    assessment: VerificationAssessment
+
+
+def examine_pen(
+    calibrations: Sequence[CalibrationFile], camera: Camera | None, leds: FloatArray
+) -> PenHealth:
+    """Examine a pen by its calibrations, the oldest first.
+
+    Parameters
+    ----------
+    camera : Camera or None
+        Of all of them, as its file has it; without it the growth is not determined.
+    leds : (L, 3) array
+        As the pen file has them, mm.
+
+    Raises
+    ------
+    UsageError
+        They are of different pens.
+    CalibrationError
+        There are fewer than two.
+    """
+    require_one_pen(calibrations)
+    if len(calibrations) < MIN_SWINGS:
+        raise CalibrationError("pen-health.too-few")
+    first = calibrations[0]
+    swings = [
+        SwingOfPen(
+            name=each.path.name,
+            shifts=_without_move(leds, each.displacements - first.displacements),
+            growth=None if camera is None else _growth(first, each, camera),
+        )
+        for each in calibrations
+    ]
+    lengths = np.array([np.linalg.norm(each.shifts, axis=1) for each in swings])
+    usual = np.nanmedian(lengths[1:], axis=1, keepdims=True)
+    stands_out = np.nan_to_num(lengths[1:]) > np.maximum(STANDS_OUT * usual, MOVED)
+    moved = tuple((np.flatnonzero(stands_out.any(axis=0)) + 1).tolist())
+    growths = [each.growth for each in swings[1:] if each.growth is not None]
+    growth = max(growths, key=abs) if growths else None
+    return PenHealth(
+        swings=tuple(swings),
+        moved=moved,
+        growth=growth,
+        assessment=_assessment(swings, moved, growth),
+    )
+
+
+def require_one_pen(calibrations: Sequence[CalibrationFile]) -> None:
+    """Refuse calibrations with different pen files.
+
+    Raises
+    ------
+    UsageError
+        Says which one differs from the first.
+    """
+    for each in calibrations[1:]:
+        if each.pen_sha256 != calibrations[0].pen_sha256:
+            raise UsageError(
+                "pen-health.another-pen",
+                other=printable(str(each.path)),
+                first=printable(str(calibrations[0].path)),
+            )
+
+
+def _without_move(leds: FloatArray, changes: FloatArray) -> FloatArray:
+    """Return changes (L, 3) less the move and scale of all that fits most of them."""
+    known = np.isfinite(changes).all(axis=1)
+    arms = leds - leds.mean(axis=0)
+    A = np.concatenate(
+        [np.tile(np.eye(3), (len(leds), 1, 1)), -skew(arms), arms[:, :, None]], axis=2
+    )[known]
+    b = changes[known]
+    weights = np.ones(len(b))
+    left = b
+    for _ in range(ROUNDS):  # iteratively reweighted: a knocked LED must not hold it
+        root = np.sqrt(weights)[:, None]
+        rows = (A * root[..., None]).reshape(-1, A.shape[2])
+        whole = np.linalg.lstsq(rows, (b * root).ravel())[0]
+        left = b - A @ whole
+        lengths = np.linalg.norm(left, axis=1)
+        width = max(2 * float(np.median(lengths)), 1e-6)
+        weights = 1 / (1 + (lengths / width) ** 2) ** 2
+    shifts = np.full_like(changes, np.nan)
+    shifts[known] = left
+    return shifts
+
+
+def _growth(
+    first: CalibrationFile, now: CalibrationFile, camera: Camera
+) -> float | None:
+    if now.camera_sha256 != first.camera_sha256:
+        return None
+    one, other = _cone_seen(first, camera), _cone_seen(now, camera)
+    if one is None or other is None:
+        return None
+    if np.linalg.norm(one[:2] - other[:2]) > SAME_PLACE:
+        return None
+    return float(np.log(one[2] / other[2]))
+
+
+def _cone_seen(calibration: CalibrationFile, camera: Camera) -> FloatArray | None:
+    """Return where the cone would be seen, px, and its depth over the focal length."""
+    fitted = np.array(calibration.calibration.instrument.intrinsics)
+    if len(fitted) != len(camera.intrinsics):
+        return None
+    seen_by = camera.with_intrinsics(fitted)
+    pixel = seen_by.project(calibration.cone_cam)
+    return np.append(pixel, calibration.cone_cam[2] / seen_by.fx)
+
+
+def _assessment(
+    swings: Sequence[SwingOfPen], moved: tuple[int, ...], growth: float | None
+) -> VerificationAssessment:
+    if moved:
+        lengths = np.array([np.linalg.norm(each.shifts, axis=1) for each in swings])
+        led = max(moved, key=lambda each: float(np.nanmax(lengths[:, each - 1])))
+        when = int(np.nanargmax(lengths[:, led - 1]))
+        return refused(
+            message(
+                "pen-health.led-moved",
+                led=led,
+                distance=float(lengths[when, led - 1]),
+                swing=swings[when].name,
+            ),
+            MEASURE_AGAIN,
+        )
+    if growth is not None and abs(growth) > GROWN:
+        return check(_grown(growth), MEASURE_LENGTH)
+    return accepted(message("pen-health.good", n_swings=len(swings)), KEEP_FILE)
+
+
+def _grown(growth: float) -> Message:
+    return message("pen-health.grown", growth=1e6 * growth, kelvin=growth / ALUMINIUM)

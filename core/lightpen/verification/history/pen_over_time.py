@@ -1,0 +1,153 @@
+"""A pen over its accepted swings, and a better LED file by them."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from itertools import count
+from pathlib import Path
+
+from lightpen.errors import FileError, UsageError
+from lightpen.formats.hashes import hashed
+from lightpen.formats.pen_files import write_pen
+from lightpen.model.camera import Camera
+from lightpen.model.origin import Origin
+from lightpen.model.pen import Pen
+from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.library.numbered_files import make_folder
+from lightpen.record.results.result_folder import SIMULATED, FolderArchive
+from lightpen.record.swings.names import Names, folder_name
+from lightpen.swing.preparation import Preparation
+from lightpen.verification.history.led_file import MIN_POOLED, ImprovedPen, improve_pen
+from lightpen.verification.history.pen_health import MIN_SWINGS, PenHealth, examine_pen
+from lightpen.verification.tasks.length import Scale
+
+LED_FILES = "led files"  # a folder of the data folder
+MOST = 20  # swings, the newest
+MOST_POOLED = 8  # more add little, and each is solved again
+
+Tell = Callable[[float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class PenOverTime:
+    """A pen over its accepted swings with the LED file that is chosen.
+
+    Attributes
+    ----------
+    swings : tuple of CalibrationFile
+        The oldest first.
+    n_left_out : int
+        Accepted swings of the pen with another LED file, or that cannot be read.
+    health : PenHealth or None
+        None of fewer than two swings.
+    """
+
+    names: Names
+    is_simulated: bool
+    pen: Pen
+    pen_file: Path
+    pen_sha256: str
+    camera: Camera | None
+    camera_sha256: str
+    swings: tuple[CalibrationFile, ...]
+    n_left_out: int
+    health: PenHealth | None
+
+    @property
+    def poolable(self) -> tuple[CalibrationFile, ...]:
+        """The newest swings that a better LED file can be made of, the oldest first."""
+        alike = [
+            swing
+            for swing in self.swings
+            if swing.camera_sha256 == self.camera_sha256 and not swing.is_of_rig
+        ]
+        return tuple(alike[-MOST_POOLED:])
+
+    @property
+    def n_missing(self) -> int:
+        """How many swings are missing before a better LED file can be made."""
+        return max(MIN_POOLED + 1 - len(self.poolable), 0)
+
+
+@dataclass(frozen=True, eq=False)
+class NewLedFile:
+    """A better LED file that was written, and what is in it."""
+
+    path: Path
+    improved: ImprovedPen
+
+
+def read_pen_over_time(
+    archive: FolderArchive, preparation: Preparation, report: Tell = lambda _: None
+) -> PenOverTime:
+    """Read the accepted swings of the pen that is chosen.
+
+    Raises
+    ------
+    FileError
+        The archive or the LED file cannot be read.
+    """
+    pen_file, camera_file = preparation.pen_file, preparation.camera_file
+    if pen_file is None:
+        raise ValueError("`pen_file` must be chosen.")
+    pen_sha256 = hashed(pen_file.path).sha256
+    camera_sha256 = "" if camera_file is None else hashed(camera_file.path).sha256
+    is_simulated = preparation.origin is Origin.SIMULATED
+    names = preparation.names
+    files = archive.files_of_pen(names.pen, is_simulated=is_simulated)[:MOST]
+    found: list[CalibrationFile] = []
+    for n, file in enumerate(files, start=1):
+        with suppress(FileError, UsageError):  # reported by whoever reads the archive
+            swing = read_calibration(file)
+            if swing.pen_sha256 == pen_sha256:
+                found.append(swing)
+        report(n / len(files))
+    swings = tuple(sorted(found, key=lambda swing: swing.when))
+    camera = None if camera_file is None else camera_file.camera
+    return PenOverTime(
+        names=names,
+        is_simulated=is_simulated,
+        pen=pen_file.pen,
+        pen_file=pen_file.path,
+        pen_sha256=pen_sha256,
+        camera=camera,
+        camera_sha256=camera_sha256,
+        swings=swings,
+        n_left_out=len(files) - len(swings),
+        health=(
+            examine_pen(swings, camera, pen_file.pen.leds)
+            if len(swings) >= MIN_SWINGS
+            else None
+        ),
+    )
+
+
+def improve_led_file(
+    data: Path,
+    pen: PenOverTime,
+    scale: Scale | None,
+    now: datetime,
+    report: Tell = lambda _: None,
+) -> NewLedFile:
+    """Write a better LED file beside the data; see `led_file.improve_pen`.
+
+    The old file stays, and no file is replaced.
+
+    Raises
+    ------
+    CalibrationError
+        There are too few swings, or the one held out does not confirm it.
+    FileError
+        It cannot be written.
+    """
+    if pen.camera is None:
+        raise ValueError("The camera of the swings must be chosen.")
+    improved = improve_pen(pen.poolable, pen.camera, pen.pen, scale, report)
+    folder = (data / SIMULATED if pen.is_simulated else data) / LED_FILES
+    make_folder(folder)
+    stem = folder_name(Names(pen=pen.names.pen), now)
+    names = (f"{stem}{'' if n == 1 else f'-{n}'}.json" for n in count(1))
+    path = next(folder / name for name in names if not (folder / name).exists())
+    write_pen(improved.pen, path, pen.pen_sha256)
+    return NewLedFile(path, improved)

@@ -1,0 +1,105 @@
+"""Verifications read back from their JSON, where something else builds on them."""
+
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import numpy as np
+from msgspec import Meta, Struct
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError
+from lightpen.formats.files import MEGABYTE, read_bytes
+from lightpen.formats.own_json import (
+    DamagedError,
+    Vector,
+    ZonedTime,
+    has_checksum,
+    parse_own_json,
+)
+from lightpen.messages import Message, message
+from lightpen.verification.tasks.fixed_point import MIN_TOUCHES
+from lightpen.verification.tasks.length import Scale
+from lightpen.verification.tasks.repeatability import RepeatedPoint
+
+FIXED_POINT = message("file.fixed-point")
+LENGTH = message("file.length")
+DRIFT = message("file.drift")
+LIMIT = 64 * MEGABYTE
+
+T = TypeVar("T")
+
+
+class _Scatter(Struct):
+    points_cam_mm: Annotated[list[Vector], Meta(min_length=MIN_TOUCHES)]
+
+
+class _FixedPoint(Struct):
+    created: ZonedTime
+    calibrated: _Scatter
+    expected_std_mm: Vector
+
+
+class _Scale(Struct):
+    factor: float
+    expanded_uncertainty: float
+    expanded_uncertainty_before: float
+
+
+class _Length(Struct):
+    scale: _Scale
+
+
+class _Drift(Struct):
+    standard_uncertainty_share_mm: Vector
+
+
+def read_fixed_point(path: Path) -> RepeatedPoint:
+    """Read a fixed point that was verified."""
+    return _touched(_read(path, _FixedPoint, FIXED_POINT))
+
+
+def fixed_point_in(record: str) -> RepeatedPoint | None:
+    """Return the fixed point that a record is of; None where it is of something else.
+
+    Parameters
+    ----------
+    record : str
+        Its JSON, which was checked before.
+    """
+    try:
+        return _touched(
+            parse_own_json(record.encode("utf-8", "surrogateescape"), _FixedPoint)
+        )
+    except DamagedError:
+        return None
+
+
+def _touched(found: _FixedPoint) -> RepeatedPoint:
+    return RepeatedPoint(
+        np.array(found.calibrated.points_cam_mm, dtype=np.float64),
+        np.array(found.expected_std_mm, dtype=np.float64),
+        found.created,
+    )
+
+
+def read_scale(path: Path) -> Scale:
+    """Read the scale that a verified length gives the pen."""
+    scale = _read(path, _Length, LENGTH).scale
+    return Scale(
+        scale.factor, scale.expanded_uncertainty, scale.expanded_uncertainty_before
+    )
+
+
+def read_drift(path: Path) -> FloatArray:
+    """Read the standard uncertainty that a drift is for what was touched meanwhile."""
+    found = _read(path, _Drift, DRIFT)
+    return np.array(found.standard_uncertainty_share_mm, dtype=np.float64)
+
+
+def _read(path: Path, shape: type[T], what: Message) -> T:
+    data = read_bytes(path, what, LIMIT)
+    try:
+        has_checksum(data)
+        return parse_own_json(data, shape)
+    except DamagedError as error:
+        raise FileError("verification.other-file", path=str(path), what=what) from error

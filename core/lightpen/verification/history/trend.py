@@ -1,0 +1,190 @@
+"""How a tip developed: its calibrations in their order, beside their limits."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.archive.chains import records_of
+from lightpen.archive.database import Database
+from lightpen.archive.entries import Kind, StoredEntry
+from lightpen.archive.history import TipState, lines
+from lightpen.archive.queries import EntryFilter, newest
+from lightpen.arrays import FloatArray
+from lightpen.estimation.reports.verdict import Change, change_since
+from lightpen.model.limits import VerificationLimits
+from lightpen.verification.history.recorded_tasks import fixed_point_in
+from lightpen.verification.tasks.fixed_point import FIXED_POINT
+from lightpen.verification.tasks.repeatability import (
+    MIN_TIPS,
+    ControlLimits,
+    Repeatability,
+    RepeatedPoint,
+    TipEstimate,
+    measure_repeatability,
+)
+
+LONGEST = 1000  # calibrations, the newest
+LATEST = 100  # verifications, among which a fixed point is looked for
+VERIFIED = "verified"  # among the settings of an entry: what was
+LIMIT = "max_uncertainty_mm"  # among the settings of an entry
+
+
+@dataclass(frozen=True, eq=False)
+class Trend:
+    """The calibrations of a tip that were accepted and not taken back.
+
+    One whose tip was put in force again stands for itself once.
+
+    Attributes
+    ----------
+    pen, tip : str
+        Empty where there is none.
+    entries : tuple of StoredEntry
+        The oldest first.
+    max_uncertainty : float or None
+        Limit of U (k = 2) at the newest, mm.
+    touched : RepeatedPoint or None
+        The fixed point that was touched last with the tip.
+    """
+
+    pen: str = ""
+    tip: str = ""
+    entries: tuple[StoredEntry, ...] = ()
+    tips: tuple[TipEstimate, ...] = ()
+    control: ControlLimits | None = None
+    max_uncertainty: float | None = None
+    touched: RepeatedPoint | None = None
+
+    def touched_with(self, entries: Sequence[StoredEntry]) -> RepeatedPoint | None:
+        """Return the fixed point if it was touched with the tip of all entries."""
+        is_of_tip = {*map(_subject, entries)} == {*map(_subject, self.entries)}
+        return self.touched if is_of_tip else None
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Two calibrations side by side.
+
+    Attributes
+    ----------
+    change : Change
+        From the earlier to the later.
+    is_same_tip : bool
+        Whether both are of the same pen and tip.
+    """
+
+    earlier: StoredEntry
+    later: StoredEntry
+    change: Change
+    is_same_tip: bool
+
+
+def trend_of(database: Database, wanted: EntryFilter) -> Trend:
+    """Return the trend of a pen and tip, of the newest calibrations if they are many.
+
+    Parameters
+    ----------
+    wanted : EntryFilter
+        With a pen and a tip; entries of all kinds but calibrations are left out.
+    """
+    accepted = replace(wanted, kinds=(Kind.ACCEPTED,))
+    found = lines(database, accepted, 0, LONGEST)
+    entries = tuple(
+        each.entry
+        for each in reversed(found)
+        if each.entry is not None
+        and has_tip(each.entry)
+        and each.state is not TipState.TAKEN_BACK
+    )
+    tips = tuple(map(tip_of, entries))
+    return Trend(
+        pen=wanted.pen,
+        tip=wanted.tip,
+        entries=entries,
+        tips=tips,
+        control=_control(tips),
+        max_uncertainty=_limit(entries[-1]) if entries else None,
+        touched=_last_touched(database, wanted),
+    )
+
+
+def _last_touched(database: Database, wanted: EntryFilter) -> RepeatedPoint | None:
+    """Return the fixed point that was touched last with a tip."""
+    tasks = newest(database, replace(wanted, kinds=(Kind.VERIFICATION,)), LATEST)
+    points = (
+        each
+        for each in tasks
+        if each.entry.event.settings.get(VERIFIED) == FIXED_POINT.kind
+    )
+    last = next(points, None)
+    if last is None:
+        return None
+    return next(map(fixed_point_in, records_of(database, [last]).values()), None)
+
+
+def has_tip(entry: StoredEntry) -> bool:
+    """Return whether an entry holds a tip with its uncertainty."""
+    event = entry.entry.event
+    return None not in (event.tip_pen_mm, event.expanded_uncertainty_mm)
+
+
+def tip_of(entry: StoredEntry) -> TipEstimate:
+    """Return the tip of an entry that holds one."""
+    event = entry.entry.event
+    return TipEstimate(
+        f"{entry.entry.number}",
+        np.array(event.tip_pen_mm, dtype=np.float64),
+        np.array(event.expanded_uncertainty_mm, dtype=np.float64),
+        event.at,
+    )
+
+
+def compare(one: StoredEntry, other: StoredEntry) -> Comparison:
+    """Compare two entries that hold tips, in any order."""
+    earlier, later = sorted((one, other), key=lambda each: each.entry.since)
+    now, then = tip_of(later), tip_of(earlier)
+    change = change_since(now.tip_pen, now.uncertainty, then.tip_pen, then.uncertainty)
+    return Comparison(earlier, later, change, _subject(one) == _subject(other))
+
+
+def repeatability_of(
+    entries: tuple[StoredEntry, ...],
+    limits: VerificationLimits,
+    tolerance: float | None = None,
+    reference: FloatArray | None = None,
+    touched: RepeatedPoint | None = None,
+) -> Repeatability | None:
+    """Return how well tips repeat; None if they are fewer than two, or of several.
+
+    Parameters
+    ----------
+    entries : tuple of StoredEntry
+        Those that put a tip in force again are left out: nothing was measured anew.
+    tolerance, reference, touched
+        As `measure_repeatability` takes them.
+    """
+    measured = [e for e in entries if e.entry.event.kind is not Kind.RESTORED]
+    if len(measured) < MIN_TIPS or len({_subject(each) for each in measured}) > 1:
+        return None
+    in_order = sorted(measured, key=lambda each: each.entry.since)
+    tips = [tip_of(each) for each in in_order]
+    return measure_repeatability(
+        *(tips, limits), tolerance=tolerance, reference=reference, touched=touched
+    )
+
+
+def _subject(entry: StoredEntry) -> tuple[str, str, bool]:
+    event = entry.entry.event
+    return event.names.pen, event.names.tip, event.is_simulated
+
+
+def _control(tips: tuple[TipEstimate, ...]) -> ControlLimits | None:
+    if len(tips) < MIN_TIPS:
+        return None
+    return measure_repeatability(tips, VerificationLimits()).control
+
+
+def _limit(entry: StoredEntry) -> float | None:
+    limit = entry.entry.event.settings.get(LIMIT)
+    return limit if isinstance(limit, float) else None

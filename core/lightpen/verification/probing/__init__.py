@@ -1,0 +1,1 @@
+"""From images to probed points: sources, drift reference, current tip."""

@@ -1,0 +1,153 @@
+"""The tip in force of a station, and the instrument that it makes with its files."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.errors import UsageError
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.formats.files import printable
+from lightpen.formats.hashes import InputFile, hashed
+from lightpen.model.origin import Origin
+from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.swings.names import Names
+from lightpen.swing.preparation import Preparation
+from lightpen.verification.probing.image_locations import (
+    ImageLocation,
+    PenCameras,
+    viewers_of_camera,
+    viewers_of_rig,
+)
+from lightpen.verification.probing.sources import instrument_of
+
+
+@dataclass(frozen=True, eq=False)
+class CurrentTip:
+    """A tip that was accepted, with the files that it is verified by.
+
+    Attributes
+    ----------
+    names : Names
+        Of what is chosen now.
+    origin : Origin
+        What the images of its verification are of.
+    nominal_tip, cone_cam : (3,) array or None
+        mm; the cone of the calibration is not known before another camera.
+    masks : tuple of (M, 3) array
+        Circles of stray light before each camera: centre x, y and radius, px.
+    """
+
+    names: Names
+    origin: Origin
+    calibration: CalibrationFile
+    instrument: Instrument
+    nominal_tip: FloatArray | None
+    cone_cam: FloatArray | None
+    masks: tuple[FloatArray, ...]
+    viewers: PenCameras
+    tip_file: InputFile
+    pen_file: InputFile
+
+    @property
+    def region(self) -> RegionOfInterest:
+        """What to look for in the images."""
+        pen, rig = self.instrument.pen, self.instrument.rig
+        first, *others = (
+            RegionOfInterest(camera, pen, mask)
+            for camera, mask in zip(rig.cameras, self.masks, strict=True)
+        )
+        return replace(first, others=tuple(others))
+
+    def is_like(self, other: "CurrentTip") -> bool:
+        """Return whether touches with the other tip are touches with this one."""
+        return (
+            self.names == other.names
+            and self.origin is other.origin
+            and self.tip_file == other.tip_file
+            and self.viewers.hashes == other.viewers.hashes
+            and self.pen_file == other.pen_file
+            and all(map(np.array_equal, self.masks, other.masks))
+        )
+
+
+def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> CurrentTip:
+    """Return the tip in force of the pen and tip that are chosen.
+
+    Parameters
+    ----------
+    preparation : Preparation
+        With names and both files.
+
+    Raises
+    ------
+    LightpenError
+        There is none, its result was changed, or it is of another LED file.
+    """
+    names, origin = preparation.names, preparation.origin
+    pen_file = preparation.pen_file
+    viewers = _viewers(preparation)
+    if viewers is None or pen_file is None:
+        raise ValueError("Cameras and `pen_file` must be chosen.")
+    file = archive.file_in_force(
+        names.pen, names.tip, is_simulated=origin is Origin.SIMULATED
+    )
+    if file is None:
+        raise UsageError(
+            "verification.no-tip", tip=printable(names.tip), pen=printable(names.pen)
+        )
+    calibration = read_calibration(file)
+    instrument = instrument_of(calibration, viewers, pen_file.pen, pen_file.path)
+    nominal_tip = preparation.nominal_tip
+    for known in (pen_file.pen.nominal_tip, calibration.nominal_tip):
+        nominal_tip = known if nominal_tip is None else nominal_tip
+    return CurrentTip(
+        names=names,
+        origin=origin,
+        calibration=calibration,
+        instrument=instrument,
+        nominal_tip=nominal_tip,
+        cone_cam=cone_before(calibration, viewers),
+        masks=tuple(map(preparation.mask_of, range(viewers.rig.n_cameras))),
+        viewers=viewers,
+        tip_file=hashed(file),
+        pen_file=hashed(pen_file.path),
+    )
+
+
+def tip_at(tip: CurrentTip, place: ImageLocation) -> CurrentTip:
+    """Return a tip before the camera of recorded images, if they bring one.
+
+    Raises
+    ------
+    UsageError
+        They are of another pen.
+    """
+    viewers, pen, pen_file = place.viewers, place.pen, place.pen_file
+    if viewers is None or pen is None or pen_file is None:
+        return tip
+    return replace(
+        tip,
+        instrument=instrument_of(tip.calibration, viewers, pen, pen_file),
+        cone_cam=cone_before(tip.calibration, viewers),
+        viewers=viewers,
+        pen_file=hashed(pen_file),
+    )
+
+
+def cone_before(calibration: CalibrationFile, viewers: PenCameras) -> FloatArray | None:
+    """Return where the calibration had the cone, (3,), mm; None before others."""
+    is_same = viewers.hashes == calibration.camera_hashes
+    return calibration.cone_cam if is_same else None
+
+
+def _viewers(preparation: Preparation) -> PenCameras | None:
+    """Return the cameras that are chosen."""
+    rig_file, camera_file = preparation.rig_file, preparation.camera_file
+    if preparation.second is not None:
+        return None if rig_file is None else viewers_of_rig(rig_file)
+    if camera_file is None:
+        return None
+    return viewers_of_camera(camera_file.camera, camera_file.path)

@@ -1,0 +1,213 @@
+"""Where images of touches are: folders, patterns and videos, and records of swings.
+
+Those of a rig are in a folder for each camera, named as the rig file names it, in the
+folder of a run; or in a record.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.files import FOLDER, printable, unreadable
+from lightpen.formats.hashes import InputFile, all_hashed
+from lightpen.formats.images import ImageSource, find_images, natural_order
+from lightpen.formats.rig_files import RigFile, read_rig
+from lightpen.model.camera import Camera
+from lightpen.model.origin import Origin
+from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig, rig_of
+from lightpen.record.swings.reading import (
+    Record,
+    is_record,
+    open_record,
+    recorded_origin,
+)
+from lightpen.record.swings.recorded_source import RecordSource, source
+from lightpen.record.swings.recordings import is_simulated_recording
+
+
+@dataclass(frozen=True, eq=False)
+class PenCameras:
+    """The cameras that look at the pen, one or those of a rig.
+
+    Attributes
+    ----------
+    files : tuple of InputFile
+        The camera file; or the rig file, and those of all its cameras.
+    """
+
+    rig: Rig
+    files: tuple[InputFile, ...]
+
+    @property
+    def hashes(self) -> tuple[str, ...]:
+        """SHA-256 of their files, which identify them."""
+        return tuple(file.sha256 for file in self.files)
+
+
+@dataclass(frozen=True, eq=False)
+class ImageLocation:
+    """Images of touches, and the files that they bring if they are a record's.
+
+    Attributes
+    ----------
+    images : tuple of ImageSource
+        Of each camera.
+    masks : tuple of (M, 3) array or None
+        Circles of stray light before each camera: centre x, y and radius, px.
+    touches : tuple of int or None
+        Which touch each image is of, from 1, or 0 where it takes no part; None of
+        images without that information.
+    """
+
+    name: str
+    images: tuple[ImageSource, ...]
+    origin: Origin | None
+    viewers: PenCameras | None = None
+    pen: Pen | None = None
+    pen_file: Path | None = None
+    masks: tuple[FloatArray | None, ...] = (None,)
+    touches: tuple[int, ...] | None = None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Files of all images."""
+        return tuple(file for each in self.images for file in each.files)
+
+
+def viewers_of_camera(camera: Camera, file: Path) -> PenCameras:
+    """Return a single camera that was read from a file."""
+    return PenCameras(rig_of(camera), all_hashed([file]))
+
+
+def viewers_of_rig(file: RigFile) -> PenCameras:
+    """Return the cameras of a rig file."""
+    return PenCameras(file.rig, all_hashed([file.path, *file.camera_files]))
+
+
+def read_viewers(camera_file: Path | None, rig_file: Path | None) -> PenCameras | None:
+    """Read a camera file or a rig file; None of neither.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or is not what it must be.
+    """
+    if rig_file is not None:
+        return viewers_of_rig(read_rig(rig_file))
+    if camera_file is not None:
+        return viewers_of_camera(read_camera(camera_file), camera_file)
+    return None
+
+
+def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> ImageLocation:
+    """Return a place as `lightpen.formats.images.find_images` takes it, or a record.
+
+    Parameters
+    ----------
+    rig : Rig, optional
+        That the images are of; what is given is then a place for each camera, or a
+        folder that holds one for each.
+
+    Raises
+    ------
+    FileError
+        There is nothing there, or it cannot be read.
+    """
+    folder = Path(where[0])
+    if len(where) == 1 and is_record(folder):
+        record = open_record(folder)
+        own = source(record)
+        return ImageLocation(
+            name=where[0],
+            images=(own.images, *own.other_images),
+            origin=recorded_origin(record),
+            viewers=_recorded_viewers(own),
+            pen=own.pen,
+            pen_file=own.pen_file,
+            masks=own.masks,
+            touches=_recorded_touches(record),
+        )
+    is_simulated = is_simulated_recording(where[0])
+    origin = Origin.SIMULATED if is_simulated else Origin.RECORDED
+    if rig is None or rig.n_cameras == 1:
+        return ImageLocation(where[0], (find_images(*where),), origin)
+    images = tuple(map(find_images, _of_each_camera(where, rig)))
+    return ImageLocation(where[0], images, origin, masks=(None,) * rig.n_cameras)
+
+
+def _recorded_touches(record: Record) -> tuple[int, ...] | None:
+    """Return which touches the images of a verification are of; None of a swing."""
+    if not any(image.touch for image in record.images):
+        return None
+    out = record.taken_out
+    return tuple(0 if i.number in out else i.touch for i in record.images)
+
+
+def _recorded_viewers(own: RecordSource) -> PenCameras:
+    if own.rig is None or own.rig_file is None:
+        return viewers_of_camera(own.camera, own.camera_files[0])
+    return PenCameras(own.rig, all_hashed([own.rig_file, *own.camera_files]))
+
+
+def _of_each_camera(where: tuple[str, ...], rig: Rig) -> tuple[str, ...]:
+    """Return the places of the images of each camera."""
+    if len(where) == rig.n_cameras:
+        return where
+    folders = [Path(where[0]) / name for name in rig.names]
+    if len(where) > 1 or not all(map(Path.is_dir, folders)):
+        raise FileError(
+            "verification.no-rig-folders",
+            place=printable(where[0]),
+            names=", ".join(rig.names),
+        )
+    return tuple(map(str, folders))
+
+
+def runs_at(place: str, rig: Rig | None = None) -> tuple[str, ...]:
+    """Return the runs at a place: itself, or the folders in it if they hold the images.
+
+    Parameters
+    ----------
+    rig : Rig, optional
+        That the images are of.
+
+    Raises
+    ------
+    FileError
+        There are no images in any of them.
+    """
+    folder = Path(place)
+    if is_record(folder):
+        return (place,)
+    try:
+        touch_place((place,), rig)
+    except FileError:
+        runs = _folders_with_images(folder, rig)
+        if not runs:
+            raise
+        return runs
+    return (place,)
+
+
+def _folders_with_images(folder: Path, rig: Rig | None) -> tuple[str, ...]:
+    if not folder.is_dir():
+        return ()
+    try:
+        inner = [path for path in folder.iterdir() if path.is_dir()]
+    except OSError as error:
+        raise unreadable(folder, FOLDER, error) from error
+    inner.sort(key=lambda path: natural_order(path.name))
+    return tuple(str(path) for path in inner if _holds_images(path, rig))
+
+
+def _holds_images(folder: Path, rig: Rig | None) -> bool:
+    if is_record(folder):
+        return True
+    try:
+        touch_place((str(folder),), rig)
+    except FileError:
+        return False
+    return True

@@ -1,0 +1,332 @@
+"""Taking touches by themselves: a point is taken when the pen is held still on it.
+
+`advance_touch` takes the state and what the next image shows, and returns the new state
+and what happened. It has no clock and no threads: live images and recorded ones go
+through the same steps. The pen is still while its tip stays within the noise of its
+images and its posture hardly turns. One image that disagrees is left out and named; a
+second one means that the pen has moved, and what was held so far counts no more. After
+a touch the pen must move on before the next one begins.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.reasons import Reason
+from lightpen.estimation.pivot.pivot import (
+    in_deviations,
+    outlier_distance,
+    tip_covariances,
+)
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.model.posture import angles_between
+from lightpen.verification.tasks.probed_point import (
+    ProbingFrame,
+    RejectedFrame,
+    StillFrames,
+)
+
+FAST, PRECISE = 5, 30  # images of a touch
+SETTLING = 3  # images, after which the hand is at rest
+RESTING = 0.01  # mm, by which a tip at rest may move
+STILL_TURN = np.radians(1.0)
+MAX_LOST = 5  # images in a row without the pen; more end a touch
+HELD_ENOUGH = 3  # images, from which on a discarded point is reported
+MAX_PATH = 20  # images
+FAR_ENOUGH = 2.0  # mm, that show the direction of approach
+
+
+class ProbingPhase(StrEnum):
+    """Where a touch stands."""
+
+    MOVING = "moving"  # or not seen
+    HOLDING = "holding"
+    RECORDED = "recorded"  # the pen has to move on
+    KNOWN = "known"  # likewise: this point was touched before
+
+
+class ProbingEventKind(StrEnum):
+    """What can happen."""
+
+    RECORDED = "recorded"
+    BROKEN_OFF = "broken off"
+
+
+@dataclass(frozen=True)
+class ProbingRules:
+    """When a touch is taken.
+
+    Attributes
+    ----------
+    n_frames : int
+        Images of a touch.
+    n_settling : int
+        Images before them through which the pen is still already.
+    min_turn : float
+        Angle by which its posture differs from that of touches before, rad, and
+    min_distance : float
+        distance by which its place does, mm: one of the two is enough.
+    """
+
+    n_frames: int = FAST
+    n_settling: int = SETTLING
+    min_turn: float = 0.0
+    min_distance: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.n_frames < 1 or self.n_settling < 0:
+            raise ValueError(f"Nothing can be touched by {self}.")
+
+
+ONE_IMAGE = ProbingRules(n_frames=1, n_settling=0)
+
+
+@dataclass(frozen=True, eq=False)
+class TipObservation:
+    """The tip by one image: place (3,), mm, and its covariance by noise, (3, 3)."""
+
+    frame: ProbingFrame
+    tip_cam: FloatArray
+    noise: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ProbingState:
+    """The touches so far.
+
+    Attributes
+    ----------
+    held : tuple of TipObservation
+        Through which the pen is still.
+    doubted : TipObservation or None
+        The last one, if it disagrees.
+    rejected : tuple of RejectedFrame
+        Between those that are held.
+    n_lost : int
+        Images in a row without the pen.
+    path : tuple of array
+        Where the tip was before, (3,) each, mm.
+    taken : tuple of StillFrames
+        What was touched.
+    places : tuple of TipObservation
+        One image of each.
+    """
+
+    phase: ProbingPhase = ProbingPhase.MOVING
+    held: tuple[TipObservation, ...] = ()
+    doubted: TipObservation | None = None
+    rejected: tuple[RejectedFrame, ...] = ()
+    n_lost: int = 0
+    path: tuple[FloatArray, ...] = ()
+    taken: tuple[StillFrames, ...] = ()
+    places: tuple[TipObservation, ...] = ()
+
+    def progress(self, rules: ProbingRules) -> float:
+        """Return how much of a touch is taken, 0 to 1."""
+        if self.phase is not ProbingPhase.HOLDING:
+            return 0.0
+        return len(self.held) / (rules.n_frames + rules.n_settling)
+
+
+@dataclass(frozen=True)
+class ProbingEvent:
+    """An event, and the images that it concerns."""
+
+    what: ProbingEventKind
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ProbingTransition:
+    """The touches after one more image."""
+
+    state: ProbingState
+    events: tuple[ProbingEvent, ...] = ()
+
+
+def advance_touch(
+    instrument: Instrument,
+    rules: ProbingRules,
+    state: ProbingState,
+    name: str,
+    detection: PenDetection,
+) -> ProbingTransition:
+    """Take one more image, of several cameras what they saw together."""
+    if not detection.has_pose or detection.is_blurred:
+        reason = detection.reason or Reason.BLURRED
+        return _without_pose(state, RejectedFrame(name, reason))
+    seen = _seen(instrument, name, detection)
+    state = replace(state, n_lost=0)
+    if not state.held:
+        return _moved_to(rules, state, (seen,))
+    if _agrees(state.held, seen):
+        rejected = state.rejected
+        if state.doubted is not None:
+            rejected = (*rejected, RejectedFrame(_name(state.doubted), Reason.SLIPPED))
+        state = replace(state, doubted=None, rejected=rejected)
+        if state.phase is not ProbingPhase.HOLDING:
+            return ProbingTransition(state)
+        return _held(rules, replace(state, held=(*state.held, seen)))
+    if state.doubted is None:
+        return ProbingTransition(replace(state, doubted=seen))
+    both_elsewhere = _agrees((state.doubted,), seen)
+    return _moved_to(rules, state, (state.doubted, seen) if both_elsewhere else (seen,))
+
+
+def take_all(
+    instrument: Instrument,
+    rules: ProbingRules,
+    images: Iterable[tuple[str, PenDetection]],
+) -> ProbingState:
+    """Take recorded images (name, sighting), one after the other."""
+    state = ProbingState()
+    for name, detection in images:
+        state = advance_touch(instrument, rules, state, name, detection).state
+    return state
+
+
+def read_rules(is_still: bool, n_frames: int) -> ProbingRules:
+    """Return how touches are taken from recorded images.
+
+    Parameters
+    ----------
+    is_still : bool
+        Whether the pen is held still through the images of a touch; else each image is
+        a touch.
+    """
+    return ProbingRules(n_frames) if is_still else ONE_IMAGE
+
+
+def taken_again(
+    instrument: Instrument, rules: ProbingRules, state: ProbingState, still: StillFrames
+) -> ProbingState:
+    """Return the touches with one more that was taken before, if it counts as new."""
+    frame = still.frames[0]
+    tip_cam = frame.rotation @ instrument.tip_pen + frame.translation
+    place = TipObservation(frame, tip_cam, np.zeros((3, 3)))
+    if not _is_new(rules, state, place):
+        return state
+    return replace(state, taken=(*state.taken, still), places=(*state.places, place))
+
+
+def touch_frame(name: str, detection: PenDetection) -> ProbingFrame:
+    """Return what images with a pose show of the pen."""
+    return ProbingFrame(
+        name, detection.rig_pixels, detection.rotation, detection.translation
+    )
+
+
+def _seen(instrument: Instrument, name: str, detection: PenDetection) -> TipObservation:
+    R = detection.rotation
+    sigma = max(detection.sigma, instrument.sigma)
+    noise = tip_covariances(
+        R[None], detection.cofactors[None] * sigma**2, instrument.tip_pen
+    )[0]
+    tip_cam = R @ instrument.tip_pen + detection.translation
+    return TipObservation(touch_frame(name, detection), tip_cam, noise)
+
+
+def _name(seen: TipObservation) -> str:
+    return seen.frame.name
+
+
+def _agrees(held: tuple[TipObservation, ...], seen: TipObservation) -> bool:
+    """Return whether the pen is where it was held."""
+    turned = angles_between(seen.frame.rotation[None], held[0].frame.rotation[None])[
+        0, 0
+    ]
+    if turned > STILL_TURN:
+        return False
+    n = len(held)
+    middle = np.mean([each.tip_cam for each in held], axis=0)
+    noise = seen.noise + held[0].noise / n + RESTING**2 * np.eye(3)
+    return bool(
+        in_deviations((seen.tip_cam - middle)[None], noise[None])[0]
+        <= outlier_distance()
+    )
+
+
+def _without_pose(state: ProbingState, rejected: RejectedFrame) -> ProbingTransition:
+    state = replace(state, n_lost=state.n_lost + 1)
+    if state.n_lost > MAX_LOST:
+        return _let_go(state)
+    if state.phase is ProbingPhase.HOLDING:
+        state = replace(state, rejected=(*state.rejected, rejected))
+    return ProbingTransition(state)
+
+
+def _let_go(state: ProbingState) -> ProbingTransition:
+    """Return to a pen that moves; say so if a touch was broken off."""
+    events: tuple[ProbingEvent, ...] = ()
+    if state.phase is ProbingPhase.HOLDING and len(state.held) >= HELD_ENOUGH:
+        names = tuple(map(_name, state.held))
+        events = (ProbingEvent(ProbingEventKind.BROKEN_OFF, names),)
+    path = (*state.path, *(each.tip_cam for each in state.held[-1:]))[-MAX_PATH:]
+    return ProbingTransition(
+        replace(
+            state,
+            phase=ProbingPhase.MOVING,
+            held=(),
+            doubted=None,
+            rejected=(),
+            path=path,
+        ),
+        events,
+    )
+
+
+def _moved_to(
+    rules: ProbingRules, state: ProbingState, held: tuple[TipObservation, ...]
+) -> ProbingTransition:
+    gone = _let_go(state)
+    again = _held(rules, replace(gone.state, phase=ProbingPhase.HOLDING, held=held))
+    return ProbingTransition(again.state, (*gone.events, *again.events))
+
+
+def _held(rules: ProbingRules, state: ProbingState) -> ProbingTransition:
+    """Take the touch if it was held long enough."""
+    if len(state.held) < rules.n_settling + rules.n_frames:
+        return ProbingTransition(state)
+    used = state.held[rules.n_settling :]
+    if not _is_new(rules, state, used[0]):
+        return ProbingTransition(replace(state, phase=ProbingPhase.KNOWN))
+    still = StillFrames(
+        frames=tuple(each.frame for each in used),
+        rejected=state.rejected,
+        approach_cam=_approach(state.path, used[0].tip_cam),
+    )
+    taken = replace(
+        state,
+        phase=ProbingPhase.RECORDED,
+        rejected=(),
+        path=(),
+        taken=(*state.taken, still),
+        places=(*state.places, used[0]),
+    )
+    event = ProbingEvent(ProbingEventKind.RECORDED, tuple(map(_name, used)))
+    return ProbingTransition(taken, (event,))
+
+
+def _is_new(rules: ProbingRules, state: ProbingState, seen: TipObservation) -> bool:
+    for before in state.places:
+        turned = angles_between(seen.frame.rotation[None], before.frame.rotation[None])[
+            0, 0
+        ]
+        distance = float(np.linalg.norm(seen.tip_cam - before.tip_cam))
+        if turned < rules.min_turn and distance < rules.min_distance:
+            return False
+    return True
+
+
+def _approach(path: tuple[FloatArray, ...], tip_cam: FloatArray) -> FloatArray | None:
+    """Return the direction in which the tip came, if it came from far enough."""
+    for before in reversed(path):
+        way = tip_cam - before
+        distance = float(np.linalg.norm(way))
+        if distance > FAR_ENOUGH:
+            return np.asarray(way / distance)
+    return None

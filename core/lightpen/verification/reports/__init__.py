@@ -1,0 +1,1 @@
+"""Verifications as JSON records, text tables and control charts."""

@@ -1,0 +1,98 @@
+"""The control chart of a tip, as a table and as a picture."""
+
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from lightpen.errors import UsageError
+from lightpen.formats.files import printable, write_whole
+from lightpen.verification.tasks.repeatability import Repeatability
+
+WIDTH, HEIGHT, MARGIN = 720, 200, 60  # px, of the chart of one coordinate
+COLOURS = {"line": "#1f5fa8", "center": "#3a3a3a", "limit": "#b3261e"}
+
+
+def write_chart(found: Repeatability, path: Path) -> None:
+    """Write the control chart of a tip by the suffix of its name.
+
+    Raises
+    ------
+    UsageError
+        The name ends neither in .csv nor in .svg.
+    FileError
+        It cannot be written.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".csv":
+        text = _table(found)
+    elif suffix == ".svg":
+        text = _picture(found)
+    else:
+        raise UsageError("chart.suffix", name=printable(path.name))
+    write_whole(path, text.encode("utf-8", "backslashreplace"))
+
+
+def _table(found: Repeatability) -> str:
+    lines = ["number,name,axis,value_mm,lower_mm,center_mm,upper_mm"]
+    for i, tip in enumerate(found.tips):
+        name = '"' + tip.name.replace('"', '""') + '"'
+        for k, axis in enumerate("xyz"):
+            cells = (
+                tip.tip_pen[k],
+                found.control.lower[k],
+                found.control.center[k],
+                found.control.upper[k],
+            )
+            numbers = ",".join(f"{cell:.6f}" for cell in cells)
+            lines.append(f"{i + 1},{name},{axis},{numbers}")
+    return "\n".join(lines) + "\n"
+
+
+def _picture(found: Repeatability) -> str:
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" '
+        f'height="{3 * HEIGHT}" font-family="sans-serif" font-size="12">',
+        f'<rect width="{WIDTH}" height="{3 * HEIGHT}" fill="white"/>',
+    ]
+    for k, axis in enumerate("xyz"):
+        parts += _coordinate(found, k, axis)
+    return "\n".join([*parts, "</svg>"]) + "\n"
+
+
+def _coordinate(found: Repeatability, k: int, axis: str) -> list[str]:
+    control, values = found.control, found.scatter.points[:, k]
+    lower, center, upper = (
+        float(each[k]) for each in (control.lower, control.center, control.upper)
+    )
+    ends = np.array([values.min(), values.max(), lower, upper])
+    low, high = float(ends.min()), float(ends.max())
+    reach = max(high - low, 1e-9)
+    top, height = k * HEIGHT + 30, HEIGHT - 50
+
+    def place(value: float) -> float:
+        return top + height * (high - value) / reach
+
+    def across(i: int) -> float:
+        return MARGIN + (WIDTH - 2 * MARGIN) * (i + 0.5) / len(values)
+
+    parts = [f'<text x="8" y="{k * HEIGHT + 18}">{axis}, mm</text>']
+    for value, kind in ((lower, "limit"), (center, "center"), (upper, "limit")):
+        y = place(value)
+        parts.append(
+            f'<line x1="{MARGIN}" y1="{y:.1f}" x2="{WIDTH - MARGIN}" y2="{y:.1f}" '
+            f'stroke="{COLOURS[kind]}" stroke-dasharray="4 3"/>'
+            f'<text x="{WIDTH - MARGIN + 4}" y="{y + 4:.1f}">{value:.4f}</text>'
+        )
+    points = " ".join(f"{across(i):.1f},{place(v):.1f}" for i, v in enumerate(values))
+    parts.append(
+        f'<polyline points="{points}" fill="none" stroke="{COLOURS["line"]}"/>'
+    )
+    for i, value in enumerate(values):
+        kind = "line" if lower <= value <= upper else "limit"
+        parts.append(
+            f'<circle cx="{across(i):.1f}" cy="{place(value):.1f}" r="3.5" '
+            f'fill="{COLOURS[kind]}"><title>{escape(found.tips[i].name)}: '
+            f"{value:.4f}</title></circle>"
+        )
+    return parts

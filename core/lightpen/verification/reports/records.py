@@ -1,0 +1,98 @@
+"""Verifications as JSON records."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.formats.json_records import plain, record_heading
+from lightpen.local_time import local_now
+from lightpen.verification.history.pen_health import PenHealth
+from lightpen.verification.tasks.assessment import VerificationAssessment
+from lightpen.verification.tasks.repeatability import Repeatability
+
+
+def verification_record(
+    kind: str,
+    entries: Mapping[str, Any],
+    assessment: VerificationAssessment | None,
+    limits: Mapping[str, float],
+    inputs: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Return the record of a verification.
+
+    Parameters
+    ----------
+    kind : str
+        What was verified.
+    entries : mapping
+        What was found.
+    assessment : VerificationAssessment or None
+        None of what is measured and not judged.
+    limits : mapping of str to float
+        That it was judged by, mm.
+    inputs : mapping
+        What it was made from.
+    """
+    record = {
+        **record_heading(local_now()),
+        "verification": kind,
+        "coverage_factor": COVERAGE_FACTOR,
+        "verdict": None
+        if assessment is None
+        else {
+            "grade": assessment.grade.value,
+            **plain(assessment.reason),
+            "next_step": assessment.next_step,
+            "decision_rule": "simple acceptance: within the limit, U stated beside it",
+            "limits_mm": limits,
+        },
+        **entries,
+        "inputs": inputs,
+    }
+    return {name: plain(entry) for name, entry in record.items()}
+
+
+def repeatability_entries(found: Repeatability) -> dict[str, Any]:
+    """Return what was found of calibrations of one tip."""
+    study = found.capability
+    return {
+        "mean_mm": found.scatter.mean,
+        "std_mm": found.scatter.deviation,
+        "range_mm": found.scatter.range,
+        "control": {
+            "lower_mm": found.control.lower,
+            "center_mm": found.control.center,
+            "upper_mm": found.control.upper,
+            "out_of_control": [tip.name for tip in found.out_of_control],
+        },
+        "capability": (
+            None
+            if study is None
+            else {"tolerance_mm": study.tolerance, "cg": study.cg, "cgk": study.cgk}
+        ),
+        "fixed_point_std_mm": (
+            None if found.touched is None else found.touched.deviation
+        ),
+        "points_to": found.points_to,
+        "tips": [
+            {
+                "name": tip.name,
+                "tip_pen_mm": tip.tip_pen,
+                "expanded_uncertainty_mm": tip.uncertainty,
+                "when": None if tip.when is None else tip.when.isoformat(),
+            }
+            for tip in found.tips
+        ],
+    }
+
+
+def pen_health_entries(found: PenHealth) -> dict[str, Any]:
+    """Return what was found of a pen over its swings."""
+    return {
+        "moved_leds": found.moved,
+        "growth": found.growth,
+        "swings": [
+            {"name": swing.name, "shifts_mm": swing.shifts, "growth": swing.growth}
+            for swing in found.swings
+        ],
+    }

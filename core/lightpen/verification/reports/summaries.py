@@ -1,0 +1,176 @@
+"""Verifications as text for the screen, in the tables of the paper.
+
+[1] S. Liu et al., "Portable light pen 3D vision coordinate measuring system - probe tip
+center calibration", Measurement Science Review 13 (2013) 194-199, tables 1 to 3.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.messages import message
+from lightpen.verification.history.led_file import ImprovedPen
+from lightpen.verification.history.pen_health import PenHealth
+from lightpen.verification.tasks.assessment import VerificationAssessment
+from lightpen.verification.tasks.probed_point import ProbedPoint, RejectedFrame
+from lightpen.verification.tasks.repeatability import (
+    CAPABLE,
+    STUDY,
+    Capability,
+    Repeatability,
+)
+from lightpen.verification.tasks.task import ResultRow, ResultTable
+
+MOST_COLUMNS = 10  # runs beside each other
+MOST_NAMED = 5  # images
+TITLE, NAME, COLUMN = 24, 28, 10  # characters
+
+
+def found_text(
+    tables: Sequence[ResultTable],
+    assessment: VerificationAssessment,
+    rejected: Sequence[RejectedFrame],
+) -> str:
+    """Return what a task found as text."""
+    lines = [line for table in tables for line in _table(table)]
+    return "\n".join([*lines, *_left_out(rejected), "", *_verdict(assessment)])
+
+
+def touches_text(
+    touches: Sequence[ProbedPoint],
+    instrument: Instrument,
+    rejected: Sequence[RejectedFrame],
+) -> str:
+    """Return points with their uncertainty as text."""
+    rows = []
+    for touch in touches:
+        spread = np.sqrt(np.diag(touch.covariance(instrument)))
+        values = [*touch.point_cam.tolist(), *(COVERAGE_FACTOR * spread).tolist()]
+        rows.append(ResultRow(touch.label, values))
+    columns = (*"uvw", *(message("drift.axis", axis=axis) for axis in "uvw"))
+    table = ResultTable(message("table.points"), columns, tuple(rows))
+    return "\n".join([*_table(table), "U has k = 2.", *_left_out(rejected)])
+
+
+def _table(table: ResultTable) -> list[str]:
+    """Return a table as lines; one of many columns is parted."""
+    lines, n_columns = [f"{table.title}"], len(table.columns)
+    for first in range(0, n_columns, MOST_COLUMNS):
+        own = slice(first, first + MOST_COLUMNS)
+        heads = [str(head) for head in table.columns[own]]
+        width = max(COLUMN, *(len(head) + 2 for head in heads))
+        lines.append(" " * NAME + "".join(f"{head:>{width}}" for head in heads))
+        for row in table.rows:
+            cells = (
+                " " * width if x is None else f"{x:{width}.{row.decimals}f}"
+                for x in row.values[own]
+            )
+            lines.append(f"{str(row.name)[:NAME]:<{NAME}}" + "".join(cells))
+    return [line.rstrip() for line in (*lines, *map(str, table.notes))]
+
+
+def _left_out(rejected: Sequence[RejectedFrame]) -> list[str]:
+    if not rejected:
+        return []
+    named = ", ".join(f"{each.name} ({each.reason})" for each in rejected[:MOST_NAMED])
+    more = ", ..." if len(rejected) > MOST_NAMED else ""
+    return [f"{len(rejected)} images left out: {named}{more}"]
+
+
+def _verdict(assessment: VerificationAssessment) -> list[str]:
+    return [
+        f"Verdict      {assessment.grade.upper()}: {assessment.reason}",
+        f"             {assessment.next_step}",
+    ]
+
+
+def repeatability_text(found: Repeatability) -> str:
+    """Return calibrations of one tip as text: the paper's Table 1."""
+
+    def row(title: str, values: FloatArray, digits: int = 4) -> str:
+        return f"{title:<{TITLE}}" + "".join(f"{x:{COLUMN}.{digits}f}" for x in values)
+
+    lines = [
+        "Center coordinates of the probe tip, mm",
+        f"{'No. of test':<{TITLE}}"
+        + "".join(f"{axis + '-axis':>{COLUMN}}" for axis in "xyz"),
+        *(
+            row(f"{i + 1:>3} {tip.name}"[:TITLE], tip.tip_pen)
+            for i, tip in enumerate(found.tips)
+        ),
+        row("Ave", found.scatter.mean),
+        row("Std", found.scatter.deviation),
+        row("Range", found.scatter.range),
+        row("Control limit, lower", found.control.lower),
+        row("Control limit, upper", found.control.upper),
+    ]
+    out = found.out_of_control
+    if out:
+        lines.append("Out of control: " + ", ".join(tip.name for tip in out))
+    if found.touched is not None:
+        lines += [
+            row("Std of a fixed point", found.touched.deviation) + "  (u v w)",
+            row("  expected", found.touched.expected_deviation),
+        ]
+    if found.capability is not None:
+        lines += _capability_lines(found.capability, len(found.tips), row)
+    return "\n".join([*lines, "", *_verdict(found.assessment)])
+
+
+def _capability_lines(
+    found: Capability, n_tips: int, row: Callable[[str, FloatArray, int], str]
+) -> list[str]:
+    lines = [
+        f"Type-1 gauge study, tolerance {found.tolerance:g} mm wide, {n_tips} repeats"
+        + (f" (a study takes {STUDY} to 50)" if n_tips < STUDY else ""),
+        row("Cg", found.cg, 2),
+    ]
+    if found.cgk is not None:
+        lines.append(row("Cgk", found.cgk, 2))
+    capable = "capable" if found.is_capable else "not capable"
+    lines.append(f"{capable.capitalize()} (all {CAPABLE} or more are asked for)")
+    return lines
+
+
+def pen_health_text(found: PenHealth) -> str:
+    """Return a pen over its swings as text."""
+    n_leds = len(found.swings[0].shifts)
+    lines = [
+        "LEDs since the first swing, mm, and size of the pen, ppm",
+        f"{'Swing':<{TITLE}}"
+        + "".join(f"{f'LED {j + 1}':>{COLUMN}}" for j in range(n_leds))
+        + f"{'size':>{COLUMN}}",
+    ]
+    for swing in found.swings:
+        lengths = np.linalg.norm(swing.shifts, axis=1)
+        cells = "".join(
+            f"{x:{COLUMN}.3f}" if np.isfinite(x) else f"{'-':>{COLUMN}}"
+            for x in lengths
+        )
+        size = "-" if swing.growth is None else f"{1e6 * swing.growth:+.0f}"
+        lines.append(f"{swing.name[:TITLE]:<{TITLE}}{cells}{size:>{COLUMN}}")
+    return "\n".join([*lines, "", *_verdict(found.assessment)])
+
+
+def improved_pen_text(found: ImprovedPen) -> str:
+    """Return the new places of the LEDs of a pen as text."""
+    pen = found.pen
+    lines = [
+        "LEDs of the pen, mm: new, and new less old",
+        f"{'LED':<5}" + "".join(f"{axis:>{COLUMN}}" for axis in ("x", "y", "z") * 2),
+    ]
+    for j, (place, move) in enumerate(zip(pen.leds, found.moves, strict=True)):
+        cells = "".join(f"{x:{COLUMN}.4f}" for x in (*place, *move))
+        lines.append(f"{j + 1:<5}{cells}")
+    lines += [
+        f"A coordinate is known to {pen.led_sigma:.5f} mm, the scale to "
+        f"{1e6 * (pen.scale_sigma or 0.0):.1f} ppm (k = 1), by "
+        + ", ".join(found.pooled)
+        + ".",
+        f"{found.held_out} confirms it: residuals of {found.sigma_after:.4f} px, "
+        f"{found.sigma_before:.4f} px with the old file.",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""A verification session: its state, its rules and guidance."""

@@ -1,0 +1,59 @@
+"""What a station verifies, with which artefacts, and by which limits."""
+
+from dataclasses import dataclass, field, replace
+
+from lightpen.messages import Message, message
+from lightpen.model.limits import VerificationLimits
+from lightpen.verification.probing.probing import FAST
+from lightpen.verification.tasks.fixed_point import FIXED_POINT
+from lightpen.verification.tasks.registry import TASKS, AnyOptions, AnyTask, TaskKind
+from lightpen.verification.tasks.task import FoundT, OptionsT, VerificationTask
+
+
+@dataclass(frozen=True)
+class VerificationChoices:
+    """What is verified, and how.
+
+    Attributes
+    ----------
+    kinds : tuple of str
+        Of the tasks, in their order.
+    options : tuple of TaskOptions
+        Of tasks, chosen or not, whose options are not the usual ones.
+    n_frames : int
+        Images of a point.
+    """
+
+    kinds: tuple[TaskKind, ...] = (FIXED_POINT.kind,)
+    options: tuple[AnyOptions, ...] = ()
+    n_frames: int = FAST
+    limits: VerificationLimits = field(default_factory=VerificationLimits)
+
+    @property
+    def tasks(self) -> tuple[AnyTask, ...]:
+        """The tasks that are chosen."""
+        return tuple(task for task in TASKS if task.kind in self.kinds)
+
+    def options_of(self, task: VerificationTask[OptionsT, FoundT]) -> OptionsT:
+        """Return the options of a task."""
+        own = (each for each in self.options if isinstance(each, task.options))
+        return next(own, task.options())
+
+    def with_options(self, options: AnyOptions) -> "VerificationChoices":
+        """Return them with other options of a task."""
+        chosen = {type(each): each for each in (*self.options, options)}
+        ordered = (chosen.get(task.options) for task in TASKS)
+        unusual = (each for each in ordered if each and each != type(each)())
+        return replace(self, options=tuple(unusual))
+
+    def with_task(self, task: AnyTask, *, is_chosen: bool) -> "VerificationChoices":
+        """Return them with a task chosen or not."""
+        kinds = {*self.kinds, task.kind} if is_chosen else {*self.kinds} - {task.kind}
+        return replace(self, kinds=tuple(t.kind for t in TASKS if t.kind in kinds))
+
+    def missing(self, ball_diameter: float | None) -> Message | None:
+        """Return what has to be entered before, with a ball of this diameter, mm."""
+        if not self.kinds:
+            return message("verification.no-task")
+        each = (t.missing(self.options_of(t), ball_diameter) for t in self.tasks)
+        return next(filter(None, each), None)

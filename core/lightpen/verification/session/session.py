@@ -1,0 +1,352 @@
+"""A whole verification in one go, without a key: the tasks one after the other.
+
+`advance_session` takes the state and what the next image shows. Each task ends by
+itself when its points suffice, and the next begins when the pen moves on; live images
+and recorded ones go through the same steps. Points that can be none of the task are
+dropped with a message.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.errors import CalibrationError
+from lightpen.messages import message
+from lightpen.verification.probing.current_tip import CurrentTip
+from lightpen.verification.probing.drift_reference import judged_with
+from lightpen.verification.probing.probing import (
+    ProbingEvent,
+    ProbingEventKind,
+    ProbingRules,
+    advance_touch,
+    taken_again,
+)
+from lightpen.verification.probing.sources import require_leds_fit
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.session.session_state import (
+    PendingDriftCheck,
+    SessionSetup,
+    SessionState,
+    n_visits,
+    with_drift,
+    without_touches,
+)
+from lightpen.verification.tasks.drift import DRIFT, MIN_VISITS, Drift, measure_drift
+from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
+from lightpen.verification.tasks.registry import TASKS, AnyTask
+from lightpen.verification.tasks.task import (
+    Found,
+    Points,
+    Runs,
+    Screening,
+    without_last,
+)
+
+WORTH_TELLING = 0.5  # of its images, that were held before a point was broken off
+BROKEN_OFF = message("session.broken-off")
+
+
+@dataclass(frozen=True, eq=False)
+class SessionTransition:
+    """A verification after one more image.
+
+    Attributes
+    ----------
+    finished : VerificationTask or None
+        A task that this image ended.
+    """
+
+    state: SessionState
+    events: tuple[ProbingEvent, ...] = ()
+    finished: AnyTask | None = None
+
+
+def setup_of(tip: CurrentTip, choices: VerificationChoices) -> SessionSetup:
+    """Return what is verified by a tip in force."""
+    return SessionSetup(
+        tip.instrument, choices, tip.names.ball_diameter, tip.nominal_tip, tip.cone_cam
+    )
+
+
+def advance_session(
+    setup: SessionSetup, state: SessionState, name: str, detection: PenDetection
+) -> SessionTransition:
+    """Take one more image, and end the task at hand when its touches suffice."""
+    task = state.task(setup)
+    if task is None:
+        return SessionTransition(state)
+    rules = rules_of(setup, task)
+    touched = advance_touch(setup.instrument, rules, state.touching, name, detection)
+    events = tuple(each for each in touched.events if _is_worth_telling(rules, each))
+    happened = {event.what for event in events}
+    state = replace(state, touching=touched.state)
+    if ProbingEventKind.BROKEN_OFF in happened:
+        state = replace(state, trouble=BROKEN_OFF)
+    if ProbingEventKind.RECORDED not in happened:
+        return SessionTransition(state, events)
+    try:
+        state = with_touch(setup, state, task)
+        if not _suffices(setup, state, task):
+            return SessionTransition(state, events)
+        state = _with_run(setup, state, task)
+    except CalibrationError as error:
+        state = replace(state, trouble=error.message)
+    is_finished = task.kind in state.found
+    return SessionTransition(state, events, task if is_finished else None)
+
+
+def end_task(setup: SessionSetup, state: SessionState) -> SessionTransition:
+    """End the task at hand with the touches that there are, or say why it cannot."""
+    task = state.task(setup)
+    if task is None:
+        return SessionTransition(state)
+    before = state.runs_of(task)
+    runs = _numbered((*before, state.touches) if state.touches else before)
+    try:
+        ended = _done(setup, state, task, runs)
+    except CalibrationError as error:
+        return SessionTransition(replace(state, trouble=error.message))
+    if task is DRIFT and state.touches:
+        ended = replace(ended, visits=(*state.visits, state.touches))
+    return SessionTransition(ended, finished=task)
+
+
+def run_again(
+    setup: SessionSetup, state: SessionState, touches: Points, *, is_last: bool
+) -> SessionState:
+    """Return it with a run that was done before, as it was then.
+
+    Parameters
+    ----------
+    is_last : bool
+        Whether the task at hand ended with it.
+
+    Raises
+    ------
+    CalibrationError
+        It is none of the task at hand.
+    """
+    state, task = replace(state, touches=touches), state.task(setup)
+    if task is None:
+        return state
+    if not is_last:
+        return _with_run(setup, state, task)
+    ended = end_task(setup, state).state
+    if ended.trouble is not None:
+        raise CalibrationError(ended.trouble)
+    return ended
+
+
+def touch_again(
+    setup: SessionSetup, state: SessionState, held: Sequence[StillFrames]
+) -> SessionState:
+    """Return it with touches of the run at hand that were taken before.
+
+    One that would end the run has to be taken again: so it was not ended by it.
+    """
+    task = state.task(setup)
+    if task is None:
+        return state
+    rules = rules_of(setup, task)
+    for still in held:
+        touching = taken_again(setup.instrument, rules, state.touching, still)
+        if touching is state.touching:
+            continue
+        touched = with_touch(setup, replace(state, touching=touching), task)
+        if not _suffices(setup, touched, task):
+            state = touched
+    return state
+
+
+def measure(setup: SessionSetup, task: AnyTask, runs: Runs) -> Found:
+    """Return what a task finds by its points.
+
+    Raises
+    ------
+    CalibrationError
+        They do not suffice.
+    """
+    found: Found = task.measure(runs, setup.conditions, setup.choices.options_of(task))
+    return found
+
+
+def measure_with_drift(
+    setup: SessionSetup, done: PendingDriftCheck, drift: Drift | None = None
+) -> Found:
+    """Return what the touches of a task find, by a camera that may have moved.
+
+    Raises
+    ------
+    CalibrationError
+        They do not suffice.
+    """
+    by = with_drift(setup if done.setup is None else done.setup, drift)
+    found = measure(by, done.task, done.runs)
+    return replace(found, assessment=judged_with(found.assessment, done.lamps))
+
+
+def with_read(
+    setup: SessionSetup, state: SessionState, read: PendingDriftCheck, found: Found
+) -> SessionState:
+    """Return it with what recorded images have found.
+
+    A drift reference that they are of counts in what was found before it, and one that
+    is yet to come will count in what they have found.
+    """
+    if isinstance(found, Drift):
+        state = _counting(setup, state, found)
+    elif state.awaits_drift(setup):
+        others = (each for each in state.pending if each.task is not read.task)
+        state = replace(state, pending=(*others, read))
+    return with_found(state, read.task, found)
+
+
+def with_found(state: SessionState, task: AnyTask, found: Found) -> SessionState:
+    """Return it with what a task has found; the next begins when the pen moves on."""
+    pending = () if task is DRIFT else state.pending
+    return replace(
+        without_touches(state), found={**state.found, task.kind: found}, pending=pending
+    )
+
+
+def touched_anew(state: SessionState, task: AnyTask) -> SessionState:
+    """Return it with one task to be done again, and no points of the one at hand.
+
+    The drift reference is visited once more after it.
+    """
+    undone = {task.kind, DRIFT.kind}
+    return replace(
+        without_touches(state),
+        found={kind: each for kind, each in state.found.items() if kind not in undone},
+        visits=() if task is DRIFT else state.visits,
+        pending=tuple(each for each in state.pending if each.task is not task),
+    )
+
+
+def with_other_choices(
+    setup: SessionSetup, state: SessionState, choices: VerificationChoices
+) -> tuple[SessionSetup, SessionState]:
+    """Return a verification that continues by other choices.
+
+    What was found of another artefact than is chosen now is found anew; all else stays.
+    Where another task is to be probed now, the points at hand are forgotten, and the
+    state has another `touching`.
+    """
+    at_hand = state.task(setup)
+    for task in TASKS:
+        one, other = setup.choices.options_of(task), choices.options_of(task)
+        if task.kind in state.found and not task.is_same_artefact(one, other):
+            state = touched_anew(state, task)
+    setup = replace(setup, choices=choices)
+    now = state.task(setup)
+    if now is not at_hand:
+        state = without_touches(state)
+    if now is not None and DRIFT.kind in state.found:  # it was of others
+        found = {k: each for k, each in state.found.items() if k != DRIFT.kind}
+        state = replace(without_touches(state), found=found)
+    if state.pending and not state.awaits_drift(setup):
+        state = replace(state, pending=())
+    return setup, state
+
+
+def rules_of(setup: SessionSetup, task: AnyTask) -> ProbingRules:
+    """Return which points count as new in a task."""
+    turn, distance = task.newness(setup.choices.options_of(task))
+    return ProbingRules(setup.choices.n_frames, min_turn=turn, min_distance=distance)
+
+
+def with_touch(setup: SessionSetup, state: SessionState, task: AnyTask) -> SessionState:
+    """Measure anew with the last point; drop it if it can be none of the task."""
+    points = measure_touches(setup.instrument, state.touching.taken)
+    state = replace(state, touches=points)
+    screening = _screened(setup, state, task)
+    kept = screening.kept
+    touching = replace(
+        state.touching,
+        taken=tuple(state.touching.taken[i] for i in kept),
+        places=tuple(state.touching.places[i] for i in kept),
+    )
+    return replace(
+        state,
+        touching=touching,
+        touches=tuple(points[i] for i in kept),
+        trouble=screening.trouble,
+    )
+
+
+def _screened(setup: SessionSetup, state: SessionState, task: AnyTask) -> Screening:
+    last = state.touches[-1]
+    try:
+        require_leds_fit(last.label, (last,))
+    except CalibrationError as error:
+        return without_last(len(state.touches), error.message)
+    options = setup.choices.options_of(task)
+    return task.screen(options, setup.conditions, state.progress(setup, task))
+
+
+def _is_worth_telling(rules: ProbingRules, event: ProbingEvent) -> bool:
+    """Return whether an event is reported: a hand that comes to rest stops and goes."""
+    needed = rules.n_settling + WORTH_TELLING * rules.n_frames
+    return event.what is ProbingEventKind.RECORDED or len(event.names) >= needed
+
+
+def _suffices(setup: SessionSetup, state: SessionState, task: AnyTask) -> bool:
+    """Return whether the points are enough for a run."""
+    options = setup.choices.options_of(task)
+    return task.done(options, state.progress(setup, task)) >= 1.0
+
+
+def _with_run(setup: SessionSetup, state: SessionState, task: AnyTask) -> SessionState:
+    """End a run, and with the last of them the task."""
+    if task is DRIFT:
+        return _with_visit(setup, state)
+    runs = (*state.runs, state.touches)
+    if len(runs) >= task.n_runs(setup.choices.options_of(task)):
+        return _done(setup, state, task, _numbered(runs))
+    if task.is_each_run_measured:
+        measure(setup, task, _numbered(runs))
+    return replace(without_touches(state), runs=runs)
+
+
+def _done(
+    setup: SessionSetup, state: SessionState, task: AnyTask, runs: Runs
+) -> SessionState:
+    """Measure a task; the next visit of the cone adds the drift to its U."""
+    if task is DRIFT:
+        state = _after_visit(setup, state, runs)
+    found = measure(setup, task, runs)
+    if task is not DRIFT and state.awaits_drift(setup):
+        done = PendingDriftCheck(task, runs)
+        state = replace(state, pending=(*state.pending, done))
+    return with_found(state, task, found)
+
+
+def _with_visit(setup: SessionSetup, state: SessionState) -> SessionState:
+    """End a visit of the cone, and with the last of them the task."""
+    visits = (*state.visits, state.touches)
+    runs = _numbered(visits)
+    if len(visits) >= n_visits(setup.choices):
+        return replace(_done(setup, state, DRIFT, runs), visits=visits)
+    return replace(without_touches(_after_visit(setup, state, runs)), visits=visits)
+
+
+def _after_visit(
+    setup: SessionSetup, state: SessionState, visits: Runs
+) -> SessionState:
+    """Count in what was found since the visit before by how far the cone moved."""
+    if len(visits) < MIN_VISITS:
+        return state
+    around = measure_drift(visits[-MIN_VISITS:], setup.conditions)
+    return _counting(setup, state, around)
+
+
+def _counting(setup: SessionSetup, state: SessionState, drift: Drift) -> SessionState:
+    """Count a drift in what was found since the visit before."""
+    for each in state.pending:
+        found = measure_with_drift(setup, each, drift)
+        state = with_found(state, each.task, found)
+    return replace(state, pending=())
+
+
+def _numbered(runs: Sequence[Points]) -> Runs:
+    return [(f"#{i}", points) for i, points in enumerate(runs, start=1)]

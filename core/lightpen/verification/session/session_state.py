@@ -1,0 +1,214 @@
+"""A verification at one moment: what is verified, and what was probed and found."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.messages import Message, message
+from lightpen.verification.probing.drift_reference import LampDrift
+from lightpen.verification.probing.probing import ProbingPhase, ProbingState
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.tasks.assessment import VerificationAssessment, worst
+from lightpen.verification.tasks.drift import DRIFT, MIN_VISITS, Drift
+from lightpen.verification.tasks.fixed_point import FIXED_POINT
+from lightpen.verification.tasks.probed_point import NO_DRIFT
+from lightpen.verification.tasks.registry import TASKS, AnyTask
+from lightpen.verification.tasks.task import (
+    Conditions,
+    Found,
+    FoundT,
+    OptionsT,
+    Points,
+    Runs,
+    TaskProgress,
+    VerificationTask,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class SessionSetup:
+    """What is verified, and by what; see `Conditions`."""
+
+    instrument: Instrument
+    choices: VerificationChoices = field(default_factory=VerificationChoices)
+    ball_diameter: float | None = None
+    nominal_tip: FloatArray | None = None
+    cone_cam: FloatArray | None = None
+    drift: FloatArray = field(default_factory=NO_DRIFT.copy)
+
+    @property
+    def conditions(self) -> Conditions:
+        """Under which points are measured and judged."""
+        return Conditions(
+            self.instrument,
+            self.choices.limits,
+            self.ball_diameter,
+            self.nominal_tip,
+            self.cone_cam,
+            self.drift,
+        )
+
+    @property
+    def is_drift_checked(self) -> bool:
+        """Whether a drift reference is visited before, between and after the tasks."""
+        return DRIFT.kind in self.choices.kinds
+
+
+def with_drift(
+    setup: SessionSetup, reference: LampDrift | Drift | None
+) -> SessionSetup:
+    """Return it with the drift of the camera by lamps or a cone."""
+    if reference is None:
+        return setup
+    return replace(setup, drift=np.maximum(setup.drift, reference.share))
+
+
+@dataclass(frozen=True, eq=False)
+class PendingDriftCheck:
+    """Points of a task that is done, until the drift reference is visited again.
+
+    Attributes
+    ----------
+    setup : SessionSetup or None
+        By which recorded images were measured; None where it is the session's.
+    lamps : LampDrift or None
+        The drift of fixed lamps in recorded images.
+    """
+
+    task: AnyTask
+    runs: Runs
+    setup: SessionSetup | None = None
+    lamps: LampDrift | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SessionState:
+    """A verification at one moment.
+
+    Attributes
+    ----------
+    touching : ProbingState
+        Of the run at hand.
+    touches : tuple of ProbedPoint
+        Measured for it.
+    runs : tuple of tuple of ProbedPoint
+        Runs of the task at hand that are done.
+    trouble : Message or None
+        What was wrong with the last point, or why the points do not suffice yet
+        though they are as many as needed.
+    found : mapping of str to Found
+        By kind of the tasks that are done.
+    visits : tuple of tuple of ProbedPoint
+        Of the cone that is the drift reference, so far.
+    pending : tuple of PendingDriftCheck
+        What was found since the last visit, which does not count the drift yet.
+    """
+
+    touching: ProbingState = field(default_factory=ProbingState)
+    touches: Points = ()
+    runs: tuple[Points, ...] = ()
+    trouble: Message | None = None
+    found: Mapping[str, Found] = field(default_factory=dict)
+    visits: tuple[Points, ...] = ()
+    pending: tuple[PendingDriftCheck, ...] = ()
+
+    def found_by(self, task: VerificationTask[OptionsT, FoundT]) -> FoundT | None:
+        """Return what a task has found; None until it is done."""
+        found: FoundT | None = self.found.get(task.kind)  # type: ignore[assignment]
+        return found
+
+    def task(self, setup: SessionSetup) -> AnyTask | None:
+        """Return what is to be probed now; None when all is done.
+
+        The drift reference is visited before the first task and after each.
+        """
+        others = [task for task in setup.choices.tasks if task is not DRIFT]
+        left = [task for task in others if task.kind not in self.found]
+        is_due = len(self.visits) <= len(others) - len(left)
+        if self.awaits_drift(setup) and (is_due or not left):
+            return DRIFT
+        return next(iter(left), None)
+
+    def awaits_drift(self, setup: SessionSetup) -> bool:
+        """Return whether a cone is visited in between, and not for the last time."""
+        return setup.is_drift_checked and DRIFT.kind not in self.found
+
+    def runs_of(self, task: AnyTask) -> tuple[Points, ...]:
+        """Return the runs of the task at hand that are done."""
+        return self.visits if task is DRIFT else self.runs
+
+    def progress(self, setup: SessionSetup, task: AnyTask) -> TaskProgress:
+        """Return how far a task is that may be at hand."""
+        is_at_hand = self.task(setup) is task
+        runs = self.runs_of(task) if is_at_hand or task is DRIFT else ()
+        n_runs = task.n_runs(setup.choices.options_of(task))
+        if task is DRIFT:
+            n_runs = max(n_visits(setup.choices), len(runs) + is_at_hand)
+        return TaskProgress(
+            points=self.touches if is_at_hand else (),
+            runs=runs,
+            n_runs=n_runs,
+            cones=self._cones(),
+        )
+
+    def _cones(self) -> tuple[FloatArray, ...]:
+        """Return the cones that were probed, of which a point may be one more."""
+        found = self.found_by(FIXED_POINT)
+        cones = [visit[0].point_cam for visit in self.visits[:1]]
+        return tuple(cones if found is None else [*cones, found.calibrated.mean])
+
+    @property
+    def is_begun(self) -> bool:
+        """Whether anything was probed or found."""
+        return bool(self.found or self.touches or self.runs or self.visits)
+
+    @property
+    def assessment(self) -> VerificationAssessment | None:
+        """The worst that was found so far; a drift first, as it explains the rest."""
+        drift = self.found_by(DRIFT)
+        found = [self.found[task.kind] for task in TASKS if task.kind in self.found]
+        if drift is not None and not drift.assessment.is_accepted:
+            found.insert(0, drift)
+        return worst([each.assessment for each in found]) if found else None
+
+
+def n_done(state: SessionState) -> int:
+    """Return how many runs are done of the task at hand, and visits of the cone."""
+    return len(state.runs) + len(state.visits)
+
+
+def n_visits(choices: VerificationChoices) -> int:
+    """Return how often the cone is visited: before, between and after the tasks."""
+    n_others = len({*choices.kinds} - {DRIFT.kind})
+    return max(n_others + 1, MIN_VISITS)
+
+
+def without_touches(state: SessionState) -> SessionState:
+    """Return it with the next run to begin; a pen at rest has to move on first."""
+    touching = replace(state.touching, taken=(), places=())
+    return replace(state, touching=touching, touches=(), runs=(), trouble=None)
+
+
+def instruction(setup: SessionSetup, state: SessionState) -> Message:
+    """Return what the operator should do now."""
+    task = state.task(setup)
+    if task is None:
+        return message("session.done")
+    if state.touching.phase is ProbingPhase.KNOWN:
+        return task.known
+    if state.trouble is not None:
+        return state.trouble
+    options = setup.choices.options_of(task)
+    return task.instruction(options, state.progress(setup, task))
+
+
+def fraction_done(setup: SessionSetup, state: SessionState) -> float:
+    """Return how much of the task at hand is done, 0 to 1."""
+    task = state.task(setup)
+    if task is None:
+        return 1.0
+    progress, options = state.progress(setup, task), setup.choices.options_of(task)
+    return (len(progress.runs) + task.done(options, progress)) / progress.n_runs

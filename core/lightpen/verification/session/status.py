@@ -1,0 +1,145 @@
+"""Snapshot of a verification."""
+
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import Protocol
+
+from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.messages import Message
+from lightpen.verification.probing.current_tip import CurrentTip
+from lightpen.verification.probing.drift_reference import LampDrift, judged_with
+from lightpen.verification.probing.probing import ProbingEventKind, ProbingPhase
+from lightpen.verification.session.session import SessionTransition
+from lightpen.verification.session.session_state import SessionSetup, SessionState
+from lightpen.verification.tasks.assessment import VerificationAssessment
+from lightpen.verification.tasks.registry import AnyTask
+
+
+def _is_known(state: SessionState) -> bool:
+    return state.touching.phase is ProbingPhase.KNOWN
+
+
+class ReadingState(StrEnum):
+    """What is being read."""
+
+    NOTHING = ""
+    TIP = "tip"
+    IMAGES = "images"
+
+
+class SessionEventKind(StrEnum):
+    """What can happen, each with a sound and a sign of its own."""
+
+    RECORDED = "recorded"
+    BROKEN_OFF = "broken off"
+    KNOWN = "known"
+    FINISHED = "finished"  # one task of several
+    DONE = "done"
+    FAILED = "failed"  # done, with something found against the tip
+
+
+@dataclass(frozen=True, eq=False)
+class VerificationStatus:
+    """A verification from the tip in force to its verdict; nothing of it is changed.
+
+    Attributes
+    ----------
+    setup, state
+        None until the tip is read.
+    region : RegionOfInterest or None
+        What its images are looked at for.
+    began : datetime or None
+        When its first image came.
+    files : tuple of Path
+        Where what was found is kept.
+    lamp_drift : LampDrift or None
+        The drift of fixed lamps in view, up to the last finished task.
+    is_here : bool
+        Whether an operator is present.
+    accepted_by : str
+        Who accepted the tip though something was found against it.
+    refusal : Message or None
+        Why nothing can be verified.
+    """
+
+    tip: CurrentTip | None = None
+    setup: SessionSetup | None = None
+    state: SessionState | None = None
+    region: RegionOfInterest | None = None
+    began: datetime | None = None
+    files: tuple[Path, ...] = ()
+    reading: ReadingState = ReadingState.NOTHING
+    lamp_drift: LampDrift | None = None
+    is_here: bool = False
+    is_paused: bool = False
+    accepted_by: str = ""
+    refusal: Message | None = None
+
+    @property
+    def task(self) -> AnyTask | None:
+        """What is to be touched now; None when all is done, or nothing can be."""
+        if self.setup is None or self.state is None:
+            return None
+        return self.state.task(self.setup)
+
+    @property
+    def is_touching(self) -> bool:
+        """Whether images are taken."""
+        is_wanted = self.is_here and not self.is_paused and self.refusal is None
+        return is_wanted and not self.reading and self.task is not None
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all that was chosen is found."""
+        return self.state is not None and self.state.is_begun and self.task is None
+
+    @property
+    def assessment(self) -> VerificationAssessment | None:
+        """The worst that was found so far."""
+        found = None if self.state is None else self.state.assessment
+        return None if found is None else judged_with(found, self.lamp_drift)
+
+
+class VerificationListener(Protocol):
+    """Listener, called on the threads of a runner; must return soon."""
+
+    def on_verification(
+        self, status: VerificationStatus, events: tuple[SessionEventKind, ...]
+    ) -> None:
+        """Take the status after a change, and what happened."""
+
+    def on_progress(self, fraction: float) -> None:
+        """Take how much of the images is read, 0 to 1."""
+
+    def on_fault(self, message: Message) -> None:
+        """Take a sentence to be read: something could not be done."""
+
+    def on_fault_cleared(self, message: Message) -> None:
+        """Take the sentence of a trouble whose cause is gone."""
+
+
+_HAPPENED = {
+    ProbingEventKind.RECORDED: SessionEventKind.RECORDED,
+    ProbingEventKind.BROKEN_OFF: SessionEventKind.BROKEN_OFF,
+}
+
+
+def event_kinds(
+    before: SessionState | None, transition: SessionTransition
+) -> list[SessionEventKind]:
+    """Return what has happened to the touches by one more image."""
+    happened = [_HAPPENED[event.what] for event in transition.events]
+    if before is not None and _is_known(transition.state) and not _is_known(before):
+        happened.append(SessionEventKind.KNOWN)
+    return happened
+
+
+def ending(status: VerificationStatus) -> SessionEventKind:
+    """Return what it is that a task is done."""
+    if status.task is not None or status.assessment is None:
+        return SessionEventKind.FINISHED
+    is_refused = status.assessment.grade is Grade.REPEAT
+    return SessionEventKind.FAILED if is_refused else SessionEventKind.DONE

@@ -1,0 +1,1 @@
+"""Verifications on disk: records, images of probed points, resuming."""

@@ -1,0 +1,106 @@
+"""How a verification ended: accepted, refused or abandoned, in a file that stays.
+
+A verification is concluded when all that was chosen is done: accepted where the limits
+are kept, refused where they are not. Who accepts the tip all the same concludes it once
+more, with a reason, and so does who does one of its tasks again: the last conclusion of
+a session counts. One that is given up before all is done is abandoned. Each names all
+records of its session by their hashes, so that it stands for the whole.
+"""
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from lightpen.errors import AcceptanceError
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.hashes import InputFile
+from lightpen.formats.json_records import file_entry, plain, record_heading
+from lightpen.model.origin import Origin
+from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.folder.verifications import CONCLUSION
+from lightpen.record.library.supervision import (
+    Signature,
+    Supervision,
+    require_supervisor,
+)
+from lightpen.record.swings.names import Names
+from lightpen.verification.tasks.assessment import VerificationAssessment
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """The end of a verification.
+
+    Attributes
+    ----------
+    session : datetime
+        When it began.
+    found : VerificationAssessment or None
+        The worst of what was found; None before anything was.
+    reason : str
+        Why the tip is used though something was found against it; else empty.
+    supervisor : str
+        Who allowed it; empty where it took none.
+    """
+
+    outcome: TrialOutcome
+    session: datetime
+    at: datetime
+    found: VerificationAssessment | None = None
+    reason: str = ""
+    supervisor: str = ""
+
+
+def conclusion_record(
+    names: Names,
+    origin: Origin,
+    tip_file: InputFile,
+    conclusion: Conclusion,
+    files: tuple[InputFile, ...],
+) -> dict[str, Any]:
+    """Return the record of a conclusion.
+
+    Parameters
+    ----------
+    tip_file : InputFile
+        The result that was verified.
+    files : tuple of InputFile
+        All records of the session.
+    """
+    found = conclusion.found
+    return {
+        **record_heading(conclusion.at),
+        "verification": CONCLUSION,
+        "outcome": conclusion.outcome,
+        "session": conclusion.session.isoformat(timespec="seconds"),
+        "station": names.station,
+        "operator": names.operator,
+        "pen": names.pen,
+        "tip": names.tip,
+        "origin": origin,
+        "verdict": None
+        if found is None
+        else {"grade": found.grade.value, **plain(found.reason)},
+        "supervisor": conclusion.supervisor,
+        "reason": conclusion.reason,
+        "inputs": {"tip": file_entry(tip_file)},
+        "records": [file_entry(file) for file in files],
+    }
+
+
+def accepting_supervisor(
+    supervision: Supervision, found: VerificationAssessment, signature: Signature | None
+) -> str:
+    """Return the supervisor who accepts the tip; empty where it takes none.
+
+    Raises
+    ------
+    AcceptanceError
+        A supervisor is needed, and none signs or the password is wrong.
+    """
+    if not supervision.is_guarded and found.grade is not Grade.REPEAT:
+        return ""
+    if signature is None:
+        raise AcceptanceError("verification.no-supervisor", why=found.reason)
+    require_supervisor(supervision, signature)
+    return signature.name.strip()

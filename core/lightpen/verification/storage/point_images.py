@@ -1,0 +1,312 @@
+"""The images of live touches on the disk, from which a verification can be repeated.
+
+Each run is a record of its own, see `lightpen.record.swings.reading`: an image is
+written before it counts, with the touch that it is of; one that counts no more is taken
+out. So a run can be given to whatever takes recorded images, and what a crash leaves is
+whole.
+"""
+
+from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from lightpen.cameras.protocol import Frame
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.detection.rig_pose import see_together
+from lightpen.errors import FileError
+from lightpen.formats.hashes import InputFile, hashed
+from lightpen.record.folder.verifications import TOUCHES
+from lightpen.record.swings.header import Header
+from lightpen.record.swings.journal import JOURNAL
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import DISCARDED, Record, image_name, open_record
+from lightpen.record.swings.writing import (
+    RecordWriter,
+    SecondaryView,
+    make_record_folder,
+)
+from lightpen.verification.probing.drift_reference import LampDrift, LampObservations
+from lightpen.verification.probing.probing import (
+    ProbingEventKind,
+    ProbingPhase,
+    ProbingRules,
+)
+from lightpen.verification.session.session import (
+    SessionTransition,
+    advance_session,
+    rules_of,
+)
+from lightpen.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+    n_done,
+    with_drift,
+)
+from lightpen.verification.storage.checkpoint import CountingRun
+from lightpen.verification.tasks.registry import AnyTask
+
+CONCLUDED = "concluded"
+NOT_COUNTED = "not counted"
+
+
+@dataclass(frozen=True)
+class PointRecord:
+    """Where the images of a run are kept.
+
+    Attributes
+    ----------
+    journal : InputFile
+        With the checksum of each image in it.
+    """
+
+    folder: Path
+    journal: InputFile
+
+
+@dataclass(frozen=True, eq=False)
+class NewRecord:
+    """A folder that was made for a record, and its header."""
+
+    folder: Path
+    header: Header
+
+
+class PointImages:
+    """Keeps the images of one run after another.
+
+    Parameters
+    ----------
+    begin : callable
+        Returns the header of a record that begins now, and makes its folder.
+    """
+
+    def __init__(self, begin: Callable[[], NewRecord]) -> None:
+        self._begin = begin
+        self._writer: RecordWriter | None = None
+        self._open: CountingRun | None = None
+        self._folder: Path | None = None
+        self._numbers: dict[str, int] = {}  # of images that count, by name
+        self._touch = 1  # that the next image is of
+        self._runs: tuple[CountingRun, ...] = ()
+        self._records: dict[str, PointRecord] = {}
+
+    @property
+    def runs(self) -> tuple[CountingRun, ...]:
+        """The runs that count, in the order of time, the one at hand included."""
+        return self._runs if self._open is None else (*self._runs, self._open)
+
+    def records(self, task: AnyTask) -> tuple[PointRecord, ...]:
+        """Return the runs of a task that are done."""
+        return tuple(self._records[r.folder] for r in self._runs if r.task == task.kind)
+
+    def keep(self, frame: Frame, seen: PenDetection, task: AnyTask) -> str:
+        """Put an image on the disk, and return its name in the record.
+
+        Raises
+        ------
+        FileError
+            It cannot be written.
+        """
+        if self._writer is None:
+            new = self._begin()
+            self._writer = RecordWriter.create(new.folder, new.header, is_swing=False)
+            self._folder, self._open = (
+                new.folder,
+                CountingRun(task.kind, new.folder.name),
+            )
+        others = frame.others[: len(seen.others)]
+        number = self._writer.append(
+            *(frame.image, seen.pixels, seen.rotation, seen.translation),
+            frame.host_ts_ns * 1e-9,
+            frame.device_ts_ns,
+            others=[
+                SecondaryView(other.image, view.pixels, other.device_ts_ns)
+                for other, view in zip(others, seen.others, strict=True)
+            ],
+            touch=self._touch,
+        )
+        name = touch_image_name(number)
+        self._numbers[name] = number
+        return name
+
+    def follow(self, before: SessionState, transition: SessionTransition) -> None:
+        """Take out what does not count any more, and end a run that is done.
+
+        Raises
+        ------
+        FileError
+            It cannot be written.
+        """
+        state = transition.state
+        has_ended = transition.finished is not None or n_done(state) > n_done(before)
+        counting = before if has_ended else state
+        touching = counting.touching
+        names = {frame.name for still in touching.taken for frame in still.frames}
+        for event in transition.events if has_ended else ():
+            if event.what is ProbingEventKind.RECORDED:
+                names.update(event.names)
+        if not has_ended:
+            doubted = () if touching.doubted is None else (touching.doubted,)
+            names.update(seen.frame.name for seen in (*touching.held, *doubted))
+        if any(event.what is ProbingEventKind.RECORDED for event in transition.events):
+            self._touch += 1
+        self._take_out([name for name in self._numbers if name not in names])
+        if has_ended:
+            self._end(is_last=transition.finished is not None)
+
+    def forget_but(self, kinds: Collection[str]) -> None:
+        """Close the run at hand as one that was given up; those of some tasks count."""
+        with suppress(FileError):  # it stays as one that was interrupted
+            self._close(DISCARDED)
+        self._open = None
+        self._runs = tuple(run for run in self._runs if run.task in kinds)
+
+    def take_over(self, runs: Sequence[CountingRun], folder: Path) -> None:
+        """Continue after interrupted runs; an unfinished one is resumed.
+
+        Parameters
+        ----------
+        folder : Path
+            Of the records of all touches.
+
+        Raises
+        ------
+        FileError
+            A record cannot be read, or be written to.
+        """
+        self.forget_but(())
+        done = []
+        for run in runs:
+            record = open_record(folder / run.folder)
+            if record.verdict == CONCLUDED:
+                done.append(run)
+                self._records[run.folder] = _touch_record(folder / run.folder)
+            else:
+                self._resume(run, record)
+        self._runs = tuple(done)
+
+    def _resume(self, run: CountingRun, record: Record) -> None:
+        self._writer = RecordWriter.resume(record)
+        self._open, self._folder = run, record.folder
+        self._numbers = {touch_image_name(i.number): i.number for i in record.images}
+        for number in record.taken_out:
+            self._numbers.pop(touch_image_name(number), None)
+        self._touch = 1 + max((image.touch for image in record.images), default=0)
+
+    def _take_out(self, names: list[str]) -> None:
+        if names and self._writer is not None:
+            self._writer.take_out([self._numbers[name] for name in names], NOT_COUNTED)
+            for name in names:
+                del self._numbers[name]
+
+    def _end(self, *, is_last: bool) -> None:
+        """Close the run at hand as one that is done."""
+        run, folder = self._open, self._folder
+        self._close(CONCLUDED)
+        self._open = None
+        if run is not None and folder is not None:
+            self._records[run.folder] = _touch_record(folder)
+            self._runs = (*self._runs, replace(run, is_last=is_last))
+        elif is_last and self._runs:  # ended between two runs
+            *others, last = self._runs
+            self._runs = (*others, replace(last, is_last=True))
+
+    def _close(self, verdict: str) -> None:
+        writer = self._writer
+        self._writer, self._numbers, self._touch = None, {}, 1
+        if writer is not None:
+            with writer:
+                writer.conclude(verdict)
+
+
+def touch_image_name(number: int) -> str:
+    """Return the name of an image in the record of touches, from 1."""
+    return Path(image_name(number)).name
+
+
+def _touch_record(folder: Path) -> PointRecord:
+    return PointRecord(folder, hashed(folder / JOURNAL))
+
+
+def is_held_on(rules: ProbingRules, state: SessionState) -> bool:
+    """Return whether the next image is one of a touch, if the pen stays still."""
+    touching = state.touching
+    n_held = len(touching.held)
+    is_holding = touching.phase is ProbingPhase.HOLDING or not rules.n_settling
+    return is_holding and n_held >= rules.n_settling
+
+
+def new_record(root: Path, names: Names, header: Header) -> NewRecord:
+    """Make a folder for the images of a run below that of the verifications."""
+    return NewRecord(make_record_folder(root / TOUCHES, names, header.created), header)
+
+
+class LivePoints:
+    """Takes the images of one verification after another.
+
+    Parameters
+    ----------
+    images : PointImages
+        Keeps those that count.
+    """
+
+    def __init__(self, images: PointImages) -> None:
+        self._images = images
+        self._lamps = LampObservations()
+
+    def begin(self, lamps: LampObservations) -> None:
+        """Begin another verification, with the lamps observed so far."""
+        self._lamps = lamps
+
+    def lamp_drift(self, setup: SessionSetup) -> LampDrift | None:
+        """Return the drift of fixed lamps."""
+        cameras = setup.instrument.rig.cameras
+        return self._lamps.lamp_drift(cameras, setup.choices.limits)
+
+    def take(
+        self,
+        setup: SessionSetup,
+        state: SessionState,
+        frame: Frame,
+        detection: PenDetection,
+        region: RegionOfInterest,
+    ) -> SessionTransition:
+        """Take an image, and return what becomes of a verification by it.
+
+        Raises
+        ------
+        FileError
+            It counts and cannot be kept.
+        """
+        if state.touching.phase is ProbingPhase.HOLDING:
+            self._lamps = self._lamps.with_frame(frame, detection, region)
+        together = see_together(setup.instrument.rig, setup.instrument.pen, detection)
+        name = self._name(frame, together, setup, state)
+        transition = advance_session(self._drifted(setup, state), state, name, together)
+        self._images.follow(state, transition)
+        return transition
+
+    def _drifted(self, setup: SessionSetup, state: SessionState) -> SessionSetup:
+        """Return it with how far the camera has moved, where that is asked for next."""
+        task = state.task(setup)
+        if task is None:
+            return setup
+        rules = rules_of(setup, task)
+        if len(state.touching.held) + 1 < rules.n_settling + rules.n_frames:
+            return setup
+        return with_drift(setup, self.lamp_drift(setup))
+
+    def _name(
+        self, frame: Frame, seen: PenDetection, setup: SessionSetup, state: SessionState
+    ) -> str:
+        """Return the name of an image; one of a touch is kept under it."""
+        task = state.task(setup)
+        if task is None or not seen.has_pose or seen.is_blurred:
+            return str(frame.seq)
+        if not is_held_on(rules_of(setup, task), state):
+            return str(frame.seq)
+        return self._images.keep(frame, seen, task)

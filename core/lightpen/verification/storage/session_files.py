@@ -1,0 +1,353 @@
+"""Storage of one verification after another: images, records and checkpoint."""
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from lightpen.formats.hashes import InputFile, all_hashed
+from lightpen.model.origin import Origin
+from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.folder.verifications import TOUCHES
+from lightpen.verification.probing.current_tip import CurrentTip
+from lightpen.verification.probing.drift_reference import LampDrift
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.session.session_state import SessionState
+from lightpen.verification.session.status import VerificationStatus
+from lightpen.verification.storage.checkpoint import (
+    CheckpointFile,
+    ReadImages,
+    VerificationCheckpoint,
+    under_way_path,
+)
+from lightpen.verification.storage.conclusion import Conclusion, conclusion_record
+from lightpen.verification.storage.point_images import NewRecord, PointImages
+from lightpen.verification.storage.recorded_runs import CompletedTask
+from lightpen.verification.storage.resuming import ResumedVerification
+from lightpen.verification.storage.verification_files import (
+    TaskImages,
+    keep_verification,
+    task_record,
+    verifications_folder,
+)
+from lightpen.verification.tasks.drift import DRIFT
+from lightpen.verification.tasks.registry import AnyTask, task_of
+from lightpen.verification.tasks.task import Found
+
+_logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class PendingRecord:
+    """A record that waits to be written; those of its session are written before.
+
+    Attributes
+    ----------
+    record_of : callable
+        Returns it by the files of the session before it.
+    task : VerificationTask or None
+        That it is of; None of a conclusion.
+    ends : CheckpointFile or None
+        Of the session, where this record concludes it.
+    """
+
+    record_of: Callable[[tuple[InputFile, ...]], Mapping[str, Any]]
+    is_simulated: bool
+    task: AnyTask | None = None
+    ends: CheckpointFile | None = None
+
+
+class SessionRecords:
+    """Writes the records of one session after another.
+
+    Parameters
+    ----------
+    data : Path
+        Data folder, in which results are kept.
+    """
+
+    def __init__(self, data: Path) -> None:
+        self._data = data
+        self._files: list[Path] = []
+        self._waiting: list[tuple[PendingRecord, list[Path]]] = []
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What is written of the session at hand."""
+        return tuple(self._files)
+
+    @property
+    def are_waiting(self) -> bool:
+        """Whether some could not be written yet."""
+        return bool(self._waiting)
+
+    @property
+    def waiting(self) -> tuple[str, ...]:
+        """The kinds of the tasks of the session at hand whose records wait."""
+        return tuple(
+            kept.task.kind
+            for kept, files in self._waiting
+            if files is self._files and kept.task is not None
+        )
+
+    def begin(self, files: tuple[Path, ...] = ()) -> None:
+        """Begin another session, of which these are written already."""
+        self._files = list(files)
+
+    def add(self, kept: PendingRecord) -> None:
+        """Have a record of the session at hand written by the next `write`."""
+        self._waiting.append((kept, self._files))
+
+    def write(self) -> None:
+        """Write all that waits.
+
+        Raises
+        ------
+        FileError
+            One cannot be written; it and those after it stay pending.
+        """
+        while self._waiting:
+            kept, files = self._waiting[0]
+            self._write(kept, files)
+            self._waiting.pop(0)
+
+    def write_now(self, kept: PendingRecord) -> None:
+        """Write a record of the session at hand, or not at all.
+
+        Raises
+        ------
+        FileError
+            It cannot be written.
+        """
+        self._write(kept, self._files)
+
+    def _write(self, kept: PendingRecord, files: list[Path]) -> None:
+        record = kept.record_of(all_hashed(files))
+        files.append(
+            keep_verification(self._data, record, is_simulated=kept.is_simulated)
+        )
+        _logger.info("verification written: %s", files[-1])
+        if kept.ends is not None:
+            kept.ends.conclude()
+
+
+def concluding(
+    tip: CurrentTip, conclusion: Conclusion, ends: CheckpointFile | None
+) -> PendingRecord:
+    """Return the record of a conclusion, to be written when its session is."""
+    return PendingRecord(
+        lambda files: conclusion_record(
+            tip.names, tip.origin, tip.tip_file, conclusion, files
+        ),
+        tip.origin is Origin.SIMULATED,
+        ends=ends,
+    )
+
+
+class SessionKeeping:
+    """Keeps what is touched and found, each thing as soon as it is known.
+
+    Parameters
+    ----------
+    data : Path
+        Folder that it is kept in.
+    new_record : callable
+        Makes a record for the images of the run at hand.
+    now : callable
+        Returns date and time with the time zone.
+
+    Attributes
+    ----------
+    images : PointImages
+        Of live touches.
+    """
+
+    def __init__(
+        self,
+        data: Path,
+        new_record: Callable[[], NewRecord],
+        now: Callable[[], datetime],
+    ) -> None:
+        self._data = data
+        self._now = now
+        self.images = PointImages(new_record)
+        self._records = SessionRecords(data)
+        self._unkept: tuple[CompletedTask, ...] = ()  # whose drift is not known yet
+        self._read: tuple[ReadImages, ...] = ()
+        self._file: CheckpointFile | None = None  # of the verification under way
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What is written of the session at hand."""
+        return self._records.files
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether something could not be written yet."""
+        return self._records.are_waiting
+
+    def has_read(self, task: AnyTask) -> bool:
+        """Return whether a task that is done was done with recorded images."""
+        return any(images.task == task.kind for images in self._read)
+
+    def root(self, tip: CurrentTip) -> Path:
+        """Return the folder of the verifications of a tip."""
+        is_simulated = tip.origin is Origin.SIMULATED
+        return verifications_folder(self._data, is_simulated=is_simulated)
+
+    def add_task(
+        self, task: AnyTask, tip: CurrentTip, lamp_drift: LampDrift | None
+    ) -> None:
+        """Keep what a task found by live touches, when its drift is known."""
+        records = self.images.records(task)
+        images = TaskImages(tip.origin, lamp_drift=lamp_drift, records=records)
+        self._unkept = (*self._unkept, CompletedTask(task, tip, images))
+
+    def add_read(self, images: ReadImages, done: CompletedTask) -> None:
+        """Keep what a task found by recorded images, when its drift is known."""
+        self._read = (*self._read, images)
+        self._unkept = (*self._unkept, done)
+
+    def settle(self, status: VerificationStatus) -> None:
+        """Have written what was found, unless a later visit will add to its U."""
+        state = status.state
+        if state is None:
+            return
+        waiting = {each.task for each in state.pending}
+        done = self._unkept
+        self._unkept = tuple(each for each in done if each.task in waiting)
+        for each in done:
+            found = state.found_by(each.task)
+            if each.task not in waiting and found is not None:
+                self._add(each, found, status)
+
+    def forget_but(self, state: SessionState) -> None:
+        """Forget the images of what is to be touched again."""
+        kinds = {*state.found, *([DRIFT.kind] if state.visits else [])}
+        self.images.forget_but(kinds)
+        self._unkept = tuple(each for each in self._unkept if each.task.kind in kinds)
+        self._read = tuple(each for each in self._read if each.task in kinds)
+
+    def conclude(self, status: VerificationStatus, outcome: TrialOutcome) -> None:
+        """Have the outcome of the verification written, with all its records."""
+        tip, began = status.tip, status.began
+        if tip is not None and began is not None:
+            conclusion = Conclusion(outcome, began, self._now(), status.assessment)
+            self._records.add(concluding(tip, conclusion, self._file))
+
+    def accept(self, tip: CurrentTip, conclusion: Conclusion) -> None:
+        """Write that a tip is accepted all the same.
+
+        Raises
+        ------
+        FileError
+            It cannot be written.
+        """
+        self._records.write_now(concluding(tip, conclusion, None))
+
+    def give_up(self, status: VerificationStatus) -> None:
+        """Have concluded what was begun and is not done; another session begins."""
+        self.images.forget_but(())
+        if status.state is not None:
+            state = replace(status.state, pending=())
+            self.settle(replace(status, state=state))
+        if status.began is not None and not status.is_done:
+            self.conclude(status, TrialOutcome.ABANDONED)
+
+    def begin(self) -> None:
+        """Begin another session."""
+        self._records.begin()
+        self._unkept, self._read, self._file = (), (), None
+
+    def write(self) -> None:
+        """Write what waits for it.
+
+        Raises
+        ------
+        LightpenError
+            Something cannot be written; it stays pending.
+        """
+        self._records.write()
+
+    def note(self, status: VerificationStatus, choices: VerificationChoices) -> None:
+        """Write the checkpoint from which the verification can be resumed.
+
+        Raises
+        ------
+        FileError
+            It cannot be written.
+        """
+        tip, runs = status.tip, self.images.runs
+        has_some = bool(runs or self._read)
+        if tip is None or status.began is None or status.is_done or not has_some:
+            return
+        if self._file is None:
+            path = under_way_path(self.root(tip), tip.names, status.began)
+            self._file = CheckpointFile(path)
+        unkept = (done.task.kind for done in self._unkept)
+        self._file.note(
+            VerificationCheckpoint(
+                began=status.began,
+                names=tip.names,
+                origin=tip.origin,
+                tip_file=tip.tip_file.path.name,
+                tip_sha256=tip.tip_file.sha256,
+                pen_sha256=tip.pen_file.sha256,
+                seen_by=tip.viewers.hashes,
+                choices=choices,
+                runs=runs,
+                read=self._read,
+                files=tuple(file.name for file in self._records.files),
+                unwritten=(*unkept, *self._records.waiting),
+            )
+        )
+
+    def take_over(
+        self, path: Path, before: ResumedVerification, lamp_drift: LampDrift | None
+    ) -> None:
+        """Continue an interrupted verification.
+
+        Parameters
+        ----------
+        path : Path
+            Its file.
+
+        Raises
+        ------
+        FileError
+            Another window has it, or a record cannot be read or written to.
+        """
+        under_way, file = before.under_way, CheckpointFile(path)
+        file.hold()
+        try:
+            self.images.take_over(under_way.runs, self.root(before.tip) / TOUCHES)
+        except BaseException:
+            file.let_go()
+            raise
+        self._file, self._read = file, under_way.read
+        self._records.begin(before.files)
+        read = {done.task.kind: done for done in before.read}
+        for kind in before.unwritten:
+            if kind in read:
+                done = read[kind]
+                self._unkept = (*self._unkept, done)
+            else:
+                self.add_task(task_of(kind), before.tip, lamp_drift)
+
+    def _add(
+        self, done: CompletedTask, found: Found, status: VerificationStatus
+    ) -> None:
+        """Have a task written, now or as soon as it can be."""
+        assert status.setup is not None
+        record = task_record(
+            done.task,
+            found,
+            done.tip,
+            status.setup.choices,
+            status.began or self._now(),
+            done.images,
+        )
+        is_simulated = Origin.SIMULATED in (done.tip.origin, done.images.origin)
+        self._records.add(PendingRecord(lambda _: record, is_simulated, done.task))

@@ -1,0 +1,124 @@
+"""Verifications in the data folder: a file for each task that was done, never changed.
+
+Each is what the command of its kind writes, and can be given to whatever reads that. It
+says besides who verified what in which session. Those of simulated pens are kept apart.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from lightpen.formats.hashes import InputFile
+from lightpen.formats.json_records import file_entry, record_bytes
+from lightpen.model.origin import Origin
+from lightpen.record.folder.verifications import VERIFICATIONS
+from lightpen.record.library.numbered_files import add_numbered
+from lightpen.record.results.result_folder import SIMULATED
+from lightpen.verification.probing.current_tip import CurrentTip
+from lightpen.verification.probing.drift_reference import LampDrift, lamp_drift_entries
+from lightpen.verification.probing.image_locations import PenCameras
+from lightpen.verification.reports.records import verification_record
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.storage.point_images import PointRecord
+from lightpen.verification.tasks.probed_point import RejectedFrame, rejected_entries
+from lightpen.verification.tasks.registry import AnyTask
+from lightpen.verification.tasks.task import Found
+
+
+@dataclass(frozen=True)
+class TaskImages:
+    """Where the images of a task come from.
+
+    Attributes
+    ----------
+    origin : Origin or None
+        What they are of; None where a record does not say.
+    files : tuple of InputFile
+        Of a live camera those through which the pen was held still: each by its
+        number, with the hash of its pixels.
+    rejected : tuple of RejectedFrame
+        Those that belong to no touch, and why.
+    lamp_drift : LampDrift or None
+        The drift of fixed lamps in view so far.
+    records : tuple of PointRecord
+        Where those of a live camera are kept, run by run.
+    """
+
+    origin: Origin | None
+    files: tuple[InputFile, ...] = ()
+    rejected: tuple[RejectedFrame, ...] = ()
+    lamp_drift: LampDrift | None = None
+    records: tuple[PointRecord, ...] = ()
+
+
+def keep_verification(
+    data: Path, record: Mapping[str, Any], *, is_simulated: bool
+) -> Path:
+    """Keep the record of a verification in a data folder, and return its file.
+
+    Raises
+    ------
+    FileError
+        It cannot be written.
+    """
+    folder = verifications_folder(data, is_simulated=is_simulated)
+    return add_numbered(folder, record_bytes(record))
+
+
+def verifications_folder(data: Path, *, is_simulated: bool) -> Path:
+    """Return the folder of a data folder that verifications are kept in."""
+    return (data / SIMULATED if is_simulated else data) / VERIFICATIONS
+
+
+def task_record(
+    task: AnyTask,
+    found: Found,
+    tip: CurrentTip,
+    choices: VerificationChoices,
+    session: datetime,
+    images: TaskImages,
+) -> dict[str, Any]:
+    """Return the record of a task.
+
+    Parameters
+    ----------
+    session : datetime
+        When the verification began that it is part of.
+    """
+    names, limits = tip.names, asdict(choices.limits)
+    return verification_record(
+        task.kind,
+        {
+            "session": session.isoformat(timespec="seconds"),
+            "station": names.station,
+            "operator": names.operator,
+            "pen": names.pen,
+            "tip": names.tip,
+            "origin": images.origin,
+            **task.entries(found, tip.instrument),
+            "rejected": rejected_entries(images.rejected),
+            "witness": lamp_drift_entries(images.lamp_drift),
+        },
+        found.assessment,
+        {name: limits[name] for name in task.limits},
+        {
+            "tip": file_entry(tip.tip_file),
+            **viewer_entries(tip.viewers),
+            "pen": file_entry(tip.pen_file),
+            "images": [file_entry(file) for file in images.files],
+            "touches": [
+                {"folder": each.folder.name, "journal_sha256": each.journal.sha256}
+                for each in images.records
+            ],
+        },
+    )
+
+
+def viewer_entries(viewers: PenCameras) -> dict[str, Any]:
+    """Return the files of cameras, as inputs of a record."""
+    first, *others = (file_entry(file) for file in viewers.files)
+    if not others:
+        return {"camera": first}
+    return {"camera": others[0], "rig": first, "cameras": others}

@@ -1,0 +1,1 @@
+"""The verification tasks: from probed points to results with uncertainty."""

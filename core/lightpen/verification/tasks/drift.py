@@ -1,0 +1,242 @@
+"""Whether the camera moved during a session: a drift reference probed before and after.
+
+The drift reference is a fixed cone, probed at the start, at the end and as often
+in between as one likes. What tip, LEDs and camera have wrong moves all visits alike
+where the pen is held alike, so that it hardly counts in a difference. What the drift
+reference moved by is counted into points that were measured in between as a rectangular
+distribution of that half-width [1]_.
+
+References
+----------
+.. [1] JCGM 100:2008, "Guide to the expression of uncertainty in measurement", 4.3.7.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.messages import Message, message
+from lightpen.model.limits import VerificationLimits
+from lightpen.model.posture import angles_between
+from lightpen.verification.tasks.articulation import ALIKE, SAME_POSTURE
+from lightpen.verification.tasks.assessment import (
+    VERIFY_AGAIN,
+    VerificationAssessment,
+    accepted,
+    check,
+    refused,
+)
+from lightpen.verification.tasks.fixed_point import (
+    ELSEWHERE,
+    LIFTED,
+    elsewhere,
+    without_others,
+)
+from lightpen.verification.tasks.probed_point import mean_point
+from lightpen.verification.tasks.task import (
+    Conditions,
+    Found,
+    HandGoal,
+    ResultRow,
+    ResultTable,
+    Runs,
+    Screening,
+    TaskOptions,
+    TaskProgress,
+    VerificationTask,
+)
+
+MIN_VISITS = 2
+VISIT_POINTS = 3
+ALONG = 3.0  # times the limit, that U may be along the view, as of a fixed point
+TOUCH_LONGER = message("drift.touch-longer")
+USE_TOUCHES = message("drift.use-touches")
+
+
+@dataclass(frozen=True, eq=False)
+class Drift(Found):
+    """A drift reference visited several times.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the visits.
+    moves : (N, 3) array
+        Of the drift reference since the first visit, camera frame, mm.
+    uncertainties : (N, 3) array
+        U (k = 2) of each, mm.
+    """
+
+    names: tuple[str, ...]
+    moves: FloatArray
+    uncertainties: FloatArray
+
+    @property
+    def share(self) -> FloatArray:
+        """Standard uncertainty by it of a point measured meanwhile, (3,), mm."""
+        return np.asarray(np.abs(self.moves).max(axis=0) / np.sqrt(3))
+
+
+class DriftOptions(TaskOptions, frozen=True, tag="drift"):
+    """There is nothing to choose."""
+
+
+def measure_drift(
+    visits: Runs, conditions: Conditions, options: DriftOptions | None = None
+) -> Drift:
+    """Measure how a drift reference moves from visit to visit, in the order of time.
+
+    Raises
+    ------
+    CalibrationError
+        There are fewer than two visits.
+    """
+    if len(visits) < MIN_VISITS:
+        raise CalibrationError("drift.too-few")
+    first, *others = [mean_point(touches) for _, touches in visits]
+    moves = np.array([each.point_cam - first.point_cam for each in (first, *others)])
+    variances = np.zeros_like(moves)
+    for i, each in enumerate(others, start=1):
+        row = each.sensitivity - first.sensitivity
+        shared = row @ conditions.instrument.covariance @ row.T
+        variances[i] = np.diag(shared + each.noise + first.noise)
+    uncertainties = COVERAGE_FACTOR * np.sqrt(variances)
+    names = tuple(name for name, _ in visits)
+    return Drift(
+        names=names,
+        moves=moves,
+        uncertainties=uncertainties,
+        assessment=_assessment(names, moves, uncertainties, conditions.limits),
+    )
+
+
+def _assessment(
+    names: tuple[str, ...],
+    moves: FloatArray,
+    uncertainties: FloatArray,
+    limits: VerificationLimits,
+) -> VerificationAssessment:
+    lengths = np.linalg.norm(moves, axis=1)
+    worst = int(np.argmax(lengths))
+    axis = int(np.argmax(np.abs(moves[worst])))
+    distance, uncertainty = float(lengths[worst]), float(uncertainties[worst, axis])
+    if distance > max(limits.drift, uncertainty):
+        return refused(
+            message(
+                "drift.moved",
+                first=names[0],
+                visit=names[worst],
+                distance=distance,
+                uncertainty=uncertainty,
+                limit=limits.drift,
+            ),
+            VERIFY_AGAIN,
+        )
+    across, along = uncertainties[:, :2].max(), uncertainties[:, 2].max()
+    largest = float(max(across, along / ALONG))
+    if max(largest, distance) > limits.drift:
+        return check(
+            message(
+                "drift.uncertain",
+                distance=distance,
+                uncertainty=float(uncertainties.max()),
+                limit=limits.drift,
+            ),
+            TOUCH_LONGER,
+        )
+    return accepted(
+        message(
+            "drift.good", distance=distance, uncertainty=uncertainty, limit=limits.drift
+        ),
+        USE_TOUCHES,
+    )
+
+
+def _screen(
+    options: DriftOptions, conditions: Conditions, progress: TaskProgress
+) -> Screening:
+    """Drop a point in another posture than the first, or away from its cone."""
+    points, visits = progress.points, progress.runs
+    first, last = (*visits, points)[0][0], points[-1]
+    is_second = not visits and len(points) == 2  # either may be the wrong one
+    kept = (1,) if is_second else tuple(range(len(points) - 1))
+    turned = angles_between(last.rotation[None], first.rotation[None])[0, 0]
+    if turned > SAME_POSTURE:
+        return Screening(kept, message("session.other-than-first"))
+    distance = float(np.linalg.norm(last.point_cam - first.point_cam))
+    if distance > ELSEWHERE:
+        return Screening(kept, elsewhere(distance))
+    return without_others(points, LIFTED)
+
+
+def _entries(found: Drift, instrument: Instrument) -> dict[str, Any]:
+    return {
+        "visits": [
+            {"name": name, "move_mm": move, "expanded_uncertainty_mm": uncertainty}
+            for name, move, uncertainty in _visits(found)
+        ],
+        "standard_uncertainty_share_mm": found.share,
+    }
+
+
+def _visits(found: Drift) -> list[tuple[str, list[float], list[float]]]:
+    """Return name, move and uncertainty of each visit."""
+    figures = found.moves.tolist(), found.uncertainties.tolist()
+    return list(zip(found.names, *figures, strict=True))
+
+
+def _tables(found: Drift, conditions: Conditions) -> tuple[ResultTable, ...]:
+    u, v, w = found.share.tolist()
+    columns = (*"uvw", *(message("drift.axis", axis=axis) for axis in "uvw"))
+    rows = (ResultRow(name, [*move, *within]) for name, move, within in _visits(found))
+    note = message("drift.share", u=u, v=v, w=w)
+    return (ResultTable(message("drift.table"), columns, tuple(rows), (note,)),)
+
+
+def _figures_so_far(
+    progress: TaskProgress, conditions: Conditions
+) -> tuple[ResultTable, ...]:
+    if len(progress.runs) < MIN_VISITS:
+        return (ResultTable(message("drift.table"), notes=(message("drift.note"),)),)
+    visits = [(str(i), points) for i, points in enumerate(progress.runs, start=1)]
+    return _tables(measure_drift(visits, conditions), conditions)
+
+
+def _instruction(options: DriftOptions, progress: TaskProgress) -> Message:
+    return message(
+        "session.touch-witness",
+        needed=VISIT_POINTS,
+        n_touches=len(progress.points),
+        visit=progress.run,
+        n_visits=progress.n_runs,
+    )
+
+
+DRIFT = VerificationTask(
+    kind="drift",
+    summary="whether the camera moved meanwhile",
+    run_help="one visit of a cone that stands still, in order of time",
+    title=message("drift.title"),
+    purpose=message("drift.purpose"),
+    first=message("drift.first"),
+    another=message("task.lift"),
+    known=ALIKE,
+    limits=("drift",),
+    options=DriftOptions,
+    measure=measure_drift,
+    entries=_entries,
+    tables=_tables,
+    figures_so_far=_figures_so_far,
+    hand=lambda options, run, step: HandGoal(),
+    n_points=lambda options: VISIT_POINTS,
+    instruction=_instruction,
+    screen=_screen,
+    newness=lambda options: (0.0, 0.0),
+    counts_drift=False,
+    shows_postures=True,
+)

@@ -1,0 +1,449 @@
+"""A fixed point measured again and again in new postures: the paper's Table 2.
+
+A tip that is right stays where it is, however the pen is held; one that is off by d in
+the pen's frame moves by ``R_i d``. So where the points scatter, the postures
+determine the tip by which they would not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import pi
+from typing import Annotated, Any
+
+import numpy as np
+from msgspec import Meta
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.messages import Message, message
+from lightpen.model.coverage import posture_spread
+from lightpen.model.limits import VerificationLimits
+from lightpen.model.quantiles import chi_quantile
+from lightpen.verification.tasks.assessment import (
+    CALIBRATE_AGAIN,
+    VERIFY_AGAIN,
+    VerificationAssessment,
+    accepted,
+    check,
+    refused,
+)
+from lightpen.verification.tasks.probed_point import (
+    ProbedPoint,
+    joint_covariance,
+    point_entries,
+    with_tip,
+)
+from lightpen.verification.tasks.task import (
+    ANY,
+    Conditions,
+    Found,
+    HandGoal,
+    ResultRow,
+    ResultTable,
+    Runs,
+    Screening,
+    TaskOptions,
+    TaskProgress,
+    VerificationTask,
+    count_option,
+    keep_all,
+)
+
+USUAL_TOUCHES = 10
+MIN_TOUCHES, MAX_TOUCHES = 3, 50
+NEW_POSTURE = float(np.radians(8.0))
+ELSEWHERE = 5.0  # mm from the other points: the tip was not in the cone at all
+TILTS = 0.2, 0.4  # rad, of the simulated operator
+MIN_SPREAD = np.radians(3.0)  # rms turn of the best direction; less proves nothing
+ASTRAY = 8.0  # times the median distance from the middle
+LIFTED = 0.2  # mm; nearer points scatter, farther ones may be of a lifted pen
+TIP_SIGMA = 3.0  # mm, by which another tip may differ
+SEATING = 0.003  # mm, of a tip in a good cone
+TIP_GATE = 1e-3  # chance that the same tip looks like another
+WORTH_TELLING = 0.01  # mm, of another tip
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """Coordinates of a point measured several times, mm.
+
+    Attributes
+    ----------
+    points : (N, 3) array
+    """
+
+    points: FloatArray
+
+    @property
+    def mean(self) -> FloatArray:
+        """Of each coordinate, (3,)."""
+        return np.asarray(self.points.mean(axis=0))
+
+    @property
+    def deviation(self) -> FloatArray:
+        """Standard deviation of each coordinate, (3,)."""
+        return np.asarray(self.points.std(axis=0, ddof=1))
+
+    @property
+    def range(self) -> FloatArray:
+        """Largest minus smallest of each coordinate, (3,)."""
+        return np.asarray(np.ptp(self.points, axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class FixedPoint(Found):
+    """A fixed point by N probed points.
+
+    Attributes
+    ----------
+    left_out : tuple of ProbedPoint
+        Far from all others: the pen was lifted.
+    nominal : Scatter or None
+        The same images with the nominal tip; None where it is not known.
+    uncertainty : (3,) array
+        U (k = 2) of the mean, mm.
+    expected_deviation : (3,) array
+        Standard deviation of the touches by all that is known of them, mm.
+    tip_change : (3,) array
+        By which tip, less the given one, the points would scatter least, mm.
+    tip_change_uncertainty : (3,) array
+        U (k = 2) of it, mm.
+    wants_other_tip : bool
+        Whether that tip differs by more than chance.
+    moved : (3,) array or None
+        Mean less the cone of the calibration, mm; None before another camera.
+    """
+
+    touches: tuple[ProbedPoint, ...]
+    left_out: tuple[ProbedPoint, ...]
+    calibrated: Scatter
+    nominal: Scatter | None
+    uncertainty: FloatArray
+    expected_deviation: FloatArray
+    tip_change: FloatArray
+    tip_change_uncertainty: FloatArray
+    wants_other_tip: bool
+    moved: FloatArray | None
+
+    @property
+    def probed(self) -> tuple[ProbedPoint, ...]:
+        """Points whose postures are of interest."""
+        return self.touches
+
+
+class FixedPointOptions(TaskOptions, frozen=True, tag="fixed point"):
+    """How often the cone is probed."""
+
+    n_touches: Annotated[int, Meta(ge=MIN_TOUCHES, le=MAX_TOUCHES)] = USUAL_TOUCHES
+
+
+def measure_fixed_point(
+    runs: Runs, conditions: Conditions, options: FixedPointOptions | None = None
+) -> FixedPoint:
+    """Measure a fixed point by all runs, and judge the tip by its scatter.
+
+    Raises
+    ------
+    CalibrationError
+        There are too few points at one place.
+    """
+    instrument, cone_cam = conditions.instrument, conditions.cone_cam
+    touches = [point for _, points in runs for point in points]
+    kept, left_out = _at_one_place(touches)
+    calibrated = scatter_of(kept)
+    covariance = joint_covariance(kept, instrument)
+    change, change_covariance = _other_tip(kept)
+    spread = change_covariance + instrument.covariance[:3, :3]
+    distance = float(np.sqrt(change @ np.linalg.solve(spread, change)))
+    n = len(kept)
+    blocks = covariance.reshape(n, 3, n, 3)
+    of_mean = blocks.sum(axis=(0, 2)) / n**2
+    own = np.einsum("nini->i", blocks) / n
+    expected = np.sqrt(np.maximum((own - np.diag(of_mean)) * n / (n - 1), 0.0))
+    found = FixedPoint(
+        touches=kept,
+        left_out=left_out,
+        calibrated=calibrated,
+        nominal=nominal_scatter(kept, instrument, conditions.nominal_tip),
+        uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(of_mean) + conditions.drift**2),
+        expected_deviation=expected,
+        tip_change=change,
+        tip_change_uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(change_covariance)),
+        wants_other_tip=distance > chi_quantile(3, TIP_GATE)
+        and float(np.linalg.norm(change)) > WORTH_TELLING,
+        moved=None if cone_cam is None else calibrated.mean - cone_cam,
+        assessment=accepted(_steady(calibrated)),
+    )
+    return replace(found, assessment=_assessment(found, conditions.limits))
+
+
+def _steady(scatter: Scatter) -> Message:
+    u, v, w = scatter.deviation.tolist()
+    return message("fixed-point.steady", u=u, v=v, w=w)
+
+
+def scatter_of(touches: Sequence[ProbedPoint]) -> Scatter:
+    """Return the coordinates of touches."""
+    return Scatter(np.array([touch.point_cam for touch in touches]))
+
+
+def nominal_scatter(
+    touches: Sequence[ProbedPoint],
+    instrument: Instrument,
+    nominal_tip: FloatArray | None,
+) -> Scatter | None:
+    """Return the coordinates of touches with the nominal tip; None if not known."""
+    if nominal_tip is None:
+        return None
+    return scatter_of([with_tip(each, instrument, nominal_tip) for each in touches])
+
+
+def _at_one_place(
+    touches: Sequence[ProbedPoint],
+) -> tuple[tuple[ProbedPoint, ...], tuple[ProbedPoint, ...]]:
+    if not touches:
+        raise _too_few(0)
+    points = scatter_of(touches).points
+    distances = np.linalg.norm(points - np.median(points, axis=0), axis=1)
+    limit = max(ASTRAY * float(np.median(distances)), LIFTED)
+    kept = tuple(t for t, d in zip(touches, distances, strict=True) if d <= limit)
+    left_out = tuple(t for t, d in zip(touches, distances, strict=True) if d > limit)
+    if len(kept) < MIN_TOUCHES:
+        raise _too_few(len(kept))
+    return kept, left_out
+
+
+def _too_few(n_touches: int) -> CalibrationError:
+    return CalibrationError(
+        "fixed-point.too-few",
+        n_touches=n_touches,
+        needed=MIN_TOUCHES,
+        usual=USUAL_TOUCHES,
+    )
+
+
+def _other_tip(touches: Sequence[ProbedPoint]) -> tuple[FloatArray, FloatArray]:
+    """Return by which change of the tip the points meet best, and its covariance.
+
+    What all touches share moves the point as a whole, and hardly their scatter; where
+    the points scatter by more than their noise, so does the change.
+    """
+    prior = np.diag([TIP_SIGMA**-2] * 3 + [0.0] * 3)
+    middle = np.mean([touch.point_cam for touch in touches], axis=0)
+    A = np.array([np.hstack([touch.rotation, -np.eye(3)]) for touch in touches])
+    b = middle - np.array([touch.point_cam for touch in touches])
+    W = np.linalg.inv([touch.noise + SEATING**2 * np.eye(3) for touch in touches])
+    AtW = np.swapaxes(A, 1, 2) @ W
+    covariance = np.linalg.inv(prior + (AtW @ A).sum(axis=0))
+    step = covariance @ np.einsum("nij,nj->i", AtW, b)
+    left = b - A @ step
+    n_free = max(3 * len(touches) - len(step), 1)
+    excess = max(float(np.einsum("ni,nij,nj->", left, W, left)) / n_free, 1.0)
+    return np.asarray(step[:3]), np.asarray(excess * covariance[:3, :3])
+
+
+def _assessment(
+    found: FixedPoint, limits: VerificationLimits
+) -> VerificationAssessment:
+    deviation = found.calibrated.deviation
+    allowed = np.array([limits.across, limits.across, limits.along])
+    axis = int(np.argmax(deviation / allowed))
+    is_beyond = bool(deviation[axis] > allowed[axis])
+    if found.wants_other_tip and is_beyond:
+        x, y, z = found.tip_change.tolist()
+        return refused(
+            message(
+                "fixed-point.other-tip",
+                deviation=float(deviation[axis]),
+                axis="uvw"[axis],
+                limit=float(allowed[axis]),
+                x=x,
+                y=y,
+                z=z,
+            ),
+            CALIBRATE_AGAIN,
+        )
+    if is_beyond:
+        return refused(
+            message(
+                "fixed-point.scatters",
+                deviation=float(deviation[axis]),
+                axis="uvw"[axis],
+                limit=float(allowed[axis]),
+            ),
+            VERIFY_AGAIN,
+        )
+    spread = float(
+        posture_spread(np.array([touch.rotation for touch in found.touches]))[0][-1]
+    )
+    if spread < MIN_SPREAD:
+        return check(
+            message(
+                "fixed-point.same-posture",
+                found=float(np.degrees(spread)),
+                needed=float(np.degrees(MIN_SPREAD)),
+            ),
+            VERIFY_AGAIN,
+        )
+    if found.left_out:
+        return check(
+            message(
+                "fixed-point.lifted",
+                n_left_out=len(found.left_out),
+                n_touches=len(found.left_out) + len(found.touches),
+                first=found.left_out[0].label,
+            ),
+            VERIFY_AGAIN,
+        )
+    return found.assessment
+
+
+def without_others(
+    points: Sequence[ProbedPoint], limit: float = ELSEWHERE
+) -> Screening:
+    """Return that points count that lie within a limit, mm, of most of them."""
+    places = scatter_of(points).points
+    distances = np.linalg.norm(places - np.median(places, axis=0), axis=1)
+    kept = np.flatnonzero(distances <= limit).tolist()
+    if len(points) < 3 or len(kept) == len(points):  # of two, either may be wrong
+        return keep_all(len(points))
+    return Screening(kept, elsewhere(float(distances.max())))
+
+
+def elsewhere(distance: float) -> Message:
+    """Return that a point does not count that lies this far from the others, mm."""
+    return message("session.elsewhere", distance=distance)
+
+
+def _screen(
+    options: FixedPointOptions, conditions: Conditions, progress: TaskProgress
+) -> Screening:
+    return without_others(progress.points)
+
+
+def _entries(found: FixedPoint, instrument: Instrument) -> dict[str, Any]:
+    return {
+        "calibrated": _scatter_entries(found.calibrated),
+        "nominal": None if found.nominal is None else _scatter_entries(found.nominal),
+        "expanded_uncertainty_mm": found.uncertainty,
+        "expected_std_mm": found.expected_deviation,
+        "moved_mm": found.moved,
+        "tip_change_mm": found.tip_change,
+        "tip_change_expanded_uncertainty_mm": found.tip_change_uncertainty,
+        "wants_other_tip": found.wants_other_tip,
+        "touches": point_entries(found.touches, instrument),
+        "left_out": point_entries(found.left_out, instrument),
+    }
+
+
+def _scatter_entries(scatter: Scatter) -> dict[str, Any]:
+    return {
+        "points_cam_mm": scatter.points,
+        "mean_mm": scatter.mean,
+        "std_mm": scatter.deviation,
+        "range_mm": scatter.range,
+    }
+
+
+def _tables(found: FixedPoint, conditions: Conditions) -> tuple[ResultTable, ...]:
+    own = [
+        ResultRow(message("fixed-point.expected"), found.expected_deviation.tolist()),
+        ResultRow(message("table.mean-uncertainty"), found.uncertainty.tolist()),
+    ]
+    if found.moved is not None:
+        own.append(ResultRow(message("fixed-point.moved"), found.moved.tolist()))
+    change = [
+        ResultRow(message("fixed-point.tip-change"), found.tip_change.tolist()),
+        ResultRow(
+            message("fixed-point.tip-change-uncertainty"),
+            found.tip_change_uncertainty.tolist(),
+        ),
+    ]
+    tables = (
+        _points(message("fixed-point.table"), found.calibrated.points),
+        _comparison(found.calibrated, found.nominal, own, change),
+    )
+    if found.nominal is None:
+        return tables
+    nominal = _points(message("fixed-point.nominal-table"), found.nominal.points)
+    return *tables, nominal
+
+
+def _figures_so_far(
+    progress: TaskProgress, conditions: Conditions
+) -> tuple[ResultTable, ...]:
+    points = progress.points
+    own = scatter_of(points)
+    table = _points(message("fixed-point.table"), own.points)
+    if len(points) < 2:
+        return (table,)
+    nominal = nominal_scatter(points, conditions.instrument, conditions.nominal_tip)
+    return table, _comparison(own, nominal)
+
+
+def _points(title: Message, places: FloatArray) -> ResultTable:
+    """Return the coordinates of each point: the paper's Table 2."""
+    rows = (ResultRow(str(i), place) for i, place in enumerate(places.tolist(), 1))
+    return ResultTable(title, tuple("uvw"), tuple(rows))
+
+
+def _comparison(
+    own: Scatter,
+    nominal: Scatter | None,
+    more: Sequence[ResultRow] = (),
+    change: Sequence[ResultRow] = (),
+) -> ResultTable:
+    rows = [*_spread(message("fixed-point.current-tip"), own), *more]
+    if nominal is not None:
+        rows += _spread(message("fixed-point.nominal-tip"), nominal)
+    notes = () if nominal is not None else (message("fixed-point.no-nominal-tip"),)
+    return ResultTable(
+        message("fixed-point.comparison"), tuple("uvw"), (*rows, *change), notes
+    )
+
+
+def _spread(name: Message, scatter: Scatter) -> list[ResultRow]:
+    return [
+        ResultRow(name, scatter.mean.tolist()),
+        ResultRow(message("table.deviation"), scatter.deviation.tolist()),
+        ResultRow(message("table.range"), scatter.range.tolist()),
+    ]
+
+
+def _instruction(options: FixedPointOptions, progress: TaskProgress) -> Message:
+    return message(
+        "session.touch-cone", n_touches=len(progress.points), needed=options.n_touches
+    )
+
+
+FIXED_POINT = VerificationTask(
+    kind="fixed point",
+    summary="the cone again, in new postures",
+    run_help="points in the cone, each in another posture",
+    title=message("fixed-point.title"),
+    purpose=message("fixed-point.purpose"),
+    first=message("task.probe-cone"),
+    another=message("fixed-point.another"),
+    known=message("session.same-posture"),
+    limits=("across", "along"),
+    options=FixedPointOptions,
+    fields=(
+        count_option("n_touches", message("option.points"), MIN_TOUCHES, MAX_TOUCHES),
+    ),
+    measure=measure_fixed_point,
+    entries=_entries,
+    tables=_tables,
+    figures_so_far=_figures_so_far,
+    hand=lambda options, run, step: HandGoal(
+        tilt=TILTS[step % 2], direction=2 * pi * step / options.n_touches
+    ),
+    n_points=lambda options: options.n_touches,
+    instruction=_instruction,
+    screen=_screen,
+    newness=lambda options: (NEW_POSTURE, ANY),
+    is_pooled=True,
+    compares_nominal_tip=True,
+    shows_postures=True,
+)

@@ -1,0 +1,389 @@
+"""A plate of known flatness: the range of probed points about their best plane.
+
+The plane is that of least squares of the distances along its normal. The distances
+``d`` follow errors ``e`` of the points along the normal by ``(I - H) e``, where ``H``
+projects on the planes over the places of the points, and flatness is the range of
+``d``. A range obeys the triangle inequality, so that for a plate of any form
+
+    | range(d + r) - range(d) | <= range(r),    r = (I - H) e
+
+and U is the quantile of ``range(r)`` that the covariance of all points gives, what they
+share included. It is exact for an ideal plate, where the noise alone makes a range, and
+on the safe side for one that is not flat. The ball moves all points alike and needs no
+compensation.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+from typing import Annotated, Any
+
+import numpy as np
+from msgspec import Meta
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.messages import Message, message
+from lightpen.model.limits import VerificationLimits
+from lightpen.verification.tasks.assessment import (
+    CALIBRATE_AGAIN,
+    CHECK_FILES,
+    VERIFY_AGAIN,
+    VerificationAssessment,
+    accepted,
+    check,
+    refused,
+)
+from lightpen.verification.tasks.circle import away_from_cones
+from lightpen.verification.tasks.probed_point import (
+    ProbedPoint,
+    joint_covariance,
+    point_entries,
+)
+from lightpen.verification.tasks.task import (
+    ANY,
+    LARGEST_U,
+    Conditions,
+    Found,
+    HandGoal,
+    NumberOption,
+    ResultRow,
+    ResultTable,
+    Runs,
+    Screening,
+    TaskOptions,
+    TaskProgress,
+    VerificationTask,
+    count_option,
+)
+
+MIN_POINTS, USUAL_POINTS, MAX_POINTS = 9, 12, 50
+LEAST_POINTS = 4  # that can lie off a plane at all
+SMALLEST = 5.0  # mm, root mean square distance of the points from their middle
+THIN = 0.2  # of the extent along: less across is a line
+NEW_PLACE = 5.0  # mm
+ASTRAY = 8.0  # times the median distance from the plane
+LIFTED = 0.1  # mm; nearer points count, farther ones may be of a lifted pen
+MAX_LEFT_OUT = 0.25  # of the points
+MAX_FORM = 0.1  # of the extent: what is rougher is no plate
+N_SAMPLES = 500  # of three points each
+N_TRIALS = 4000
+COVERAGE = 0.9545  # that k = 2 has of a normal distribution
+LATEST = 6  # points whose residuals are shown
+
+# The plate of the simulated operator, from the bottom of its cone, mm
+SIMULATED_CENTER = np.array([0.0, -40.0, 0.0])
+SIMULATED_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.9, -(0.19**0.5)]])
+SIMULATED_RADII = 15.0, 30.0
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneFit:
+    """A plane of least squares.
+
+    Attributes
+    ----------
+    center_cam, normal_cam : (3,) array
+        Middle of the points, mm, and unit normal, towards the camera.
+    extent : float
+        Root mean square distance of the points from their middle, mm.
+    residuals : (N,) array
+        Distances of the points along the normal, mm.
+    weights : (N, N) array
+        Derivative of the residuals by moves of the points along the normal.
+    """
+
+    center_cam: FloatArray
+    normal_cam: FloatArray
+    extent: float
+    residuals: FloatArray
+    weights: FloatArray
+
+    @property
+    def flatness(self) -> float:
+        """Range of the residuals, mm."""
+        return float(np.ptp(self.residuals))
+
+
+@dataclass(frozen=True, eq=False)
+class Flatness(Found):
+    """A plate.
+
+    Attributes
+    ----------
+    left_out : tuple of ProbedPoint
+        Off the plane: the pen was lifted.
+    certified : float
+        Flatness of the plate, mm.
+    uncertainty : float
+        U (k = 2) of the measured flatness, mm.
+    """
+
+    points: tuple[ProbedPoint, ...]
+    left_out: tuple[ProbedPoint, ...]
+    fit: PlaneFit
+    certified: float
+    uncertainty: float
+
+    @property
+    def error(self) -> float:
+        """Measured less certified flatness, mm."""
+        return self.fit.flatness - self.certified
+
+
+class PlaneOptions(TaskOptions, frozen=True, tag="plane"):
+    """A plate; a flatness of 0 is an ideal one."""
+
+    flatness: Annotated[float, Meta(ge=0)] = 0.0
+    n_points: Annotated[int, Meta(ge=MIN_POINTS, le=MAX_POINTS)] = USUAL_POINTS
+
+
+def measure_plane(
+    runs: Runs, conditions: Conditions, options: PlaneOptions
+) -> Flatness:
+    """Measure the flatness of a plate by the points of all runs.
+
+    Raises
+    ------
+    CalibrationError
+        The points are too few, lie on a line, or on no plane.
+    """
+    points = [point for _, own in runs for point in own]
+    places = np.array([point.point_cam for point in points]).reshape(-1, 3)
+    if len(points) < MIN_POINTS:
+        raise CalibrationError("plane.too-few", n_points=len(points), needed=MIN_POINTS)
+    fit_plane(places)  # refuses what can be none
+    near = _on_plane(places)
+    fit = fit_plane(places[near])
+    is_rough = fit.flatness > MAX_FORM * fit.extent
+    if np.mean(~near) > MAX_LEFT_OUT or near.sum() < MIN_POINTS or is_rough:
+        raise CalibrationError(
+            "plane.none",
+            n_off=int(np.sum(~near)),
+            n_points=len(points),
+            off=fit.flatness,
+        )
+    kept = tuple(p for p, is_near in zip(points, near, strict=True) if is_near)
+    left_out = tuple(p for p, is_near in zip(points, near, strict=True) if not is_near)
+    uncertainty = _uncertainty(fit, kept, conditions)
+    return Flatness(
+        points=kept,
+        left_out=left_out,
+        fit=fit,
+        certified=options.flatness,
+        uncertainty=uncertainty,
+        assessment=_assessment(
+            fit, left_out, options.flatness, uncertainty, conditions.limits
+        ),
+    )
+
+
+def fit_plane(points_cam: FloatArray) -> PlaneFit:
+    """Fit a plane to points (N, 3), mm.
+
+    Raises
+    ------
+    CalibrationError
+        They lie in one place or on a line.
+    """
+    center = points_cam.mean(axis=0)
+    _, extents, axes = np.linalg.svd(points_cam - center, full_matrices=False)
+    if extents[0] / np.sqrt(len(points_cam)) < SMALLEST or (
+        extents[1] < THIN * extents[0]
+    ):
+        raise CalibrationError("plane.line")
+    normal = axes[2] if axes[2][2] < 0 else -axes[2]
+    across = (points_cam - center) @ axes[:2].T / extents[:2]
+    hat = across @ across.T + 1 / len(points_cam)
+    return PlaneFit(
+        center_cam=center,
+        normal_cam=normal,
+        extent=float(np.linalg.norm(extents)) / np.sqrt(len(points_cam)),
+        residuals=(points_cam - center) @ normal,
+        weights=np.eye(len(points_cam)) - hat,
+    )
+
+
+def _on_plane(places: FloatArray) -> BoolArray:
+    """Return which points (N, 3) lie on the plane that most of them lie on."""
+    rng = np.random.default_rng(0)  # the same points give the same plane
+    members = np.argsort(rng.random((N_SAMPLES, len(places))), axis=1)[:, :3]
+    a, b, c = (places[members[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    spans = np.linalg.norm(places - places.mean(axis=0), axis=1).max()
+    wide = lengths > THIN * spans**2  # others turn by the noise of their points
+    normals = normals[wide] / lengths[wide, None]
+    distances = np.abs(np.einsum("sni,si->sn", places - a[wide, None], normals))
+    best = distances[int(np.argmin(np.median(distances, axis=1)))]
+    near = best <= max(ASTRAY * float(np.median(best)), LIFTED)
+    fit = fit_plane(places[near])
+    again = np.abs((places - fit.center_cam) @ fit.normal_cam)
+    return np.asarray(again <= max(ASTRAY * float(np.median(again)), LIFTED))
+
+
+def _uncertainty(
+    fit: PlaneFit, points: Sequence[ProbedPoint], conditions: Conditions
+) -> float:
+    """Return the quantile of the range that errors of the points make, mm."""
+    rng = np.random.default_rng(0)  # the same points give the same uncertainty
+    n = len(points)
+    blocks = joint_covariance(points, conditions.instrument).reshape(n, 3, n, 3)
+    along = np.einsum("i,minj,j->mn", fit.normal_cam, blocks, fit.normal_cam)
+    along += float(fit.normal_cam**2 @ conditions.drift**2) * np.eye(n)
+    values, vectors = np.linalg.eigh(fit.weights @ along @ fit.weights)
+    root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+    ranges = np.ptp(rng.standard_normal((N_TRIALS, n)) @ root, axis=1)
+    return float(np.quantile(ranges, COVERAGE))
+
+
+def _assessment(
+    fit: PlaneFit,
+    left_out: Sequence[ProbedPoint],
+    certified: float,
+    uncertainty: float,
+    limits: VerificationLimits,
+) -> VerificationAssessment:
+    flatness, limit = fit.flatness, limits.form
+    error = flatness - certified
+    if error > limit:
+        said = message(
+            "plane.off",
+            flatness=flatness,
+            uncertainty=uncertainty,
+            certified=certified,
+            limit=limit,
+        )
+        return refused(said, CALIBRATE_AGAIN)
+    if left_out:
+        said = message(
+            "plane.lifted", n_left_out=len(left_out), first=left_out[0].label
+        )
+        return check(said, VERIFY_AGAIN)
+    if uncertainty > limit:
+        said = message("plane.uncertain", uncertainty=uncertainty, limit=limit)
+        return check(said, CHECK_FILES)
+    return accepted(
+        message(
+            "plane.good",
+            flatness=flatness,
+            uncertainty=uncertainty,
+            certified=certified,
+            limit=limit,
+        )
+    )
+
+
+def _screen(
+    options: PlaneOptions, conditions: Conditions, progress: TaskProgress
+) -> Screening:
+    return away_from_cones(progress)
+
+
+def _entries(found: Flatness, instrument: Instrument) -> dict[str, Any]:
+    return {
+        "flatness_mm": found.fit.flatness,
+        "expanded_uncertainty_mm": found.uncertainty,
+        "certified_flatness_mm": found.certified,
+        "error_mm": found.error,
+        "center_cam_mm": found.fit.center_cam,
+        "normal_cam": found.fit.normal_cam,
+        "residuals_mm": found.fit.residuals,
+        "touches": point_entries(found.points, instrument),
+        "left_out": point_entries(found.left_out, instrument),
+    }
+
+
+def _tables(found: Flatness, conditions: Conditions) -> tuple[ResultTable, ...]:
+    columns = (
+        message("plane.flatness"),
+        message("table.uncertainty"),
+        message("plane.certified"),
+        message("table.error"),
+        message("table.limit"),
+    )
+    values = [
+        found.fit.flatness,
+        found.uncertainty,
+        found.certified,
+        found.error,
+        conditions.limits.form,
+    ]
+    summary = ResultTable(
+        message("plane.table"), columns, (ResultRow(message("plane.title"), values),)
+    )
+    return summary, _residuals(found.points, found.fit)
+
+
+def _figures_so_far(
+    progress: TaskProgress, conditions: Conditions
+) -> tuple[ResultTable, ...]:
+    points = progress.points
+    if len(points) < LEAST_POINTS:
+        return (_residuals((), None),)
+    try:
+        fit = fit_plane(np.array([point.point_cam for point in points]))
+    except CalibrationError:
+        return (_residuals((), None),)
+    return (_residuals(points, fit, LATEST),)
+
+
+def _residuals(
+    points: Sequence[ProbedPoint], fit: PlaneFit | None, latest: int = MAX_POINTS
+) -> ResultTable:
+    title = message("plane.residuals")
+    if fit is None:
+        return ResultTable(title)
+    rows = tuple(
+        ResultRow(str(i), [*point.point_cam.tolist(), residual])
+        for i, (point, residual) in enumerate(
+            zip(points, fit.residuals.tolist(), strict=True), start=1
+        )
+    )
+    return ResultTable(title, (*"uvw", message("plane.residual")), rows[-latest:])
+
+
+def _instruction(options: PlaneOptions, progress: TaskProgress) -> Message:
+    return message(
+        "plane.instruction", n_points=len(progress.points), needed=options.n_points
+    )
+
+
+def _hand(options: PlaneOptions, run: int, step: int) -> HandGoal:
+    angle = 2 * pi * step / options.n_points
+    spoke = np.array([np.cos(angle), np.sin(angle)]) @ SIMULATED_AXES
+    return HandGoal(SIMULATED_CENTER + SIMULATED_RADII[step % 2] * spoke)
+
+
+PLANE = VerificationTask(
+    kind="plane",
+    summary="a flat plate",
+    run_help="points all over the plate; several runs count as one",
+    title=message("plane.title"),
+    purpose=message("plane.purpose"),
+    first=message("plane.first"),
+    another=message("task.next-point"),
+    known=message("plane.known"),
+    limits=("form",),
+    options=PlaneOptions,
+    fields=(
+        NumberOption(
+            "flatness",
+            message("plane.certified-flatness"),
+            most=LARGEST_U,
+            argument="--certified-flatness",
+            help="of the plate; 0 unless said",
+        ),
+        count_option("n_points", message("option.points"), MIN_POINTS, MAX_POINTS),
+    ),
+    measure=measure_plane,
+    entries=_entries,
+    tables=_tables,
+    figures_so_far=_figures_so_far,
+    hand=_hand,
+    n_points=lambda options: options.n_points,
+    instruction=_instruction,
+    screen=_screen,
+    newness=lambda options: (ANY, NEW_PLACE),
+)

@@ -1,0 +1,32 @@
+"""The verification tasks, in the order in which they are done."""
+
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from lightpen.verification.tasks.articulation import ARTICULATION
+from lightpen.verification.tasks.circle import CIRCLE
+from lightpen.verification.tasks.drift import DRIFT
+from lightpen.verification.tasks.fixed_point import FIXED_POINT
+from lightpen.verification.tasks.length import LENGTH
+from lightpen.verification.tasks.plane import PLANE
+from lightpen.verification.tasks.task import TaskOptions, VerificationTask
+
+AnyTask: TypeAlias = VerificationTask[Any, Any]
+
+TASKS: tuple[AnyTask, ...] = (FIXED_POINT, CIRCLE, LENGTH, PLANE, ARTICULATION, DRIFT)
+PAPER = (FIXED_POINT, CIRCLE, LENGTH)  # the paper's three
+
+_BY_KIND = {task.kind: task for task in TASKS}
+
+if TYPE_CHECKING:
+    TaskKind: TypeAlias = str
+    AnyOptions: TypeAlias = TaskOptions
+else:  # by which msgspec takes the registered ones and no others
+    TaskKind = Literal[tuple(_BY_KIND)]
+    AnyOptions = reduce(or_, (task.options for task in TASKS))
+
+
+def task_of(kind: TaskKind) -> AnyTask:
+    """Return the task of a kind."""
+    return _BY_KIND[kind]

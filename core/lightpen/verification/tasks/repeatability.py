@@ -1,0 +1,275 @@
+"""One tip calibrated several times: the paper's Table 1, and what a scatter points to.
+
+An error of the estimator, of the files or of the camera moves tip and fixed point
+alike: both are the same poses, read once in the pen and once in the camera. So a tip
+that scatters by more than a fixed point touched with it has really moved in its pen
+between the calibrations, and a fixed point that scatters by more than the tips has
+moved under the pen, or was not held.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.messages import Message, message
+from lightpen.model.limits import VerificationLimits
+from lightpen.model.quantiles import normal_quantile
+from lightpen.verification.tasks.assessment import (
+    CALIBRATE_AGAIN,
+    VERIFY_AGAIN,
+    VerificationAssessment,
+    accepted,
+    check,
+    refused,
+)
+from lightpen.verification.tasks.fixed_point import Scatter
+
+MIN_TIPS = 2
+STUDY = 30  # repeats of a type-1 gauge study, at least
+MOVING_RANGE = 1.128  # mean range of two over the standard deviation
+CONTROL = 3.0  # standard deviations
+BY_CHANCE = 0.01  # that equal variances differ as much, either way
+SHARE_OF_TOLERANCE = 0.2
+CAPABLE = 1.33
+TIGHTEN = message("repeatability.tighten")
+USE_NEWEST = message("repeatability.use-newest")
+
+
+@dataclass(frozen=True, eq=False)
+class TipEstimate:
+    """A tip by one calibration.
+
+    Attributes
+    ----------
+    tip_pen, uncertainty : (3,) array
+        The tip and U (k = 2) of it, mm.
+    when : datetime or None
+        When it was calibrated.
+    """
+
+    name: str
+    tip_pen: FloatArray
+    uncertainty: FloatArray
+    when: datetime | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatedPoint:
+    """A fixed point touched several times with a tip.
+
+    Attributes
+    ----------
+    points : (N, 3) array
+        Camera frame, mm.
+    expected_deviation : (3,) array
+        Standard deviation of the touches by all that is known of them, mm.
+    when : datetime
+        When it was verified.
+    """
+
+    points: FloatArray
+    expected_deviation: FloatArray
+    when: datetime
+
+    @property
+    def deviation(self) -> FloatArray:
+        """Standard deviation of the touches, (3,), mm."""
+        return Scatter(self.points).deviation
+
+
+@dataclass(frozen=True, eq=False)
+class Capability:
+    """A type-1 gauge study, per coordinate.
+
+    Attributes
+    ----------
+    tolerance : float
+        Width of the tolerance of a coordinate, mm.
+    cg : (3,) array
+        A fifth of the tolerance over six standard deviations.
+    cgk : (3,) array or None
+        The same less the bias; None without a reference.
+    """
+
+    tolerance: float
+    cg: FloatArray
+    cgk: FloatArray | None
+
+    @property
+    def is_capable(self) -> bool:
+        """Whether all are 1.33 or more."""
+        least = self.cg if self.cgk is None else np.minimum(self.cg, self.cgk)
+        return bool(least.min() >= CAPABLE)
+
+
+@dataclass(frozen=True, eq=False)
+class ControlLimits:
+    """A control chart of individual values: (3,) each, mm."""
+
+    lower: FloatArray
+    center: FloatArray
+    upper: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Repeatability:
+    """Calibrations of one tip.
+
+    Attributes
+    ----------
+    touched : RepeatedPoint or None
+        A fixed point touched with the tip.
+    points_to : Message or None
+        What the scatter points to beside that of the fixed point.
+    """
+
+    tips: tuple[TipEstimate, ...]
+    control: ControlLimits
+    capability: Capability | None
+    touched: RepeatedPoint | None
+    points_to: Message | None
+    assessment: VerificationAssessment
+
+    @property
+    def scatter(self) -> Scatter:
+        """Of the tips, in the pen frame."""
+        return Scatter(np.array([tip.tip_pen for tip in self.tips]))
+
+    @property
+    def out_of_control(self) -> tuple[TipEstimate, ...]:
+        """The tips beyond the limits of the control chart."""
+        values, control = self.scatter.points, self.control
+        beyond = (values < control.lower) | (values > control.upper)
+        return tuple(self.tips[i] for i in np.flatnonzero(beyond.any(axis=1)))
+
+
+def measure_repeatability(
+    tips: Sequence[TipEstimate],
+    limits: VerificationLimits,
+    *,
+    tolerance: float | None = None,
+    reference: FloatArray | None = None,
+    touched: RepeatedPoint | None = None,
+) -> Repeatability:
+    """Measure how well calibrations of one tip repeat.
+
+    Parameters
+    ----------
+    tolerance : float, optional
+        Width of the tolerance of a coordinate, mm, to study the capability.
+    reference : (3,) array, optional
+        The tip by a better instrument, mm.
+    touched : RepeatedPoint, optional
+        A fixed point touched with the tip.
+
+    Raises
+    ------
+    CalibrationError
+        There are fewer than two.
+    """
+    if len(tips) < MIN_TIPS:
+        raise CalibrationError("repeatability.too-few", n_tips=len(tips))
+    scatter = Scatter(np.array([tip.tip_pen for tip in tips]))
+    values, deviation = scatter.points, scatter.deviation
+    points_to = None if touched is None else _points_to(deviation, len(tips), touched)
+    return Repeatability(
+        tips=tuple(tips),
+        control=_control(values),
+        capability=(
+            None if tolerance is None else _capability(values, tolerance, reference)
+        ),
+        touched=touched,
+        points_to=points_to,
+        assessment=_assessment(tips, deviation, points_to, limits),
+    )
+
+
+def _control(values: FloatArray) -> ControlLimits:
+    sigma = np.abs(np.diff(values, axis=0)).mean(axis=0) / MOVING_RANGE
+    center = values.mean(axis=0)
+    return ControlLimits(center - CONTROL * sigma, center, center + CONTROL * sigma)
+
+
+def _capability(
+    values: FloatArray, tolerance: float, reference: FloatArray | None
+) -> Capability:
+    sigma = np.maximum(values.std(axis=0, ddof=1), np.finfo(float).tiny)
+    cg = SHARE_OF_TOLERANCE * tolerance / (6 * sigma)
+    cgk = None
+    if reference is not None:
+        bias = np.abs(values.mean(axis=0) - reference)
+        cgk = (SHARE_OF_TOLERANCE / 2 * tolerance - bias) / (3 * sigma)
+    return Capability(tolerance, cg, cgk)
+
+
+def _points_to(tip: FloatArray, n_tips: int, touched: RepeatedPoint) -> Message | None:
+    """Return what two scatters point to that differ by more than chance.
+
+    A point that scatters no more than its touches are expected to has not moved.
+    """
+    of_tip = float(np.linalg.norm(tip))
+    of_point = float(np.linalg.norm(touched.deviation))
+    expected = float(np.linalg.norm(touched.expected_deviation))
+    n_free, n_free_point = 3 * (n_tips - 1), 3 * (len(touched.points) - 1)
+    if _is_larger(of_tip, of_point, 2 / n_free + 2 / n_free_point):
+        return message("repeatability.rode-with-pen", of_tip=of_tip, of_point=of_point)
+    is_beyond_noise = _is_larger(of_point, expected, 2 / n_free_point)
+    if is_beyond_noise and _is_larger(of_point, of_tip, 2 / n_free + 2 / n_free_point):
+        return message("repeatability.point-moved", of_tip=of_tip, of_point=of_point)
+    return None
+
+
+def _is_larger(one: float, other: float, variance: float) -> bool:
+    """Return whether a deviation is larger by more than chance.
+
+    Parameters
+    ----------
+    variance : float
+        Of the logarithm of the ratio of both variances.
+    """
+    if not (one > 0 and other > 0):
+        return one > 0
+    return 2 * float(np.log(one / other)) > (
+        normal_quantile(BY_CHANCE / 2) * float(np.sqrt(variance))
+    )
+
+
+def _assessment(
+    tips: Sequence[TipEstimate],
+    deviation: FloatArray,
+    points_to: Message | None,
+    limits: VerificationLimits,
+) -> VerificationAssessment:
+    axis = int(np.argmax(deviation))
+    stated = np.mean([tip.uncertainty for tip in tips], axis=0) / 2
+    ridden = "repeatability.rode-with-pen"
+    has_ridden = points_to is not None and points_to.code == ridden
+    if deviation[axis] > limits.repeatability:
+        return refused(
+            points_to
+            if points_to is not None and has_ridden
+            else message(
+                "repeatability.scatters",
+                deviation=float(deviation[axis]),
+                axis="xyz"[axis],
+                limit=limits.repeatability,
+                stated=float(stated[axis]),
+            ),
+            CALIBRATE_AGAIN,
+        )
+    if points_to is not None:
+        return check(points_to, TIGHTEN if has_ridden else VERIFY_AGAIN)
+    return accepted(
+        message(
+            "repeatability.good",
+            deviation=float(deviation[axis]),
+            axis="xyz"[axis],
+            limit=limits.repeatability,
+            stated=float(stated[axis]),
+        ),
+        USE_NEWEST,
+    )

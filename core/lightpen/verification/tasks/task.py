@@ -1,0 +1,403 @@
+"""What a verification task is: all that the command line, a session and the window use.
+
+A module of this package makes one `VerificationTask`; `lightpen.verification.tasks.
+registry` lists them. Nothing else switches on the kind of a task.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, Generic, TypeAlias, TypeVar
+
+from msgspec import Struct
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.messages import Message, message
+from lightpen.model.limits import VerificationLimits
+from lightpen.verification.tasks.assessment import VerificationAssessment
+from lightpen.verification.tasks.probed_point import NO_DRIFT, ProbedPoint
+
+ANY = 1e6  # mm or rad: no other place, no other posture makes a point a new one
+LONGEST, LARGEST_U = 10_000.0, 1.0  # mm, that a station may enter
+MOST_RUNS = 20
+
+Points: TypeAlias = tuple[ProbedPoint, ...]
+Runs: TypeAlias = Sequence[tuple[str, Sequence[ProbedPoint]]]
+
+
+class Surface(StrEnum):
+    """What the ball touches of a ring, or of the ends of a length."""
+
+    GROOVE = "groove"  # in which the centre of the ball runs, or cones
+    BORE = "bore"  # or inner faces
+    BOSS = "boss"  # or outer faces
+
+
+def ball_offset(surface: Surface, ball_diameter: float | None) -> float:
+    """Return by how much a surface lies farther out than the tip's centre, mm.
+
+    That is to be added to the radius of a circle of tip centres, and to each end of a
+    length.
+    """
+    sign = {Surface.GROOVE: 0.0, Surface.BORE: 1.0, Surface.BOSS: -1.0}[surface]
+    return sign * (ball_diameter or 0.0) / 2
+
+
+class TaskOptions(Struct, frozen=True, tag_field="task"):
+    """Base of what a station chooses for a task; the defaults are the usual values."""
+
+
+@dataclass(frozen=True)
+class NumberOption:
+    """A number among the options of a task.
+
+    Attributes
+    ----------
+    name : str
+        Of the attribute of the options.
+    unknown : Message or None
+        Shown in place of 0, which then stands for a number that must be entered.
+    argument, help : str
+        Option of the command line; empty where it has none.
+    is_of_artefact : bool
+        Whether a task has to be done again when it changes.
+    """
+
+    name: str
+    label: Message
+    least: float = 0.0
+    most: float = LONGEST
+    unit: str = "mm"
+    decimals: int = 4
+    unknown: Message | None = None
+    argument: str = ""
+    help: str = ""
+    is_of_artefact: bool = True
+
+
+@dataclass(frozen=True)
+class SurfaceOption:
+    """Which surface of an artefact is touched.
+
+    Attributes
+    ----------
+    labels : tuple of Message
+        In the order of `Surface`.
+    words : mapping of str to Surface
+        Of the command line, the usual one first; used with the diameter of the ball.
+    ball_help : str
+        Of the option for the diameter.
+    """
+
+    name: str
+    label: Message
+    labels: tuple[Message, ...]
+    argument: str
+    words: dict[str, Surface]
+    ball_help: str
+    is_of_artefact: bool = True
+
+
+Option: TypeAlias = NumberOption | SurfaceOption
+
+
+def count_option(name: str, label: Message, least: int, most: int) -> NumberOption:
+    """Return an option that counts points or runs."""
+    return NumberOption(
+        name, label, least, most, unit="", decimals=0, is_of_artefact=False
+    )
+
+
+def certificate_option(name: str) -> NumberOption:
+    """Return the option for the expanded uncertainty of a certified value."""
+    return NumberOption(
+        name,
+        message("option.certificate-uncertainty"),
+        most=LARGEST_U,
+        argument="--certified-uncertainty",
+        help="U (k = 2) of what is certified",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Under which points are measured and judged.
+
+    Attributes
+    ----------
+    ball_diameter : float or None
+        Of the tip, mm; needed where a surface and not a groove is touched.
+    nominal_tip : (3,) array or None
+        mm, to compare with.
+    cone_cam : (3,) array or None
+        Where the calibration had the same cone before the same camera, mm.
+    drift : (3,) array
+        Standard uncertainty of a point by a camera that moved meanwhile, mm.
+    """
+
+    instrument: Instrument
+    limits: VerificationLimits = field(default_factory=VerificationLimits)
+    ball_diameter: float | None = None
+    nominal_tip: FloatArray | None = None
+    cone_cam: FloatArray | None = None
+    drift: FloatArray = field(default_factory=NO_DRIFT.copy)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Base of what a task finds."""
+
+    assessment: VerificationAssessment
+
+    @property
+    def probed(self) -> Points:
+        """Points whose postures are of interest."""
+        return ()
+
+
+@dataclass(frozen=True, eq=False)
+class ResultRow:
+    """A row of a table: its name, and a number for each column or None for a blank."""
+
+    name: Message | str
+    values: Sequence[float | None]
+    decimals: int = 4
+
+
+@dataclass(frozen=True, eq=False)
+class ResultTable:
+    """Figures of a task, for the screen and the window alike.
+
+    Attributes
+    ----------
+    notes : tuple of Message
+        Sentences below it.
+    """
+
+    title: Message
+    columns: tuple[Message | str, ...] = ()
+    rows: tuple[ResultRow, ...] = ()
+    notes: tuple[Message, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class TaskProgress:
+    """The task at hand.
+
+    Attributes
+    ----------
+    points : tuple of ProbedPoint
+        Of the run at hand.
+    runs : tuple of tuple of ProbedPoint
+        That are done.
+    n_runs : int
+        In all.
+    cones : tuple of array
+        Cones that were touched in tasks before, camera frame, mm.
+    """
+
+    points: Points = ()
+    runs: tuple[Points, ...] = ()
+    n_runs: int = 1
+    cones: tuple[FloatArray, ...] = ()
+
+    @property
+    def run(self) -> int:
+        """Number of the run at hand, from 1."""
+        return len(self.runs) + 1
+
+
+@dataclass(frozen=True)
+class Screening:
+    """Which points of the run at hand count, and why one does not."""
+
+    kept: Sequence[int]
+    trouble: Message | None = None
+
+
+def keep_all(count: int) -> Screening:
+    """Return that all points count."""
+    return Screening(range(count))
+
+
+def without_last(count: int, trouble: Message) -> Screening:
+    """Return that the last point does not count."""
+    return Screening(range(count - 1), trouble)
+
+
+@dataclass(frozen=True)
+class HandGoal:
+    """What a simulated operator does for the next point.
+
+    Attributes
+    ----------
+    point : (3,) array or None
+        Where the tip goes, from the bottom of the cone, camera frame, mm; None into
+        the cone.
+    tilt, direction : float
+        How the pen is held in the cone, rad.
+    """
+
+    point: FloatArray | None = None
+    tilt: float = 0.0
+    direction: float = 0.0
+
+
+OptionsT = TypeVar("OptionsT", bound=TaskOptions)
+FoundT = TypeVar("FoundT", bound=Found)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class VerificationTask(Generic[OptionsT, FoundT]):
+    """One task of a verification.
+
+    Attributes
+    ----------
+    kind : str
+        In records and settings.
+    summary, run_help : str
+        What the help of the command line says of it, and of a run.
+    title : Message
+        A noun.
+    purpose : Message
+        What the operator does; beside the box that chooses the task.
+    first, another, other_run : Message
+        Few words on what to do next: for the first point, for another one, and for the
+        first point of another run.
+    known : Message
+        Said of a point that was touched before.
+    limits : tuple of str
+        Fields of `VerificationLimits`.
+    measure : callable
+        Returns the result of all runs. Raises `CalibrationError` where the points do
+        not suffice.
+    entries : callable
+        Returns what of it is recorded.
+    tables : callable
+        Returns the figures of it.
+    figures_so_far : callable
+        Returns the figures while points are probed.
+    hand : callable
+        Returns what a simulated operator does, by options, run and point from 0.
+    n_points, n_runs : callable
+        Needed in a run; of runs.
+    fraction : callable
+        Returns how much of the run at hand is done; it ends at 1.
+    instruction : callable
+        Returns a sentence on what to do now.
+    count : callable
+        Returns how much is probed of how much.
+    screen : callable
+        Returns which points count.
+    newness : callable
+        Returns the turn, rad, and the distance, mm, one of which makes a point a new
+        one; both 0 where it is the same again after the tip was lifted.
+    missing : callable
+        Returns what has to be entered before, by options and ball diameter.
+    is_each_run_measured : bool
+        Whether a single run gives a result.
+    is_pooled : bool
+        Whether all images that are given to the command are one run.
+    counts_drift : bool
+        Whether U counts how far the camera moved.
+    compares_nominal_tip : bool
+        Whether the nominal tip is of use.
+    shows_postures : bool
+        Whether the window shows how the pen was held.
+    """
+
+    kind: str
+    summary: str
+    run_help: str
+    title: Message
+    purpose: Message
+    first: Message
+    another: Message
+    known: Message
+    limits: tuple[str, ...]
+    measure: Callable[[Runs, Conditions, OptionsT], FoundT]
+    entries: Callable[[FoundT, Instrument], dict[str, Any]]
+    tables: Callable[[FoundT, Conditions], tuple[ResultTable, ...]]
+    hand: Callable[[OptionsT, int, int], HandGoal]
+    instruction: Callable[[OptionsT, TaskProgress], Message]
+    newness: Callable[[OptionsT], tuple[float, float]]
+    n_points: Callable[[OptionsT], int]
+    options: type[OptionsT]
+    fields: tuple[Option, ...] = ()
+    other_run: Message | None = None
+    n_runs: Callable[[OptionsT], int] = lambda _: 1
+    figures_so_far: Callable[[TaskProgress, Conditions], tuple[ResultTable, ...]] = (
+        lambda progress, _: (points_table(progress.points),)
+    )
+    fraction: Callable[[OptionsT, TaskProgress], float] | None = None
+    count: Callable[[OptionsT, TaskProgress], Message] | None = None
+    screen: Callable[[OptionsT, Conditions, TaskProgress], Screening] = (
+        lambda options, conditions, progress: keep_all(len(progress.points))
+    )
+    missing: Callable[[OptionsT, float | None], Message | None] = lambda *_: None
+    is_each_run_measured: bool = True
+    is_pooled: bool = False
+    counts_drift: bool = True
+    compares_nominal_tip: bool = False
+    shows_postures: bool = False
+
+    def __str__(self) -> str:
+        return self.kind
+
+    @property
+    def command(self) -> str:
+        """Its name on the command line."""
+        return self.kind.replace(" ", "-")
+
+    def done(self, options: OptionsT, progress: TaskProgress) -> float:
+        """Return how much of the run at hand is done, 0 to 1."""
+        if self.fraction is not None:
+            return self.fraction(options, progress)
+        return min(len(progress.points) / self.n_points(options), 1.0)
+
+    def counted(self, options: OptionsT, progress: TaskProgress) -> Message:
+        """Return how much of the task at hand is probed of how much."""
+        count = (
+            message(
+                "task.points",
+                n_points=len(progress.points),
+                needed=self.n_points(options),
+            )
+            if self.count is None
+            else self.count(options, progress)
+        )
+        if progress.n_runs == 1:
+            return count
+        return message(
+            "task.run", count=count, run=progress.run, n_runs=progress.n_runs
+        )
+
+    def headline(self, progress: TaskProgress, *, is_next: bool) -> Message:
+        """Return in few words what to do.
+
+        Parameters
+        ----------
+        is_next : bool
+            Whether a point was just recorded.
+        """
+        if progress.points and (is_next or self.other_run):
+            return self.another
+        return self.other_run if progress.runs and self.other_run else self.first
+
+    def is_same_artefact(self, one: OptionsT, other: OptionsT) -> bool:
+        """Return whether what was found by some options stands by others."""
+        names = [each.name for each in self.fields if each.is_of_artefact]
+        return all(getattr(one, name) == getattr(other, name) for name in names)
+
+
+def points_table(points: Sequence[ProbedPoint]) -> ResultTable:
+    """Return the coordinates of points in the camera frame."""
+    return ResultTable(
+        message("table.points"),
+        tuple("uvw") if points else (),
+        tuple(
+            ResultRow(str(i), point.point_cam.tolist())
+            for i, point in enumerate(points, start=1)
+        ),
+    )

@@ -1,0 +1,488 @@
+"""The course of a verification: what commands, images and folders do to it.
+
+Nothing here knows threads: one who owns a course makes all calls in turn, and has what
+takes long done elsewhere.
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime
+from enum import Enum, auto
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from msgspec.structs import replace as with_entries
+
+from lightpen.cameras.protocol import Frame
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.errors import FileError, LightpenError
+from lightpen.messages import Message, message
+from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.library.supervision import Signature
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.runners.faults import FaultReporter
+from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread
+from lightpen.swing.preparation import Preparation
+from lightpen.verification.probing.current_tip import CurrentTip, read_tip_in_force
+from lightpen.verification.probing.drift_reference import LampObservations
+from lightpen.verification.probing.probing import read_rules
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.session.session import (
+    SessionTransition,
+    end_task,
+    setup_of,
+    touched_anew,
+    with_other_choices,
+    with_read,
+)
+from lightpen.verification.session.session_state import SessionState, with_drift
+from lightpen.verification.session.status import (
+    ReadingState,
+    SessionEventKind,
+    VerificationListener,
+    VerificationStatus,
+    ending,
+    event_kinds,
+)
+from lightpen.verification.storage.checkpoint import InterruptedVerification, ReadImages
+from lightpen.verification.storage.conclusion import Conclusion, accepting_supervisor
+from lightpen.verification.storage.point_images import LivePoints, NewRecord, new_record
+from lightpen.verification.storage.recorded_runs import ReadRuns, read_runs
+from lightpen.verification.storage.resuming import (
+    ResumedVerification,
+    resume_verification,
+)
+from lightpen.verification.storage.session_files import SessionKeeping
+from lightpen.verification.tasks.drift import DRIFT
+from lightpen.verification.tasks.registry import AnyTask
+
+ANOTHER = message("verification.another-under-way")
+NOT_READY = message("verification.not-ready")
+BUG = message("verification.bug")
+
+T = TypeVar("T")
+
+_logger = logging.getLogger(__name__)
+
+
+class Cause(Enum):
+    """What a trouble comes of that can end by itself."""
+
+    IMAGES = auto()  # of touches cannot be kept
+    NOTE = auto()  # the checkpoint cannot be written
+
+
+class VerificationWorkflow:
+    """One verification after another, of the tip in force.
+
+    Parameters
+    ----------
+    archive : FolderArchive
+        Of the accepted results.
+    data : Path
+        Data folder, in which results are kept.
+    now : callable
+        Returns date and time with the time zone.
+    """
+
+    def __init__(
+        self,
+        archive: FolderArchive,
+        data: Path,
+        listener: VerificationListener,
+        now: Callable[[], datetime],
+        start: StartThread,
+    ) -> None:
+        self._archive = archive
+        self._data = data
+        self._listener = listener
+        self._now = now
+        self._status = VerificationStatus()
+        self._preparation: Preparation | None = None
+        self._choices = VerificationChoices()
+        self._keeping = SessionKeeping(data, self._new_record, now)
+        self._live = LivePoints(self._keeping.images)
+        self._faults = FaultReporter(listener)
+        self._task = BackgroundTask(start, self.recover, listener.on_progress)
+
+    @property
+    def status(self) -> VerificationStatus:
+        """The verification as published last."""
+        return self._status
+
+    def recover(self) -> None:
+        """Carry on after a bug, paused: the next image may have it again."""
+        self._task.drop()
+        status = replace(self._status, reading=ReadingState.NOTHING, is_paused=True)
+        refusal = BUG if status.tip is None else status.refusal
+        self._publish(replace(status, refusal=refusal))
+        self._faults.tell(BUG)
+
+    # Commands
+
+    def choose(self, preparation: Preparation, choices: VerificationChoices) -> None:
+        """Set the choices; while an operator is present, the tip is read again."""
+        before, self._preparation = self._preparation, preparation
+        self._choose_how(choices)
+        is_other = before is None or not _verifies_like(before, preparation)
+        status = self._status
+        has_none = status.tip is None and status.refusal is None and not status.reading
+        if status.is_here and (is_other or has_none):
+            self._read_tip()
+
+    def come(self) -> None:
+        """Operator present: read the current tip, and take images."""
+        self._publish(replace(self._status, is_here=True))
+        self._write()
+        if self._status.reading is not ReadingState.IMAGES:
+            self._read_tip()
+
+    def leave(self) -> None:
+        """Operator absent: take no images."""
+        self._publish(replace(self._status, is_here=False))
+
+    def toggle_pause(self) -> None:
+        """Take no images until this is called again, or take them again."""
+        self._publish(replace(self._status, is_paused=not self._status.is_paused))
+
+    def start_over(self) -> None:
+        """Forget all touches, and read the tip in force anew; what is kept stays."""
+        self._task.drop()
+        self._faults.end()
+        self._give_up()
+        self._publish(VerificationStatus(is_here=self._status.is_here))
+        self._read_tip()
+
+    def touch_anew(self, task: AnyTask) -> None:
+        """Do one task again; the result before stays in the archive."""
+        status, state = self._status, self._status.state
+        if state is not None:
+            self._publish(replace(status, accepted_by=""))
+            self._touch_again(touched_anew(state, task))
+
+    def accept(self, reason: str, signature: Signature | None = None) -> None:
+        """Accept the tip though something was found against it, or say why not."""
+        self._faults.trying(lambda: self._accept(reason.strip(), signature))
+
+    def _accept(self, reason: str, signature: Signature | None) -> None:
+        self._write()  # what is accepted is named by its files
+        status = self._status
+        tip, found, began = status.tip, status.assessment, status.began
+        is_written = not self._keeping.is_behind
+        is_open = status.is_done and is_written and not status.accepted_by
+        if not is_open or tip is None or found is None or began is None or not reason:
+            return
+        supervision = self._archive.supervision()
+        supervisor = accepting_supervisor(supervision, found, signature)
+        conclusion = Conclusion(
+            *(TrialOutcome.ACCEPTED, began, self._now(), found, reason, supervisor)
+        )
+        self._keeping.accept(tip, conclusion)
+        _logger.info("accepted, reason %r", reason)
+        self._faults.end()
+        accepted_by = supervisor or tip.names.operator
+        kept = self._keeping.files
+        self._publish(replace(status, files=kept, accepted_by=accepted_by))
+
+    def end_task(self) -> None:
+        """End the task at hand with the touches that there are, if they suffice."""
+        status = self._status
+        if status.setup is None or status.state is None:
+            return
+        transition = end_task(status.setup, status.state)
+        try:
+            self._keeping.images.follow(status.state, transition)
+        except FileError as error:
+            self._faults.tell(error.message)
+            return
+        self._become(transition)
+
+    def read(self, task: AnyTask, place: str, *, is_still: bool) -> None:
+        """Do a task with recorded images; a drift reference counts in it.
+
+        Parameters
+        ----------
+        place : str
+            A folder, pattern, video or record; or a folder of such folders, one a run.
+        is_still : bool
+            Whether the pen is held still through the images of a touch; else each
+            image is a touch.
+        """
+        tip, setup, state = self._status.tip, self._status.setup, self._status.state
+        if self._task.is_there or tip is None or setup is None or state is None:
+            return
+        if self._keeping.has_read(DRIFT):
+            setup = with_drift(setup, state.found_by(DRIFT))
+        rules = read_rules(is_still, setup.choices.n_frames)
+        work = partial(read_runs, task, place, tip, setup, rules)
+        images = ReadImages(task.kind, place, is_still)
+        self._start(
+            *(ReadingState.IMAGES, work),
+            *(partial(self._on_runs_read, images), self._on_runs_unread),
+        )
+
+    def go_on(self, interrupted: InterruptedVerification) -> None:
+        """Resume an interrupted verification, or report why that is impossible."""
+        preparation, under_way = self._preparation, interrupted.under_way
+        status = self._status
+        if preparation is None or under_way is None or self._task.is_there:
+            return
+        if status.began is not None and not status.is_done:
+            self._faults.tell(ANOTHER)
+            return
+        if preparation.missing_inputs():
+            self._faults.tell(NOT_READY)
+            return
+        chosen = replace(under_way.choices, limits=self._choices.limits)
+        again = with_entries(under_way, choices=chosen)
+        work = partial(
+            resume_verification, self._archive, self._data, preparation, again
+        )
+        self._start(
+            *(ReadingState.IMAGES, work),
+            *(partial(self._on_gone_on, interrupted.path), self._on_runs_unread),
+        )
+
+    def _on_gone_on(self, path: Path, before: ResumedVerification) -> None:
+        self._give_up()
+        self._live.begin(before.lamps)
+        lamp_drift = self._live.lamp_drift(before.setup)
+        try:
+            self._keeping.take_over(path, before, lamp_drift)
+        except FileError as error:
+            self._on_runs_unread(error.message)
+            return
+        self._faults.end()
+        self._choices = before.setup.choices
+        self._publish(
+            VerificationStatus(
+                tip=before.tip,
+                setup=before.setup,
+                state=before.state,
+                region=before.tip.region,
+                began=before.under_way.began,
+                files=before.files,
+                lamp_drift=lamp_drift,
+                is_here=self._status.is_here,
+                refusal=self._why_not(before.tip),
+            )
+        )
+        self._keep()
+        self._conclude_done()
+        self._publish(self._status)
+
+    def cancel(self) -> None:
+        """Stop reading."""
+        self._task.drop()
+        self._publish(replace(self._status, reading=ReadingState.NOTHING))
+
+    def shut_down(self) -> None:
+        """Write what is not written yet."""
+        self._task.drop()
+        self._give_up()
+        self._write()
+
+    # Images
+
+    def take(
+        self, frame: Frame, detection: PenDetection | None, region: RegionOfInterest
+    ) -> None:
+        """Take an image, as `VerificationRunner.take` has it."""
+        status = self._status
+        if not status.is_touching or region is not status.region or detection is None:
+            return
+        setup, state = status.setup, status.state
+        assert setup is not None
+        assert state is not None
+        if status.began is None:
+            self._status = replace(status, began=self._now())
+            self._live.begin(LampObservations())
+        try:
+            transition = self._live.take(setup, state, frame, detection, region)
+        except FileError as error:  # an image that is not kept does not count
+            self._faults.tell(error.message, Cause.IMAGES)
+            return
+        self._faults.end_of(Cause.IMAGES)
+        self._become(transition)
+
+    def _new_record(self) -> NewRecord:
+        """Make a record for the images of the run at hand."""
+        status, preparation = self._status, self._preparation
+        assert preparation is not None
+        assert status.tip is not None
+        tip = status.tip
+        header = preparation.header(
+            {
+                "verification": "" if status.task is None else status.task.kind,
+                "tip_file": tip.tip_file.path.name,
+                "tip_sha256": tip.tip_file.sha256,
+            }
+        )
+        return new_record(self._keeping.root(tip), tip.names, header)
+
+    def _become(self, transition: SessionTransition) -> None:
+        before, state = self._status.state, transition.state
+        finished = transition.finished
+        self._status = replace(self._status, state=state)
+        happened = event_kinds(before, transition)
+        if finished is not None:
+            tip, setup = self._status.tip, self._status.setup
+            assert tip is not None
+            assert setup is not None
+            lamp_drift = self._live.lamp_drift(setup)
+            self._keeping.add_task(finished, tip, lamp_drift)
+            self._status = replace(self._status, lamp_drift=lamp_drift)
+            happened.append(ending(self._status))
+        self._keep()
+        if finished is not None:
+            self._conclude_done()
+        self._publish(self._status, *happened)
+
+    def _touch_again(self, state: SessionState) -> None:
+        """Continue with another state, in which points have to be probed again."""
+        self._keeping.forget_but(state)
+        self._publish(replace(self._status, state=state))
+
+    # The tip
+
+    def _choose_how(self, choices: VerificationChoices) -> None:
+        if choices == self._choices:
+            return
+        self._choices = choices
+        if self._status.reading is ReadingState.IMAGES:
+            self.cancel()  # they are measured by what was chosen before
+        status, setup, state = self._status, self._status.setup, self._status.state
+        if setup is None or state is None:
+            return
+        before = state
+        setup, state = with_other_choices(setup, state, choices)
+        refusal = self._why_not(status.tip)
+        self._status = replace(status, setup=setup, state=state, refusal=refusal)
+        if state.touching is before.touching:
+            self._publish(self._status)
+        else:
+            self._touch_again(state)
+        self._keep()
+
+    def _read_tip(self) -> None:
+        preparation = self._preparation
+        if preparation is None or preparation.missing_inputs():
+            return
+        self._task.drop()
+        archive = self._archive
+        self._start(
+            *(ReadingState.TIP, lambda _: read_tip_in_force(archive, preparation)),
+            *(self._on_tip_read, self._on_no_tip),
+        )
+
+    def _on_tip_read(self, tip: CurrentTip) -> None:
+        status = replace(self._status, reading=ReadingState.NOTHING)
+        if status.tip is None or not tip.is_like(status.tip):
+            self._give_up()
+            status = VerificationStatus(
+                tip=tip,
+                setup=setup_of(tip, self._choices),
+                state=SessionState(),
+                region=tip.region,
+                is_here=status.is_here,
+            )
+        self._publish(replace(status, refusal=self._why_not(tip)))
+
+    def _on_no_tip(self, why: Message) -> None:
+        self._give_up()
+        self._publish(VerificationStatus(is_here=self._status.is_here, refusal=why))
+
+    def _why_not(self, tip: CurrentTip | None) -> Message | None:
+        """Return why what is chosen cannot be verified."""
+        if tip is None:
+            return self._status.refusal
+        return self._choices.missing(tip.names.ball_diameter)
+
+    # Recorded images
+
+    def _on_runs_read(self, images: ReadImages, read: ReadRuns) -> None:
+        status = replace(self._status, reading=ReadingState.NOTHING)
+        setup, state, done = status.setup, status.state, read.done
+        if setup is None or state is None:
+            return
+        self._faults.end()
+        self._status = replace(status, began=status.began or self._now())
+        self._touch_again(with_read(setup, state, read.touched, read.found))
+        self._keeping.add_read(images, done)
+        self._keep()
+        self._conclude_done()
+        self._publish(self._status, ending(self._status))
+
+    def _on_runs_unread(self, why: Message) -> None:
+        self._faults.tell(why)
+        self._publish(replace(self._status, reading=ReadingState.NOTHING))
+
+    def _start(
+        self,
+        reading: ReadingState,
+        work: Callable[[Report], T],
+        then: Callable[[T], None],
+        otherwise: Callable[[Message], None],
+    ) -> None:
+        self._task.begin(work, then, otherwise)
+        self._publish(replace(self._status, reading=reading))
+
+    # Records
+
+    def _keep(self) -> None:
+        """Keep what tasks have found, unless a later visit will add to their U."""
+        self._keeping.settle(self._status)
+        self._write()
+
+    def _conclude_done(self) -> None:
+        """Conclude a verification when all that was chosen is found."""
+        found = self._status.assessment
+        if self._status.is_done and found is not None:
+            is_kept = found.is_accepted
+            outcome = TrialOutcome.ACCEPTED if is_kept else TrialOutcome.REFUSED
+            self._keeping.conclude(self._status, outcome)
+            self._write()
+
+    def _give_up(self) -> None:
+        """Conclude what was begun and is not done."""
+        self._keeping.give_up(self._status)
+        self._write()
+        self._keeping.begin()
+
+    def _write(self) -> None:
+        """Write pending records, or report why that is impossible."""
+        if not self._keeping.is_behind:
+            return
+        try:
+            self._keeping.write()
+            self._faults.end()
+        except LightpenError as error:
+            self._faults.tell(error.message)
+        self._status = replace(self._status, files=self._keeping.files)
+
+    def _note_under_way(self) -> None:
+        """Write the checkpoint from which the verification can be resumed."""
+        try:
+            self._keeping.note(self._status, self._choices)
+        except FileError as error:
+            if not self._faults.is_any:  # it may be reported already
+                self._faults.tell(error.message, Cause.NOTE)
+            return
+        self._faults.end_of(Cause.NOTE)
+
+    def _publish(self, status: VerificationStatus, *events: SessionEventKind) -> None:
+        """Set the status and notify."""
+        if status.tip is not None and status.tip is not self._status.tip:
+            _logger.info("tip read: %s", status.tip.tip_file.path)
+        for event in events:
+            _logger.info("event: %s", event)
+        self._status = status
+        self._note_under_way()
+        self._listener.on_verification(status, events)
+
+
+def _verifies_like(one: Preparation, other: Preparation) -> bool:
+    return one.swings_like(other) and one.source == other.source

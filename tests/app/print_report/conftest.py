@@ -1,0 +1,101 @@
+"""A record on paper, and the words on its pages."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from benchmarks.small_records import record_of
+from PySide6.QtCore import QBuffer, QSize
+from PySide6.QtGui import QPainter
+from PySide6.QtSvg import QSvgGenerator
+
+from lightpen.archive.result_entry import ArchivePlace
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.files import write_whole
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.model.origin import Origin
+from lightpen.record.calibrations.calibrations import read_calibration
+from lightpen.record.calibrations.reestimated_poses import reestimate_poses
+from lightpen.record.results.results import Result, result_bytes
+from lightpen.record.swings.names import Names
+from lightpen.swing_messages import tip_changed
+from lightpen_app.print_report.pages import (
+    PAGE_HEIGHT,
+    PAGE_WIDTH,
+    PrintReport,
+    paint_page,
+)
+from lightpen_app.print_report.printing import paper_of
+
+SVG = "{http://www.w3.org/2000/svg}text"
+
+
+def _words_on(paper: PrintReport, number: int) -> list[str]:
+    """Return what is written on a page, each line of it."""
+    buffer = QBuffer()
+    generator = QSvgGenerator()
+    generator.setOutputDevice(buffer)
+    generator.setSize(QSize(round(PAGE_WIDTH), round(PAGE_HEIGHT)))
+    painter = QPainter(generator)
+    paint_page(paper, number, painter)
+    painter.end()
+    tree = ElementTree.fromstring(buffer.data().data())
+    return ["".join(each.itertext()).strip() for each in tree.iter(SVG)]
+
+
+@pytest.fixture
+def result(stated: dict[str, Any]) -> Result:
+    """Return an accepted result of a live camera that passed."""
+    return Result(
+        names=Names("Hall 3", "Ann", "LP-04", "T-10", "C-1", 3.0005),
+        accepted=datetime(2026, 1, 2, 12, tzinfo=UTC),
+        grade=Grade.PASS,
+        record=Path("records", "1"),
+        images=(1, 2),
+        calibration=record_of(stated),
+        origin=Origin.LIVE,
+    )
+
+
+@pytest.fixture
+def doubted(result: Result) -> Result:
+    """Return one of a recording that was accepted with a reason."""
+    told = tip_changed(0.0312, "2026-01-01", "y", 0.0301, 0.0142)
+    return replace(
+        result,
+        grade=Grade.CHECK,
+        origin=Origin.RECORDED,
+        why=StoredMessage.of(told),
+        reason="New ball mounted.",
+    )
+
+
+@pytest.fixture
+def printed(tmp_path: Path) -> Callable[..., PrintReport]:
+    """Return a function that writes a result and puts what it states on paper."""
+
+    def put_on_paper(
+        result: Result, entered: ArchivePlace | None = None
+    ) -> PrintReport:
+        path = tmp_path / "000017.json"
+        write_whole(path, result_bytes(result, "records/1"))
+        calibration_file = read_calibration(path)
+        return paper_of(
+            calibration_file, reestimate_poses(calibration_file.calibration), entered
+        )
+
+    return put_on_paper
+
+
+@pytest.fixture
+def words() -> Callable[[PrintReport], list[list[str]]]:
+    """Return a function that reads what is written on each page, line by line."""
+
+    def read(paper: PrintReport) -> list[list[str]]:
+        return [_words_on(paper, number) for number in range(1, paper.n_pages + 1)]
+
+    return read

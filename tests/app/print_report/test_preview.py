@@ -1,0 +1,94 @@
+"""What is shown is what is saved and printed."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QThreadPool
+from PySide6.QtPrintSupport import QPrinter
+from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton
+from pytestqt.qtbot import QtBot
+from shiboken6 import isValid
+
+from lightpen.record.results.results import Result
+from lightpen_app.print_report.pages import PrintReport
+from lightpen_app.print_report.preview import PrintReportWindow
+from lightpen_app.print_report.printing import paint_on
+from lightpen_app.work.workbench import Workbench
+
+
+@pytest.fixture
+def window(
+    workbench: Workbench, result: Result, printed: Callable[..., PrintReport]
+) -> Iterator[PrintReportWindow]:
+    window = PrintReportWindow(printed(result), workbench.save_place, "tip")
+    window.show()
+    yield window
+    QThreadPool.globalInstance().waitForDone()
+    QApplication.processEvents()  # what a job tells at its end
+    if isValid(window):
+        window.close()
+
+
+def test_all_pages_are_shown(
+    qtbot: QtBot,
+    window: PrintReportWindow,
+    result: Result,
+    printed: Callable[..., PrintReport],
+) -> None:
+    qtbot.waitUntil(lambda: window.n_pages() == printed(result).n_pages)
+
+
+def test_it_is_saved_where_it_is_wanted(
+    qtbot: QtBot, window: PrintReportWindow, tmp_path: Path
+) -> None:
+    path = tmp_path / "record.pdf"
+    (button,) = (
+        each
+        for each in window.findChildren(QPushButton)
+        if each.text() == "Save as PDF..."
+    )
+    button.click()
+    (dialog,) = window.findChildren(QFileDialog)
+
+    with qtbot.waitSignal(window.saved) as saved:
+        dialog.fileSelected.emit(str(path))
+        dialog.close()
+
+    assert saved.args == [path]
+    assert path.read_bytes().startswith(b"%PDF-1.4")
+
+
+def test_where_it_cannot_be_saved_is_told(
+    qtbot: QtBot, window: PrintReportWindow, tmp_path: Path
+) -> None:
+    with qtbot.waitSignal(window.failed) as failed:
+        window.write(tmp_path / "no" / "such" / "record.pdf")
+
+    assert "record.pdf" in failed.args[0]
+
+
+def test_a_printer_gets_every_page(
+    result: Result, printed: Callable[..., PrintReport], tmp_path: Path
+) -> None:
+    printer = QPrinter(QPrinter.PrinterMode.HighResolution)
+    printer.setOutputFormat(QPrinter.OutputFormat.PdfFormat)
+    printer.setOutputFileName(str(tmp_path / "printed.pdf"))
+    paper = printed(result)
+
+    paint_on(paper, printer)
+
+    pdf = (tmp_path / "printed.pdf").read_bytes()
+    assert f"/Count {paper.n_pages}".encode() in pdf
+
+
+def test_a_window_that_is_closed_while_it_saves_saves_all_the_same(
+    qtbot: QtBot, window: PrintReportWindow, tmp_path: Path
+) -> None:
+    path = tmp_path / "record.pdf"
+
+    with qtbot.waitSignal(window.saved):
+        window.write(path)
+        window.close()
+
+    assert path.read_bytes().startswith(b"%PDF-1.4")

@@ -1,0 +1,175 @@
+"""What the operator is told, moment by moment."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PySide6.QtWidgets import QApplication
+
+from lightpen.estimation.reports.verdict import Grade, Verdict
+from lightpen.model.limits import SwingLimits
+from lightpen.simulator.swings import paper_camera, paper_pen
+from lightpen.swing.shortfall import measure_shortfall
+from lightpen.swing.state import (
+    Pause,
+    Phase,
+    Progress,
+    SwingSetup,
+    SwingState,
+    start_swing,
+)
+from lightpen.swing_messages import PEN_LOST, tip_is_good
+from lightpen_app.steps.swing.remaining_images import RemainingImages, in_true_steps
+from lightpen_app.steps.swing.view_state import SwingViewState, SwingWords
+from lightpen_app.widgets.sign_label import StatusMessage
+
+SETUP = SwingSetup(paper_camera(binning=2), paper_pen())
+PASSED = Verdict(Grade.PASS, tip_is_good(0.001))
+
+
+@pytest.fixture
+def words(qapp: QApplication) -> SwingWords:
+    return SwingWords()
+
+
+def moment(state: SwingState, **more: object) -> SwingViewState:
+    short = measure_shortfall(SETUP, state)
+    # Which names there are is known to the class alone.
+    return replace(SwingViewState(SETUP, state, short), **more)  # type: ignore[arg-type]
+
+
+def at_verdict(**more: object) -> SwingViewState:
+    state = replace(start_swing(SETUP), phase=Phase.VERDICT, message=PASSED.reason)
+    return moment(state, verdict=PASSED, **more)
+
+
+def test_after_the_verdict_the_dial_shows_how_far_from_upright_the_pen_is(
+    words: SwingWords,
+) -> None:
+    value = words.operator_value(at_verdict())
+
+    assert "upright and still" in value.hint
+    assert value.dial is not None
+    assert value.dial.target is not None
+    assert value.dial.target.tilt == 0.0
+    assert value.keys == "Enter: review"
+
+
+RECORDING = replace(SETUP, is_recording=True)
+
+
+@pytest.mark.parametrize(
+    "why", [{"setup": RECORDING}, {"is_away": True}, {"is_accepted": True}]
+)
+def test_nobody_is_asked_to_hold_the_pen_upright_who_need_not(
+    words: SwingWords, why: dict[str, object]
+) -> None:
+    value = words.operator_value(at_verdict(stillness=0.5, **why))
+
+    assert "upright" not in value.hint
+    assert value.state.fraction is None
+    assert value.dial is not None
+    assert value.dial.target is None
+
+
+def test_at_the_end_of_a_recording_it_is_told_how_much_of_it_was_read(
+    words: SwingWords,
+) -> None:
+    done = at_verdict(setup=RECORDING)
+    state = replace(done.state, progress=Progress(60, 60))
+
+    assert words.note(replace(done, state=state)) == "60 of 60 images loaded"
+
+
+def test_away_from_the_swing_nobody_is_told_that_the_review_is_open(
+    words: SwingWords,
+) -> None:
+    hint = words.operator_value(at_verdict(is_away=True)).hint
+
+    assert hint == "Put the pen down. Continue at the computer."
+
+
+def test_without_a_swing_nothing_is_wrong_on_the_other_steps(words: SwingWords) -> None:
+    value = words.resting_value()
+
+    assert value.instruction == "No swing yet"
+    assert value.state.word == "WAITING"
+
+
+def test_a_lost_pen_is_not_said_to_show_its_leds(words: SwingWords) -> None:
+    paused = replace(
+        start_swing(SETUP), phase=Phase.PAUSED, pause=Pause.LOST, message=PEN_LOST
+    )
+
+    lost = words.operator_value(moment(paused, seen="10 of 10 LEDs"))
+    lifted = replace(paused, pause=Pause.LIFTED)
+
+    assert (lost.state.word, lost.state.detail) == ("PEN LOST", "")
+    shown = words.operator_value(moment(lifted, seen="10 of 10 LEDs"))
+    assert shown.state.detail == "10 of 10 LEDs"
+
+
+def test_images_to_go_are_told_in_true_steps() -> None:
+    told = [in_true_steps(n_more) for n_more in (0, 1, 9, 10, 11, 16, 30, 31, 47, 240)]
+
+    assert told == [0, 1, 9, 10, 15, 20, 30, 40, 50, 240]
+
+
+def test_what_the_files_leave_open_is_told_during_the_swing(words: SwingWords) -> None:
+    state = start_swing(SETUP)
+    vague = replace(state.kept.predicted, uncertainty=0.02, floor=0.0042)
+    state = replace(state, kept=replace(state.kept, predicted=vague))
+    setup = replace(SETUP, limits=SwingLimits(max_uncertainty=0.002))
+
+    early = replace(moment(state), setup=setup)
+    short = replace(early.short, fields=np.zeros_like(early.short.fields))
+    late = replace(early, short=short)
+
+    told = words.warning(late)
+
+    assert "With this LED file the lowest achievable U (k =" in told.text
+    assert words.warning(early) == StatusMessage()
+    assert words.warning(replace(late, setup=SETUP)) == StatusMessage()
+    is_read = replace(setup, is_recording=True)
+    assert words.warning(replace(late, setup=is_read)) == StatusMessage()
+
+
+def test_the_pen_in_space_stands_as_the_dial_has_it(words: SwingWords) -> None:
+    value = words.stand(at_verdict())
+
+    assert value is not None
+    assert value.target is not None
+    np.testing.assert_array_equal(value.tip_pen, paper_pen().nominal_tip)
+    nobody = replace(SETUP, pen=replace(SETUP.pen, nominal_tip=None))
+    assert words.stand(replace(at_verdict(), setup=nobody)) is None
+
+
+def told(*estimates: tuple[int, int]) -> list[int]:
+    """What is told to be to go after estimates of images to go, and kept."""
+    to_go = RemainingImages.first(*estimates[0])
+    found = [to_go.n_images]
+    for n_more, n_kept in estimates[1:]:
+        to_go = to_go.after(n_more, n_kept)
+        found.append(to_go.n_images)
+    return found
+
+
+def test_what_is_to_go_does_not_creep_up() -> None:
+    assert told((24, 30), (26, 31), (29, 32), (14, 40), (4, 50), (6, 51)) == [
+        *(25, 25, 25, 15, 4, 4)
+    ]
+
+
+def test_more_is_to_go_after_images_were_dropped() -> None:
+    assert told((4, 50), (10, 44)) == [4, 10]
+
+
+def test_a_rise_that_is_no_chance_is_told_with_its_reason(words: SwingWords) -> None:
+    to_go = RemainingImages.first(4, 50).after(4, 51).after(40, 52)
+    assert (to_go.n_images, to_go.has_risen) == (40, True)
+    capturing = replace(start_swing(SETUP), phase=Phase.CAPTURING)
+
+    note = words.note(moment(capturing, to_go=to_go))
+    assert note == "at most 300 images  ·  More images needed: U (k = 2) has increased"
+    calm = words.note(moment(capturing, to_go=to_go.after(20, 53)))
+    assert "More images needed:" not in calm

@@ -1,0 +1,51 @@
+"""Tests of widgets that are arranged otherwise where they have little room."""
+
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
+from typing_extensions import override
+
+from lightpen_app.widgets.responsive_layout import ResponsiveLayout, SizeClass
+
+
+class Arranged(ResponsiveLayout, QWidget):
+    narrow_below, low_below = 300, 200
+    large_from, vast_from = QSize(600, 500), QSize(1200, 900)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.arranged_for: list[SizeClass] = []
+
+    @override
+    def _use_room(self) -> None:
+        self.arranged_for.append(self._room)
+
+
+def test_a_widget_is_arranged_anew_only_when_its_room_changes(qtbot: QtBot) -> None:
+    widget = Arranged()
+    qtbot.addWidget(widget)
+    widget.resize(300, 200)
+    widget.show()
+    for size in ((500, 400), (299, 400), (250, 199), (200, 150), (300, 200)):
+        widget.resize(*size)
+
+    assert widget.arranged_for == [
+        SizeClass(is_narrow=True),
+        SizeClass(is_narrow=True, is_low=True),
+        SizeClass(),
+    ]
+
+
+def test_plenty_of_room_is_told_where_there_is_plenty_both_ways(qtbot: QtBot) -> None:
+    widget = Arranged()
+    qtbot.addWidget(widget)
+    widget.resize(300, 200)
+    widget.show()
+    for size in ((900, 499), (600, 500), (1200, 900), (599, 900)):
+        widget.resize(*size)
+
+    assert widget.arranged_for == [
+        SizeClass(is_large=True),
+        SizeClass(is_large=True, is_vast=True),
+        SizeClass(),
+    ]

@@ -1,0 +1,158 @@
+"""An older tip is put in force again as a new entry, and notes are entries."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from msgspec import structs
+from tests.core.archive.test_logbook import NAMES, checked, result
+
+from lightpen.archive.chains import append, entries_of
+from lightpen.archive.due import due_tips
+from lightpen.archive.entries import Event, Kind, StoredEntry, text_sha256
+from lightpen.archive.history import lines, messages_on
+from lightpen.archive.logbook import Logbook
+from lightpen.archive.queries import EntryFilter, last_accepted
+from lightpen.errors import AcceptanceError, ArchiveError
+from lightpen.model.limits import DueRule
+from lightpen.record.library.library_changes import Author, add_item, retire_item
+from lightpen.record.library.tip_library import ItemKind, ListedTip
+from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen.record.swings.names import Names
+
+BEA = Names("Hall 7", "Bea")
+
+
+@pytest.fixture
+def data(tmp_path: Path, swung: Callable[..., Path]) -> Path:
+    """A data folder in which a tip was calibrated twice."""
+    shutil.copytree(swung(), tmp_path / "data" / RECORDS / "swing")
+    for n in range(2):
+        FolderArchive(tmp_path / "data").store(result(tmp_path / "data", n))
+    return tmp_path / "data"
+
+
+@pytest.fixture
+def logbook(data: Path) -> Iterator[Logbook]:
+    with closing(Logbook(data)) as book:
+        book.enter_owed()
+        yield book
+
+
+def entries(logbook: Logbook) -> list[StoredEntry]:
+    return list(entries_of(logbook.database, logbook.chain))
+
+
+def test_an_older_tip_is_in_force_again_and_all_results_are_kept(
+    data: Path, logbook: Logbook
+) -> None:
+    first, second = entries(logbook)
+    archive = FolderArchive(data)
+    before = [file.read_bytes() for file in archive.all_files()]
+    logbook.restore(first, BEA, "The new one is bent.")
+
+    found = archive.in_force("LP-04", "T-10")
+    assert found is not None
+    assert found.tip_pen.tolist() == [0.0, 2.0, 3.0]
+    assert (found.names.station, found.names.operator) == ("Hall 7", "Bea")
+    assert found.change is not None
+    assert found.change.difference_mm == (-1.0, 0.0, 0.0)
+    assert [file.read_bytes() for file in archive.all_files()[:2]] == before
+    event = entries(logbook)[-1].entry.event
+    assert (event.kind, event.concerns) == (Kind.RESTORED, first.sha256)
+    assert event.reason == "The new one is bent."
+    states = [line.state for line in lines(logbook.database, EntryFilter(), 0, 9)]
+    assert states == ["in force", "replaced", "replaced"]
+    assert checked(data).findings == ()
+    last = last_accepted(logbook.database, "LP-04", "T-10")
+    assert last is not None
+    assert last.sha256 == entries(logbook)[-1].sha256 != second.sha256
+
+
+def test_a_restored_tip_is_as_old_as_its_calibration(
+    data: Path, logbook: Logbook
+) -> None:
+    first, _ = entries(logbook)
+    restored = logbook.restore(first, BEA, "The new one is bent.")
+    again = logbook.restore(entries(logbook)[1], BEA, "By mistake.")
+    logbook.restore(entries(logbook)[2], BEA, "No, it is bent.")
+
+    assert restored.accepted <= again.accepted
+    (tip,) = due_tips(logbook.database, logbook.chain, DueRule(30))
+    assert tip.entry == entries(logbook)[-1]
+    assert tip.calibrated == first.entry.event.at
+    assert tip.due == first.entry.event.at + timedelta(days=30)
+    assert tip.n_swings == 1  # that of the second calibration
+
+
+def test_a_tip_that_was_retired_is_not_restored(data: Path, logbook: Logbook) -> None:
+    now, by = entries(logbook)[0].entry.event.at, Author()
+    add_item(data, ListedTip(id="T-10"), by, now)
+    retire_item(data, ItemKind.TIP, "T-10", by, now)
+
+    with pytest.raises(AcceptanceError, match="T-10 is retired"):
+        logbook.restore(entries(logbook)[0], BEA, "The new one is bent.")
+    assert len(FolderArchive(data).all_files()) == 2
+
+
+def test_a_restored_tip_can_be_taken_back(data: Path, logbook: Logbook) -> None:
+    archive = FolderArchive(data)
+    restored = logbook.restore(entries(logbook)[0], BEA, "By mistake.")
+    archive.revoke(restored, "Bea", restored.accepted)
+    logbook.enter_owed()
+
+    found = archive.in_force("LP-04", "T-10")
+    assert found is not None
+    assert found.tip_pen[0] == 1.0
+    back = entries(logbook)[-1].entry.event
+    assert (back.kind, back.concerns) == (Kind.TAKEN_BACK, entries(logbook)[2].sha256)
+
+
+def test_what_put_no_tip_in_force_is_not_restored(data: Path, logbook: Logbook) -> None:
+    event = structs.replace(
+        entries(logbook)[0].entry.event, kind=Kind.REFUSED, result=None
+    )
+    refused = append(logbook.database, logbook.chain, event)
+    assert refused is not None
+
+    with pytest.raises(ArchiveError, match="Entry 3 is not an accepted tip"):
+        logbook.restore(refused, BEA, "I like it.")
+    assert len(FolderArchive(data).all_files()) == 2
+
+
+@pytest.mark.parametrize("record", [None, '{"tip_pen_mm": [1.0, 2.0, 3.0]}'])
+def test_a_tip_of_which_too_little_is_kept_is_not_restored(
+    data: Path, logbook: Logbook, record: str | None
+) -> None:
+    event = Event(
+        kind=Kind.ACCEPTED,
+        at=entries(logbook)[0].entry.event.at,
+        names=NAMES,
+        program="lightpen 0.1",
+        grade="pass",
+    )
+    if record is not None:
+        event = structs.replace(event, record_sha256=text_sha256(record))
+    bare = append(logbook.database, logbook.chain, event, record)
+    assert bare is not None
+
+    with pytest.raises(
+        ArchiveError, match="Entry 3 has no complete calibration record"
+    ):
+        logbook.restore(bare, BEA, "The old one.")
+    assert len(FolderArchive(data).all_files()) == 2
+
+
+def test_a_note_is_an_entry_on_another(data: Path, logbook: Logbook) -> None:
+    first, _ = entries(logbook)
+    logbook.enter_note(first, "Dropped on the floor. 掉在地上了", "Bea")
+
+    (note,) = messages_on(logbook.database, first)
+    event = note.entry.event
+    assert (event.kind, event.names.operator) == (Kind.NOTE, "Bea")
+    assert event.reason == "Dropped on the floor. 掉在地上了"
+    assert (event.names.pen, event.names.tip) == ("LP-04", "T-10")
+    assert checked(data).findings == ()

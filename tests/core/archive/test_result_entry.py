@@ -1,0 +1,88 @@
+"""Where a result is entered, told by the archive beside it."""
+
+from datetime import UTC, datetime
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+from benchmarks.small_records import small_record
+
+from lightpen.archive.entries import NOTHING_BEFORE
+from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.archive.result_entry import entry_of_file
+from lightpen.errors import ArchiveError, FileError
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.names import Names
+
+NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
+
+
+def digest(file: Path) -> str:
+    return sha256(file.read_bytes()).hexdigest()
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> list[Path]:
+    """Return the files of two results, both entered."""
+    archive = FolderArchive(tmp_path)
+    for n in (1, 2):
+        archive.store(
+            Result(
+                names=Names("Hall 3", "Ann", "LP-04", "T-10"),
+                accepted=NOON.replace(hour=n),
+                grade=Grade.PASS,
+                record=tmp_path / "records" / str(n),
+                images=(1,),
+                calibration=small_record(
+                    {
+                        "tip_pen_mm": [1.0, -90.0, -25.0],
+                        "expanded_uncertainty_mm": [0.003, 0.004, 0.005],
+                        "cone_cam_mm": [0.0, 200.0, 1000.0],
+                        "covariance": [[0.25] * 6] * 6,
+                    }
+                ),
+            )
+        )
+    logbook = Logbook(tmp_path)
+    assert logbook.enter_owed() == ()
+    logbook.close()
+    return sorted(archive.folder.glob("*.json"))
+
+
+def test_an_entry_is_told_with_the_one_before(results: list[Path]) -> None:
+    first, second = (entry_of_file(file, digest(file)) for file in results)
+
+    assert first is not None
+    assert second is not None
+    assert (first.number, first.previous) == (1, NOTHING_BEFORE)
+    assert (second.number, second.previous) == (2, first.sha256)
+
+
+def test_a_result_that_was_changed_since_is_told(results: list[Path]) -> None:
+    with pytest.raises(FileError, match="is not the one that was entered"):
+        entry_of_file(results[0], 64 * "0")
+
+
+def test_what_is_in_no_archive_has_no_entry(results: list[Path]) -> None:
+    elsewhere = results[0].parents[1] / "000001.json"
+    elsewhere.write_bytes(results[0].read_bytes())
+    new = results[0].with_name("000009.json")
+    new.write_bytes(results[0].read_bytes())
+
+    assert entry_of_file(elsewhere, digest(elsewhere)) is None
+    assert entry_of_file(new, digest(new)) is None
+
+
+def test_an_archive_that_cannot_be_read_is_told(results: list[Path]) -> None:
+    (results[0].parents[1] / ARCHIVE).write_bytes(b"precious" * 100)
+
+    with pytest.raises(ArchiveError):
+        entry_of_file(results[0], digest(results[0]))
+
+
+def test_without_an_archive_there_is_no_entry(results: list[Path]) -> None:
+    (results[0].parents[1] / ARCHIVE).unlink()
+
+    assert entry_of_file(results[0], digest(results[0])) is None

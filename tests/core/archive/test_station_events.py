@@ -1,0 +1,193 @@
+"""Limits, verifications and calibrated cameras are entered, too, each once."""
+
+import json
+from collections.abc import Iterator
+from contextlib import closing
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+from tests.core.archive.conftest import NOON
+
+from lightpen.archive.chains import entries_of, records_of
+from lightpen.archive.check import check_archive
+from lightpen.archive.database import look_into
+from lightpen.archive.entries import Event, Kind
+from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.hashes import InputFile
+from lightpen.formats.json_records import record_bytes
+from lightpen.messages import message
+from lightpen.model.limits import StationLimits
+from lightpen.model.origin import Origin
+from lightpen.record.folder.camera_calibrations import CameraTrial, keep_camera_trial
+from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
+from lightpen.record.library.numbered_files import add_numbered
+from lightpen.record.library.supervision import Signature, save_limits
+from lightpen.record.results.result_folder import SIMULATED
+from lightpen.record.swings.names import Names
+from lightpen.verification.reports.records import verification_record
+from lightpen.verification.tasks.assessment import VerificationAssessment
+
+NAMES = Names("Hall 2", "Ann")
+EVE = Signature("Eve", "correct horse")
+HASH = "ab" * 32
+
+
+@pytest.fixture
+def logbook(tmp_path: Path) -> Iterator[Logbook]:
+    book = Logbook(tmp_path)
+    yield book
+    book.database.close()
+
+
+def events(logbook: Logbook) -> list[Event]:
+    assert logbook.enter_owed() == ()
+    found = entries_of(logbook.database, logbook.chain)
+    return [each.entry.event for each in found]
+
+
+def keep(data: Path, grade: Grade, folder: str = VERIFICATIONS) -> Path:
+    """Keep a verification as the step Verify does."""
+    told = message("file.image")
+    record = verification_record(
+        "circle",
+        {"station": "Hall 2", "operator": "Ann", "pen": "LP-04", "tip": "T-10"}
+        | {"origin": Origin.SIMULATED if SIMULATED in folder else Origin.LIVE},
+        VerificationAssessment(grade, told, told),
+        {"radius": 0.01},
+        {"images": [{"file": "7", "sha256": HASH}]},
+    )
+    return add_numbered(data / folder, record_bytes(record))
+
+
+def found_by(data: Path) -> list[str]:
+    with closing(look_into(data / ARCHIVE)) as database:
+        return [each.code for each in check_archive(database, data).findings]
+
+
+def test_a_verification_is_entered_with_who_what_and_the_hash_of_each_image(
+    tmp_path: Path, logbook: Logbook
+) -> None:
+    keep(tmp_path, Grade.PASS)
+    (event,) = events(logbook)
+
+    assert (event.kind, event.outcome) == (Kind.VERIFICATION, TrialOutcome.ACCEPTED)
+    assert (event.grade, event.origin) == ("pass", Origin.LIVE)
+    assert event.names == Names("Hall 2", "Ann", "LP-04", "T-10")
+    assert event.settings == {"verified": "circle", "max_radius_mm": 0.01}
+    assert event.why is not None
+    assert event.why.text == "image"
+    written = tuple(entries_of(logbook.database, logbook.chain))
+    (record,) = records_of(logbook.database, written).values()
+    assert json.loads(record)["inputs"]["images"][0]["sha256"] == HASH
+
+
+def test_a_verification_that_did_not_pass_is_refused_until_somebody_accepts_it(
+    tmp_path: Path, logbook: Logbook
+) -> None:
+    keep(tmp_path, Grade.REPEAT)
+    conclusion = {
+        "program": {"name": "lightpen", "version": "1"},
+        "created": NOON.isoformat(),
+        "verification": CONCLUSION,
+        "outcome": "accepted",
+        "operator": "Ann",
+        "verdict": {
+            "grade": "repeat",
+            "code": "test.found",
+            "text": "image",
+            "values": {},
+        },
+        "supervisor": "Eve",
+        "reason": "for a trial",
+    }
+    add_numbered(tmp_path / VERIFICATIONS, record_bytes(conclusion))
+
+    refused, accepted = events(logbook)
+    assert (refused.outcome, accepted.outcome) == (
+        TrialOutcome.REFUSED,
+        TrialOutcome.ACCEPTED,
+    )
+    assert (accepted.grade, accepted.reason) == ("repeat", "for a trial")
+    assert accepted.settings["supervisor"] == "Eve"
+
+
+def test_a_verification_of_a_simulated_pen_is_entered_as_practice(
+    tmp_path: Path, logbook: Logbook
+) -> None:
+    keep(tmp_path, Grade.PASS, f"{SIMULATED}/{VERIFICATIONS}")
+
+    (event,) = events(logbook)
+    assert event.is_simulated
+
+
+@pytest.mark.parametrize("outcome", TrialOutcome)
+def test_the_calibration_of_a_camera_is_entered_whatever_became_of_it(
+    tmp_path: Path, logbook: Logbook, outcome: TrialOutcome
+) -> None:
+    file = InputFile(Path("camera.yaml"), HASH)
+    trial = CameraTrial(
+        *(outcome, "chessboard:7x5:20", "21538392", Origin.LIVE),
+        images={"1": HASH},
+        camera_file=file if outcome is TrialOutcome.ACCEPTED else None,
+    )
+    keep_camera_trial(tmp_path, trial, NAMES, NOON)
+
+    (event,) = events(logbook)
+    assert (event.kind, event.outcome, event.at) == (Kind.CAMERA, outcome, NOON)
+    assert event.settings == {"board": "chessboard:7x5:20", "camera": "21538392"}
+    assert (event.names.station, event.names.operator) == ("Hall 2", "Ann")
+    written = tuple(entries_of(logbook.database, logbook.chain))
+    (record,) = records_of(logbook.database, written).values()
+    assert json.loads(record)["inputs"]["images"] == [{"file": "1", "sha256": HASH}]
+
+
+def test_a_change_of_limits_and_of_the_password_is_entered_with_who_and_when(
+    tmp_path: Path, logbook: Logbook
+) -> None:
+    save_limits(tmp_path, "Hall 2", StationLimits(), EVE, "", NOON)
+
+    password, limits = events(logbook)
+    assert {password.kind, limits.kind} == {Kind.LIMITS}
+    assert password.settings == {"changes_password": True}
+    assert (limits.names.operator, limits.names.station) == ("Eve", "Hall 2")
+    assert limits.at == NOON
+    assert limits.settings["max_radius_mm"] == StationLimits().verification.radius
+    assert "argon2" not in str(password)
+
+
+def test_each_is_entered_once(tmp_path: Path, logbook: Logbook) -> None:
+    keep(tmp_path, Grade.PASS)
+    save_limits(tmp_path, "Hall 2", StationLimits(), EVE, "", NOON)
+    for _ in range(2):
+        assert len(events(logbook)) == 3
+
+
+def test_one_that_is_changed_later_is_found_and_one_before_stays_owed(
+    tmp_path: Path, logbook: Logbook
+) -> None:
+    file = keep(tmp_path, Grade.PASS)
+    whole = file.read_bytes()
+    file.write_bytes(whole.replace(b"0.01", b"0.09"))
+    (trouble,) = logbook.enter_owed()
+    assert trouble.code == "verification.damaged"
+
+    file.write_bytes(whole)
+    assert len(events(logbook)) == 1
+    assert found_by(tmp_path) == []
+    file.write_bytes(whole.replace(b"0.01", b"0.09"))
+    assert found_by(tmp_path) == ["archive.vouched-changed"]
+
+
+def test_an_absurd_time_is_not_entered(tmp_path: Path, logbook: Logbook) -> None:
+    record = {
+        "program": {"name": "lightpen", "version": "1"},
+        "created": datetime(1, 1, 1).isoformat(),
+        "verification": "circle",
+    }
+    add_numbered(tmp_path / VERIFICATIONS, record_bytes(record))
+
+    (trouble,) = logbook.enter_owed()
+    assert trouble.code == "verification.damaged"

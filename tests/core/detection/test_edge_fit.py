@@ -1,0 +1,158 @@
+"""Discs that are not evenly lit are found by their rims; a part missing is noticed."""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.detection.edge_fit import EdgeFit, fit_edge
+from lightpen.detection.labelling.spot_arrays import UNWHOLE
+from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
+from lightpen.model.ellipse import Ellipses, disc_images
+from lightpen.simulator.image_plans import ImagePlan, plan_scene
+from lightpen.simulator.render import render_view
+from lightpen.simulator.scenes import LEDS, Scene
+from lightpen.simulator.sensor import expose
+from lightpen.simulator.swings import leds_in_camera
+from lightpen.simulator.view import Finger
+
+N_IMAGES = 3
+BESIDE = 15.0  # px, of a spot that is still that of a disc
+
+
+@dataclass(frozen=True, eq=False)
+class DisplayedImage:
+    """A rendered image and the true discs in it."""
+
+    image: Image
+    discs: Ellipses
+
+
+def scene(leds: str, diameter: float = 10.0, blur: float = 0.8) -> Scene:
+    looks = LEDS[leds]
+    usual = Scene(n_images=N_IMAGES, seed=4, faces=looks.faces)
+    return replace(
+        usual,
+        optics=replace(looks.optics, psf_sigma=blur),
+        pen=replace(usual.pen, diameter=diameter),
+    )
+
+
+def show(scene: Scene, plan: ImagePlan, *fingers: Finger) -> DisplayedImage:
+    view = replace(plan.view, fingers=fingers)
+    light = render_view(scene.camera, scene.pen, view, plan.optics)
+    image = expose(light, scene.sensor, np.random.default_rng(plan.index))
+    leds, normals = leds_in_camera(scene.pen, plan.rotation, plan.translation)
+    radius = scene.pen.diameter / 2
+    return DisplayedImage(image, disc_images(scene.camera, leds, normals, radius))
+
+
+@lru_cache(maxsize=8)
+def shown(
+    leds: str, diameter: float = 10.0, blur: float = 0.8
+) -> tuple[DisplayedImage, ...]:
+    wanted = scene(leds, diameter, blur)
+    return tuple(show(wanted, plan) for plan in plan_scene(wanted).image_plans)
+
+
+def nearest(spots: Spots, center: FloatArray) -> int | None:
+    gaps = np.linalg.norm(spots.centers - center, axis=1)
+    return int(gaps.argmin()) if len(gaps) and gaps.min() < BESIDE else None
+
+
+def rim_of(one: DisplayedImage, led: int) -> EdgeFit:
+    rim = fit_edge(one.image, one.discs.centers[led] + 0.6, 1.1 * one.discs.shapes[led])
+    assert rim is not None
+    return rim
+
+
+@pytest.mark.parametrize(
+    ("leds", "diameter", "blur"),
+    [
+        ("hot-spot", 10.0, 0.8),
+        ("hot-spot", 5.0, 0.8),
+        ("dome", 10.0, 0.8),
+        ("dome", 5.0, 0.8),
+        ("dome", 10.0, 2.0),
+        ("ring", 10.0, 0.8),
+        ("ring", 5.0, 0.8),
+        ("halo", 10.0, 0.8),
+        ("ghost", 10.0, 0.8),
+    ],
+)
+def test_leds_as_they_are_have_their_centers_and_are_whole(
+    leds: str, diameter: float, blur: float
+) -> None:
+    errors = []
+    for one in shown(leds, diameter, blur):
+        spots = detect_spots(one.image)
+        assert len(spots) == len(one.discs.centers)
+        assert not (spots.flaws & UNWHOLE).any()
+        for center in one.discs.centers:
+            which = nearest(spots, center)
+            assert which is not None
+            errors.append(spots.centers[which] - center)
+    assert np.sqrt(np.mean(np.square(errors))) < 0.02
+
+
+@pytest.mark.parametrize("leds", ["hot-spot", "dome"])
+@pytest.mark.parametrize("blur", [0.8, 2.0])
+def test_the_area_is_that_of_the_rim_however_blurred(leds: str, blur: float) -> None:
+    ratios = []
+    for one in shown(leds, 10.0, blur):
+        spots = detect_spots(one.image)
+        for center, shape in zip(one.discs.centers, one.discs.shapes, strict=True):
+            which = nearest(spots, center)
+            assert which is not None
+            true_area = 4 * np.pi * np.sqrt(np.linalg.det(shape))
+            ratios.append(spots.areas[which] / true_area)
+    # A wrong disc diameter is told from it.
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.005)
+    assert np.std(ratios) < 0.01
+
+
+def test_the_rim_tells_the_blur_of_optics_and_pixel() -> None:
+    rim = rim_of(shown("hot-spot")[0], 0)
+    # Pixel and interpolation widen the Gaussian: 1 / 12 and 1 / 6 px^2.
+    assert rim.sigma == pytest.approx(np.sqrt(0.8**2 + 1 / 12 + 1 / 6), rel=0.06)
+
+
+def test_the_rim_of_an_evenly_lit_disc_is_found_as_well() -> None:
+    for one in shown("even"):
+        for led, center in enumerate(one.discs.centers):
+            rim = rim_of(one, led)
+            assert rim.is_whole
+            np.testing.assert_allclose(rim.center, center, atol=0.03)
+
+
+def test_nothing_is_fitted_to_a_smear_or_to_darkness() -> None:
+    y, x = np.mgrid[:120, :120]
+    smear = np.exp(-((x - 60) ** 2 + (y - 60) ** 2) / 400.0)
+    dark = np.zeros((120, 120), np.uint8)
+    for image in ((200 * smear).astype(np.uint8), dark):
+        rim = fit_edge(image, np.array([60.0, 60.0]), 60.0 * np.eye(2))
+        assert rim is None or not rim.is_whole
+
+
+@pytest.mark.parametrize("leds", ["even", "hot-spot", "dome"])
+@pytest.mark.parametrize("sliver", [1.0, 3.0, 8.0])
+def test_a_finger_over_an_led_as_it_is_is_told(leds: str, sliver: float) -> None:
+    wanted = scene(leds)
+    plan = plan_scene(wanted).image_plans[0]
+    discs = show(wanted, plan).discs
+    rng = np.random.default_rng(6)
+    covered = (1, 4, 7)
+    fingers = []
+    for led in covered:
+        angle = rng.uniform(0, 2 * np.pi)
+        outwards = np.array([np.cos(angle), np.sin(angle)])
+        reach = 2 * np.sqrt(outwards @ discs.shapes[led] @ outwards)
+        middle = discs.centers[led] + (reach - sliver + 40.0) * outwards
+        fingers.append(Finger(middle, middle + outwards, radius=40.0, softness=0.7))
+    spots = detect_spots(show(wanted, plan, *fingers).image)
+    for led in covered:
+        which = nearest(spots, discs.centers[led])
+        assert which is not None
+        assert SpotFlaw(int(spots.flaws[which])) & (SpotFlaw.CUT | SpotFlaw.MERGED)

@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+
+from lightpen.estimation.bundle.seat_modes import (
+    FULL_LEAN,
+    drift_modes,
+    lean_modes,
+    oval_seat,
+)
+from lightpen.model.posture import rotations_of
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.swings import paper_pen, swing_poses
+
+PEN = paper_pen()
+ANGLES = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+ROUND = rotations_of(PEN, np.full(60, 0.4), ANGLES, np.zeros(60))
+
+
+def test_forms_of_the_seat_say_nothing_of_where_it_is_on_average() -> None:
+    forms = lean_modes(swing_poses(60, np.random.default_rng(0)).rotations)
+
+    np.testing.assert_allclose(forms.mean(axis=0), 0, atol=1e-12)
+    np.testing.assert_allclose(np.mean(forms**2, axis=0), 1)
+
+
+def test_a_drift_in_time_says_nothing_of_where_the_cone_is_on_average() -> None:
+    (in_time,) = drift_modes(7).T
+
+    assert in_time.mean() == pytest.approx(0)
+    assert np.ptp(in_time) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.3, 1.2])
+def test_an_oval_seat_moves_the_tip_to_the_axis_and_away_from_it(phase: float) -> None:
+    weight = np.sin(0.4) / (np.sin(0.4) + FULL_LEAN)
+    radius = 0.01 * weight * np.cos(2 * ANGLES - phase)
+    away = np.stack([np.cos(ANGLES), 0 * ANGLES, np.sin(ANGLES)], axis=1)
+
+    numbers = 0.01 * np.array([np.cos(phase), np.sin(phase)])
+    moves = (oval_seat(ROUND) @ numbers).reshape(-1, 3)
+
+    found = lean_modes(ROUND) @ moves
+    np.testing.assert_allclose(found, radius[:, None] * away, atol=1e-12)
+
+
+def test_a_camera_that_looks_down_sees_the_same_seat() -> None:
+    looking = rotation_from_vector(np.array([0.6, 0.0, 0.0]))
+
+    np.testing.assert_allclose(
+        lean_modes(looking @ ROUND), lean_modes(ROUND), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        oval_seat(looking @ ROUND).reshape(-1, 3, 2),
+        looking @ oval_seat(ROUND).reshape(-1, 3, 2),
+        atol=1e-12,
+    )
+
+
+def test_a_seat_has_forms_before_a_camera_that_lies_on_its_side() -> None:
+    on_its_side = rotation_from_vector(np.array([0.0, 0.0, np.pi / 2]))
+    forms = lean_modes(on_its_side @ ROUND)
+
+    # Waves round the cone are independent of each other where the lean goes round.
+    np.testing.assert_allclose(forms[:, :6].T @ forms[:, :6] / 60, np.eye(6), atol=1e-9)
+
+
+def test_a_pen_that_keeps_its_lean_has_no_forms() -> None:
+    upright = np.tile(np.eye(3), (5, 1, 1))
+
+    assert not lean_modes(upright).any()
+    assert not oval_seat(upright).any()

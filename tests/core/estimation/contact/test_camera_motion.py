@@ -1,0 +1,179 @@
+"""A camera that moves during the swing, and the lamps that witness it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.fixed_lamps import lamps_among
+from lightpen.detection.observations import Observations, leave_out, observe_centers
+from lightpen.detection.reasons import Reason
+from lightpen.errors import CalibrationError
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.contact.camera_motion import follow_lamps, pose_steadily
+from lightpen.estimation.reports.report_warnings import warnings_of
+from lightpen.estimation.reports.verdict import Grade, NextStep, judge
+from lightpen.formats.observation_files import Centers
+from lightpen.model.limits import SwingLimits
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+from lightpen.swing_messages import Code
+
+CAMERA, PEN = paper_camera(), paper_pen()
+N_IMAGES = 80
+TIME = np.linspace(0, 1, N_IMAGES)
+LAMPS = np.array([[1100.0, 900.0], [1300.0, 1100.0]])
+SIGMA = 0.03  # px
+SWING = swing_poses(N_IMAGES, np.random.default_rng(5))
+
+
+def lamps_along(way: FloatArray, noise: float = 0.02) -> FloatArray:
+    rng = np.random.default_rng(6)
+    return LAMPS + way[:, None] + noise * rng.standard_normal((len(way), 2, 2))
+
+
+def seen_along(pen_way: FloatArray) -> Observations:
+    rng = np.random.default_rng(7)
+    poses = SWING.rotations, SWING.translations
+    pixels = simulate_centers(CAMERA, PEN, *poses, SIGMA, rng) + pen_way[:, None]
+    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
+    return observe_centers(centers, CAMERA, PEN)
+
+
+def solved(pen_way: FloatArray, lamp_way: FloatArray) -> Calibration:
+    seen = replace(seen_along(pen_way), lamps=lamps_along(lamp_way))
+    return calibrate(CAMERA, PEN, seen)
+
+
+def errors_in_u(calibration: Calibration) -> FloatArray:
+    off = calibration.joint.tip_pen - SWING.tip_pen
+    return np.abs(off) / calibration.budget.expanded_uncertainty[:3]
+
+
+STILL = np.zeros((N_IMAGES, 2))
+EVEN = np.outer(TIME, [1.0, -0.6])
+CURVE = np.outer(np.sin(7 * TIME), [1.5, 0.8])
+BUMP = np.outer(TIME > 0.4, [0.8, 0.3])
+
+
+def test_noise_is_no_way() -> None:
+    path = follow_lamps(lamps_along(STILL))
+    assert path is not None
+    assert path.moved == 0
+    # Two lamps, each with noise of 0.02 px.
+    np.testing.assert_allclose(path.noise, 0.02 / np.sqrt(2), rtol=0.2)
+    np.testing.assert_allclose(path.lamps, LAMPS, atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("way", "left"),
+    [(EVEN, 0.6), (CURVE, 0.8), (BUMP, 1.1)],
+    ids=["even", "curve", "bump"],
+)
+def test_the_way_of_the_lamps_is_freed_of_noise(way: FloatArray, left: float) -> None:
+    path = follow_lamps(lamps_along(way))
+    assert path is not None
+    off = path.shifts - (way - way.mean(axis=0))
+    assert np.sqrt(np.mean(off**2)) < left * 0.02 / np.sqrt(2)
+    farthest = np.linalg.norm(way[:, None] - way, axis=2).max()
+    assert path.moved == pytest.approx(farthest, rel=0.1)
+
+
+def test_images_that_do_not_show_a_lamp_are_bridged() -> None:
+    lamps = lamps_along(EVEN)
+    lamps[::7] = np.nan
+    path = follow_lamps(lamps)
+    assert path is not None
+    np.testing.assert_allclose(path.shifts, EVEN - EVEN.mean(axis=0), atol=0.05)
+
+
+def test_images_without_the_pen_do_not_tell_the_way() -> None:
+    """A swing that is captured does not keep them, and gives the same tip."""
+    dark = np.arange(0, N_IMAGES, 4)
+    lamps = lamps_along(CURVE)
+    lamps[dark] += 30.0
+    seen = leave_out(
+        replace(seen_along(CURVE), lamps=lamps), dict.fromkeys(dark, Reason.EMPTY)
+    )
+    path = pose_steadily(CAMERA, PEN, seen).path
+    kept = follow_lamps(np.delete(lamps, dark, axis=0))
+    assert path is not None
+    assert kept is not None
+    assert path.is_followed
+    np.testing.assert_array_equal(np.delete(path.shifts, dark, axis=0), kept.shifts)
+    assert path.moved == kept.moved
+
+
+def test_without_lamps_there_is_no_way() -> None:
+    assert follow_lamps(np.zeros((N_IMAGES, 0, 2))) is None
+
+
+@pytest.mark.parametrize("way", [EVEN, BUMP], ids=["even", "bump"])
+def test_the_way_of_a_camera_is_taken_out_and_told(way: FloatArray) -> None:
+    calibration = solved(way, way)
+    path = calibration.cameras[0].path
+    assert path is not None
+    assert path.is_followed
+    assert calibration.used.all()
+    assert errors_in_u(calibration).max() < 1.2
+    assert calibration.budget.weakest_uncertainty < 0.01
+    codes = {str(each.code) for each in warnings_of(calibration)}
+    assert "warning.camera-moved" in codes
+    verdict = judge(calibration, SwingLimits())
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason.code == Code.CAMERA_MOVED
+    assert verdict.next_step is NextStep.CLAMP
+
+
+@pytest.mark.parametrize("bump", [12.0, 60.0])
+def test_a_hard_bump_of_the_camera_is_told_in_pixels(bump: float) -> None:
+    turn = rotation_from_vector(np.array([0.0, bump / CAMERA.fx, 0.0]))
+    is_after = (TIME > 0.6)[:, None]
+    poses = (
+        np.where(is_after[..., None], turn @ SWING.rotations, SWING.rotations),
+        np.where(is_after, SWING.translations @ turn.T, SWING.translations),
+    )
+    rng = np.random.default_rng(7)
+    pixels = simulate_centers(CAMERA, PEN, *poses, SIGMA, rng)
+    rays = np.column_stack([CAMERA.unproject(LAMPS), np.ones(2)])
+    shown = np.where(is_after[..., None], CAMERA.project(rays @ turn.T), LAMPS)
+    noisy = shown + 0.02 * rng.standard_normal(shown.shape)
+    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
+    seen = observe_centers(centers, CAMERA, PEN)
+    lamps = lamps_among(np.zeros((N_IMAGES, 0, 2)), list(noisy))
+    calibration = calibrate(CAMERA, PEN, replace(seen, lamps=lamps))
+    told = [str(each) for each in warnings_of(calibration)]
+
+    assert f"fixed lamps in view and the pen shifted by {bump:.0f}." in " ".join(told)
+    assert judge(calibration, SwingLimits()).reason.code == Code.CAMERA_MOVED
+    assert calibration.used.all()
+    assert errors_in_u(calibration).max() < 1.2
+
+
+def test_a_way_without_a_lamp_is_refused_and_with_one_it_is_not() -> None:
+    with pytest.raises(CalibrationError, match="times the image noise"):
+        calibrate(CAMERA, PEN, seen_along(CURVE))
+    calibration = solved(CURVE, CURVE)
+    assert calibration.used.all()
+    assert errors_in_u(calibration).max() < 1.2
+
+
+def test_a_lamp_that_moves_by_itself_changes_nothing() -> None:
+    calibration = solved(STILL, EVEN)
+    alone = calibrate(CAMERA, PEN, seen_along(STILL))
+    path = calibration.cameras[0].path
+    assert path is not None
+    assert path.moved > 1
+    assert not path.is_followed
+    np.testing.assert_allclose(
+        calibration.joint.tip_pen, alone.joint.tip_pen, atol=1e-3
+    )
+    codes = [str(each.code) for each in warnings_of(calibration)]
+    assert codes == ["warning.lamp-moved"]

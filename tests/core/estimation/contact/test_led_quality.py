@@ -1,0 +1,91 @@
+"""Each LED's fit: a displaced one is named, a good one is not."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated_centers import drop_centers
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.contact.led_quality import LedQuality
+from lightpen.formats.observation_files import Centers
+from lightpen.model.pen import Pen
+from lightpen.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    perturbed_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+CAMERA = paper_camera()
+PEN = paper_pen()
+SWING = swing_poses(80, np.random.default_rng(0))
+
+
+def quality(measured: Pen, n_missing: int = 0) -> LedQuality:
+    rng = np.random.default_rng(1)
+    pixels = simulate_centers(
+        CAMERA, PEN, SWING.rotations, SWING.translations, 0.02, rng
+    )
+    return quality_of(measured, drop_centers(pixels, n_missing, rng))
+
+
+def quality_of(measured: Pen, pixels: FloatArray) -> LedQuality:
+    centers = Centers(np.arange(len(pixels)), pixels, Path("simulated"))
+    return calibrate(CAMERA, measured, observe_centers(centers, CAMERA, measured)).leds
+
+
+@pytest.mark.parametrize("led", [1, 4, 7, 10])
+def test_a_displaced_led_is_named_with_its_displacement(led: int) -> None:
+    shift = np.array([0.0, 0.08, 0.04])
+    leds = perturbed_pen(PEN, 0.002, np.random.default_rng(2)).leds
+    leds[led - 1] -= shift
+
+    found = quality(replace(PEN, leds=leds))
+
+    assert found.displaced == (led,)
+    np.testing.assert_allclose(found.displacement[led - 1], shift, atol=0.02)
+
+
+def test_a_good_pen_has_no_displaced_led() -> None:
+    assert quality(perturbed_pen(PEN, 0.01, np.random.default_rng(3))).displaced == ()
+
+
+@pytest.mark.parametrize("n_seen", [1, 5, 40])
+def test_a_displacement_is_told_only_where_the_led_was_often_seen(n_seen: int) -> None:
+    rng = np.random.default_rng(1)
+    pixels = simulate_centers(
+        CAMERA, PEN, SWING.rotations, SWING.translations, 0.02, rng
+    )
+    pixels[n_seen:, 3] = np.nan
+    pixels[:, 3] += 2.0  # half a millimetre
+
+    found = quality_of(PEN, pixels)
+
+    assert found.displaced == ((4,) if n_seen == 40 else ())
+    assert np.isfinite(found.displacement[3]).all() == (n_seen == 40)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_led_that_is_badly_seen_is_not_called_displaced(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    pixels = simulate_centers(
+        CAMERA, PEN, SWING.rotations, SWING.translations, 0.02, rng
+    )
+    pixels[:, 3] += 3.0 * rng.standard_normal((80, 2))
+
+    assert quality_of(PEN, pixels).displaced == ()
+
+
+def test_residuals_and_counts_are_those_of_the_led() -> None:
+    found = quality(PEN, n_missing=3)
+
+    assert found.n_seen.sum() == 80 * 7
+    np.testing.assert_array_equal(found.n_seen, found.n_used)
+    # sigma 0.02 px an axis, less the freedom the fit takes.
+    assert ((found.rms > 0.018) & (found.rms < 0.03)).all()
+    assert np.abs(found.mean).max() < 5 * 0.02 / np.sqrt(50)

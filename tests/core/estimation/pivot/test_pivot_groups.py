@@ -1,0 +1,79 @@
+"""Two tips or two pivots in one series of poses are found, and one is left alone."""
+
+import numpy as np
+import pytest
+from tests.simulated_centers import correlated_noise
+
+from lightpen.arrays import BoolArray
+from lightpen.estimation.pivot.pivot import fit_pivot
+from lightpen.estimation.pivot.pivot_groups import PoseGroups, find_groups
+from lightpen.simulator.postures import SwingKind
+from lightpen.simulator.swings import swing_poses
+
+N_POSES = 200
+HALF = np.arange(N_POSES) >= N_POSES // 2
+
+
+def groups_of(
+    *,
+    kind: SwingKind = "operator",
+    noise: float = 0.3,
+    correlation: float = 0.0,
+    other_tip: float = 0.0,
+    other_pivot: float = 0.0,
+    others: BoolArray = HALF,
+    seed: int = 0,
+) -> PoseGroups | None:
+    """Find groups where some poses have another tip along y, or pivot along u, mm."""
+    rng = np.random.default_rng(seed)
+    swing = swing_poses(N_POSES, rng, kind)
+    moved = swing.rotations @ [0.0, -other_tip, 0.0] + [other_pivot, 0.0, 0.0]
+    translations = swing.translations + others[:, None] * moved
+    translations += noise * correlated_noise(N_POSES, correlation, rng)
+    used = fit_pivot(swing.rotations, translations).used
+    return find_groups(swing.rotations, translations, used)
+
+
+def test_a_tip_exchanged_halfway_is_found_with_the_pose_it_happened_at() -> None:
+    groups = groups_of(other_tip=5.0)
+
+    assert groups is not None
+    assert groups.has_two_tips
+    assert groups.tip_distance == pytest.approx(5.0, abs=0.5)
+    assert set(groups.group[:100]) == {1}
+    assert set(groups.group[100:]) == {2}
+
+
+def test_a_cone_that_moved_halfway_is_found() -> None:
+    groups = groups_of(other_pivot=2.0)
+
+    assert groups is not None
+    assert not groups.has_two_tips
+    assert groups.pivot_distance == pytest.approx(2.0, abs=0.5)
+
+
+@pytest.mark.parametrize("distance", [10.0, 15.0])
+@pytest.mark.parametrize("kind", ["field", "operator"])
+def test_a_third_of_the_poses_that_agree_elsewhere_is_told_apart(
+    kind: SwingKind, distance: float
+) -> None:
+    others = np.random.default_rng(1).random(N_POSES) < 0.3
+    groups = groups_of(kind=kind, noise=1.8, other_pivot=distance, others=others)
+
+    assert groups is not None
+    # Gaussian noise of 1.8 mm puts 0.3 % of the poses nearer to what is 10 mm away.
+    assert np.mean((groups.group == 2) != others) < 0.02
+    assert groups.minor_share == pytest.approx(others.mean(), abs=0.02)
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.9, 0.98])
+@pytest.mark.parametrize("kind", ["field", "operator"])
+def test_poses_of_one_tip_are_one_group_however_they_drift(
+    kind: SwingKind, correlation: float
+) -> None:
+    for seed in range(5):
+        assert groups_of(kind=kind, correlation=correlation, seed=seed) is None
+
+
+def test_exact_poses_are_one_group() -> None:
+    assert groups_of(noise=0.0) is None

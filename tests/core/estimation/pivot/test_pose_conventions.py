@@ -1,0 +1,97 @@
+"""Poses in another convention or unit are refused, with what they look like."""
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.pivot.pose_conventions import (
+    is_likely_inverted,
+    require_usual_reading,
+)
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.swings import swing_poses
+
+SWING = swing_poses(60, np.random.default_rng(0), "operator")
+R = SWING.rotations
+T = SWING.translations + 0.2 * np.random.default_rng(1).standard_normal((60, 3))
+
+
+def quaternions_read_as(order: tuple[int, int, int, int]) -> FloatArray:
+    """Return the rotations whose quaternions (x, y, z, w) are read in an order."""
+    vectors = np.random.default_rng(2).uniform(-0.5, 0.5, (60, 3))
+    angles = np.linalg.norm(vectors, axis=1, keepdims=True)
+    q = np.hstack([vectors / angles * np.sin(angles / 2), np.cos(angles / 2)])
+    x, y, z, w = q[:, order].T
+    angle = 2 * np.arctan2(np.linalg.norm([x, y, z], axis=0), w)
+    axes = np.array([x, y, z]) / np.linalg.norm([x, y, z], axis=0)
+    return rotation_from_vector((axes * angle).T)
+
+
+def test_poses_as_documented_pass() -> None:
+    require_usual_reading(R, T)
+
+
+@pytest.mark.parametrize("n_poses", [6, 8, 12])
+def test_few_noisy_poses_pass(n_poses: int) -> None:
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        swing = swing_poses(n_poses, rng)
+        noise = rng.standard_normal((n_poses, 3))
+        require_usual_reading(swing.rotations, swing.translations + noise)
+
+
+def test_transposed_rotations_are_named() -> None:
+    with pytest.raises(
+        CalibrationError, match=r"seem transposed.*by 0\.\d* mm transposed"
+    ):
+        require_usual_reading(np.swapaxes(R, 1, 2), T)
+
+
+def test_translations_of_the_inverse_are_named() -> None:
+    of_inverse = -np.einsum("nji,nj->ni", R, T)
+    with pytest.raises(CalibrationError, match="seem transposed"):
+        require_usual_reading(R, of_inverse)
+
+
+@pytest.mark.parametrize("order", [(3, 0, 1, 2), (1, 2, 3, 0)])
+def test_quaternions_in_the_wrong_order_are_named(
+    order: tuple[int, int, int, int],
+) -> None:
+    right = quaternions_read_as((0, 1, 2, 3))
+    translations = np.array([10.0, 20.0, 800.0]) - right @ [2.0, -150.0, 1.0]
+    require_usual_reading(right, translations)
+
+    with pytest.raises(CalibrationError, match="quaternions in the wrong order"):
+        require_usual_reading(quaternions_read_as(order), translations)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_an_axis_with_the_wrong_sign_is_named(axis: int) -> None:
+    flipped = T * np.where(np.arange(3) == axis, -1.0, 1.0)
+    with pytest.raises(CalibrationError, match=rf"sign of t{'xyz'[axis]} seems wrong"):
+        require_usual_reading(R, flipped)
+
+
+def test_metres_are_named() -> None:
+    with pytest.raises(
+        CalibrationError, match="The translations seem to be in metres:"
+    ):
+        require_usual_reading(R, T / 1000)
+
+
+def test_micrometres_are_named() -> None:
+    with pytest.raises(CalibrationError, match="millimetres are needed"):
+        require_usual_reading(R, T * 1000)
+
+
+@pytest.mark.parametrize("n_poses", [8, 60])
+def test_poses_without_a_tip_are_refused(n_poses: int) -> None:
+    shuffled = np.random.default_rng(3).uniform(-300, 300, (n_poses, 3))
+    with pytest.raises(CalibrationError, match="have no common tip"):
+        require_usual_reading(R[:n_poses], shuffled)
+
+
+def test_a_tip_nearer_to_the_camera_than_to_its_pen_looks_inverted() -> None:
+    assert not is_likely_inverted(SWING.tip_pen, SWING.cone_cam)
+    assert is_likely_inverted(SWING.cone_cam, SWING.tip_pen)

@@ -1,0 +1,94 @@
+"""The record of a calibration is defined once, and published as it is defined."""
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from benchmarks.small_records import SMALL, entries_of, record_of, small_record
+from docs.schema import FILE, PAGE, page_text, schema_text
+
+from lightpen.formats.json_records import record_bytes
+from lightpen.formats.own_json import DamagedError
+
+if TYPE_CHECKING:
+    from jsonschema import Draft202012Validator
+
+
+def test_the_published_schema_is_that_of_the_types() -> None:
+    """If it is not, run ``python docs/schema.py``."""
+    assert FILE.read_text("utf-8") == schema_text()
+
+
+def test_the_page_of_the_record_is_that_of_its_types() -> None:
+    content = PAGE.read_text("utf-8")
+
+    assert page_text(content) == content
+
+
+def test_what_is_written_keeps_the_schema_and_is_read_back(
+    stated: Mapping[str, Any], validator: "Draft202012Validator"
+) -> None:
+    record = record_of(stated)
+
+    validator.validate(json.loads(record_bytes(record)))
+    assert entries_of(record) == stated
+
+
+def without(path: str) -> Mapping[str, Any]:
+    """Return a record that lacks an entry."""
+    entries = json.loads(json.dumps(dict(SMALL)))
+    *parents, name = path.split(".")
+    inner = entries
+    for parent in parents:
+        inner = inner[int(parent) if parent.isdecimal() else parent]
+    del inner[name]
+    return entries  # type: ignore[no-any-return]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        *("tip_pen_mm", "verdict", "verdict.values", "verdict.limits.min_images"),
+        *("uncertainty.shares", "instrument", "frames.0.leds", "inputs.pen.sha256"),
+    ],
+)
+def test_a_record_that_lacks_an_entry_is_refused_by_reader_and_schema(
+    path: str, validator: "Draft202012Validator"
+) -> None:
+    with pytest.raises(DamagedError):
+        record_of(without(path))
+    assert not validator.is_valid(without(path))
+    assert validator.is_valid(SMALL)
+
+
+def seen(led: int) -> dict[str, Any]:
+    spot = {"led": led, "x_px": 1.0, "y_px": 1.0, "area_px2": 1.0}
+    frame, other = SMALL["frames"]
+    return {"frames": [{**frame, "leds": [{**spot, "fit": True, "used": True}]}, other]}
+
+
+def lamps(n: int) -> dict[str, Any]:
+    frame, other = SMALL["frames"]
+    return {"frames": [{**frame, "lamps_px": n * [[1.0, None]]}, other]}
+
+
+@pytest.mark.parametrize(
+    ("entries", "problem"),
+    [
+        (seen(2), "LED is seen that the pen does not have"),
+        (lamps(1), "different numbers of fixed lamps"),
+        ({"leds": []}, "instrument is of another pen"),
+        (
+            {"instrument": {**SMALL["instrument"], "covariance": [[1.0]]}},
+            "covariance is of another instrument",
+        ),
+        ({"method": "third"}, "enum"),
+    ],
+)
+def test_a_record_that_contradicts_itself_is_refused(
+    entries: Mapping[str, Any], problem: str
+) -> None:
+    small_record(seen(1))
+    with pytest.raises(DamagedError, match=problem):
+        small_record(entries)

@@ -1,0 +1,490 @@
+"""The verdict: good, to be looked at, or to be repeated, with the reason."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.detection.reasons import Reason
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.reports.report_warnings import warnings_of
+from lightpen.estimation.reports.verdict import (
+    Change,
+    Grade,
+    NextStep,
+    Verdict,
+    change_doubt,
+    change_since,
+    distance_from_nominal,
+    halves_agree,
+    judge,
+    judge_change,
+    judge_unknown,
+    repeats,
+)
+from lightpen.estimation.statistics.variance_components import Component
+from lightpen.estimation.uncertainty.budget import (
+    ContributionName,
+    SplitHalfCheck,
+    UncertaintyContribution,
+)
+from lightpen.formats.observation_files import Centers
+from lightpen.messages import Message, message
+from lightpen.model.camera import Camera
+from lightpen.model.limits import SwingLimits
+from lightpen.model.pen import Pen
+from lightpen.simulator.postures import Postures
+from lightpen.simulator.swings import (
+    Swing,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_from_postures,
+    swing_poses,
+)
+from lightpen.swing_messages import (
+    Code,
+    camera_moved,
+    change_beyond_limit,
+    halves_differ,
+    led_displaced,
+    leds_off,
+    many_dropped,
+    tip_is_good,
+    too_few_images,
+    too_little_tilt,
+)
+
+CAMERA, PEN = paper_camera(), paper_pen()
+
+
+def calibrated(
+    swing: Swing, sigma: float = 0.05, camera: Camera = CAMERA, pen: Pen = PEN
+) -> Calibration:
+    rng = np.random.default_rng(1)
+    pixels: FloatArray = simulate_centers(
+        CAMERA, PEN, swing.rotations, swing.translations, sigma, rng
+    )
+    centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
+    return calibrate(camera, pen, observe_centers(centers, camera, pen))
+
+
+@pytest.fixture(scope="module")
+def good() -> Calibration:
+    return calibrated(swing_poses(150, np.random.default_rng(0)))
+
+
+def test_a_good_calibration_passes_with_its_uncertainty(good: Calibration) -> None:
+    verdict = judge(good, SwingLimits(max_uncertainty=0.01))
+    assert verdict.grade is Grade.PASS
+    assert verdict.reason == tip_is_good(good.budget.weakest_uncertainty)
+
+
+@pytest.mark.parametrize(("share", "grade"), [(0.9, Grade.CHECK), (0.3, Grade.REPEAT)])
+def test_a_larger_uncertainty_is_checked_and_a_far_larger_one_repeated(
+    good: Calibration, share: float, grade: Grade
+) -> None:
+    limit = share * good.budget.weakest_uncertainty
+    verdict = judge(good, SwingLimits(max_uncertainty=limit))
+    assert verdict.grade is grade
+    assert verdict.reason.code == Code.UNCERTAIN
+
+
+def test_halves_that_differ_are_checked(good: Calibration) -> None:
+    uncertainty = good.halves.expanded_uncertainty
+    halves = SplitHalfCheck(np.array([0.0, -1.6, 1.0]) * uncertainty, uncertainty)
+    verdict = judge(replace(good, halves=halves), SwingLimits(max_uncertainty=0.01))
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason.code == Code.HALVES_DIFFER
+    assert verdict.reason.values == {
+        "difference": 1.6 * uncertainty[1],
+        "usual": uncertainty[1],
+    }
+
+
+def test_halves_that_differ_along_any_axis_by_more_than_is_allowed_are_checked(
+    good: Calibration,
+) -> None:
+    """The axis that differs most certainly is not the one that differs most."""
+    uncertainty = np.array([0.0005, 0.005, 0.005])
+    halves = SplitHalfCheck(np.array([0.004, 0.020, 0.0]), uncertainty)
+    limits = SwingLimits(max_uncertainty=0.01)
+    verdict = judge(replace(good, halves=halves), limits)
+    assert verdict.reason == halves_differ(0.02, 0.005)
+
+    small = SplitHalfCheck(np.array([0.004, 0.006, 0.0]), uncertainty)
+    assert judge(replace(good, halves=small), limits).grade is Grade.PASS
+
+
+def test_what_must_be_repeated_cannot_be_accepted() -> None:
+    good = tip_is_good(0.004)
+    assert [Verdict(grade, good).can_be_accepted for grade in Grade] == [
+        *(True, True, False)
+    ]
+
+
+def test_leds_that_do_not_fit_are_checked() -> None:
+    noisy = calibrated(swing_poses(300, np.random.default_rng(0)), sigma=0.15)
+    verdict = judge(noisy, SwingLimits(max_uncertainty=0.05))
+    assert verdict.reason.code == Code.LEDS_MISFIT
+    assert verdict.reason.values["sigma"] == noisy.joint.sigma
+
+
+def with_share(
+    calibration: Calibration, name: ContributionName, u: float, *, assumed: bool = False
+) -> Calibration:
+    """Return a calibration with one more share, of so large a U (k = 2) along y."""
+    along_y = np.diag([0.0, (u / 2) ** 2, 0.0, 0.0, 0.0, 0.0])
+    kept = tuple(each for each in calibration.budget.shares if each.name is not name)
+    shares = (*kept, UncertaintyContribution(name, along_y, assumed))
+    return replace(calibration, budget=replace(calibration.budget, shares=shares))
+
+
+def with_led_sigma(calibration: Calibration, sigma: float) -> Calibration:
+    bundle = calibration.bundle
+    counted = bundle.budget_components._replace(leds=Component(sigma, 100.0))
+    return replace(calibration, bundle=replace(bundle, budget_components=counted))
+
+
+def test_an_uncertainty_by_leds_that_are_off_is_told_as_such(good: Calibration) -> None:
+    off = with_led_sigma(with_share(good, ContributionName.LEDS, 0.02), 0.1)
+    by_leds = off.budget.weakest_share(off.budget.largest_share)
+    assert by_leds == pytest.approx(0.02, rel=1e-2)
+
+    verdict = judge(off, SwingLimits(max_uncertainty=0.015))
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason == leds_off(0.1, by_leds)
+    assert judge(off, SwingLimits(max_uncertainty=0.005)).grade is Grade.REPEAT
+    assert judge(off, SwingLimits(max_uncertainty=0.025)).reason.code == Code.GOOD
+
+    small = with_led_sigma(off, 0.01)
+    verdict = judge(small, SwingLimits(max_uncertainty=0.015))
+    assert verdict.reason.code == Code.FILE_UNCERTAIN
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "step"),
+    [
+        (
+            ContributionName.CAMERA,
+            "the camera file. Calibrate the camera",
+            "intrinsics file",
+        ),
+        (ContributionName.LEDS, "the LED file. Measure the LEDs more", "LED file"),
+        (
+            *(ContributionName.SCALE, "the scale of the LED file. Calibrate the LED"),
+            "LED file",
+        ),
+        (
+            ContributionName.DIAMETER,
+            "the diameter of the LED discs. State it",
+            "LED file",
+        ),
+        (ContributionName.CENTERS, "the systematic error of the LED centres", "cause"),
+        (ContributionName.FORM, "the form error of ball and cone", "cause"),
+        (ContributionName.TEMPERATURE, "the temperature of the pen", "cause"),
+        (ContributionName.DISTANCE, "the distance of the two cones", "cause"),
+        (
+            ContributionName.EXTRINSICS,
+            "the extrinsics of the cameras. Calibrate the rig",
+            "rig file",
+        ),
+    ],
+)
+@pytest.mark.parametrize(
+    ("assumed", "how"), [(True, "is assumed for"), (False, "due to")]
+)
+def test_the_reason_names_the_largest_share_and_what_would_shrink_it(
+    good: Calibration,
+    name: ContributionName,
+    words: str,
+    step: str,
+    assumed: bool,
+    how: str,
+) -> None:
+    large = with_share(good, name, 0.02, assumed=assumed)
+    verdict = judge(large, SwingLimits(max_uncertainty=0.015))
+
+    assert verdict.grade is Grade.CHECK
+    told = str(verdict.next_step.message)
+    named = ("intrinsics file", "LED file", "rig file", "cause")
+    assert [each for each in named if each in told] == [step]
+    assert f"{how} {words}" in str(verdict.reason)
+    assert "More images hardly help." in str(verdict.reason)
+
+
+@pytest.mark.parametrize(
+    "name", [ContributionName.NOISE, ContributionName.SEAT, ContributionName.DRIFT]
+)
+def test_what_more_images_shrink_asks_for_more_of_them(
+    good: Calibration, name: ContributionName
+) -> None:
+    large = with_share(good, name, 0.02)
+    verdict = judge(large, SwingLimits(max_uncertainty=0.015))
+
+    assert verdict.reason.code == Code.UNCERTAIN
+    assert verdict.next_step is NextStep.CAPTURE_MORE
+
+
+def test_a_tip_by_assumptions_alone_passes_only_within_the_limit_with_them() -> None:
+    unknown = replace(CAMERA, covariance=None)
+    bare = replace(PEN, scale_sigma=None, diameter_sigma=None)
+    swing = swing_poses(150, np.random.default_rng(0))
+    result = calibrated(swing, camera=unknown, pen=bare)
+    uncertainty = result.budget.weakest_uncertainty
+    stated = calibrated(swing).budget.weakest_uncertainty
+
+    assert uncertainty > stated
+    between = SwingLimits(max_uncertainty=(stated + uncertainty) / 2)
+    assert judge(result, between).grade is not Grade.PASS
+    within = SwingLimits(max_uncertainty=1.01 * uncertainty)
+    assert judge(result, within).grade is Grade.PASS
+
+
+def led_misplaced_too(warning: Message) -> Message:
+    return replace(warning, values={**warning.values, "led": 2})
+
+
+def test_an_led_off_its_place_is_checked_though_the_tip_is_certain() -> None:
+    leds = PEN.leds.copy()
+    leds[8, 1] += 3.0
+    wrong = replace(PEN, leds=leds)
+    swing = swing_poses(150, np.random.default_rng(0))
+    pixels: FloatArray = simulate_centers(
+        *(CAMERA, PEN, swing.rotations, swing.translations, 0.05),
+        np.random.default_rng(1),
+    )
+    centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
+    calibration = calibrate(CAMERA, wrong, observe_centers(centers, CAMERA, wrong))
+
+    verdict = judge(calibration, SwingLimits(max_uncertainty=0.05))
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason.code == Code.LED_DISPLACED
+    assert verdict.reason.values["led"] == 9
+    assert verdict.reason.values["distance"] == pytest.approx(3.0, abs=0.05)
+    doubts = [each for each in warnings_of(calibration) if "LED 9 is " in each.text()]
+    assert len(doubts) == 1
+    assert repeats(doubts[0], verdict.reason)  # it is not told twice
+    assert not repeats(led_misplaced_too(doubts[0]), verdict.reason)
+
+
+def test_a_tip_far_from_its_nominal_place_is_noticed() -> None:
+    tip = np.array([0.0, 140.0, 2.0])
+    assert distance_from_nominal(tip, None) is None
+    assert distance_from_nominal(tip + np.array([0.0, 2.9, 0.0]), tip) is None
+    assert distance_from_nominal(tip, tip - [3.0, 4.0, 0.0]) == pytest.approx(5.0)
+
+
+def test_many_dropped_images_are_checked(good: Calibration) -> None:
+    used = good.used.copy()
+    used[::4] = False
+    verdict = judge(replace(good, used=used), SwingLimits(max_uncertainty=0.01))
+    assert verdict.reason == many_dropped(38, 150)
+
+
+def test_images_without_the_pen_do_not_count_however_many(good: Calibration) -> None:
+    """A camera that runs before and after the swing says nothing about the tip."""
+    no_pen = (Reason.EMPTY, Reason.TOO_FEW_LEDS, Reason.BLURRED, Reason.UNREADABLE)
+    used = np.arange(len(good.used)) % 3 == 0
+    reasons = tuple(
+        Reason.NONE if is_used else no_pen[i % len(no_pen)]
+        for i, is_used in enumerate(used)
+    )
+    few = replace(good, used=used, reasons=reasons)
+    limits = SwingLimits(max_uncertainty=0.01, min_images=50)
+    assert judge(few, limits).grade is Grade.PASS
+    verdict = judge(few, replace(limits, min_images=51))
+    assert verdict.reason == too_few_images(50, 51)
+
+
+@pytest.mark.parametrize("reason", [Reason.SLIPPED, Reason.MISFIT, Reason.TAKEN_OUT])
+def test_images_of_the_pen_that_are_left_out_count(
+    good: Calibration, reason: Reason
+) -> None:
+    used = good.used.copy()
+    used[:31] = False
+    reasons = (reason,) * 31 + good.reasons[31:]
+    limits = SwingLimits(max_uncertainty=0.01, min_images=150)
+    verdict = judge(replace(good, used=used, reasons=reasons), limits)
+    assert verdict.reason == many_dropped(31, 150)
+
+
+def test_fewer_images_than_asked_for_are_checked_also_if_they_suffice(
+    good: Calibration,
+) -> None:
+    limits = SwingLimits(max_uncertainty=0.01, min_images=150)
+    assert judge(good, limits).grade is Grade.PASS
+
+    verdict = judge(good, replace(limits, min_images=151))
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason == too_few_images(150, 151)
+
+
+def test_sides_that_the_pen_never_leant_to_are_named() -> None:
+    rng = np.random.default_rng(0)
+    postures = Postures(
+        np.radians(rng.uniform(10, 30, 150)),
+        np.radians(rng.uniform(-20, 155, 150)),
+        np.radians(rng.uniform(-30, 30, 150)),
+    )
+    calibration = calibrated(swing_from_postures(postures))
+    limits = SwingLimits(max_uncertainty=0.05)
+    verdict = judge(calibration, limits)
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason == too_little_tilt(8, (4, 5, 6, 7))
+    assert str(verdict.reason) == (
+        "Not enough tilt to the left, towards the camera to the left, towards the "
+        "camera, towards the camera to the right. Tilt the pen further. "
+        "Images needed: about 8."
+    )
+    unasked = judge(calibration, replace(limits, min_per_field=0))
+    assert unasked.grade is Grade.PASS
+
+
+@pytest.mark.parametrize(
+    ("code", "step"),
+    [
+        (Code.GOOD, NextStep.ACCEPT),
+        (Code.UNCERTAIN, NextStep.CAPTURE_MORE),
+        (Code.TOO_LITTLE_TILT, NextStep.CAPTURE_MORE),
+        (Code.TOO_FEW_IMAGES, NextStep.CAPTURE_MORE),
+        (Code.HALVES_DIFFER, NextStep.REPEAT),
+        (Code.MANY_DROPPED, NextStep.REPEAT),
+        (Code.LEDS_MISFIT, NextStep.CHECK_FILES),
+        (Code.LEDS_OFF, NextStep.CHECK_LEDS),
+        (Code.LED_DISPLACED, NextStep.CHECK_LEDS),
+        (Code.NOT_SIMULTANEOUS, NextStep.REPEAT),
+        (Code.CAMERA_MOVED, NextStep.CLAMP),
+    ],
+)
+def test_every_reason_has_one_next_step(code: Code, step: NextStep) -> None:
+    assert Verdict(Grade.CHECK, Message(code)).next_step is step
+
+
+def test_halves_may_differ_by_what_chance_leaves() -> None:
+    uncertainty = np.array([0.001, 0.002, 0.001])
+    assert halves_agree(
+        SplitHalfCheck(np.array([1.4, -1.4, 0.0]) * uncertainty, uncertainty)
+    )
+    assert not halves_agree(
+        SplitHalfCheck(np.array([0.0, 0.0, -1.6]) * uncertainty, uncertainty)
+    )
+
+
+U_NOW, U_THEN = np.array([0.003, 0.003, 0.003]), np.array([0.004, 0.004, 0.004])
+
+
+def change(difference: list[float]) -> Change:
+    tip_then = np.array([1.0, -90.0, -24.0])
+    return change_since(tip_then + difference, U_NOW, tip_then, U_THEN)
+
+
+def test_a_change_is_uncertain_by_both_calibrations() -> None:
+    found = change([0.03, 0.0, 0.04])
+
+    np.testing.assert_allclose(found.expanded_uncertainty, 0.005)
+    assert found.distance == pytest.approx(0.05)
+
+
+PASSED = Verdict(Grade.PASS, tip_is_good(0.004))
+
+
+@pytest.mark.parametrize(
+    ("difference", "grade"),
+    [
+        ([0.0, 0.0, 0.0], Grade.PASS),
+        ([0.0059, 0.0, -0.0059], Grade.PASS),
+        ([0.0, -0.0061, 0.0], Grade.CHECK),
+        ([0.3, 0.2, 0.1], Grade.CHECK),
+    ],
+)
+def test_a_change_that_uncertainty_does_not_explain_is_to_be_checked(
+    difference: list[float], grade: Grade
+) -> None:
+    assert judge_change(PASSED, change(difference), "2026-01-02").grade is grade
+
+
+def test_a_change_of_3_8_um_at_a_u_of_0_5_um_is_told() -> None:
+    u = np.full(3, 0.0005)
+    found = change_since(np.array([0.0, 0.0038, 0.0005]), u, np.zeros(3), u)
+    verdict = judge_change(PASSED, found, "2026-01-02")
+
+    assert verdict.grade is Grade.CHECK
+    assert str(verdict.reason) == (
+        "The tip changed by 0.0038 mm since 2026-01-02: along y 0.0038 mm, more "
+        "than the combined U (0.0007 mm). Was the tip replaced, bent or "
+        "refitted?"
+    )
+    assert verdict.next_step is NextStep.CHECK_TIP
+
+
+def test_a_large_change_that_uncertainty_explains_passes() -> None:
+    tip, wide = np.zeros(3), np.full(3, 0.5)
+    found = change_since(tip + 0.3, wide, tip, wide)
+    assert judge_change(PASSED, found, "") is PASSED
+    assert judge_change(PASSED, None, "") is PASSED
+
+
+def test_what_is_wrong_with_a_tip_by_itself_counts_more_than_its_change() -> None:
+    repeat = Verdict(Grade.REPEAT, tip_is_good(0.4))
+    assert judge_change(repeat, change([0.3, 0.2, 0.1]), "") is repeat
+    assert judge_unknown(repeat, tip_is_good(0.4)) is repeat
+
+
+def test_a_fair_share_of_unchanged_tips_passes() -> None:
+    """Of independent calibrations of one tip some 5 % are asked about."""
+    rng = np.random.default_rng(3)
+    u = np.array([0.002, 0.003, 0.004])
+    tips = rng.normal(0.0, u / 2, (2, 2000, 3))
+    found = [change_since(now, u, then, u) for now, then in zip(*tips, strict=True)]
+    share = np.mean([each.is_unexplained for each in found])
+    assert 0.035 < share < 0.065  # four standard deviations about 4.8 %
+
+
+def test_a_fifth_of_all_images_may_be_dropped(good: Calibration) -> None:
+    used = good.used.copy()
+    used[:30] = False
+    limits = SwingLimits(max_uncertainty=0.01)
+    assert judge(replace(good, used=used), limits).grade is Grade.PASS
+
+    used[30] = False
+    assert judge(replace(good, used=used), limits).reason == many_dropped(31, 150)
+
+
+def test_a_camera_that_moved_by_three_times_the_limit_is_checked(
+    good: Calibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits = SwingLimits(max_uncertainty=0.01)
+    monkeypatch.setattr(Calibration, "moved", 0.029)
+    assert judge(good, limits).grade is Grade.PASS
+
+    monkeypatch.setattr(Calibration, "moved", 0.031)
+    assert judge(good, limits) == Verdict(Grade.CHECK, camera_moved(0.031))
+
+
+def test_a_change_beyond_the_limit_of_the_tip_is_checked_though_it_is_explained() -> (
+    None
+):
+    wide = np.full(3, 0.5)
+    found = change_since(np.array([0.0, 0.06, 0.08]), wide, np.zeros(3), wide)
+
+    assert change_doubt(found, "2026-01-02", 0.11) is None
+    doubt = change_doubt(found, "2026-01-02", 0.09)
+    assert doubt == change_beyond_limit(0.1, "2026-01-02", 0.09)
+    assert judge_change(PASSED, found, "2026-01-02", 0.09).reason == doubt
+
+
+def test_a_doubt_repeats_a_reason_of_the_same_code_and_led() -> None:
+    displaced = led_displaced(3, 0.05)
+    warning = {
+        led: message("warning.led-displaced", led=led, distance=0.05, u=0.01)
+        for led in (3, 4)
+    }
+
+    assert repeats(tip_is_good(0.1), tip_is_good(0.2))
+    assert not repeats(tip_is_good(0.1), displaced)
+    assert repeats(warning[3], displaced)
+    assert not repeats(warning[4], displaced)

@@ -1,0 +1,120 @@
+"""How large errors of a kind are: found where they are, and none invented."""
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.statistics.variance_components import (
+    find_component,
+    find_jitter,
+)
+
+N_RUNS = 40
+
+
+def observed(
+    n: int, sigma: float, seed: int, noise: float = 0.01
+) -> tuple[FloatArray, FloatArray]:
+    """Return what images say of n errors of one size: information and right side."""
+    rng = np.random.default_rng(seed)
+    A = rng.standard_normal((2 * n, n)) / noise
+    errors = sigma * rng.standard_normal(n)
+    return A.T @ A, A.T @ (A @ errors + rng.standard_normal(2 * n))
+
+
+def shaken(
+    n_images: int, root: FloatArray, seed: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what each image says of a vector that is ``root`` times normal numbers."""
+    rng = np.random.default_rng(seed)
+    A = rng.standard_normal((n_images, 8, 3)) / 0.005
+    vectors = rng.standard_normal((n_images, 3)) @ root.T
+    seen = np.einsum("nki,ni->nk", A, vectors) + rng.standard_normal((n_images, 8))
+    transposed = np.swapaxes(A, 1, 2)
+    right = np.einsum("nki,nk->ni", A, seen)
+    return transposed @ A, right, np.zeros((n_images, 3, 3))
+
+
+def test_the_size_of_errors_is_found() -> None:
+    found = [find_component(*observed(24, 0.02, seed)).sigma for seed in range(N_RUNS)]
+
+    # 40 draws of 24 errors fix a standard deviation to 2.3 %, a grid of 6 % apart.
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(0.02, rel=0.08)
+
+
+def test_errors_far_above_the_noise_are_significant_and_none_hardly_ever() -> None:
+    for seed in range(N_RUNS):
+        assert find_component(*observed(24, 0.05, seed)).is_significant
+    by_chance = [find_component(*observed(24, 0.0, seed)) for seed in range(N_RUNS)]
+    assert sum(each.is_significant for each in by_chance) <= 1  # one in a thousand
+
+
+def test_errors_are_judged_beside_what_the_file_states() -> None:
+    for seed in range(N_RUNS):
+        stated = find_component(*observed(24, 0.02, seed), stated=0.02)
+        assert not stated.is_significant
+        assert find_component(*observed(24, 0.1, seed), stated=0.02).is_significant
+
+
+def test_what_no_image_sees_is_no_evidence() -> None:
+    S, right = np.zeros((4, 4)), np.zeros(4)
+    S[0, 0], right[0] = 1e4, 0.0
+
+    nothing = find_component(S, right)
+    assert (nothing.sigma, nothing.gain) == (0.0, 0.0)
+
+
+def test_a_jitter_is_found_with_its_directions() -> None:
+    root = np.array([[0.01, 0.0, 0.0], [0.0, 0.002, 0.0], [0.006, 0.0, 0.008]])
+    found = np.zeros((3, 3))
+    for seed in range(N_RUNS):
+        jitter = find_jitter(*shaken(60, root, seed)).covariance
+        assert jitter is not None
+        found += jitter / N_RUNS
+
+    # 2400 vectors fix a variance to 2.9 %; the noise of each image adds to it.
+    scale = np.sqrt(np.diag(root @ root.T))
+    np.testing.assert_allclose(
+        found / np.outer(scale, scale),
+        root @ root.T / np.outer(scale, scale),
+        atol=0.15,
+    )
+
+
+@pytest.mark.parametrize(("n_images", "n_runs"), [(15, 40), (4, 200)])
+def test_a_jitter_of_few_images_is_taken_as_alike_all_round(
+    n_images: int, n_runs: int
+) -> None:
+    variances = []
+    for seed in range(n_runs):
+        jitter = find_jitter(*shaken(n_images, 0.01 * np.eye(3), seed)).covariance
+        assert jitter is not None
+        np.testing.assert_array_equal(jitter, jitter[0, 0] * np.eye(3))
+        variances.append(jitter[0, 0])
+
+    # The numbers of all runs fix a variance to 3.3 and 2.9 %; those of one jitter
+    # raise it by 45 / 43 and 12 / 10.
+    raised = 3 * n_images / (3 * n_images - 2)
+    assert np.mean(variances) == pytest.approx(0.01**2 * raised, rel=0.12)
+
+
+def test_a_still_seat_has_no_jitter() -> None:
+    still = np.zeros((3, 3))
+    found = [find_jitter(*shaken(60, still, seed)) for seed in range(N_RUNS)]
+
+    assert sum(jitter.covariance is not None for jitter in found) <= 1
+
+
+def test_a_jitter_that_is_not_certain_is_expected_all_the_same() -> None:
+    root = 0.001 * np.eye(3)  # images see each vector to 0.002
+    found = [find_jitter(*shaken(8, root, seed)) for seed in range(N_RUNS)]
+
+    assert sum(jitter.covariance is None for jitter in found) > N_RUNS / 2
+    expected = np.sqrt(np.mean([jitter.expected_sigma**2 for jitter in found]))
+    assert 0.5 * 0.001 < expected < 2 * 0.001
+
+
+def test_what_is_expected_of_errors_is_what_they_are() -> None:
+    found = [find_component(*observed(24, 0.02, seed)) for seed in range(N_RUNS)]
+    expected = np.sqrt(np.mean([component.expected_sigma**2 for component in found]))
+    assert expected == pytest.approx(0.02, rel=0.1)

@@ -1,0 +1,291 @@
+"""Every figure of a calibration is as before, in swings that have something of all.
+
+That a figure is right is shown by the other tests; that none changes unnoticed, here.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from benchmarks.small_records import entries_of
+from tests.reference import assert_as_before, text_figures
+from tests.simulated_centers import simulate_rig_centers
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import Observations, observe_centers
+from lightpen.detection.rig_observations import observe_rig_centers
+from lightpen.estimation.bundle.priors import ConeSeparation
+from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
+from lightpen.estimation.monte_carlo import trials_of
+from lightpen.estimation.pivot_calibration import calibrate_pivot
+from lightpen.estimation.reports.methods import METHODS
+from lightpen.estimation.reports.pivot_report import pivot_record
+from lightpen.estimation.reports.report import calibration_record
+from lightpen.estimation.reports.report_warnings import warnings_of
+from lightpen.estimation.reports.summary import calibration_text, pivot_text
+from lightpen.estimation.reports.verdict import judge
+from lightpen.estimation.running_tip import fit_running_tip
+from lightpen.estimation.spin import fit_spin
+from lightpen.estimation.uncertainty.prediction import predict_uncertainty
+from lightpen.estimation.uncertainty.second_cone import SecondSwing
+from lightpen.formats.hashes import InputFile, Inputs
+from lightpen.formats.observation_files import Centers
+from lightpen.formats.pairing import pair_images
+from lightpen.model.assumptions import USUAL
+from lightpen.model.camera import Camera
+from lightpen.model.ellipse import disc_images
+from lightpen.model.limits import SwingLimits
+from lightpen.model.pen import Pen, grown
+from lightpen.model.rig import from_first
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.samples import row_of_cameras
+from lightpen.simulator.swings import (
+    PAPER_CONE,
+    Swing,
+    leds_in_camera,
+    paper_camera,
+    paper_pen,
+    seen_from,
+    simulate_centers,
+    swing_poses,
+)
+
+CAMERA = paper_camera()
+PEN = replace(paper_pen(), led_sigma=0.002)
+BARE = replace(paper_pen(), led_sigma=None, scale_sigma=None, diameter_sigma=None)
+FILE = InputFile(Path("file"), 64 * "0")
+INPUTS = Inputs(FILE, FILE, (FILE,), PEN.nominal_tip)
+LIMITS = SwingLimits(max_uncertainty=0.05, min_images=12)
+N_IMAGES = 40
+
+
+def swing_of(seed: int, n_images: int = N_IMAGES) -> Swing:
+    return swing_poses(n_images, np.random.default_rng(seed))
+
+
+def lasting(seed: int, correlation: float, n_images: int = N_IMAGES) -> FloatArray:
+    """Return noise of unit variance that lasts from image to image."""
+    fresh = np.random.default_rng(seed).standard_normal((n_images, PEN.n_leds, 2))
+    noise = fresh.copy()
+    for i in range(1, n_images):
+        noise[i] = correlation * noise[i - 1] + np.sqrt(1 - correlation**2) * fresh[i]
+    return noise
+
+
+def observed(
+    swing: Swing, errors: FloatArray, camera: Camera = CAMERA, pen: Pen = PEN
+) -> Observations:
+    exact = simulate_centers(
+        *(CAMERA, PEN, swing.rotations, swing.translations),
+        *(0.0, np.random.default_rng(0)),
+    )
+    centers = Centers(np.arange(len(swing)) + 1, exact + errors, Path("simulated"))
+    return observe_centers(centers, camera, pen)
+
+
+def usual() -> Calibration:
+    """Images that slipped, do not fit, or lack LEDs are left out."""
+    swing, errors = swing_of(1), 0.03 * lasting(1, 0.0)
+    translations = swing.translations.copy()
+    translations[5:8] += [0.5, 0.0, 0.2]
+    errors[11] += np.linspace(-2, 2, PEN.n_leds)[:, None]
+    errors[20, 2:] = np.nan
+    errors[25:, 3] = np.nan
+    moved = replace(swing, translations=translations)
+    return calibrate(CAMERA, PEN, observed(moved, errors))
+
+
+def restless() -> Calibration:
+    """Noise that lasts, a seat that jitters and wanders, and a slow drift."""
+    rng = np.random.default_rng(2)
+    swing = swing_of(2, 60)
+    moves = 0.008 * rng.standard_normal((60, 3))
+    moves += np.linspace(0, 0.06, 60)[:, None] * [1.0, 0.0, 0.5]
+    turns = 2 * np.arctan2(swing.rotations[:, 0, 1], swing.rotations[:, 2, 1])
+    moves[:, 0] += 0.02 * np.cos(turns)
+    moved = replace(swing, translations=swing.translations + moves)
+    return calibrate(CAMERA, PEN, observed(moved, 0.05 * lasting(2, 0.8, 60)))
+
+
+def unstated() -> Calibration:
+    """Files that state no uncertainty, a warm pen, and other assumptions."""
+    camera = replace(CAMERA, covariance=None)
+    longer = replace(camera, fx=1.002 * CAMERA.fx, fy=1.002 * CAMERA.fy)
+    assumptions = replace(USUAL, temperature_c=24.0, temperature=0.3, form_error=4e-4)
+    seen = observed(swing_of(3), 0.03 * lasting(3, 0.0), longer, BARE)
+    return calibrate(longer, BARE, seen, assumptions)
+
+
+def spoilt_files() -> Calibration:
+    """A camera and a pen file that are off by more than they state, and one LED."""
+    wrong = replace(
+        CAMERA, fx=1.004 * CAMERA.fx, fy=1.004 * CAMERA.fy, cx=CAMERA.cx + 4
+    )
+    leds = grown(PEN, 3e-4).leds.copy()
+    leds[2] += [0.05, -0.08, 0.0]
+    pen = replace(PEN, leds=leds)
+    return calibrate(
+        wrong, pen, observed(swing_of(4), 0.03 * lasting(4, 0.0), wrong, pen)
+    )
+
+
+def followed() -> Calibration:
+    """A camera that moves, with lamps that tell, and discs whose areas are measured."""
+    swing, rng = swing_of(5), np.random.default_rng(5)
+    way = np.outer(np.sin(np.linspace(0, 4, N_IMAGES)), [1.5, 0.8])
+    lamps = np.array([[1100.0, 900.0], [1300.0, 1100.0]]) + way[:, None]
+    lamps += 0.02 * rng.standard_normal(lamps.shape)
+    seen = observed(swing, way[:, None] + 0.03 * lasting(5, 0.0))
+    leds, normals = leds_in_camera(PEN, swing.rotations, swing.translations)
+    shapes = disc_images(CAMERA, leds, normals, 1.002 * PEN.diameter / 2).shapes
+    areas = 4 * np.pi * np.sqrt(np.linalg.det(shapes))
+    areas *= 1 + 0.002 * rng.standard_normal(areas.shape)
+    seen = replace(seen, lamps=lamps, areas=areas, edge_widths=np.full(N_IMAGES, 2.2))
+    return calibrate(CAMERA, PEN, seen)
+
+
+def by_two_cones() -> Calibration:
+    pen = replace(PEN, scale_sigma=None, expansion=None)
+    cones = PAPER_CONE + np.array([[-70.0, 0.0, 0.0], [70.0, 0.0, 10.0]])
+    rng = np.random.default_rng(6)
+    first, second = (
+        observed(swing_poses(25, rng, cone_cam=cone), 0.03 * lasting(seed, 0.0, 25))
+        for seed, cone in enumerate(cones)
+    )
+    apart = float(np.linalg.norm(cones[1] - cones[0]))
+    return calibrate(
+        *(CAMERA, pen, first),
+        second=SecondSwing(second, ConeSeparation(apart + 0.02, 0.002)),
+    )
+
+
+def by_two_cameras() -> Calibration:
+    """The second camera stands a little elsewhere than the file has it."""
+    row = row_of_cameras(2, 1000.0)
+    rig, places = from_first(row), (row.rotations[0], row.translations[0])
+    swing, rng = seen_from(swing_of(7, 25), *places), np.random.default_rng(7)
+    pixels = simulate_rig_centers(rig, PEN, swing, 0.03, rng)
+    pixels[3, 1], pixels[9, 0, 2:], pixels[14, 1, :4] = np.nan, np.nan, np.nan
+    turned = rotation_from_vector(np.array([2e-4, -3e-4, 1e-4]))
+    rotations = np.stack([rig.rotations[0], turned @ rig.rotations[1]])
+    filed = replace(rig, rotations=rotations)
+    centers = [
+        Centers(taken, pixels[taken, c], Path("simulated"))
+        for c in range(2)
+        for taken in [np.flatnonzero(np.isfinite(pixels[:, c]).any(axis=(1, 2)))]
+    ]
+    pairing = pair_images([list(map(str, c.frames)) for c in centers], rig.names)
+    return calibrate_rig(filed, PEN, observe_rig_centers(centers, pairing, filed, PEN))
+
+
+SWINGS: dict[str, Callable[[], Calibration]] = {
+    each.__name__: each
+    for each in (
+        *(usual, restless, unstated, spoilt_files),
+        *(followed, by_two_cones, by_two_cameras),
+    )
+}
+
+
+@cache
+def calibrated(name: str) -> Calibration:
+    return SWINGS[name]()
+
+
+@pytest.mark.parametrize("name", SWINGS)
+def test_the_figures_of_a_printed_calibration_are_as_before(name: str) -> None:
+    calibration = calibrated(name)
+    verdict = judge(calibration, LIMITS)
+    texts = [
+        calibration_text(calibration, method, PEN.nominal_tip, verdict)
+        for method in METHODS
+    ]
+
+    assert_as_before(f"printed-{name}", [text_figures(text) for text in texts])
+
+
+@pytest.mark.parametrize("name", SWINGS)
+def test_the_record_of_a_calibration_is_as_before(name: str) -> None:
+    calibration = calibrated(name)
+    record: dict[str, Any] = entries_of(
+        calibration_record(calibration, INPUTS, "joint", LIMITS)
+    )
+    for changing in ("program", "created", "inputs", "checksum", "format"):
+        record.pop(changing, None)
+    record["warnings"] = [{"code": each.code} for each in warnings_of(calibration)]
+
+    assert_as_before(
+        f"calibration-{name}",
+        {
+            **record,
+            "instrument_sigma": (np.sqrt(np.diag(calibration.instrument.covariance))),
+        },
+    )
+
+
+@pytest.mark.parametrize("name", ["restless", "by_two_cones", "unstated"])
+def test_what_trials_are_drawn_from_is_as_before(name: str) -> None:
+    assert_as_before(f"trials-{name}", vars(trials_of(calibrated(name))))
+
+
+@pytest.mark.parametrize("name", ["usual", "restless", "unstated"])
+def test_what_more_images_are_predicted_to_give_is_as_before(name: str) -> None:
+    calibration = calibrated(name)
+    pixels = calibration.observations.pixels[calibration.used][:, None]
+    state, joint = calibration.bundle.state, calibration.joint
+    prediction = predict_uncertainty(state.rig, state.pen, pixels, joint)
+    found = {
+        f"{sigma} {assumed.form_error}": prediction.predicted(joint, sigma, assumed)
+        for sigma in (0.02, 0.1)
+        for assumed in (USUAL, replace(USUAL, form_error=0.002))
+    }
+
+    assert_as_before(
+        f"prediction-{name}",
+        {key: [each.uncertainty, each.floor] for key, each in found.items()},
+    )
+
+
+def test_the_running_tip_is_as_before() -> None:
+    swing, rng = swing_of(8), np.random.default_rng(8)
+    draws = rng.standard_normal((N_IMAGES, 6, 6)) * ([1e-4] * 3 + [0.02] * 3)
+    covariances = np.swapaxes(draws, 1, 2) @ draws
+    noise = 0.02 * rng.standard_normal((N_IMAGES, 3))
+    running = fit_running_tip(
+        *(swing.rotations, swing.translations + noise, covariances), *(swing.tip_pen, 8)
+    )
+
+    assert_as_before("running-tip", vars(running))
+
+
+def test_the_spin_of_a_swing_is_as_before() -> None:
+    rng = np.random.default_rng(10)
+    axis = np.array([0.1, -0.98, -0.17])
+    turns = rotation_from_vector(np.linspace(0, 1.8, N_IMAGES)[:, None] * axis)
+    wobble = rotation_from_vector(0.01 * rng.standard_normal((N_IMAGES, 3)))
+    first = rotation_from_vector(np.array([0.3, 0.2, -0.1]))
+
+    assert_as_before("spin", vars(fit_spin(wobble @ first @ turns)))
+
+
+@pytest.mark.parametrize("robust", [True, False])
+def test_a_tip_by_poses_is_as_before(robust: bool) -> None:
+    """A third of the poses are of another pivot; some are far off."""
+    rng = np.random.default_rng(9)
+    rotations = rotation_from_vector(rng.uniform(-0.6, 0.6, (60, 3)))
+    pivots = np.where(np.arange(60)[:, None] < 20, [10.0, 20.0, 803.0], [10.0, 20, 800])
+    translations = pivots - rotations @ [2.0, -1.0, 150.0]
+    translations += 0.1 * rng.standard_normal((60, 3))
+    translations[::13] += 40.0
+    found = calibrate_pivot(rotations, translations, robust=robust)
+    record = pivot_record(found, FILE, least_squares=not robust)
+    for changing in ("program", "created", "input", "inputs", "checksum"):
+        record.pop(changing, None)
+
+    assert_as_before(
+        f"pivot-{robust}", {**record, "text": text_figures(pivot_text(found))}
+    )

@@ -1,0 +1,342 @@
+"""The budget: its shares, blocks, halves and the weakest direction."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.bundle.adjustment import Adjustment, adjust
+from lightpen.estimation.bundle.linearised import BundleState
+from lightpen.estimation.bundle.priors import priors_of
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.contact.joint import JointFit, fit_joint
+from lightpen.estimation.uncertainty.budget import (
+    Budget,
+    ContributionName,
+    combine,
+    compare_halves,
+    contributions_of,
+    one_wave_variance,
+)
+from lightpen.formats.observation_files import Centers
+from lightpen.model.assumptions import USUAL
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+from lightpen.model.rig import rig_of
+from lightpen.simulator.swings import (
+    Swing,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+CAMERA = paper_camera()
+PEN = replace(paper_pen(), led_sigma=0.002)
+SWING = swing_poses(100, np.random.default_rng(0))
+FEW = swing_poses(40, np.random.default_rng(0))
+
+
+def noise(seed: int, correlation: float = 0.0, n_images: int = 100) -> FloatArray:
+    """Return normal noise whose neighbours in time are correlated, unit variance."""
+    rng = np.random.default_rng(seed)
+    fresh = rng.standard_normal((n_images, PEN.n_leds, 2))
+    series = fresh.copy()
+    for i in range(1, n_images):
+        series[i] = correlation * series[i - 1] + np.sqrt(1 - correlation**2) * fresh[i]
+    return series
+
+
+def seen(errors: FloatArray, swing: Swing = SWING) -> FloatArray:
+    return errors + simulate_centers(
+        CAMERA,
+        PEN,
+        *(swing.rotations, swing.translations, 0.0),
+        np.random.default_rng(0),
+    )
+
+
+def fit(errors: FloatArray, swing: Swing = SWING) -> JointFit:
+    return fit_joint(
+        CAMERA,
+        PEN,
+        seen(errors, swing),
+        *(swing.rotations, swing.tip_pen, swing.cone_cam),
+    )
+
+
+def calibrated(
+    errors: FloatArray, swing: Swing = FEW, camera: Camera = CAMERA, pen: Pen = PEN
+) -> Calibration:
+    centers = Centers(np.arange(len(swing)), seen(errors, swing), Path("simulated"))
+    return calibrate(camera, pen, observe_centers(centers, camera, pen))
+
+
+def of_images(joint: JointFit, some: slice) -> JointFit:
+    """Return what some of the images say about the same solution."""
+    return replace(
+        joint,
+        rotations=joint.rotations[some],
+        residuals=joint.residuals[some],
+        used=joint.used[some],
+        information=joint.information[some],
+        gradients=joint.gradients[some],
+    )
+
+
+DOUBTED = (ContributionName.CENTERS, ContributionName.SEAT, ContributionName.DRIFT)
+OF_STATION = {
+    ContributionName.CENTERS,
+    ContributionName.FORM,
+    ContributionName.TEMPERATURE,
+}
+
+
+def adjusted(calibration: Calibration) -> Adjustment:
+    """Return the adjustment of the same images."""
+    pixels = calibration.observations.pixels[calibration.used]
+    fit = calibration.joint
+    state = BundleState(rig_of(CAMERA), PEN, fit.tip_pen, fit.cone_cam, fit.rotations)
+    return adjust(state, pixels[:, None], priors_of(state.rig, PEN, USUAL))
+
+
+def without(budget: Budget, *names: ContributionName) -> FloatArray:
+    """Return the covariance without some shares, (6, 6)."""
+    kept = (s.covariance for s in budget.shares if s.name not in names)
+    return np.asarray(sum(kept))
+
+
+def variance_of(budget: Budget, name: ContributionName) -> FloatArray:
+    """Return what one share adds to the variances of tip and cone, (6,); 0 if none."""
+    found = [np.diag(s.covariance) for s in budget.shares if s.name is name]
+    return found[0] if found else np.zeros(6)
+
+
+def test_blocks_of_independent_noise_scatter_as_that_noise_does() -> None:
+    adjustment = adjusted(calibrated(0.05 * noise(0, n_images=40)))
+    ratios = []
+    for seed in range(10):
+        joint = fit(0.05 * noise(seed))
+        for first in range(0, 99, 9):  # three blocks each
+            some = of_images(joint, slice(first, first + 9))
+            ratios.append(combine(adjustment, some).block_ratio)
+
+    # 110 draws of 12 degrees of freedom fix the mean to 4 %.
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)
+
+
+def test_independent_noise_is_hardly_ever_raised() -> None:
+    factors = [
+        calibrated(0.05 * noise(seed, n_images=40)).budget.correlation_factor
+        for seed in range(20)
+    ]
+
+    assert np.mean(np.array(factors) > 1) <= 0.1
+
+
+# The scatter is 2.5 and 11 times the independent one. 20 draws fix a variance to 32 %,
+# 10 to 45 %.
+@pytest.mark.parametrize(("correlation", "n_draws"), [(0.5, 20), (0.9, 10)])
+def test_correlated_noise_raises_the_uncertainty_to_the_scatter_it_has(
+    correlation: float, n_draws: int
+) -> None:
+    swing = swing_poses(60, np.random.default_rng(0), "operator")
+    errors, independent, raised = [], [], []
+    for seed in range(n_draws):
+        result = calibrated(0.05 * noise(seed, correlation, 60), swing)
+        errors.append(result.joint.tip_pen - swing.tip_pen)
+        independent.append(np.diag(result.budget.independent_noise)[:3])
+        # What seat and centres may do besides is counted, not drawn.
+        raised.append(np.diag(without(result.budget, *DOUBTED))[:3])
+    scatter = np.mean(np.square(errors), axis=0)
+
+    assert (scatter > 1.5 * np.mean(independent, axis=0)).all()
+    # The files' shares are covered, not drawn.
+    assert (np.mean(raised, axis=0) > 0.5 * scatter).all()
+    assert (np.mean(raised, axis=0) < 3.0 * scatter).all()
+
+
+def test_halves_differ_as_predicted() -> None:
+    outside = 0
+    for seed in range(100):
+        halves = compare_halves(fit(0.05 * noise(seed)))
+        beyond = np.abs(halves.difference) > halves.expanded_uncertainty
+        outside += int(beyond.sum())
+
+    assert 3 <= outside <= 30  # 4.6 % of 300 lie beyond two standard deviations
+
+
+def test_halves_agree_with_two_fits_of_half_the_images() -> None:
+    errors = 0.05 * noise(1)
+    errors[1::2, :4] = np.nan  # so that one half knows more than the other
+    odd, even = (
+        fit_joint(
+            CAMERA,
+            PEN,
+            seen(errors)[k::2],
+            *(SWING.rotations[k::2], SWING.tip_pen, SWING.cone_cam),
+        )
+        for k in (0, 1)
+    )
+
+    halves = compare_halves(fit(errors))
+
+    np.testing.assert_allclose(halves.difference, odd.tip_pen - even.tip_pen, atol=2e-4)
+    variances = np.diag(odd.covariance + even.covariance)[:3]
+    # Each half has a noise of its own.
+    np.testing.assert_allclose(
+        halves.expanded_uncertainty, 2 * np.sqrt(variances), rtol=0.05
+    )
+
+
+def test_the_shares_add_up_to_the_covariance() -> None:
+    for correlation in (0.0, 0.9):
+        result = calibrated(0.05 * noise(8, correlation, 40))
+        budget, bundle = result.budget, result.bundle
+        np.testing.assert_allclose(
+            budget.covariance, sum(share.covariance for share in budget.shares)
+        )
+        np.testing.assert_allclose(
+            budget.expanded_uncertainty, 2 * np.sqrt(np.diag(budget.covariance))
+        )
+        if correlation == 0.0:  # then they are those of the bundle itself
+            assert budget.correlation_factor == 1
+            # But for what may be so besides, and is no part of it, and the seat, which
+            # counts otherwise than it was fitted.
+            of_seat = bundle.part(*bundle.layout.seat)
+            np.testing.assert_allclose(
+                np.diag(without(budget, *DOUBTED, ContributionName.FORM)),
+                np.diag(bundle.covariance[:6, :6] - of_seat),
+                rtol=1e-3,
+            )
+
+
+def test_what_holding_back_from_a_likely_error_changes_is_a_share() -> None:
+    adjustment = adjusted(calibrated(0.05 * noise(8, n_images=40)))
+    changed = np.array([0.01, -0.02, 0.03, 0.0, 0.0, 0.0])
+
+    *_, last = contributions_of(
+        adjustment.unshrunk, adjustment.priors, 40, np.eye(6), shrinkage_shift=changed
+    )
+
+    assert last.name is ContributionName.SHRINKAGE
+    np.testing.assert_allclose(last.standard_uncertainty, np.abs(changed[:3]))
+
+
+def test_the_camera_has_the_share_by_which_a_perfect_one_would_shrink_u() -> None:
+    errors = 0.03 * noise(2, n_images=40)
+    assert CAMERA.covariance is not None
+    exact = replace(CAMERA, covariance=1e-8 * CAMERA.covariance)
+
+    with_camera = calibrated(errors).budget
+    without = calibrated(errors, camera=exact).budget
+
+    by_camera = variance_of(with_camera, ContributionName.CAMERA)
+    assert (by_camera > 0).all()
+    assert (variance_of(without, ContributionName.CAMERA) < 0.01 * by_camera).all()
+    drop = np.diag(with_camera.covariance) - np.diag(without.covariance)
+    # Solved for, a camera also lets more of the noise in.
+    assert (drop >= 0.9 * by_camera).all()
+
+
+def test_a_camera_that_states_nothing_is_assumed_and_counted() -> None:
+    errors = 0.03 * noise(3, n_images=40)
+    assumed = calibrated(errors, camera=replace(CAMERA, covariance=None)).budget
+    stated = calibrated(errors).budget
+
+    marked = {share.name for share in assumed.shares if share.assumed}
+    assert marked == {ContributionName.CAMERA, *OF_STATION}
+    assert (assumed.expanded_uncertainty > stated.expanded_uncertainty).all()
+    # The height of the cone goes with cy, which one swing hardly tells.
+    assert assumed.expanded_uncertainty[4] > 2 * stated.expanded_uncertainty[4]
+
+
+def test_a_pen_that_states_nothing_is_assumed_and_counted() -> None:
+    bare = replace(PEN, led_sigma=None, scale_sigma=None, diameter_sigma=None)
+    budget = calibrated(0.03 * noise(4, n_images=40), pen=bare).budget
+
+    marked = {share.name for share in budget.shares if share.assumed}
+    assert marked == {ContributionName.SCALE, ContributionName.DIAMETER, *OF_STATION}
+
+
+def test_of_files_that_state_all_only_the_station_is_assumed() -> None:
+    budget = calibrated(0.03 * noise(5, n_images=40)).budget
+
+    assert {share.name for share in budget.shares if share.assumed} == OF_STATION
+
+
+def test_the_scale_of_the_pen_moves_the_tip_as_much_as_it_may_be_off() -> None:
+    loose = replace(PEN, scale_sigma=1e-4)
+    budget = calibrated(0.03 * noise(6, n_images=40), pen=loose).budget
+
+    found = np.sqrt(variance_of(budget, ContributionName.SCALE)[:3])
+    # The middle of the LEDs stays: a tip 180 mm below it moves by 18 um.
+    lever = np.abs(FEW.tip_pen - loose.leds.mean(axis=0))
+    np.testing.assert_allclose(found, 1e-4 * lever, rtol=0.05, atol=1e-4)
+
+
+def test_too_few_images_for_blocks_are_said_so() -> None:
+    calibration = calibrated(0.01 * noise(4, n_images=40))
+
+    some = of_images(fit(0.01 * noise(4)), slice(8))
+    budget = combine(adjusted(calibration), some)
+
+    assert budget.blocks is None
+    assert budget.correlation_factor == 1
+
+
+def test_the_weakest_direction_is_where_the_covariance_is_largest() -> None:
+    budget = calibrated(0.05 * noise(5, n_images=40)).budget
+    weakest = budget.weakest_direction
+    tip = budget.covariance[:3, :3]
+
+    assert weakest @ tip @ weakest == pytest.approx(np.linalg.eigvalsh(tip)[-1])
+    assert budget.weakest_uncertainty == pytest.approx(
+        2 * np.sqrt(weakest @ tip @ weakest)
+    )
+    squares = [budget.weakest_share(share) ** 2 for share in budget.shares]
+    assert sum(squares) == pytest.approx(budget.weakest_uncertainty**2)
+    assert budget.weakest_share(budget.largest_share) ** 2 == max(squares)
+
+
+def test_a_seat_that_jitters_counts_as_seat_and_not_as_noise_too() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(3):
+        jitter = 0.01 * rng.standard_normal(SWING.translations.shape)
+        moved = replace(SWING, translations=SWING.translations + jitter)
+        budget = calibrated(0.03 * noise(8), moved).budget
+
+        assert any(share.name is ContributionName.SEAT for share in budget.shares)
+        # Chance alone makes it 1.5 once in a hundred; the jitter would make it 2.5.
+        assert budget.block_ratio < 2
+        assert budget.correlation_factor < 2
+
+
+def test_errors_of_the_centres_shrink_with_up_to_thirty_images() -> None:
+    adjustment = adjusted(calibrated(0.05 * noise(8, n_images=40)))
+    zero = np.zeros(6)
+
+    def share(n_images: int) -> FloatArray:
+        shares = contributions_of(
+            adjustment.unshrunk, adjustment.priors, n_images, np.eye(6), zero
+        )
+        (found,) = (s for s in shares if s.name is ContributionName.CENTERS)
+        return found.covariance
+
+    usual, sigma = USUAL.center_bias, adjustment.unshrunk.sigma
+    once = (usual / sigma) ** 2 * adjustment.unshrunk.independent_noise
+    # Of fewer images each has a posture of its own; of more, postures repeat.
+    for n_images, times in ((5, 1.0), (30, 1.0), (60, 2.0), (300, 10.0)):
+        np.testing.assert_allclose(share(n_images), times * once)
+
+
+def test_a_seat_mode_of_one_wave_counts_less_along_the_cone() -> None:
+    along = one_wave_variance(FEW.rotations)
+
+    values, vectors = np.linalg.eigh(along)
+    np.testing.assert_allclose(values, [0.4**2, 1.0, 1.0])
+    # The pen swings about the axis of the cone, which stands upright.
+    assert abs(vectors[1, 0]) > 0.95

@@ -1,0 +1,71 @@
+"""A stored message is worded from its code and values; its text is for people alone."""
+
+import json
+import math
+
+import pytest
+from msgspec import structs, to_builtins
+
+from lightpen.formats.own_json import DamagedError, in_shape
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.messages import Message, message
+from lightpen.swing_messages import (
+    file_uncertain,
+    halves_differ,
+    last_unknown,
+    led_displaced,
+    tip_changed,
+    too_little_tilt,
+)
+
+DAMAGED = message("results.damaged", file="a, b {c}.json")
+ADVICE = message("share.temperature")
+SHOUTED = str.upper
+
+
+def stored(told: Message) -> StoredMessage:
+    """Return a message as it is read back from JSON, without its text."""
+    written = json.dumps(to_builtins(StoredMessage.of(told)))
+    return structs.replace(in_shape(json.loads(written), StoredMessage), text="")
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        tip_changed(0.03, "2026-01-02", "y", 0.02, 0.01),
+        halves_differ(0.02, 0.01),
+        led_displaced(7, 0.05),
+        too_little_tilt(6, [0, 2, 5]),
+        too_little_tilt(20, range(8)),
+        last_unknown(DAMAGED),
+        file_uncertain(0.02, 0.01, 0.015, ADVICE, assumed=True),
+        halves_differ(math.nan, 0.01),
+    ],
+    ids=lambda told: told.code,
+)
+def test_it_is_worded_as_if_it_had_never_been_written_down(told: Message) -> None:
+    assert StoredMessage.of(told).text == str(told)
+    assert stored(told).worded() == str(told)
+    assert stored(told).worded(mark) == told.text(mark) != str(told)
+
+
+def mark(template: str) -> str:
+    """Return a template in another language."""
+    return f"<{template}>"
+
+
+@pytest.mark.parametrize(
+    "changes", [{"code": "gone.since"}, {"values": {}}, {"values": {"led": "seven"}}]
+)
+def test_its_text_stands_where_the_catalogue_does_not_fit_any_more(
+    changes: dict[str, object],
+) -> None:
+    told = StoredMessage.of(led_displaced(7, 0.05))
+
+    assert structs.replace(told, **changes).worded(mark) == told.text
+
+
+@pytest.mark.parametrize("entries", [{"code": "x", "text": "y"}, {"values": [[]]}])
+def test_what_is_no_message_is_refused(entries: dict[str, object]) -> None:
+    with pytest.raises(DamagedError):
+        in_shape(entries, StoredMessage)

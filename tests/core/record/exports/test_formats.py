@@ -1,0 +1,134 @@
+"""A tip as other programs read it says the same tip in each of their languages."""
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import yaml
+
+from lightpen.formats.json_records import record_bytes
+from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.exports.dcc import Laboratory
+from lightpen.record.exports.formats import FORMATS
+from lightpen.record.swings.names import Names
+
+ACCEPTED = datetime(2026, 8, 14, 9, 30, tzinfo=UTC)
+TIP, U = [-1.5, -90.25, -23.875], [0.001, 0.0025, 0.002]
+# Slicer's axes point right, to the front and up, ITK's left, to the back and up.
+RAS_FROM_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def exported(
+    stated: Mapping[str, Any], tmp_path_factory: pytest.TempPathFactory
+) -> CalibrationFile:
+    record = {**stated, "tip_pen_mm": TIP, "expanded_uncertainty_mm": U}
+    file = tmp_path_factory.mktemp("exported") / "tip.json"
+    file.write_bytes(record_bytes(record))
+    return named(read_calibration(file))
+
+
+def named(
+    file: CalibrationFile, pen: str = "LP-04", tip: str = "T-10"
+) -> CalibrationFile:
+    return replace(file, names=Names(pen=pen, tip=tip), accepted=ACCEPTED)
+
+
+def text(name: str, file: CalibrationFile, laboratory: Laboratory | None = None) -> str:
+    (found,) = [each for each in FORMATS if each.name == name]
+    return found.content(file, laboratory).decode()
+
+
+def test_slicer_finds_the_tip_where_it_is(exported: CalibrationFile) -> None:
+    """Slicer inverts what it reads, and turns it into its own axes."""
+    fields = dict(
+        line.split(": ")
+        for line in text("slicer", exported).splitlines()
+        if ": " in line and not line.startswith("#")
+    )
+    assert fields["Transform"] == "AffineTransform_double_3_3"
+    numbers = np.array(fields["Parameters"].split(), dtype=float)
+    from_parent = np.eye(4)
+    from_parent[:3, :3] = numbers[:9].reshape(3, 3)
+    from_parent[:3, 3] = numbers[9:]
+    to_parent = np.linalg.inv(RAS_FROM_LPS @ from_parent @ RAS_FROM_LPS)
+
+    np.testing.assert_array_equal(to_parent[:3, 3], TIP)
+
+
+def test_plus_reads_a_transform_of_tip_to_stylus(exported: CalibrationFile) -> None:
+    element = ElementTree.fromstring(text("plus", exported))
+    matrix = np.array(element.attrib["Matrix"].split(), dtype=float).reshape(4, 4)
+
+    assert (element.attrib["From"], element.attrib["To"]) == ("StylusTip", "Stylus")
+    np.testing.assert_array_equal(matrix[:, 3], [*TIP, 1.0])
+
+
+def test_ros_reads_metres(exported: CalibrationFile) -> None:
+    message = yaml.safe_load(text("ros", exported))
+    shift = message["transform"]["translation"]
+
+    np.testing.assert_allclose([shift[a] for a in "xyz"], np.array(TIP) / 1000)
+    assert message["transform"]["rotation"]["w"] == 1.0
+    assert message["header"]["stamp"]["sec"] == ACCEPTED.timestamp()
+    after = ACCEPTED + timedelta(seconds=0.25)
+    later = replace(exported, accepted=after)
+    stamp = yaml.safe_load(text("ros", later))["header"]["stamp"]
+    assert stamp == {**message["header"]["stamp"], "nanosec": 250_000_000}
+
+
+def test_statistics_get_each_axis_and_its_uncertainty(
+    exported: CalibrationFile,
+) -> None:
+    fields = dict(line.split(" ", 1) for line in text("qdas", exported).splitlines())
+
+    n_characteristics = int(fields["K0100"])
+    values = [float(fields[f"K0001/{i + 1}"]) for i in range(n_characteristics)]
+    np.testing.assert_allclose(values, [*TIP, *U], atol=5e-7)  # as many decimals
+    assert (fields["K1001"], fields["K1003"]) == ("LP-04", "T-10")
+    assert {fields[f"K2142/{i + 1}"] for i in range(n_characteristics)} == {"mm"}
+
+
+def test_names_cannot_break_the_lines_of_a_file(exported: CalibrationFile) -> None:
+    written = text("qdas", named(exported, pen="LP\nK0001/1 9", tip="T\0"))
+
+    assert [line[:5] for line in written.splitlines()].count("K0001") == 6
+    assert "\0" not in written
+
+
+def test_text_and_table_hold_the_tip(exported: CalibrationFile) -> None:
+    (row,) = csv.DictReader(io.StringIO(text("csv", exported)))
+
+    line = text("text", exported).splitlines()[0]
+    assert list(map(float, line.split("\t"))) == TIP
+    assert [float(row[f"tip_{axis}_mm"]) for axis in "xyz"] == TIP
+    assert [float(row[f"expanded_uncertainty_{axis}_mm"]) for axis in "xyz"] == U
+    assert (row["pen"], row["tip"]) == ("LP-04", "T-10")
+
+
+@pytest.mark.parametrize("name", [each.name for each in FORMATS])
+def test_every_format_states_origin_and_grade(
+    exported: CalibrationFile, name: str, stated: Mapping[str, Any]
+) -> None:
+    laboratory = Laboratory("Hall 2", "hall2@example.com", "Berlin", "DE")
+    written = text(name, exported, laboratory)
+
+    assert written.endswith("\n")
+    assert stated["origin"] in written
+    assert stated["verdict"]["grade"] in written
+
+
+def test_images_are_a_table_with_a_row_each(
+    exported: CalibrationFile, stated: Mapping[str, Any]
+) -> None:
+    rows = list(csv.DictReader(io.StringIO(text("images", exported))))
+
+    assert [int(row["image"]) for row in rows] == list(range(1, len(rows) + 1))
+    assert [row["file"] for row in rows] == [each["file"] for each in stated["frames"]]
+    assert [row["reason"] for row in rows].count("") == stated["images"]["used"]

@@ -1,0 +1,193 @@
+"""The tip library: what follows from its changes, and which changes are refused."""
+
+from datetime import UTC, date, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec import structs
+
+from lightpen.errors import AcceptanceError, FileError, UsageError
+from lightpen.formats.decoding import encode_png
+from lightpen.model.limits import DueRule
+from lightpen.record.library.library_changes import (
+    Author,
+    add_item,
+    change_item,
+    keep_picture,
+    retire_item,
+)
+from lightpen.record.library.supervision import Signature, set_password
+from lightpen.record.library.tip_library import (
+    LIBRARY,
+    AxisOrigin,
+    ItemKind,
+    Library,
+    ListedCone,
+    ListedPen,
+    ListedTip,
+    library_changes,
+    library_files,
+    read_library,
+)
+
+NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
+ANN = Author("Hall 2", "Ann", "worn")
+TIP = ListedTip(id="T-10", ball_diameter_mm=10.0, nominal_tip_mm=(0.0, 0.0, -150.0))
+
+
+def test_a_folder_without_a_library_has_an_empty_one(tmp_path: Path) -> None:
+    assert read_library(tmp_path) == Library()
+
+
+def test_pens_tips_and_cones_are_known_by_their_ids(tmp_path: Path) -> None:
+    add_item(tmp_path, TIP, ANN, NOON)
+    add_item(tmp_path, ListedPen(id="LP-04", due=date(2032, 1, 1)), ANN, NOON)
+    library = add_item(tmp_path, ListedCone(id="C-1"), ANN, NOON)
+
+    assert library == read_library(tmp_path)
+    assert library.item(ItemKind.TIP, "T-10") == TIP
+    assert library.pens["LP-04"].is_overdue(date(2032, 1, 2))
+    assert not library.pens["LP-04"].is_overdue(date(2032, 1, 1))
+    assert list(library.cones) == ["C-1"]
+
+
+def test_a_change_keeps_what_was_before_it_with_who_and_when(tmp_path: Path) -> None:
+    add_item(tmp_path, TIP, ANN, NOON)
+    smaller = structs.replace(TIP, ball_diameter_mm=9.998)
+    change_item(tmp_path, smaller, ANN, NOON)
+    change_item(tmp_path, smaller, ANN, NOON)  # nothing changes
+
+    assert read_library(tmp_path).tips["T-10"] == smaller
+    first, second = (change for _, change in library_changes(tmp_path))
+    assert (first.item, second.item) == (TIP, smaller)
+    assert (second.operator, second.station, second.reason) == ("Ann", "Hall 2", "worn")
+    assert second.at == NOON
+
+
+def test_a_retired_item_stays_known_and_can_be_brought_back(tmp_path: Path) -> None:
+    add_item(tmp_path, TIP, ANN, NOON)
+
+    assert (
+        retire_item(tmp_path, ItemKind.TIP, "T-10", ANN, NOON).tips["T-10"].is_retired
+    )
+    back = retire_item(tmp_path, ItemKind.TIP, "T-10", ANN, NOON, is_retired=False)
+    assert not back.tips["T-10"].is_retired
+
+
+@pytest.mark.parametrize("name", ["T-10", "t-10", " T-10 "])
+def test_an_id_that_is_in_use_is_refused(tmp_path: Path, name: str) -> None:
+    add_item(tmp_path, TIP, ANN, NOON)
+
+    with pytest.raises(UsageError, match=r"tip T-10 is in the library already\. Edit"):
+        add_item(tmp_path, ListedTip(id=name), ANN, NOON)
+    assert add_item(tmp_path, ListedPen(id="T-10"), ANN, NOON).pens  # a pen is no tip
+
+
+def test_the_id_of_a_retired_tip_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    add_item(tmp_path, TIP, ANN, NOON)
+    retire_item(tmp_path, ItemKind.TIP, "T-10", ANN, NOON)
+
+    with pytest.raises(UsageError, match=r"retired\. Reactivate it"):
+        add_item(tmp_path, TIP, ANN, NOON)
+
+
+@pytest.mark.parametrize(
+    ("entries", "told"),
+    [
+        ({"ball_diameter_mm": 0.0}, "Ball diameter 0 mm is not valid"),
+        ({"ball_diameter_mm": 5000.0}, "Ball diameter 5000 mm is not valid"),
+        ({"ball_diameter_mm": float("nan")}, "Ball diameter nan mm is not valid"),
+        ({"max_change_mm": -0.1}, "Max. change -0.1 mm"),
+        ({"max_days": 0}, "0 is not valid"),
+        ({"max_swings": 10**6}, "1000000 is not valid"),
+        ({"stylus_axis": (0.0, 0.0, 0.0)}, "0 0 0 is not a direction."),
+        ({"nominal_tip_mm": (0.0, float("inf"), 0.0)}, "The nominal centre"),
+        ({"id": "  "}, "is not a valid ID"),
+        ({"id": "T\n1"}, "is not a valid ID"),
+        ({"id": "T" * 201}, "is not a valid ID"),
+    ],
+)
+def test_what_makes_no_sense_of_a_tip_is_refused(
+    tmp_path: Path, entries: dict[str, object], told: str
+) -> None:
+    with pytest.raises(UsageError, match=told):
+        add_item(tmp_path, structs.replace(TIP, **entries), ANN, NOON)
+    assert library_files(tmp_path) == ()
+
+
+def test_a_tip_that_is_not_there_cannot_be_changed(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="There is no tip T-10 in the library"):
+        change_item(tmp_path, TIP, ANN, NOON)
+
+
+def test_an_axis_is_kept_as_a_direction_with_where_it_is_from(tmp_path: Path) -> None:
+    tip = structs.replace(TIP, stylus_axis=(0.0, 3.0, 4.0))
+    kept = add_item(tmp_path, tip, ANN, NOON).tips["T-10"]
+
+    assert kept.stylus_axis == pytest.approx((0, 0.6, 0.8))
+    assert kept.axis_origin is AxisOrigin.GIVEN
+
+
+def test_a_tip_has_a_rule_of_its_own_or_that_of_the_station() -> None:
+    usual, own = DueRule(30, 0), ListedTip(id="T", max_days=7)
+
+    library = Library(tips={"T": own})
+    assert library.rule_of("T", usual) == DueRule(7, 0)
+    assert library.rule_of("T-10", usual) == usual
+
+
+def test_a_barcode_is_known_whatever_case_the_scanner_types(tmp_path: Path) -> None:
+    library = add_item(tmp_path, TIP, ANN, NOON)
+
+    assert library.tip_of_code("T-10") == library.tip_of_code("t-10") == TIP
+    assert library.tip_of_code("T-1") is None
+
+
+def test_with_a_password_only_a_supervisor_changes_the_library(tmp_path: Path) -> None:
+    eve = Signature("Eve", "correct horse")
+    set_password(tmp_path, eve, eve.password, NOON)
+
+    for by in (ANN, Author("Hall 2", "Ann", signature=Signature("Eve", "wrong one"))):
+        with pytest.raises(AcceptanceError):
+            add_item(tmp_path, TIP, by, NOON)
+    add_item(tmp_path, TIP, Author("Hall 2", "Ann", signature=eve), NOON)
+    ((_, change),) = library_changes(tmp_path)
+    assert (change.operator, change.supervisor) == ("Ann", "Eve")
+
+
+def test_a_changed_file_is_told_and_nothing_older_counts(tmp_path: Path) -> None:
+    add_item(tmp_path, TIP, ANN, NOON)
+    change_item(tmp_path, structs.replace(TIP, max_change_mm=0.02), ANN, NOON)
+    _, newest = library_files(tmp_path)
+    newest.write_bytes(newest.read_bytes().replace(b"0.02", b"0.92"))
+
+    with pytest.raises(FileError, match=r"000002\.json was modified or damaged"):
+        read_library(tmp_path)
+
+
+def test_a_file_of_a_later_version_is_refused(tmp_path: Path) -> None:
+    from lightpen.formats.json_records import record_bytes
+
+    (tmp_path / LIBRARY).mkdir()
+    file = tmp_path / LIBRARY / "000001.json"
+    file.write_bytes(record_bytes({"format": 2, "new": True}))
+
+    with pytest.raises(FileError, match="later version"):
+        read_library(tmp_path)
+
+
+def test_a_picture_is_kept_by_its_hash_in_the_data_folder(tmp_path: Path) -> None:
+    photo = tmp_path / "tip.png"
+    photo.write_bytes(encode_png(np.zeros((4, 4), np.uint8)))
+
+    picture = keep_picture(tmp_path / "data", photo)
+    assert (tmp_path / "data" / picture.place).read_bytes() == photo.read_bytes()
+    assert keep_picture(tmp_path / "data", photo) == picture  # once is enough
+
+
+def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "tip.png").write_text("no picture")
+
+    with pytest.raises(FileError):
+        keep_picture(tmp_path / "data", tmp_path / "tip.png")

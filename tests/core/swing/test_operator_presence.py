@@ -1,0 +1,71 @@
+"""When a swing is due, and whether the one that began is still what is chosen."""
+
+from dataclasses import replace
+
+import pytest
+
+from lightpen.messages import message
+from lightpen.record.swings.names import Names
+from lightpen.swing.operator_presence import OperatorPresence
+from lightpen.swing.preparation import Preparation
+
+WHY = message("system.full")
+
+
+@pytest.fixture
+def ready(prepared: Preparation) -> OperatorPresence:
+    """Somebody is there and all is chosen."""
+    return OperatorPresence(choices=prepared).come()
+
+
+def test_a_swing_is_due_when_somebody_is_there_and_nothing_lacks(
+    ready: OperatorPresence, prepared: Preparation
+) -> None:
+    lacking = replace(prepared, pen_file=None)
+
+    assert ready.is_due
+    assert not OperatorPresence(choices=prepared).is_due
+    assert not OperatorPresence().come().is_due
+    assert not replace(ready, choices=lacking).is_due
+    assert not ready.left().is_due
+
+
+def test_what_was_refused_is_not_due_until_somebody_comes_or_a_swing_begins(
+    ready: OperatorPresence,
+) -> None:
+    refused = replace(ready, refusal=WHY)
+
+    assert not refused.is_due
+    assert not refused.left().is_due
+    assert refused.come().is_due
+    assert refused.begun().is_due
+
+
+def test_nobody_is_away_before_somebody_has_left() -> None:
+    assert not OperatorPresence().is_away
+    assert not OperatorPresence().come().is_away
+    assert OperatorPresence().come().left().is_away
+    assert not OperatorPresence().come().left().come().is_away
+
+
+def test_who_comes_or_begins_ends_a_pause_by_leaving(ready: OperatorPresence) -> None:
+    paused = replace(ready.left(), paused_by_leaving=True)
+
+    assert not paused.come().paused_by_leaving
+    assert not paused.begun().paused_by_leaving
+    assert paused.begun().is_away  # who begins may be elsewhere
+
+
+def test_choices_are_others_from_when_a_swing_began_until_they_are_like_its_own(
+    ready: OperatorPresence, prepared: Preparation
+) -> None:
+    others = replace(prepared, names=Names(operator="Bob"))
+    begun = ready.begun()
+    changed = replace(begun, choices=others)
+
+    assert not ready.has_other_choices
+    assert not begun.has_other_choices
+    assert changed.has_other_choices
+    assert not replace(changed, choices=prepared).has_other_choices
+    assert not changed.begun().has_other_choices
+    assert not replace(ready, choices=others).has_other_choices  # none began

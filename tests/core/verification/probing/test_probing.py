@@ -1,0 +1,162 @@
+"""Tests of `lightpen.verification.probing.probing`."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.pen_detection import PenDetection, detect_from_centers, unseen
+from lightpen.detection.reasons import Reason
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.model.posture import rotations_of
+from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP, simulate_centers
+from lightpen.verification.probing.probing import (
+    ProbingEvent,
+    ProbingEventKind,
+    ProbingPhase,
+    ProbingRules,
+    ProbingState,
+    advance_touch,
+)
+
+RULES = ProbingRules(n_frames=5, n_settling=2)
+STILL = 7  # images of one touch by these rules
+Place = tuple[FloatArray, float]  # of the tip, mm, and tilt, rad
+
+
+def detections(
+    instrument: Instrument, places: Sequence[Place | None]
+) -> list[tuple[str, PenDetection]]:
+    """What is seen of a tip that goes through places; None shows no pen."""
+    rng = np.random.default_rng(4)
+    camera, pen = instrument.camera, instrument.pen
+    seen = []
+    for i, place in enumerate(places):
+        if place is None:
+            seen.append((f"image {i}", unseen(pen, Reason.EMPTY)))
+            continue
+        point, tilt = place
+        one = np.zeros(1)
+        R = rotations_of(pen, one + tilt, one, one)
+        t = point - R @ PAPER_TIP
+        (pixels,) = simulate_centers(camera, pen, R, t, 0.01, rng)
+        seen.append(
+            (f"image {i}", detect_from_centers(camera, pen, pixels, R[0], t[0]))
+        )
+    return seen
+
+
+def run(
+    instrument: Instrument, places: Sequence[Place | None], rules: ProbingRules = RULES
+) -> tuple[ProbingState, list[ProbingEvent]]:
+    state, events = ProbingState(), list[ProbingEvent]()
+    for name, detection in detections(instrument, places):
+        transition = advance_touch(instrument, rules, state, name, detection)
+        state = transition.state
+        events += transition.events
+    return state, events
+
+
+def moving(n: int = 6) -> list[Place]:
+    return [(PAPER_CONE + np.array([0.0, -8.0 * (n - i), 0.0]), 0.1) for i in range(n)]
+
+
+HELD: Place = (PAPER_CONE, 0.1)
+
+
+def test_a_still_pen_is_taken_after_so_many_images(instrument: Instrument) -> None:
+    state, events = run(instrument, [*moving(), *[HELD] * STILL])
+
+    assert [event.what for event in events] == [ProbingEventKind.RECORDED]
+    assert events[0].names == tuple(f"image {i}" for i in range(8, 13))
+    assert state.phase is ProbingPhase.RECORDED
+    assert len(state.taken[0].frames) == RULES.n_frames
+
+
+def test_progress_tells_how_much_of_a_touch_is_taken(instrument: Instrument) -> None:
+    state, _ = run(instrument, [*moving(), *[HELD] * 4])
+
+    assert state.progress(RULES) == pytest.approx(4 / STILL)
+
+
+def test_the_approach_is_where_the_tip_came_from(instrument: Instrument) -> None:
+    state, _ = run(instrument, [*moving(), *[HELD] * STILL])
+
+    approach = state.taken[0].approach_cam
+    assert approach is not None
+    np.testing.assert_allclose(approach, [0, 1, 0], atol=0.05)
+
+
+def test_a_moving_pen_is_not_taken(instrument: Instrument) -> None:
+    state, events = run(instrument, moving(30))
+
+    assert events == []
+    assert state.taken == ()
+
+
+def test_a_held_pen_is_taken_once_until_it_moves_on(instrument: Instrument) -> None:
+    held = [*moving(), *[HELD] * (3 * STILL)]
+    state, _ = run(instrument, held)
+    assert len(state.taken) == 1
+
+    elsewhere: Place = (PAPER_CONE + np.array([20.0, 0.0, 0.0]), 0.1)
+    state, _ = run(instrument, [*held, *[elsewhere] * STILL])
+    assert len(state.taken) == 2
+
+
+def test_one_image_that_disagrees_is_left_out_and_named(instrument: Instrument) -> None:
+    jolt: Place = (PAPER_CONE + np.array([1.0, 0.0, 0.0]), 0.1)
+    held = [HELD] * 4
+
+    state, events = run(instrument, [*moving(), *held, jolt, *held])
+
+    assert [event.what for event in events] == [ProbingEventKind.RECORDED]
+    assert [each.name for each in state.taken[0].rejected] == ["image 10"]
+
+
+def test_an_image_without_the_pen_is_named_with_its_reason(
+    instrument: Instrument,
+) -> None:
+    state, _ = run(instrument, [*moving(), *[HELD] * 4, None, *[HELD] * 4])
+
+    (rejected,) = state.taken[0].rejected
+    assert (rejected.name, rejected.reason) == ("image 10", Reason.EMPTY)
+
+
+def test_a_pen_lifted_in_the_middle_is_told_and_nothing_taken(
+    instrument: Instrument,
+) -> None:
+    up: list[Place] = [
+        (PAPER_CONE + np.array([0.0, -10.0 * i, 0.0]), 0.1) for i in range(1, 6)
+    ]
+
+    state, events = run(instrument, [*moving(), *[HELD] * 5, *up])
+
+    assert [event.what for event in events] == [ProbingEventKind.BROKEN_OFF]
+    assert events[0].names[0] == "image 6"
+    assert state.taken == ()
+
+
+def test_a_pen_that_is_lost_ends_the_touch(instrument: Instrument) -> None:
+    state, events = run(instrument, [*moving(), *[HELD] * 5, *[None] * 8])
+
+    assert [event.what for event in events] == [ProbingEventKind.BROKEN_OFF]
+    assert state.phase is ProbingPhase.MOVING
+
+
+def test_the_same_posture_counts_once_where_postures_count(
+    instrument: Instrument,
+) -> None:
+    rules = ProbingRules(5, 2, min_turn=0.15, min_distance=1e6)
+    away = moving()
+    leant: Place = (PAPER_CONE, 0.4)
+
+    state, _ = run(instrument, [*[HELD] * 7, *away, *[HELD] * 9, *[leant] * 9], rules)
+
+    assert len(state.taken) == 2
+
+
+def test_rules_that_take_nothing_are_refused() -> None:
+    with pytest.raises(ValueError, match="Nothing can be touched"):
+        ProbingRules(n_frames=0)

@@ -1,0 +1,469 @@
+"""A whole verification by the simulated operator, without a key."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from tests.accepted_tip import Hold, Holder, leant, round_a_ring
+from tests.verifying import BAR, CHOICES, PAPER, found_by
+
+from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.protocol import CameraSettings
+from lightpen.detection.pen_detection import PenDetection, detect_pen
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
+from lightpen.model.rig import rig_of
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import paper_camera
+from lightpen.simulator.toucher import ProbingOperator
+from lightpen.verification.probing.probing import ProbingEvent, ProbingEventKind
+from lightpen.verification.session.session import (
+    advance_session,
+    end_task,
+    touched_anew,
+)
+from lightpen.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+    fraction_done,
+    instruction,
+)
+from lightpen.verification.tasks.articulation import ALIKE, ARTICULATION, OTHER_POSTURE
+from lightpen.verification.tasks.circle import CIRCLE
+from lightpen.verification.tasks.drift import DRIFT
+from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
+from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
+from lightpen.verification.tasks.registry import TASKS, AnyTask
+from lightpen.verification.tasks.task import TaskOptions
+
+LONGEST = 180.0  # s of the operator's time, from the first touch to the verdict
+GIVE_UP = 240.0  # s
+FRAME_RATE = 5.0  # 1/s: a quarter of the usual one, as each image is rendered
+
+
+def test_a_simulated_operator_verifies_a_tip_without_a_key() -> None:
+    scene = Scene(camera=paper_camera(binning=4))
+    pen = replace(scene.pen, led_sigma=0.002)
+    instrument = instrument_of_files(
+        rig_of(scene.camera), pen, scene.tip_pen, 1e-6 * np.eye(3), 0.01
+    )
+    choices = replace(CHOICES, n_frames=2)
+    setup = SessionSetup(instrument, choices, cone_cam=scene.cone_cam)
+    clock = SkippingClock()
+    camera = SimulatedCamera(scene, clock)
+    camera.open()
+    camera.configure(CameraSettings(frame_rate=FRAME_RATE))
+    camera.start()
+    probing_operator = ProbingOperator(camera.operator)
+    state, before, finished, first = SessionState(), None, [], None
+    asked = {instruction(setup, state).code}
+    is_lifted = False
+    while state.task(setup) is not None and clock.now_ns() < GIVE_UP * 1e9:
+        probing_operator.follow(setup, state)
+        if len(state.touches) == 2 and not is_lifted:
+            is_lifted = True
+            camera.operator.lift()  # which the operator sees and goes on
+        frame = camera.read(1.0)
+        detection: PenDetection = detect_pen(
+            frame.image, scene.camera, pen, None, before
+        )
+        before = detection
+        transition = advance_session(setup, state, str(frame.seq), detection)
+        state = transition.state
+        asked.add(instruction(setup, state).code)
+        if transition.events and first is None:
+            first = clock.now_ns()
+        if transition.finished is not None:
+            finished.append(transition.finished)
+    camera.close()
+
+    assert finished == list(PAPER)
+    assert first is not None
+    assert (clock.now_ns() - first) * 1e-9 < LONGEST
+    assert FIXED_POINT.kind in state.found
+    assert CIRCLE.kind in state.found
+    assert LENGTH.kind in state.found
+    # A quarter of the pixels: the noise is four times that of the whole camera.
+    assert abs(found_by(state, CIRCLE).errors[0]) < 0.05
+    assert abs(found_by(state, LENGTH).errors[0]) < 0.05
+    assert state.assessment is not None
+    assert asked >= {
+        "session.touch-cone",
+        "session.touch-ring",
+        "session.touch-ends",
+        "session.done",
+    }
+
+
+# What a hand can do wrong, seen without an image
+
+
+@dataclass
+class Session:
+    """A verification that takes what a holder shows."""
+
+    setup: SessionSetup
+    holder: Holder
+    state: SessionState = field(default_factory=SessionState)
+    events: list[ProbingEvent] = field(default_factory=list)
+
+    def see(self, detections: Iterable[PenDetection]) -> None:
+        for detection in detections:
+            transition = advance_session(self.setup, self.state, "image", detection)
+            self.state = transition.state
+            self.events += transition.events
+
+    def touch(self, *holds: Hold) -> None:
+        for hold in holds:
+            self.see(self.holder.still(hold))
+
+    def says(self) -> str:
+        return instruction(self.setup, self.state).code
+
+    def choose(self, *tasks: AnyTask, options: TaskOptions | None = None) -> None:
+        kinds = tuple(task.kind for task in tasks)
+        chosen = replace(self.setup.choices, kinds=kinds)
+        if options is not None:
+            chosen = chosen.with_options(options)
+        self.setup = replace(self.setup, choices=chosen)
+
+
+@pytest.fixture
+def session(instrument: Instrument) -> Session:
+    setup = SessionSetup(instrument, CHOICES)
+    return Session(setup, Holder(instrument.rig, instrument.pen))
+
+
+def test_each_task_begins_when_the_one_before_is_done(session: Session) -> None:
+    session.touch(*leant(4))
+    assert FIXED_POINT.kind in session.state.found
+    assert session.state.task(session.setup) is CIRCLE
+    session.touch(leant(8)[1])
+    assert session.says() == "session.still-in-cone"
+    session.touch(*round_a_ring(11, 31.751)[:10])
+    assert CIRCLE.kind in session.state.found
+    assert session.state.task(session.setup) is LENGTH
+    assert not session.state.touches
+    session.touch(*BAR)
+
+    assert session.state.assessment is not None
+    assert session.state.assessment.grade is Grade.PASS
+    assert session.says() == "session.done"
+
+
+@pytest.mark.parametrize("task", TASKS, ids=str)
+def test_the_simulated_hand_completes_each_task(
+    session: Session, task: AnyTask
+) -> None:
+    session.choose(task)
+    for _ in range(60):
+        if session.state.task(session.setup) is None:
+            break
+        state, options = session.state, session.setup.choices.options_of(task)
+        goal = task.hand(options, len(state.runs), len(state.touches))
+        if goal.point is None:
+            session.touch(Hold((0.0, 0.0, 0.0), goal.tilt, goal.direction))
+        else:
+            session.touch(Hold(tuple(goal.point.tolist()), 0.1))
+        session.see(session.holder.away())
+
+    found = session.state.found[task.kind]
+    assert found.assessment.grade is Grade.PASS
+    assert all(table.rows for table in task.tables(found, session.setup.conditions))
+
+
+def test_a_posture_that_was_taken_before_does_not_count(session: Session) -> None:
+    first, second, *_ = leant(4)
+    session.touch(first, second, first)
+
+    assert len(session.state.touches) == 2
+    assert session.says() == "session.same-posture"
+
+
+def test_one_end_touched_twice_does_not_count(session: Session) -> None:
+    session.choose(LENGTH)
+    session.touch(BAR[0])
+    session.see(session.holder.away())
+    session.touch(BAR[0])
+
+    assert len(session.state.touches) == 1
+    assert session.says() == "session.same-end"
+    session.touch(BAR[1])
+    assert LENGTH.kind in session.state.found
+
+
+def test_two_touches_of_no_such_length_do_not_end_the_task(session: Session) -> None:
+    session.choose(LENGTH)
+    session.touch(BAR[0], Hold((10.0, -20.0, 0.0)))
+    assert session.says() == "session.no-ends"
+    assert len(session.state.touches) == 1
+
+    session.touch(Hold((-140.0, -20.0, 0.0)))
+    assert LENGTH.kind in session.state.found
+
+
+def test_a_length_is_touched_at_each_of_its_places(session: Session) -> None:
+    session.choose(LENGTH, options=LengthOptions(length=SIMULATED_LENGTH, n_places=2))
+    session.touch(*BAR)
+    assert LENGTH.kind not in session.state.found
+    assert fraction_done(session.setup, session.state) == 0.5
+    session.touch(*(Hold((x, 10.0, 0.0)) for x in (-75.0, 75.0)))
+
+    assert LENGTH.kind in session.state.found
+    assert len(found_by(session.state, LENGTH).runs) == 2
+
+
+def test_a_pen_that_is_lifted_in_the_middle_of_a_touch_is_told_so(
+    session: Session,
+) -> None:
+    (first, *_) = leant(4)
+    session.see(session.holder.still(first, 5))
+    session.see(session.holder.away())
+
+    assert [event.what for event in session.events] == [ProbingEventKind.BROKEN_OFF]
+    assert session.says() == "session.broken-off"
+    assert not session.state.touches
+    session.touch(first)
+    assert len(session.state.touches) == 1
+    assert session.says() == "session.touch-cone"
+
+
+def test_a_pen_that_was_laid_down_is_no_touch_of_the_cone(session: Session) -> None:
+    table = Hold((60.0, -30.0, 0.0), direction=4.0)
+    session.touch(table, *leant(4)[:2])
+
+    assert session.says() == "session.elsewhere"
+    assert len(session.state.touches) == 2
+    session.touch(*leant(4)[2:])
+    assert FIXED_POINT.kind in session.state.found
+    assert found_by(session.state, FIXED_POINT).assessment.grade is Grade.PASS
+
+
+def test_leds_that_are_not_those_of_the_pen_are_told_and_not_counted(
+    session: Session,
+) -> None:
+    rng = np.random.default_rng(1)
+    pen = session.setup.instrument.pen
+    session.holder = Holder(
+        session.setup.instrument.rig,
+        replace(pen, leds=pen.leds + rng.normal(0, 2.0, pen.leds.shape)),
+    )
+    session.touch(leant(4)[0])
+
+    assert session.says() == "verification.leds-do-not-fit"
+    assert not session.state.touches
+
+
+def test_less_than_270_degrees_are_said_and_do_not_end_the_ring(
+    session: Session,
+) -> None:
+    session.choose(CIRCLE)
+    session.touch(*round_a_ring(12, 31.751, 250.0))
+    assert CIRCLE.kind not in session.state.found
+    assert session.says() == "session.touch-ring"
+
+    ended = end_task(session.setup, session.state)
+    assert ended.state.trouble is not None
+    assert ended.state.trouble.code == "circle.open"
+    assert ended.finished is None
+    assert len(ended.state.touches) == len(session.state.touches)
+
+
+def test_points_that_are_no_circle_are_told(session: Session) -> None:
+    session.choose(CIRCLE)
+    ring = round_a_ring(12, 31.751)
+    wide = [Hold((1.3 * x, y, z)) for x, y, z in (tuple(hold.place) for hold in ring)]
+    session.touch(*wide)
+
+    assert CIRCLE.kind not in session.state.found
+    assert session.says() == "circle.none"
+
+
+def test_a_task_ended_early_has_what_its_touches_give(session: Session) -> None:
+    session.touch(*leant(4)[:3])
+    ended = end_task(session.setup, session.state)
+
+    assert ended.finished is FIXED_POINT
+    assert FIXED_POINT.kind in ended.state.found
+    too_few = end_task(session.setup, SessionState())
+    assert too_few.state.trouble is not None
+    assert too_few.state.trouble.code == "fixed-point.too-few"
+
+
+def test_another_tip_than_the_one_in_force_is_named(session: Session) -> None:
+    session.choose(FIXED_POINT, options=FixedPointOptions(n_touches=6))
+    instrument = session.setup.instrument
+    bent = instrument.tip_pen + np.array([0.3, 0.0, 0.0])
+    session.holder = Holder(instrument.rig, instrument.pen, bent)
+    session.touch(*leant(6))
+
+    found = found_by(session.state, FIXED_POINT)
+    assert found is not None
+    assert found.assessment.grade is Grade.REPEAT
+    assert found.assessment.reason.code == "fixed-point.other-tip"
+    np.testing.assert_allclose(found.tip_change, [0.3, 0.0, 0.0], atol=0.02)
+
+
+def test_a_task_done_anew_forgets_what_it_found(session: Session) -> None:
+    session.touch(*leant(4), *round_a_ring(3, 31.751))
+    again = touched_anew(session.state, FIXED_POINT)
+
+    assert again.task(session.setup) is FIXED_POINT
+    assert again.touches == ()
+
+
+# Five postures of five touches
+
+
+@pytest.fixture
+def postures(session: Session) -> Session:
+    session.choose(ARTICULATION)
+    return session
+
+
+def test_a_posture_ends_with_its_fifth_touch_and_the_last_one_the_task(
+    postures: Session,
+) -> None:
+    for hold in [Hold(tilt=0.0), *leant(4)]:
+        for _ in range(5):
+            postures.touch(hold)
+            postures.see(postures.holder.away())
+
+    assert ARTICULATION.kind in postures.state.found
+    assert found_by(postures.state, ARTICULATION).assessment.is_accepted
+
+
+def test_a_posture_held_before_and_one_that_changes_do_not_count(
+    postures: Session,
+) -> None:
+    upright = Hold(tilt=0.0)
+    postures.touch(upright)
+    postures.see(postures.holder.away())
+    postures.touch(Hold(tilt=0.4))
+    assert postures.state.trouble is OTHER_POSTURE
+    assert len(postures.state.touches) == 1
+
+    for _ in range(5):
+        postures.see(postures.holder.away())
+        postures.touch(upright)
+    assert len(postures.state.runs) == 1
+    assert postures.state.trouble is ALIKE
+    assert not postures.state.touches
+
+
+def test_a_touch_above_the_cone_does_not_count_in_a_posture(postures: Session) -> None:
+    seated, lifted = Hold(tilt=0.0), Hold((0.0, -0.5, 0.0), tilt=0.0)
+    for hold in (seated, seated, lifted, seated, seated):
+        postures.touch(hold)
+        postures.see(postures.holder.away())
+
+    assert len(postures.state.touches) == 4
+
+
+# A cone that stands still, as witness that the camera does
+
+
+UPRIGHT = (Hold(tilt=0.0),) * 3
+
+
+@pytest.fixture
+def witnessed(session: Session) -> Session:
+    session.choose(FIXED_POINT, LENGTH, DRIFT)
+    return session
+
+
+def visit(session: Session, *holds: Hold) -> None:
+    """Touch the witness, lifting the tip in between."""
+    for hold in holds or UPRIGHT:
+        session.touch(hold)
+        session.see(session.holder.away())
+
+
+def test_a_witness_is_visited_before_between_and_after_the_tasks(
+    witnessed: Session,
+) -> None:
+    tasks = []
+    for holds in ((), leant(4), (), BAR, ()):
+        tasks.append(witnessed.state.task(witnessed.setup))
+        witnessed.touch(*holds) if holds else visit(witnessed)
+
+    assert tasks == [*(DRIFT, FIXED_POINT, DRIFT), *(LENGTH, DRIFT)]
+    drift = found_by(witnessed.state, DRIFT)
+    assert drift is not None
+    assert len(drift.names) == 3
+    assert drift.assessment.grade is Grade.PASS
+    assert witnessed.says() == "session.done"
+
+
+def test_a_camera_that_moved_between_visits_is_told_and_counts_in_what_was_touched(
+    witnessed: Session,
+) -> None:
+    moved = (0.06, 0.0, 0.0)
+    visit(witnessed)
+    witnessed.touch(*leant(4))
+    before = found_by(witnessed.state, FIXED_POINT)
+    visit(witnessed)
+    witnessed.touch(*BAR)
+    length = found_by(witnessed.state, LENGTH)
+    visit(witnessed, *(Hold(moved, tilt=0.0),) * 3)
+    state = witnessed.state
+
+    assert DRIFT.kind in state.found
+    assert found_by(state, DRIFT).assessment.reason.code == "drift.moved"
+    assert state.assessment is found_by(state, DRIFT).assessment
+    assert before is not None
+    assert FIXED_POINT.kind in state.found
+    assert np.allclose(
+        found_by(state, FIXED_POINT).uncertainty, before.uncertainty, atol=0.003
+    )
+    assert length is not None
+    assert LENGTH.kind in state.found
+    share = 2 * 0.06 / np.sqrt(3)  # k = 2, rectangular; but for the noise of a visit
+    assert (
+        found_by(state, LENGTH).uncertainties[0]
+        > 0.95 * share
+        > length.uncertainties[0]
+    )
+
+
+def test_a_witness_held_otherwise_or_missed_does_not_count(witnessed: Session) -> None:
+    visit(witnessed)
+    witnessed.touch(*leant(4))
+    visit(witnessed, UPRIGHT[0], Hold(tilt=0.4))
+    assert witnessed.says() == "session.other-than-first"
+    visit(witnessed, Hold((30.0, 0.0, 0.0), tilt=0.0))
+    assert witnessed.says() == "session.elsewhere"
+    assert len(witnessed.state.touches) == 1
+
+
+def test_a_first_touch_beside_the_cone_does_not_hold_the_witness_up(
+    witnessed: Session,
+) -> None:
+    visit(witnessed, Hold((30.0, 0.0, 0.0), tilt=0.0), *UPRIGHT)
+
+    assert witnessed.state.task(witnessed.setup) is FIXED_POINT
+
+
+def test_a_task_done_anew_is_witnessed_anew(witnessed: Session) -> None:
+    visit(witnessed)
+    witnessed.touch(*leant(4))
+    visit(witnessed)
+    witnessed.touch(*BAR)
+    visit(witnessed)
+    witnessed.state = touched_anew(witnessed.state, LENGTH)
+    witnessed.touch(*BAR)
+    assert witnessed.state.task(witnessed.setup) is DRIFT
+    visit(witnessed)
+
+    assert DRIFT.kind in witnessed.state.found
+    assert len(found_by(witnessed.state, DRIFT).names) == 4
+
+
+def test_a_witness_alone_is_visited_twice(session: Session) -> None:
+    session.choose(DRIFT)
+    visit(session)
+    assert DRIFT.kind not in session.state.found
+    visit(session)
+    assert DRIFT.kind in session.state.found

@@ -1,0 +1,269 @@
+"""Interrupted at any moment, a verification is offered, gone on with, or closed."""
+
+import pickle
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.accepted_tip import Hold, accept_tip, leant, round_a_ring
+from tests.verifying import BAR, CHOICES, NOON, TIMEOUT, Verifier
+
+from lightpen.archive.logbook import Logbook
+from lightpen.record.swings.reading import DISCARDED, open_record
+from lightpen.swing.preparation import Preparation
+from lightpen.verification.session.session_state import SessionState
+from lightpen.verification.storage.checkpoint import (
+    InterruptedVerification,
+    find_interrupted,
+)
+from lightpen.verification.storage.point_images import CONCLUDED
+from lightpen.verification.storage.resuming import abandon_interrupted
+from lightpen.verification.tasks.circle import CIRCLE
+from lightpen.verification.tasks.drift import DRIFT
+from lightpen.verification.tasks.fixed_point import FIXED_POINT
+from lightpen.verification.tasks.length import LENGTH
+
+ALL = replace(CHOICES, kinds=(*CHOICES.kinds, DRIFT.kind))
+UPRIGHT = (Hold(tilt=0.0),) * 3
+
+# Verifies until it is killed, at most one touch longer than said, and tells how many
+# touches count.
+PROGRAM = """
+import os, pickle, sys, time
+from itertools import islice
+from pathlib import Path
+from tests.verifying import Verifier
+from tests.core.verification.storage.test_resuming import ALL, acts
+
+folder = Path(sys.argv[1])
+verifier = Verifier(folder, pickle.loads(Path(sys.argv[2]).read_bytes()))
+verifier.come(ALL)
+for act in islice(acts(verifier), int(sys.argv[3]) + 1):
+    act()
+    os.write(1, b"touched\\n")
+    time.sleep(0.01)
+time.sleep(600)
+"""
+
+
+def acts(verifier: Verifier) -> Iterator[Callable[[], None]]:
+    """Yield what is done in a whole verification with a witness, touch by touch."""
+
+    def lifted(hold: Hold) -> None:
+        verifier.touch(hold)
+        verifier.see(verifier.holder.away())
+
+    visit = [lambda hold=hold: lifted(hold) for hold in UPRIGHT]
+    for holds in (leant(4), round_a_ring(11, 31.751)[:10], BAR):
+        yield from visit
+        yield from [lambda hold=hold: verifier.touch(hold) for hold in holds]
+    yield from visit
+
+
+N_ACTS = 4 * 3 + 4 + 10 + 2
+
+
+@pytest.fixture
+def in_force(tmp_path: Path, prepared: Preparation) -> Path:
+    """A data folder with a tip in force."""
+    accept_tip(tmp_path, prepared)
+    return tmp_path
+
+
+@pytest.fixture
+def verifying(
+    in_force: Path, prepared: Preparation
+) -> Iterator[Callable[[Path], Verifier]]:
+    """Return a function that makes who verifies in a data folder."""
+    all_of_them: list[Verifier] = []
+
+    def verifier_in(folder: Path = in_force) -> Verifier:
+        verifier = Verifier(folder, prepared)
+        verifier.runner.ask(lambda workflow: workflow.choose(prepared, ALL))
+        all_of_them.append(verifier)
+        return verifier
+
+    yield verifier_in
+    for each in all_of_them:
+        each.runner.shut_down()
+        assert each.runner.await_end(TIMEOUT)
+
+
+Verifying = Callable[..., Verifier]
+
+
+def interrupted_in(folder: Path) -> InterruptedVerification:
+    (found,) = find_interrupted(folder)
+    return found
+
+
+def go_on(verifier: Verifier) -> SessionState:
+    """Go on with what was interrupted, and return what is there then."""
+    interrupted = interrupted_in(verifier.folder)
+    verifier.runner.ask(lambda workflow: workflow.go_on(interrupted))
+    verifier.runner.ask(lambda workflow: workflow.come())
+    verifier.ear.wait_until(lambda: verifier.status.began is not None)
+    assert verifier.ear.faults == []
+    assert verifier.status.state is not None
+    return verifier.status.state
+
+
+def touched(state: SessionState) -> list[list[float]]:
+    """Return all points that are touched for what is not done yet."""
+    runs = (*state.visits, *state.runs, state.touches)
+    return [touch.point_cam.tolist() for run in runs for touch in run]
+
+
+def measured(state: SessionState) -> list[object]:
+    """Return what was found, as numbers."""
+    point, ring = state.found_by(FIXED_POINT), state.found_by(CIRCLE)
+    length = state.found_by(LENGTH)
+    return [
+        None if point is None else point.uncertainty.tolist(),
+        None if ring is None else (ring.radii.tolist(), ring.uncertainty),
+        None
+        if length is None
+        else (length.errors.tolist(), length.uncertainties.tolist()),
+        [each.task for each in state.pending],
+    ]
+
+
+def test_after_any_touch_a_verification_goes_on_as_it_was(
+    in_force: Path, tmp_path_factory: pytest.TempPathFactory, verifying: Verifying
+) -> None:
+    """A copy of the folder is what a kill would have left there."""
+    first, copies = verifying(), []
+    first.come(ALL)
+    for n, act in enumerate(acts(first), start=1):
+        act()
+        if n in (2, 5, 8, 12, 20, 25, N_ACTS - 1):
+            copy = tmp_path_factory.mktemp("killed") / "data"
+            shutil.copytree(in_force, copy)
+            copies.append((n, copy, first.status.state))
+    assert first.status.is_done
+    assert find_interrupted(in_force) == ()
+
+    for n, copy, before in copies:
+        second = verifying(copy)
+        state = go_on(second)
+        assert before is not None
+        assert touched(state) == touched(before)
+        assert measured(state) == measured(before)
+        if n in (12, N_ACTS - 1):
+            for act in list(acts(second))[n:]:
+                act()
+            assert second.status.is_done
+            (conclusion,) = second.conclusions
+            assert conclusion["outcome"] != "abandoned"
+            kinds = [each["verification"] for each in second.records]
+            assert sorted(kinds) == sorted(ALL.kinds)
+            assert len(conclusion["records"]) == len(kinds)
+            assert find_interrupted(copy) == ()
+            verdicts = {open_record(run).verdict for run in second.runs}
+            assert verdicts == {CONCLUDED}
+
+
+@pytest.mark.parametrize("n_touches", [1, 5])  # the first task ends with the seventh
+def test_killed_it_is_offered_and_keeps_every_touch(
+    in_force: Path, prepared: Preparation, verifying: Verifying, n_touches: int
+) -> None:
+    chosen = in_force / "prepared.pickle"
+    chosen.write_bytes(pickle.dumps(prepared))
+    words = [sys.executable, "-c", PROGRAM, str(in_force), str(chosen), str(n_touches)]
+    root = Path(__file__).parents[4]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, cwd=root) as process:
+        assert process.stdout is not None
+        for _ in range(n_touches):
+            assert process.stdout.readline()
+        assert find_interrupted(in_force) == ()  # it is under way there
+        process.kill()
+        n_touches += len(process.stdout.readlines())
+    state = go_on(verifying())
+
+    assert len(touched(state)) in (n_touches, n_touches + 1)  # one may not be told
+
+
+def test_a_touch_that_was_not_complete_does_not_count(
+    in_force: Path, verifying: Verifying, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    first = verifying()
+    first.come()
+    first.touch(*leant(4)[:2])
+    first.see(first.holder.still(leant(4)[2], 5))  # of which two may count
+    copy = tmp_path_factory.mktemp("killed") / "data"
+    shutil.copytree(in_force, copy)
+    second = verifying(copy)
+    assert len(go_on(second).touches) == 2
+
+    second.touch(*leant(4)[2:])
+    (point,) = second.records
+    (run,) = second.runs
+    assert len(point["touches"]) == 4
+    assert len(open_record(run).images) == 14
+    assert len(open_record(run).used_images) == 12
+
+
+def test_what_is_closed_is_an_abandoned_verification_in_the_archive(
+    in_force: Path, verifying: Verifying, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    first = verifying()
+    first.come()
+    first.touch(*leant(4), round_a_ring(11, 31.751)[0])
+    copy = tmp_path_factory.mktemp("killed") / "data"
+    shutil.copytree(in_force, copy)
+    second = verifying(copy)
+    abandon_interrupted(copy, interrupted_in(copy), NOON)
+
+    assert find_interrupted(copy) == ()
+    (conclusion,) = second.conclusions
+    assert conclusion["outcome"] == "abandoned"
+    assert (conclusion["operator"], conclusion["tip"]) == ("Ann", "T-10")
+    assert [each["file"] for each in conclusion["records"]] == ["000001.json"]
+    verdicts = [open_record(run).verdict for run in second.runs]
+    assert verdicts == [CONCLUDED, DISCARDED]
+    logbook = Logbook(copy)
+    with closing(logbook.database):
+        assert logbook.enter_owed() == ()
+
+
+def test_with_another_tip_in_force_it_cannot_be_gone_on_with(
+    in_force: Path,
+    prepared: Preparation,
+    verifying: Verifying,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    first = verifying()
+    first.come()
+    first.touch(leant(4)[0])
+    copy = tmp_path_factory.mktemp("killed") / "data"
+    shutil.copytree(in_force, copy)
+    accept_tip(copy, prepared, seed=4)
+    second = verifying(copy)
+    second.runner.ask(lambda workflow: workflow.go_on(interrupted_in(copy)))
+    second.ear.wait_until(lambda: second.ear.faults == ["under-way.other-tip"])
+
+    assert second.status.began is None
+    assert interrupted_in(copy).under_way is not None
+
+
+def test_a_damaged_file_is_told_and_put_aside(
+    in_force: Path, verifying: Verifying, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    first = verifying()
+    first.come()
+    first.touch(leant(4)[0])
+    copy = tmp_path_factory.mktemp("killed") / "data"
+    shutil.copytree(in_force, copy)
+    found = interrupted_in(copy)
+    found.path.write_bytes(found.path.read_bytes().replace(b"LP-04", b"LP-05"))
+    damaged = interrupted_in(copy)
+    assert damaged.trouble is not None
+    assert damaged.trouble.code == "under-way.damaged"
+    abandon_interrupted(copy, damaged, NOON)
+
+    assert find_interrupted(copy) == ()

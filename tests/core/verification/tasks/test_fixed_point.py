@@ -1,0 +1,137 @@
+"""Tests of `lightpen.verification.tasks.fixed_point`."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from lightpen.errors import CalibrationError
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.model.limits import VerificationLimits
+from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
+from lightpen.verification.tasks.fixed_point import measure_fixed_point
+from lightpen.verification.tasks.probed_point import ProbedPoint
+from lightpen.verification.tasks.task import Conditions
+
+Touching = Callable[..., tuple[ProbedPoint, ...]]
+NOMINAL_TIP = np.array([0.0, -90.0, -25.0])
+LIMITS = VerificationLimits()
+
+
+def test_a_right_tip_is_accepted(instrument: Instrument, touching: Touching) -> None:
+    touches = touching(np.tile(PAPER_CONE, (10, 1)))
+
+    found = measure_fixed_point(
+        [("", touches)],
+        Conditions(instrument, LIMITS, nominal_tip=NOMINAL_TIP, cone_cam=PAPER_CONE),
+    )
+
+    assert found.assessment.grade is Grade.PASS
+    assert not found.wants_other_tip
+    assert found.nominal is not None
+    # The nominal tip lies 1.8 mm off, and moves about the cone by as much.
+    assert found.nominal.deviation.max() > 0.3
+    assert found.calibrated.deviation.max() < 0.03
+    # Standard deviations of ten values scatter by a quarter.
+    np.testing.assert_allclose(
+        found.calibrated.deviation, found.expected_deviation, rtol=0.7
+    )
+
+
+def test_a_camera_that_moved_makes_a_fixed_point_less_certain(
+    instrument: Instrument, touching: Touching
+) -> None:
+    touches = touching(np.tile(PAPER_CONE, (4, 1)))
+
+    still, moved = (
+        measure_fixed_point(
+            [("", touches)], Conditions(instrument, LIMITS, drift=np.array(drift))
+        )
+        for drift in ([0.0, 0.0, 0.0], [0.01, 0.0, 0.02])
+    )
+
+    np.testing.assert_allclose(
+        moved.uncertainty, np.hypot(still.uncertainty, [0.02, 0.0, 0.04])
+    )
+
+
+def test_an_exchanged_tip_is_told_with_how_far_off_it_is(
+    instrument: Instrument, touching: Touching
+) -> None:
+    moved = np.array([0.3, 0.0, -0.2])
+    touches = touching(np.tile(PAPER_CONE, (10, 1)), tip_pen=PAPER_TIP + moved)
+
+    found = measure_fixed_point([("", touches)], Conditions(instrument, LIMITS))
+
+    assert found.assessment.grade is Grade.REPEAT
+    assert found.assessment.reason.code == "fixed-point.other-tip"
+    np.testing.assert_allclose(
+        found.tip_change, moved, atol=1.5 * found.tip_change_uncertainty.max()
+    )
+
+
+def test_a_cone_that_moves_is_not_blamed_on_the_tip(
+    instrument: Instrument, touching: Touching
+) -> None:
+    rng = np.random.default_rng(3)
+    points = PAPER_CONE + 0.05 * rng.standard_normal((10, 3))
+
+    found = measure_fixed_point(
+        [("", touching(points))], Conditions(instrument, LIMITS)
+    )
+
+    assert found.assessment.reason.code == "fixed-point.scatters"
+
+
+def test_a_pen_lifted_in_the_middle_is_left_out_and_named(
+    instrument: Instrument, touching: Touching
+) -> None:
+    points = np.tile(PAPER_CONE, (10, 1))
+    points[4] += [0.0, -12.0, 3.0]
+
+    found = measure_fixed_point(
+        [("", touching(points))], Conditions(instrument, LIMITS)
+    )
+
+    assert [touch.label for touch in found.left_out] == ["touch 5 image 1"]
+    assert found.assessment.grade is Grade.CHECK
+    assert "touch 5 image 1" in str(found.assessment.reason)
+
+
+def test_touches_in_one_posture_prove_nothing(
+    instrument: Instrument, touching: Touching
+) -> None:
+    touches = touching(np.tile(PAPER_CONE, (10, 1)))[:1] * 10
+
+    found = measure_fixed_point([("", touches)], Conditions(instrument, LIMITS))
+
+    assert found.assessment.reason.code == "fixed-point.same-posture"
+
+
+def test_two_touches_are_refused(instrument: Instrument, touching: Touching) -> None:
+    touches = touching(np.tile(PAPER_CONE, (2, 1)))
+
+    with pytest.raises(CalibrationError, match=r"2 usable points, at least 3"):
+        measure_fixed_point([("", touches)], Conditions(instrument, LIMITS))
+
+
+def test_the_limit_decides(instrument: Instrument, touching: Touching) -> None:
+    touches = touching(np.tile(PAPER_CONE, (10, 1)))
+    strict = VerificationLimits(across=1e-5, along=1e-5)
+
+    found = measure_fixed_point([("", touches)], Conditions(instrument, strict))
+
+    assert found.assessment.grade is Grade.REPEAT
+
+
+def test_touches_alike_are_expected_to_scatter_by_their_noise(
+    instrument: Instrument, touching: Touching
+) -> None:
+    touches = touching(np.tile(PAPER_CONE, (3, 1)))[:1] * 3
+
+    found = measure_fixed_point([("", touches)], Conditions(instrument, LIMITS))
+
+    # What all of them share moves none against another.
+    noise = np.sqrt(np.diag(touches[0].noise))
+    np.testing.assert_allclose(found.expected_deviation, noise, rtol=1e-6)

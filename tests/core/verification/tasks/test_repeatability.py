@@ -1,0 +1,182 @@
+"""Tests of `lightpen.verification.tasks.repeatability` and its control chart."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from lightpen.errors import CalibrationError, UsageError
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.model.limits import VerificationLimits
+from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
+from lightpen.verification.reports.charts import write_chart
+from lightpen.verification.reports.summaries import repeatability_text
+from lightpen.verification.tasks.repeatability import (
+    RepeatedPoint,
+    TipEstimate,
+    measure_repeatability,
+)
+
+LIMITS = VerificationLimits()
+# Table 1 of the paper, mm.
+TABLE_1 = np.array(
+    [
+        [-1.278, -90.429, -23.903],
+        [-1.329, -90.388, -23.754],
+        [-1.339, -90.401, -23.842],
+        [-1.304, -90.456, -23.844],
+        [-1.344, -90.397, -23.830],
+        [-1.353, -90.450, -23.887],
+        [-1.251, -90.431, -23.855],
+        [-1.343, -90.388, -23.866],
+        [-1.311, -90.383, -23.890],
+        [-1.330, -90.372, -23.877],
+    ]
+)
+TABLE_2_STD = np.array([0.007, 0.007, 0.022])
+
+
+def estimates(values: np.ndarray) -> list[TipEstimate]:
+    return [
+        TipEstimate(f"test {i + 1}", value, np.full(3, 0.004))
+        for i, value in enumerate(values)
+    ]
+
+
+def touched(
+    deviation: np.ndarray, expected: float = 0.004, n: int = 10
+) -> RepeatedPoint:
+    """A fixed point whose standard deviation is as given."""
+    rng = np.random.default_rng(0)
+    draws = rng.standard_normal((n, 3))
+    draws -= draws.mean(axis=0)
+    points = PAPER_CONE + deviation * draws / draws.std(axis=0, ddof=1)
+    return RepeatedPoint(points, np.full(3, expected), datetime(2026, 1, 2, tzinfo=UTC))
+
+
+def test_the_table_of_the_paper_is_reproduced() -> None:
+    found = measure_repeatability(estimates(TABLE_1), LIMITS)
+
+    np.testing.assert_allclose(
+        found.scatter.mean, [-1.3182, -90.4095, -23.8548], atol=5e-5
+    )
+    np.testing.assert_allclose(
+        found.scatter.deviation, [0.033, 0.030, 0.043], atol=1e-3
+    )
+    text = repeatability_text(found)
+    assert "  1 test 1                 -1.2780  -90.4290  -23.9030" in text
+    assert "Ave                        -1.3182  -90.4095  -23.8548" in text
+
+
+def test_a_tip_that_scatters_more_than_a_fixed_point_rode_with_the_pen() -> None:
+    found = measure_repeatability(
+        estimates(TABLE_1), LIMITS, touched=touched(TABLE_2_STD)
+    )
+
+    assert found.points_to is not None
+    assert found.points_to.code == "repeatability.rode-with-pen"
+    assert found.assessment.grade is Grade.REPEAT
+    loose = VerificationLimits(repeatability=0.1)
+    found = measure_repeatability(
+        estimates(TABLE_1), loose, touched=touched(TABLE_2_STD)
+    )
+    assert found.assessment.grade is Grade.CHECK
+    assert found.assessment.next_step.code == "repeatability.tighten"
+
+
+def test_a_fixed_point_that_scatters_more_than_the_tip_has_moved_itself() -> None:
+    steady = PAPER_TIP + 0.02 * (TABLE_1 - TABLE_1.mean(axis=0))
+
+    found = measure_repeatability(
+        estimates(steady), LIMITS, touched=touched(TABLE_2_STD)
+    )
+
+    assert found.points_to is not None
+    assert found.points_to.code == "repeatability.point-moved"
+    assert found.assessment.grade is Grade.CHECK
+
+
+def test_a_fixed_point_that_scatters_by_the_noise_of_its_touches_has_not_moved() -> (
+    None
+):
+    steady = PAPER_TIP + 0.02 * (TABLE_1 - TABLE_1.mean(axis=0))
+
+    found = measure_repeatability(
+        estimates(steady), LIMITS, touched=touched(TABLE_2_STD, expected=0.012)
+    )
+
+    assert found.points_to is None
+    assert found.assessment.grade is Grade.PASS
+
+
+def test_a_tip_beyond_its_limit_is_not_called_steady() -> None:
+    found = measure_repeatability(
+        estimates(TABLE_1), LIMITS, touched=touched(10 * TABLE_2_STD)
+    )
+
+    assert found.points_to is not None
+    assert found.points_to.code == "repeatability.point-moved"
+    assert found.assessment.reason.code == "repeatability.scatters"
+
+
+def test_scatters_that_agree_point_to_nothing() -> None:
+    steady = PAPER_TIP + 0.1 * (TABLE_1 - TABLE_1.mean(axis=0))
+
+    found = measure_repeatability(
+        estimates(steady), LIMITS, touched=touched(np.full(3, 0.004))
+    )
+
+    assert found.points_to is None
+    assert found.assessment.grade is Grade.PASS
+
+
+def test_capability_is_that_of_a_type_1_study() -> None:
+    rng = np.random.default_rng(1)
+    values = PAPER_TIP + 0.001 * rng.standard_normal((50, 3))
+
+    found = measure_repeatability(
+        estimates(values),
+        LIMITS,
+        tolerance=0.1,
+        reference=PAPER_TIP + np.array([0.004, 0, 0]),
+    )
+
+    study = found.capability
+    assert study is not None
+    assert study.cgk is not None
+    s, bias = values[:, 0].std(ddof=1), abs(values[:, 0].mean() - PAPER_TIP[0] - 0.004)
+    assert study.cg[0] == pytest.approx(0.2 * 0.1 / (6 * s))
+    assert study.cgk[0] == pytest.approx((0.1 * 0.1 - bias) / (3 * s))
+    assert study.is_capable
+
+
+def test_one_calibration_is_refused() -> None:
+    with pytest.raises(CalibrationError, match="does not show repeatability"):
+        measure_repeatability(estimates(TABLE_1[:1]), LIMITS)
+
+
+def test_a_tip_beyond_its_control_limits_is_named() -> None:
+    values = PAPER_TIP + 0.0001 * np.arange(20)[:, None] % 0.0002
+    values[12] += 0.01
+
+    found = measure_repeatability(estimates(values), LIMITS)
+
+    assert [tip.name for tip in found.out_of_control] == ["test 13"]
+
+
+def test_the_control_chart_is_a_table_or_a_picture(tmp_path: Path) -> None:
+    found = measure_repeatability(estimates(TABLE_1), LIMITS)
+
+    write_chart(found, tmp_path / "chart.csv")
+    write_chart(found, tmp_path / "chart.svg")
+
+    lines = (tmp_path / "chart.csv").read_text().splitlines()
+    assert len(lines) == 1 + 3 * len(TABLE_1)
+    assert lines[1].startswith('1,"test 1",x,-1.278000,')
+    root = ElementTree.parse(tmp_path / "chart.svg").getroot()
+    circles = [each for each in root if each.tag.endswith("circle")]
+    assert len(circles) == 3 * len(TABLE_1)
+    with pytest.raises(UsageError, match="does not end in"):
+        write_chart(found, tmp_path / "chart.png")

@@ -1,0 +1,269 @@
+"""What each verification task finds, records and shows is as before.
+
+That it is right is shown by the other tests; that nothing changes unnoticed, here.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.reference import assert_as_before, text_figures
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.model.limits import VerificationLimits
+from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
+from lightpen.verification.reports.charts import write_chart
+from lightpen.verification.reports.records import (
+    repeatability_entries,
+    verification_record,
+)
+from lightpen.verification.reports.summaries import found_text, repeatability_text
+from lightpen.verification.tasks.articulation import ArticulationOptions
+from lightpen.verification.tasks.circle import CircleOptions
+from lightpen.verification.tasks.drift import DriftOptions
+from lightpen.verification.tasks.fixed_point import FixedPointOptions
+from lightpen.verification.tasks.length import LengthOptions
+from lightpen.verification.tasks.plane import PlaneOptions
+from lightpen.verification.tasks.probed_point import ProbedPoint
+from lightpen.verification.tasks.registry import AnyTask, task_of
+from lightpen.verification.tasks.repeatability import (
+    STUDY,
+    TipEstimate,
+    measure_repeatability,
+)
+from lightpen.verification.tasks.task import (
+    Conditions,
+    ResultTable,
+    Surface,
+    TaskOptions,
+    TaskProgress,
+)
+
+Touching = Callable[..., tuple[ProbedPoint, ...]]
+Ring = Callable[..., FloatArray]
+Named = tuple[tuple[str, tuple[ProbedPoint, ...]], ...]
+
+ENDS = PAPER_CONE + np.array([[-75.0, 0.0, 0.0], [75.0, 4.0, 20.0]])
+DRIFT = np.array([0.004, 0.001, 0.006])
+
+
+def spread(points: FloatArray, seed: int, by: float = 0.01) -> FloatArray:
+    """Return points that are off by as much, mm."""
+    return points + by * np.random.default_rng(seed).standard_normal(points.shape)
+
+
+@pytest.fixture(scope="module")
+def runs(touching: Touching, ring: Ring) -> Mapping[str, tuple[TaskOptions, Named]]:
+    """What is touched in each task, and how it is chosen."""
+    cone, off = np.tile(PAPER_CONE, (8, 1)), PAPER_TIP + np.array([0.15, 0.0, -0.1])
+    lifted = cone.copy()
+    lifted[5] += [0.0, -9.0, 2.0]
+    plate = np.stack(np.meshgrid([-60.0, 0.0, 60.0], [-40.0, 0.0, 40.0]), axis=-1)
+    tilted = plate.reshape(-1, 2) @ [[1.0, 0.1, 0.0], [0.0, 0.9, 0.4]]
+    postures = [
+        (str(k), touching(np.tile(PAPER_CONE, (5, 1)), seed=k, tilt=0.1 + 0.1 * k))
+        for k in range(5)
+    ]
+    again = [tuple(replace(t, rotation=p[0].rotation) for t in p) for _, p in postures]
+    circles = [
+        (f"run {k}", touching(spread(ring(20 + k), k), seed=k, n_frames=1 + k))
+        for k in range(3)
+    ]
+    return {
+        "fixed point": (FixedPointOptions(), (("", touching(spread(cone, 1))),)),
+        "fixed point, lifted": (
+            FixedPointOptions(n_touches=8),
+            (("", touching(lifted, n_frames=3)),),
+        ),
+        "fixed point, another tip": (
+            FixedPointOptions(),
+            (("", touching(cone, tip_pen=off)),),
+        ),
+        "circle": (CircleOptions(31.75, 0.002, n_runs=3), tuple(circles)),
+        "circle, one run": (CircleOptions(31.7), tuple(circles[:1])),
+        "length": (
+            LengthOptions(151.5, 0.003, n_places=2),
+            (
+                ("here", touching(spread(np.repeat(ENDS, 3, axis=0), 2), n_frames=2)),
+                ("there", touching(spread(ENDS + np.array([0.0, 30.0, 60.0]), 3))),
+            ),
+        ),
+        "plane": (
+            PlaneOptions(0.004, 9),
+            (("", touching(spread(PAPER_CONE + tilted, 4), n_frames=2)),),
+        ),
+        "articulation": (
+            ArticulationOptions(),
+            tuple(zip("abcde", again, strict=True)),
+        ),
+        "drift": (
+            DriftOptions(),
+            tuple(
+                (name, touching(cone[:3] + k * DRIFT, seed=k, n_frames=4))
+                for k, name in enumerate(("before", "between", "after"))
+            ),
+        ),
+    }
+
+
+CASES = (
+    *("fixed point", "fixed point, lifted", "fixed point, another tip", "circle"),
+    *("circle, one run", "length", "plane", "articulation", "drift"),
+)
+
+
+@pytest.fixture(scope="module")
+def conditions(instrument: Instrument) -> Conditions:
+    return Conditions(
+        instrument,
+        ball_diameter=10.0,
+        nominal_tip=np.array([0.0, -90.0, -25.0]),
+        cone_cam=PAPER_CONE + np.array([0.002, 0.0, 0.001]),
+        drift=DRIFT,
+    )
+
+
+def shown(tables: tuple[ResultTable, ...]) -> list[dict[str, Any]]:
+    """Return tables as mappings of names, figures and codes."""
+    return [
+        {
+            "code": table.title.code,
+            "columns": len(table.columns),
+            "rows": [
+                {"values": [v for v in row.values if not isinstance(v, str)]}
+                for row in table.rows
+            ],
+        }
+        for table in tables
+    ]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_a_task_finds_is_as_before(
+    case: str, runs: Mapping[str, tuple[TaskOptions, Named]], conditions: Conditions
+) -> None:
+    options, named = runs[case]
+    task = task_of(case.partition(",")[0])
+    found = task.measure(named, conditions, options)
+    limits = VerificationLimits()
+    record = verification_record(
+        *(task.kind, task.entries(found, conditions.instrument), found.assessment),
+        *({name: getattr(limits, name) for name in task.limits}, {}),
+    )
+    del record["program"], record["created"]
+
+    assert_as_before(
+        f"verification-{case.replace(', ', '-').replace(' ', '-')}",
+        {
+            "record": record,
+            "tables": shown(task.tables(found, conditions)),
+            "text": text_figures(
+                found_text(task.tables(found, conditions), found.assessment, ())
+            ),
+        },
+    )
+
+
+def step_of(
+    task: AnyTask, options: TaskOptions, progress: TaskProgress, conditions: Conditions
+) -> dict[str, Any]:
+    """Return what is said and counted after some points."""
+    said = [
+        task.counted(options, progress),
+        task.instruction(options, progress),
+        *(task.headline(progress, is_next=is_next) for is_next in (False, True)),
+    ]
+    step = {"done": task.done(options, progress)}
+    if not progress.points:
+        return step | {"said": [{"code": each.code} for each in said]}
+    screened = task.screen(options, conditions, progress)
+    if screened.trouble is not None:
+        said.append(screened.trouble)
+    return step | {
+        "said": [{"code": each.code} for each in said],
+        "kept": list(screened.kept),
+        "figures": shown(task.figures_so_far(progress, conditions)),
+    }
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_how_a_task_goes_on_is_as_before(
+    case: str, runs: Mapping[str, tuple[TaskOptions, Named]], conditions: Conditions
+) -> None:
+    options, named = runs[case]
+    task = task_of(case.partition(",")[0])
+    steps: list[dict[str, Any]] = []
+    for i, (_, points) in enumerate(named):
+        for n in range(len(points) + 1):
+            progress = TaskProgress(
+                points[:n], tuple(each for _, each in named[:i]), n_runs=len(named)
+            )
+            steps.append(step_of(task, options, progress, conditions))
+    goals = [task.hand(options, i, k) for i in range(2) for k in range(6)]
+    about = {
+        "hand": [[g.point, g.tilt, g.direction] for g in goals],
+        "newness": task.newness(options),
+        "needed": [task.n_points(options), task.n_runs(options)],
+    }
+
+    name = case.replace(", ", "-").replace(" ", "-")
+    assert_as_before(f"course-{name}", {"steps": steps, **about})
+
+
+def test_how_well_tips_repeat_is_as_before(tmp_path: Path) -> None:
+    rng = np.random.default_rng(11)
+    tips = [
+        TipEstimate(f"{i}", tip, np.array([0.003, 0.004, 0.006]))
+        for i, tip in enumerate(PAPER_TIP + 0.003 * rng.standard_normal((12, 3)))
+    ]
+    found = measure_repeatability(
+        *(tips, VerificationLimits()), tolerance=0.05, reference=PAPER_TIP
+    )
+
+    charts = []
+    for name in ("chart.svg", "chart.csv"):
+        write_chart(found, tmp_path / name)
+        charts.append(text_figures((tmp_path / name).read_text(encoding="utf-8")))
+    few = measure_repeatability(tips[:3], VerificationLimits())
+    for n_tips in (STUDY - 1, STUDY):
+        many = measure_repeatability(
+            (3 * tips)[:n_tips], VerificationLimits(), tolerance=0.05
+        )
+        is_short = f"a study takes {STUDY}" in repeatability_text(many)
+        assert is_short == (n_tips < STUDY)
+
+    assert_as_before(
+        "repeatability",
+        {
+            **repeatability_entries(found),
+            "charts": charts,
+            "texts": [text_figures(repeatability_text(each)) for each in (found, few)],
+        },
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "ball", "code"),
+    [
+        (CircleOptions(), 10.0, "verification.no-radius"),
+        (CircleOptions(20.0), None, None),
+        (CircleOptions(20.0, surface=Surface.BORE), None, "verification.no-ball"),
+        (CircleOptions(20.0, surface=Surface.BOSS), 10.0, None),
+        (LengthOptions(), 10.0, "verification.no-length"),
+        (LengthOptions(100.0), None, None),
+        (LengthOptions(100.0, surface=Surface.BOSS), None, "verification.no-ball"),
+        (LengthOptions(100.0, surface=Surface.BORE), 10.0, None),
+        (FixedPointOptions(), None, None),
+    ],
+)
+def test_what_has_to_be_entered_before_is_named(
+    options: TaskOptions, ball: float | None, code: str | None
+) -> None:
+    kind = str(type(options).__struct_config__.tag)
+    missing = task_of(kind).missing(options, ball)
+
+    assert (None if missing is None else missing.code) == code

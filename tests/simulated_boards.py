@@ -1,0 +1,229 @@
+"""Images of calibration boards, and where an operator holds them."""
+
+from functools import lru_cache
+
+import cv2
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
+from lightpen.intrinsics.boards import Board, BoardKind, marker_dictionary
+from lightpen.intrinsics.start import BoardPoses
+from lightpen.model.camera import Camera
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.sensor import Sensor
+
+SAMPLES = 3  # per pixel and axis; blurred before they are taken together
+RIM = 1.0  # of a square, white round the board
+WHITE, BLACK, BEHIND = 0.72, 0.05, 0.01  # of full scale
+MAX_TILT = np.radians(35.0)
+FILLED = (0.5, 0.8)  # of the image's shorter side, by the longer side of the board
+ROLLS = np.radians([-90.0, -15.0, 0.0, 10.0, 90.0])
+OUTER_RIM = 2.0  # squares or distances beyond the points, which stay in the image, too
+MAX_TRIES = 100
+
+
+def render_board(
+    camera: Camera,
+    board: Board,
+    rotation: FloatArray,
+    translation: FloatArray,
+    blur: float = 0.8,
+    bend: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> FloatArray:
+    """Return the light of a board on the sensor, (H, W), fraction of full scale.
+
+    Parameters
+    ----------
+    rotation, translation : (3, 3) and (3,) array
+        Of cam_from_board, mm.
+    blur : float
+        Standard deviation of the optics' blur, px.
+    bend : tuple of float
+        By how much its corners lie away from the camera along x^2, xy and y^2, mm.
+    """
+    directions = _directions(camera)
+    light = _light(board, _on_board(board, directions, rotation, translation, bend))
+    sigma = blur * SAMPLES
+    blurred = cv2.GaussianBlur(light, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)
+    size = (camera.width, camera.height)
+    return np.asarray(cv2.resize(blurred, size, interpolation=cv2.INTER_AREA))
+
+
+def expose_board(light: FloatArray, sensor: Sensor, rng: np.random.Generator) -> Image:
+    """Return the image that a sensor reads of the light of a board."""
+    charge = light * sensor.full_well
+    noise = np.sqrt(charge + sensor.read_noise**2) * rng.standard_normal(light.shape)
+    read = np.round((charge + noise + sensor.offset) / sensor.electrons_per_dn)
+    kind = np.uint8 if sensor.bits == 8 else np.uint16
+    return np.asarray(np.clip(read, 0, sensor.full_scale).astype(kind))
+
+
+@lru_cache(maxsize=2)
+def _directions(camera: Camera) -> FloatArray:
+    """Return where each sample looks, (S H, S W, 3); a camera is asked many times."""
+    x, y = (
+        (np.arange(SAMPLES * side) + 0.5) / SAMPLES - 0.5
+        for side in (camera.width, camera.height)
+    )
+    pixels = np.stack(np.meshgrid(x, y), axis=-1)
+    normalised = camera.unproject(pixels)
+    return np.concatenate([normalised, np.ones((*normalised.shape[:-1], 1))], axis=-1)
+
+
+def _on_board(
+    board: Board,
+    directions: FloatArray,
+    rotation: FloatArray,
+    translation: FloatArray,
+    bend: tuple[float, float, float],
+) -> FloatArray:
+    """Return where the samples meet the board, (..., 2), mm."""
+    rays = directions @ rotation
+    eye = -rotation.T @ translation
+    half = np.abs(board.points[:, :2]).max(axis=0)
+    height: FloatArray | float = 0.0
+    for _ in range(4 if any(bend) else 1):  # a bend moves the place by little
+        depth = (height - eye[2]) / rays[..., 2]
+        places = eye[:2] + depth[..., None] * rays[..., :2]
+        u, v = places[..., 0] / half[0], places[..., 1] / half[1]
+        height = bend[0] * u * u + bend[1] * u * v + bend[2] * v * v
+    return np.asarray(places)
+
+
+def _light(board: Board, places: FloatArray) -> FloatArray:
+    """Return the brightness of the board at places on it."""
+    if board.kind.is_circles:
+        return _circles_light(board, places)
+    is_squares = board.kind is not BoardKind.MARKERS
+    extra = 0 if board.kind.has_markers else 1
+    columns, rows = board.columns + extra, board.rows + extra
+    step = board.pitch if is_squares else board.pitch + board.detail
+    width = columns * step - (0 if is_squares else board.detail)
+    height = rows * step - (0 if is_squares else board.detail)
+    x, y = places[..., 0] + 0.5 * width, places[..., 1] + 0.5 * height
+    rim = RIM * board.pitch
+    on_sheet = (x > -rim) & (x < width + rim) & (y > -rim) & (y < height + rim)
+    column, row = np.floor(x / step).astype(int), np.floor(y / step).astype(int)
+    on_board = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    first = int(board.kind is BoardKind.LEGACY_CHARUCO and rows % 2 == 0)
+    white = np.ones(x.shape)
+    if is_squares:
+        squares = _squares(x / step, y / step, first)
+        edge = np.minimum(
+            _soft(np.minimum(x, width - x)), _soft(np.minimum(y, height - y))
+        )
+        white = 1 - edge * (1 - squares)
+    if board.kind.has_markers:
+        marked = on_board & ((row + column) % 2 != first if is_squares else True)
+        side = board.detail if is_squares else board.pitch
+        gap = 0.5 * (board.pitch - board.detail) if is_squares else 0.0
+        numbers = (
+            _numbers(columns, rows, first)
+            if is_squares
+            else np.arange(columns * rows).reshape(rows, columns)
+        )
+        white[marked] *= _markers_white(
+            board,
+            numbers[row[marked], column[marked]],
+            (x[marked] - column[marked] * step - gap) / side,
+            (y[marked] - row[marked] * step - gap) / side,
+        )
+    return np.asarray(np.where(on_sheet, BLACK + (WHITE - BLACK) * white, BEHIND))
+
+
+def _soft(depth: FloatArray) -> FloatArray:
+    """Return the share of each sample that lies within, by how deep it does.
+
+    Without it an edge along the rows of the samples would jump from one to the next.
+    """
+    down, across = np.gradient(depth)
+    width = np.maximum(np.hypot(down, across), 1e-12)
+    return np.asarray(np.clip(0.5 + depth / width, 0, 1))
+
+
+def _squares(x: FloatArray, y: FloatArray, first: int) -> FloatArray:
+    """Return how white the squares of a chessboard are, 0 to 1, of side 1."""
+    across, down = (2 * _soft(_wave(each)) - 1 for each in (x, y))
+    sign = 1 if first == 1 else -1
+    return np.asarray(0.5 + 0.5 * sign * across * down)
+
+
+def _wave(x: FloatArray) -> FloatArray:
+    """Return the distance from the nearest whole number, by turns above and below 0."""
+    nearest = np.round(x)
+    return np.asarray((x - nearest) * np.where(nearest % 2 == 0, 1, -1))
+
+
+def _numbers(columns: int, rows: int, first: int) -> IntArray:
+    """Return the numbers of the markers in white squares, row by row."""
+    row, column = np.mgrid[:rows, :columns]
+    white = (row + column) % 2 != first
+    return np.asarray(np.where(white, np.cumsum(white).reshape(white.shape) - 1, 0))
+
+
+def _markers_white(
+    board: Board, numbers: IntArray, u: FloatArray, v: FloatArray
+) -> BoolArray:
+    """Tell what is white at places within markers, 0 to 1 along their sides."""
+    dictionary = marker_dictionary(board)
+    n_cells = dictionary.markerSize + 2
+    cells = np.stack(
+        [
+            np.asarray(dictionary.generateImageMarker(number, n_cells)) > 127
+            for number in range(int(numbers.max()) + 1)
+        ]
+    )
+    inside = (u >= 0) & (u < 1) & (v >= 0) & (v < 1)
+    row = np.clip((v * n_cells).astype(int), 0, n_cells - 1)
+    column = np.clip((u * n_cells).astype(int), 0, n_cells - 1)
+    return np.asarray(np.where(inside, cells[numbers, row, column], True))
+
+
+def _circles_light(board: Board, places: FloatArray) -> FloatArray:
+    points = board.points[:, :2]
+    radius = 0.5 * board.detail
+    half = np.abs(points).max(axis=0) + board.pitch
+    on_sheet = (np.abs(places) < half).all(axis=-1)
+    away = places - points.min(axis=0)
+    if board.kind is BoardKind.ASYMMETRIC_CIRCLES:
+        twice, n_odd = 2 * board.pitch, board.rows // 2
+        distance = np.minimum(
+            _from_circles(away, twice, board.columns, board.rows - n_odd),
+            _from_circles(away - board.pitch, twice, board.columns, n_odd),
+        )
+    else:
+        distance = _from_circles(away, board.pitch, board.columns, board.rows)
+    black = _soft(radius - distance)
+    return np.asarray(np.where(on_sheet, WHITE + (BLACK - WHITE) * black, BEHIND))
+
+
+def _from_circles(away: FloatArray, step: float, columns: int, rows: int) -> FloatArray:
+    """Return how far places are from the nearest middle of a grid's circles."""
+    most = np.array([columns, rows]) - 1
+    nearest = np.clip(np.round(away / step), 0, most)
+    return np.asarray(np.linalg.norm(away - step * nearest, axis=-1))
+
+
+def simulate_board_poses(
+    camera: Camera, board: Board, n_views: int, rng: np.random.Generator
+) -> BoardPoses:
+    """Return poses in which the whole board is seen, its rim included."""
+    size = np.array(camera.image_size)
+    longer = 2 * float(np.abs(board.points[:, :2]).max())
+    sheet = board.outline + OUTER_RIM * board.pitch * np.sign(board.outline)
+    rotations: list[FloatArray] = []
+    translations: list[FloatArray] = []
+    for _ in range(MAX_TRIES * n_views):
+        if len(rotations) == n_views:
+            break
+        tilt = np.append(rng.uniform(-MAX_TILT, MAX_TILT, 2), 0.0)
+        roll = np.array([0.0, 0.0, rng.choice(ROLLS)])
+        R = rotation_from_vector(tilt) @ rotation_from_vector(roll)
+        depth = camera.fx * longer / (rng.uniform(*FILLED) * size.min())
+        place = camera.unproject(rng.uniform(0.2, 0.8, 2) * size)
+        t = depth * np.append(place, 1.0)
+        pixels = camera.project(sheet @ R.T + t) / size
+        if np.all((pixels > 0) & (pixels < 1)):
+            rotations.append(R)
+            translations.append(t)
+    return BoardPoses(np.array(rotations), np.array(translations))

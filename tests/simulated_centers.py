@@ -1,0 +1,109 @@
+"""Centres of LEDs as tests and benchmarks need them: noise, several cameras, faults."""
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig
+from lightpen.simulator.swings import Swing, seen_from, simulate_centers
+
+
+def correlated_noise(
+    n_frames: int, correlation: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return noise (F, 3) of unit variance that hangs together from frame to frame.
+
+    Parameters
+    ----------
+    correlation : float
+        Of neighbouring frames; that of others falls off by its powers.
+    """
+    noise = rng.standard_normal((n_frames, 3))
+    fresh = np.sqrt(1 - correlation**2)
+    for i in range(1, n_frames):
+        noise[i] = correlation * noise[i - 1] + fresh * noise[i]
+    return noise
+
+
+def simulate_rig_centers(
+    rig: Rig, pen: Pen, swing: Swing, sigma: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return measured centres of the LEDs in the images of several cameras.
+
+    Parameters
+    ----------
+    swing : Swing
+        In the frame that the rig is given from, F frames.
+    sigma : float
+        As for `simulate_centers`.
+
+    Returns
+    -------
+    (F, C, L, 2) array
+        px; NaN where missing.
+    """
+    views = []
+    stands = zip(rig.cameras, rig.rotations, rig.translations, strict=True)
+    for camera, R, t in stands:
+        there = seen_from(swing, R, t)
+        poses = there.rotations, there.translations
+        views.append(simulate_centers(camera, pen, *poses, sigma, rng))
+    return np.stack(views, axis=1)
+
+
+def drop_centers(
+    centers: FloatArray, n_missing: int, rng: np.random.Generator
+) -> FloatArray:
+    """Return centres with ``n_missing`` random LEDs missing (NaN) in every frame.
+
+    Parameters
+    ----------
+    centers : (F, L, 2) array
+        px.
+    """
+    order = np.argsort(rng.random(centers.shape[:-1]), axis=-1)
+    return np.where((order < n_missing)[..., None], np.nan, centers)
+
+
+def displace_centers(
+    centers: FloatArray, fraction: float, distance: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return centres with one LED displaced in a fraction of the frames.
+
+    Parameters
+    ----------
+    centers : (F, L, 2) array
+        px.
+    fraction : float
+        Of the frames, 0 to 1.
+    distance : float
+        Of the displaced LED from where it was, px, in a random direction.
+    """
+    n_frames, n_leds, _ = centers.shape
+    hit = rng.permutation(n_frames)[: round(fraction * n_frames)]
+    angles = rng.uniform(0, 2 * np.pi, len(hit))
+    displaced = centers.copy()
+    displaced[hit, rng.integers(n_leds, size=len(hit))] += distance * np.stack(
+        [np.cos(angles), np.sin(angles)], axis=-1
+    )
+    return displaced
+
+
+def swap_centers(
+    centers: FloatArray, fraction: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return centres with two LEDs exchanged in a fraction of the frames.
+
+    Parameters
+    ----------
+    centers : (F, L, 2) array
+        px.
+    fraction : float
+        Of the frames, 0 to 1.
+    """
+    n_frames, n_leds, _ = centers.shape
+    swapped = centers.copy()
+    for frame in rng.permutation(n_frames)[: round(fraction * n_frames)]:
+        pair = rng.permutation(n_leds)[:2]
+        swapped[frame, pair] = centers[frame, pair[::-1]]
+    return swapped

@@ -1,0 +1,32 @@
+"""Images of an operator's endless swing, at any time."""
+
+import numpy as np
+
+from lightpen.model.rigid import vector_from_rotation
+from lightpen.simulator.image_plans import ImagePlan, plan_in_motion
+from lightpen.simulator.postures import operator_postures
+from lightpen.simulator.scenes import Scene
+
+
+def live_plan(
+    scene: Scene, index: int, time: float, exposure_time: float = 0.004
+) -> ImagePlan:
+    """Return what a camera sees of an operator's endless swing.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its disturbances are left out.
+    index : int
+        Number of the image, which chooses its noise.
+    time : float
+        Of mid-exposure, seconds.
+    exposure_time : float
+        Seconds; the pen moves meanwhile.
+    """
+    ends = time + exposure_time * np.array([-0.5, 0.0, 0.5])
+    postures = operator_postures(ends, scene.seed)
+    first, middle, last = postures.rotations
+    turn = vector_from_rotation(last @ first.T)
+    translation = scene.cone_cam - middle @ scene.tip_pen
+    return plan_in_motion(scene, index, middle, translation, turn)

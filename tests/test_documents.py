@@ -1,0 +1,44 @@
+"""The documents lead where they say, and name every command."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from lightpen.cli import COMMANDS
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted(
+    path
+    for pattern in ("*.md", "docs/*.md", "installer/*.md", "resources/**/*.md")
+    for path in ROOT.glob(pattern)
+)
+HELP = ROOT / "resources" / "lightpen_resources" / "help"
+LINK = re.compile(r"\]\((?!https?:)([^)#\s]*)(?:#([^)\s]*))?\)")
+
+
+def anchors(page: Path) -> set[str]:
+    """Return the anchors of the headings of a page, as GitHub makes them."""
+    headings = re.findall(r"^#+ +(.*)$", page.read_text("utf-8"), flags=re.MULTILINE)
+    plain = (re.sub(r"[^\w\- ]", "", heading.lower()) for heading in headings)
+    return {heading.replace(" ", "-") for heading in plain}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_link_leads_to_a_file_and_to_a_heading(page: Path) -> None:
+    for place, anchor in LINK.findall(page.read_text("utf-8")):
+        linked = page.parent / place if place else page
+        if page.parent.parent == HELP and not linked.exists():
+            linked = HELP / "en" / place  # as the help window does
+        assert linked.exists(), place
+        if anchor:
+            assert anchor in anchors(linked), f"{place}#{anchor}"
+
+
+@pytest.mark.parametrize(
+    "name", [*(name for name, *_ in COMMANDS), "archive", "tips", "open", "report"]
+)
+def test_every_command_is_on_the_page_of_commands(name: str) -> None:
+    page = (ROOT / "docs" / "command-line.md").read_text("utf-8")
+
+    assert f"`lightpen {name} " in page
