@@ -47,7 +47,7 @@ def assert_as_before(name: str, found: Any) -> None:
         for path, now in kept.items()
         if not _are_alike(before[path], now)
     }
-    assert not changed
+    assert not changed, changed
 
 
 def text_figures(text: str) -> dict[str, list[float]]:

@@ -80,7 +80,7 @@ def test_less_than_three_quarters_of_a_ring_are_refused(
 @pytest.mark.parametrize("middle", [0, 90, 180, 270])
 def test_a_gap_counts_wherever_in_the_ring_it_is(ring: Ring, middle: int) -> None:
     degrees = np.degrees(fit_circle(ring(72)).angles) - middle
-    open_here = ring(72)[np.abs((degrees + 180) % 360 - 180) > 60]
+    open_here = ring(72)[np.abs((degrees + 180) % 360 - 180) > 57.5]
 
     assert fit_circle(open_here).covered == pytest.approx(240, abs=6)
 
