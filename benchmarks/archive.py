@@ -12,17 +12,15 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.hostile_records import NAMES, make_data
+from benchmarks.hostile_records import make_data
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
-from benchmarks.small_records import with_images
 
 from lightpen.archive.chains import append, copy_entries, own_chain
 from lightpen.archive.check import check_archive
@@ -172,11 +170,7 @@ def _data_files(folder: Path) -> list[Path]:
     """Enter a result and its swing, and return all files that are vouched for."""
     data = make_data(folder)
     swing = open_record(data.swing)
-    images = [{"file": each.file.name, "sha256": each.sha256} for each in swing.images]
     results = FolderArchive(folder)
-    result = results.in_force(NAMES.pen, NAMES.tip)
-    assert result is not None
-    results.store(replace(result, calibration=with_images(images)))
     with closing(Logbook(folder)) as logbook:
         logbook.enter_owed()
     archive = folder / ARCHIVE

@@ -152,8 +152,3 @@ def entries_of(record: CalibrationRecord) -> dict[str, Any]:
     """Return a record as JSON has it."""
     entries: dict[str, Any] = json.loads(json_bytes(record))
     return entries
-
-
-def with_images(images: list[dict[str, str]]) -> CalibrationRecord:
-    """Return a record that names these images, each with its hash."""
-    return small_record({"inputs": {**SMALL["inputs"], "observations": images}})

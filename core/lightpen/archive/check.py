@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy import Row, exists, select, text
 
-from lightpen.archive.chains import chain_at_home, heads, records_of, sound_entry
+from lightpen.archive.chains import chain_at_home, heads, sound_entry
 from lightpen.archive.database import Database, is_open, look_into
 from lightpen.archive.entries import (
     NOTHING_BEFORE,
@@ -175,7 +175,7 @@ def _walked(
                 sound.append(entry)
             number, previous = row.number, row.sha256
         if files is not None:
-            yield from files.findings(sound, records_of(database, sound))
+            yield from files.findings(sound)
         report(min(1.0, number / max(1, head.number)))
     if number < head.number:
         yield _missing(head.chain, number + 1, head.number)

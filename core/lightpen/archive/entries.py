@@ -105,9 +105,10 @@ class Event(Struct, frozen=True):
         The file that put a tip in force, or took it back; of what is no swing, the
         file that tells of it.
     files : tuple of FileHash
-        The record of the swing, without its images; of the library a picture.
+        The record of the swing, whose journal names the images with their hashes; of
+        a verification the journals of its touches; of the library a picture.
     record_sha256 : str or None
-        Of the record as JSON, which names the images with their hashes.
+        Of the record as JSON.
     concerns : str or None
         Hash of the entry that it restores, takes back, or is a note on.
     """

@@ -1,12 +1,10 @@
 """What happened, told by the files of a data folder: results, swings, the library."""
 
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 from msgspec.structs import replace
 
@@ -28,7 +26,7 @@ from lightpen.record.library.tip_library import (
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.results.result_folder import LIMIT, WHAT, FolderArchive
 from lightpen.record.results.results import Result
-from lightpen.record.swings.header import HEADER, copy_name
+from lightpen.record.swings.header import HEADER, header_copies
 from lightpen.record.swings.journal import JOURNAL, journal_bytes
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import (
@@ -48,8 +46,7 @@ class ExtractedEvent:
     Attributes
     ----------
     record : str or None
-        The record of the calibration as JSON; of a swing without a tip what names its
-        images with their hashes. The event has its hash.
+        The record of the calibration as JSON; the event has its hash.
     takes_back : str
         File of the result that is taken back, as `FileHash.place`; else empty.
     """
@@ -118,16 +115,7 @@ def account_of_abandoned(
     results: FolderArchive, record: Record, at: datetime
 ) -> ExtractedEvent:
     """Return what a swing says that was left without a tip."""
-    event = _event_of_swing(results, record, Kind.ABANDONED, at)
-    _, _, camera, pen = event.files
-    inputs = {
-        "camera": {"file": Path(camera.place).name, "sha256": camera.sha256},
-        "pen": {"file": Path(pen.place).name, "sha256": pen.sha256},
-        "observations": [
-            {"file": image.file.name, "sha256": image.sha256} for image in record.images
-        ],
-    }
-    return _with_record(event, {"inputs": inputs})
+    return ExtractedEvent(_event_of_swing(results, record, Kind.ABANDONED, at))
 
 
 def account_of_unreadable(
@@ -214,26 +202,20 @@ def _event_of_swing(
 
 
 def _files_of(results: FolderArchive, record: Record) -> tuple[FileHash, ...]:
-    """Return header, journal and the copies of camera and pen file.
+    """Return header, journal and the copies of the files of cameras, rig and pen.
 
-    Of the journal no more than was read: lines are added to it.
+    Of the journal no more than was read: lines are added to it. It names the images.
     """
-    header, folder = record.header, record.folder
+    folder = record.folder
     digest = sha256(journal_bytes(folder)[: record.length]).hexdigest()
-    whole = [
-        FileHash(results.place_of(path), file_sha256(path))
-        for path in (
-            folder / HEADER,
-            folder / copy_name("camera", header.camera_file),
-            folder / copy_name("pen", header.pen_file),
-        )
-    ]
     read = FileHash(results.place_of(folder / JOURNAL), digest, record.length)
-    return (whole[0], read, *whole[1:])
+    header, *copies = (
+        FileHash(results.place_of(folder / name), file_sha256(folder / name))
+        for name in (HEADER, *header_copies(record.header))
+    )
+    return (header, read, *copies)
 
 
-def _with_record(
-    event: Event, record: Mapping[str, Any] | CalibrationRecord
-) -> ExtractedEvent:
+def _with_record(event: Event, record: CalibrationRecord) -> ExtractedEvent:
     text = json_bytes(record).decode()
     return ExtractedEvent(replace(event, record_sha256=text_sha256(text)), text)

@@ -1,32 +1,26 @@
-"""Whether the results, swings and images that entries vouch for are as they were."""
+"""Whether the results, swings and images that entries vouch for are as they were.
 
-from collections.abc import Iterable, Iterator, Mapping
+An entry has the hash of the journal of its swing as far as it went then, and each line
+of that the hashes of the images of all cameras: so the entry vouches for every image.
+"""
+
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
-from msgspec import Struct
-
 from lightpen.archive.entries import Entry, FileHash, StoredEntry
 from lightpen.errors import FileError
 from lightpen.formats.files import A_FILE, printable, unreadable
-from lightpen.formats.own_json import DamagedError, parse_own_json
 from lightpen.messages import Message, message
-from lightpen.record.swings.reading import IMAGES, open_record
-
-
-class _Image(Struct):
-    file: str
-    sha256: str
-
-
-class _Inputs(Struct, frozen=True):
-    observations: tuple[_Image, ...] = ()
-
-
-class _Record(Struct):
-    inputs: _Inputs = _Inputs()
+from lightpen.record.swings.journal import (
+    JOURNAL,
+    ImageLine,
+    journal_bytes,
+    parse_lines,
+)
+from lightpen.record.swings.reading import image_name, open_record
 
 
 class FilesCheck:
@@ -49,32 +43,21 @@ class FilesCheck:
         self._swings = set[str]()
         self.n_files = 0
 
-    def findings(
-        self, entries: Iterable[StoredEntry], records: Mapping[str, str]
-    ) -> Iterator[Message]:
-        """Yield what is not right with the files of entries.
-
-        Parameters
-        ----------
-        records : mapping of str to str
-            Of the entries, as JSON, by their hash.
-        """
+    def findings(self, entries: Iterable[StoredEntry]) -> Iterator[Message]:
+        """Yield what is not right with the files of entries."""
         if self._data is None:
             return
         for each in entries:
-            yield from self._findings(self._data, each.entry, records)
+            yield from self._findings(self._data, each.entry)
 
-    def _findings(
-        self, data: Path, entry: Entry, records: Mapping[str, str]
-    ) -> Iterator[Message]:
+    def _findings(self, data: Path, entry: Entry) -> Iterator[Message]:
         event = entry.event
         files = [] if event.result is None else [event.result]
         if event.files and not event.swing:
-            files += event.files
+            files += _with_images(data, event.files)
         elif event.files:
             if (data / event.swing).is_dir():
-                files += event.files
-                files += _images(event.swing, records.get(event.record_sha256 or ""))
+                files += _with_images(data, event.files)
                 yield from self._unreadable(data, event.swing)
             elif event.swing not in self._swings:
                 yield message(
@@ -101,16 +84,30 @@ class FilesCheck:
             yield error.message
 
 
-def _images(swing: str, record: str | None) -> list[FileHash]:
-    """Return the images that a record names."""
+def _with_images(data: Path, files: Iterable[FileHash]) -> Iterator[FileHash]:
+    """Yield files, and after each journal the images that it names."""
+    for file in files:
+        yield file
+        if Path(file.place).name == JOURNAL:
+            yield from _images(data, file)
+
+
+def _images(data: Path, journal: FileHash) -> Iterator[FileHash]:
+    """Yield the images of all cameras that a journal named when it was entered."""
+    path = data / journal.place
     try:
-        found = parse_own_json((record or "{}").encode(), _Record)
-    except DamagedError:  # which is found where records are looked at
-        return []
-    return [
-        FileHash(f"{swing}/{IMAGES}/{image.file}", image.sha256)
-        for image in found.inputs.observations
-    ]
+        content = journal_bytes(path.parent)[: journal.n_bytes]
+        if sha256(content).hexdigest() != journal.sha256:
+            return  # which is a finding of its own
+        lines = parse_lines(content.splitlines(), path.parent)
+    except FileError:
+        return
+    folder = Path(journal.place).parent.as_posix()
+    for line in lines:
+        if isinstance(line, ImageLine):
+            digests = [line.sha256, *(other.sha256 for other in line.others)]
+            for c, digest in enumerate(digests):
+                yield FileHash(f"{folder}/{image_name(line.number, c)}", digest)
 
 
 def _finding(data: Path, number: int, file: FileHash) -> Message | None:

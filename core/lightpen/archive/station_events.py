@@ -1,13 +1,11 @@
 """What happens at a station besides swings: limits, verifications, cameras."""
 
 from collections.abc import Iterator
-from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 
 from lightpen.archive.entries import Event, FileHash, Kind, this_program
 from lightpen.archive.event_extraction import ExtractedEvent
-from lightpen.errors import FileError
 from lightpen.formats.files import MEGABYTE, read_bytes
 from lightpen.record.folder.camera_calibrations import (
     CAMERA_CALIBRATIONS,
@@ -26,7 +24,6 @@ from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.record.swings.assumed import Plain
 from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.names import Names
-from lightpen.record.swings.reading import open_record
 
 LIMIT = 64 * MEGABYTE
 FOLDERS = (
@@ -134,10 +131,7 @@ def _of_tip(
 def _touched(
     results: FolderArchive, file: Path, done: StoredVerification
 ) -> Iterator[FileHash]:
-    """Yield the files of live touches, each image among them."""
+    """Yield the journals of live touches, which name the images."""
     for run in done.inputs.touches:
-        folder = file.parent / TOUCHES / run.folder
-        yield FileHash(results.place_of(folder / JOURNAL), run.journal_sha256)
-        with suppress(FileError):  # what is missing is found where files are looked at
-            for image in open_record(folder).images:
-                yield FileHash(results.place_of(image.file), image.sha256)
+        journal = file.parent / TOUCHES / run.folder / JOURNAL
+        yield FileHash(results.place_of(journal), run.journal_sha256)

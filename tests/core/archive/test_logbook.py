@@ -8,7 +8,7 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
-from benchmarks.small_records import with_images
+from benchmarks.small_records import small_record
 from msgspec import structs
 from tests.core.archive.conftest import NOON
 
@@ -44,12 +44,10 @@ def logbook(data: Path) -> Iterator[Logbook]:
 
 
 def result(data: Path, n: int = 0, **changes: object) -> Result:
-    """Return an accepted tip of the swing, whose images it names."""
+    """Return an accepted tip of the swing."""
     record = open_record(data / RECORDS / "swing")
-    images = [{"file": i.file.name, "sha256": i.sha256} for i in record.images]
-    calibration = with_images(images)
     calibration = structs.replace(
-        calibration,
+        small_record(),
         tip_pen_mm=(float(n), 2.0, 3.0),
         expanded_uncertainty_mm=(0.1, 0.1, 0.1),
     )
@@ -93,7 +91,7 @@ def test_an_accepted_tip_is_entered_with_all_that_it_was_made_from(
     assert event.settings["min_images"] == 20
     (written,) = entries_of(logbook.database, logbook.chain)
     (record,) = records_of(logbook.database, [written]).values()
-    assert '"observations": [{"file": "000001.png"' in record
+    assert '"tip_pen_mm": [0.0, 2.0, 3.0]' in record
 
 
 def test_results_of_earlier_versions_are_taken_over_once_and_stay(data: Path) -> None:
@@ -214,6 +212,52 @@ def test_a_file_that_was_changed_is_named(data: Path, name: str) -> None:
     file.unlink()
     findings = [str(each) for each in checked(data).findings]
     assert f"The file {name} of entry 1 is missing." in findings
+
+
+@pytest.fixture
+def data_of_two(tmp_path: Path, swung: Callable[..., Path]) -> Path:
+    """A data folder with a recorded swing before two cameras, accepted and entered."""
+    data = tmp_path / "two"
+    shutil.copytree(swung(14, by_two=True), data / RECORDS / "swing")
+    FolderArchive(data).store(result(data))
+    with closing(Logbook(data)) as logbook:
+        logbook.enter_owed()
+    return data
+
+
+def test_an_untouched_swing_of_two_cameras_is_checked_without_a_finding(
+    data_of_two: Path,
+) -> None:
+    found = checked(data_of_two)
+
+    assert found.findings == ()
+    # Result, header, journal, pen, rig, two cameras, and two images of each moment.
+    assert found.n_files == 7 + 2 * 14
+
+
+@pytest.mark.parametrize(
+    "name", ["images/000002.png", "images-2/000002.png", "camera-2.yaml", "rig.json"]
+)
+def test_a_changed_file_of_either_camera_is_named(data_of_two: Path, name: str) -> None:
+    file = data_of_two / RECORDS / "swing" / name
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+
+    findings = [str(each) for each in checked(data_of_two).findings]
+    assert findings[-1] == (
+        f"The file records/swing/{name} of entry 1 was modified after it was entered."
+    )
+
+
+def test_images_of_two_cameras_that_were_swapped_are_named(data_of_two: Path) -> None:
+    swing = data_of_two / RECORDS / "swing"
+    first, second = swing / "images/000005.png", swing / "images-2/000005.png"
+    first.rename(swing / "kept.png")
+    second.rename(first)
+    (swing / "kept.png").rename(second)
+
+    assert len(checked(data_of_two).findings) == 2
 
 
 def test_images_that_were_swapped_are_named(data: Path) -> None:
