@@ -21,13 +21,17 @@ Optional in all: ``intrinsics_covariance``, square, of fx fy cx cy and the disto
 coefficients; or their standard deviations ``std_deviations_intrinsics``, in the order
 of OpenCV's ``calibrateCameraExtended``, fx and fy being taken as off together, as they
 are; the day of the calibration, ``calibration_date`` or ``calibration_time``; the
-serial number of the camera, ``camera_serial``; and how warm it was,
-``calibration_temperature``, in degrees Celsius.
+serial number of the camera, ``camera_serial``; how warm it was,
+``calibration_temperature``, in degrees Celsius; and the residual field of the lens,
+``lens_field``, see `lightpen.model.lens_field`: ``amplitude`` and
+``correlation_length``, px, and where it was measured ``columns``, ``rows``, ``values``
+(a row u v for each node) and ``covariance``.
 """
 
 import json
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -47,11 +51,14 @@ from lightpen.formats.entries import Entries, counted_numbers, is_covariance
 from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
+from lightpen.model.lens_field import MOST, LensField
 
 CAMERA_FILE = message("file.camera")
 CAMERA_FILE_LIMIT = 4 * MEGABYTE  # some keep the points they were calibrated from
 LONGEST_SERIAL = 60  # characters
 COLDEST, WARMEST = -50.0, 100.0  # degrees Celsius
+LARGEST_AMPLITUDE = 10.0  # px, of a lens field; more is another distortion
+SHORTEST_LENGTH = 10.0  # px
 FOCAL_CORRELATION = 0.99  # of fx and fy: 0.991 by 24 views of a board, 5 MP
 
 _WIDTH = ("image_width", "width")
@@ -70,6 +77,10 @@ _DEVIATIONS = (
 _DATE = ("calibration_date", "calibration_time")
 _SERIAL = ("camera_serial",)
 _TEMPERATURE = ("calibration_temperature",)
+_FIELD = ("lens_field",)
+_FIELD_ENTRIES = (
+    *("amplitude", "correlation_length", "columns", "rows", "values", "covariance"),
+)
 _MODELS = {"plumb_bob", "rational_polynomial", "radtan", "none"}
 _FISHEYE = {"equidistant", "fisheye", "kannala_brandt", "kannala_brandt4", "fov"}
 _MONTHS = [
@@ -242,6 +253,7 @@ def _camera(
         calibrated_on=_day(entries),
         serial=_serial(entries),
         temperature_c=_temperature(entries),
+        lens_field=_lens_field(entries, width, height),
     )
     check_fold(camera, entries)
     return camera
@@ -319,6 +331,46 @@ def _temperature(entries: Entries) -> float | None:
     return celsius
 
 
+def _lens_field(entries: Entries, width: int, height: int) -> LensField | None:
+    if not entries.has(*_FIELD):
+        return None
+    part = entries.part(*_FIELD)
+    part.refuse_others(*_FIELD_ENTRIES)
+    amplitude, length = (
+        float(part.counted(1, name)[0]) for name in ("amplitude", "correlation_length")
+    )
+    if not (0 < amplitude <= LARGEST_AMPLITUDE and length >= SHORTEST_LENGTH):
+        raise FileError(
+            "camera-file.lens-field",
+            name=entries.name,
+            amplitude=amplitude,
+            length=length,
+            largest=LARGEST_AMPLITUDE,
+            shortest=SHORTEST_LENGTH,
+        )
+    prior = LensField.of(width, height, amplitude, length)
+    if not part.has("values"):
+        return prior
+    sides = part.counted(1, "columns")[0], part.counted(1, "rows")[0]
+    if not all(side == round(side) and 2 <= side <= MOST for side in sides):
+        raise FileError(
+            "camera-file.lens-field-grid",
+            name=entries.name,
+            columns=sides[0],
+            rows=sides[1],
+            most=MOST,
+        )
+    columns, rows = map(int, sides)
+    n_nodes = columns * rows
+    covariance = part.counted(n_nodes**2, "covariance").reshape(n_nodes, n_nodes)
+    if not is_covariance(covariance):
+        raise FileError("camera-file.lens-field-covariance", name=entries.name)
+    values = part.counted(2 * n_nodes, "values").reshape(n_nodes, 2)
+    return replace(
+        prior, columns=columns, rows=rows, values=values, covariance=covariance
+    )
+
+
 def _opencv_lines(camera: Camera) -> list[str]:
     """Return the lines of a FileStorage of OpenCV."""
     lines = [
@@ -337,7 +389,22 @@ def _opencv_lines(camera: Camera) -> list[str]:
         lines.append(f"camera_serial: {json.dumps(camera.serial, ensure_ascii=False)}")
     if camera.temperature_c is not None:
         lines.append(f"calibration_temperature: {_decimal(camera.temperature_c)}")
+    if camera.lens_field is not None:
+        lines += ["lens_field:", *_field_lines(camera.lens_field)]
     return lines
+
+
+def _field_lines(field: LensField) -> list[str]:
+    """Return the lines below ``lens_field``."""
+    lines = [
+        f"amplitude: {_decimal(field.amplitude)}",
+        f"correlation_length: {_decimal(field.length)}",
+        f"columns: {field.columns}",
+        f"rows: {field.rows}",
+        *_matrix_lines("values", field.values),
+        *_matrix_lines("covariance", field.covariance),
+    ]
+    return ["   " + line.replace("\n", "\n   ") for line in lines]
 
 
 def _matrix_lines(name: str, matrix: FloatArray) -> list[str]:

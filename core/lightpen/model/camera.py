@@ -26,6 +26,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.errors import CalibrationError
+from lightpen.model.lens_field import LensField
 
 UNDISTORT_STEPS = 20
 # Of a step of Newton's method, in normalised units: what is left is about its square,
@@ -70,6 +71,9 @@ class Camera:
         Serial number of the camera; empty where its file does not say.
     temperature_c : float or None
         Of the camera at its calibration, degrees Celsius.
+    lens_field : LensField or None
+        What the distortion leaves, as the calibration of the camera found it. Not part
+        of the projection: it is removed from observed pixels by `without_lens_field`.
     """
 
     width: int
@@ -83,6 +87,7 @@ class Camera:
     calibrated_on: date | None = None
     serial: str = ""
     temperature_c: float | None = None
+    lens_field: LensField | None = None
 
     @property
     def image_size(self) -> tuple[int, int]:
@@ -107,6 +112,12 @@ class Camera:
         """Return the camera with other `intrinsics`, of as many coefficients."""
         fx, fy, cx, cy = values[:4].tolist()
         return replace(self, fx=fx, fy=fy, cx=cx, cy=cy, distortion=values[4:])
+
+    def without_lens_field(self, pixels: FloatArray) -> FloatArray:
+        """Return observed pixels less the mean of the lens field, both (..., 2)."""
+        if self.lens_field is None:
+            return pixels
+        return pixels - self.lens_field.at(pixels)
 
     def project(self, points_cam: FloatArray) -> FloatArray:
         """Return the pixels of points in the camera frame.

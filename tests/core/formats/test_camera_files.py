@@ -3,6 +3,7 @@
 import contextlib
 import json
 import random
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, LightpenError, UsageError
 from lightpen.formats.camera_files import FOCAL_CORRELATION, read_camera, write_camera
 from lightpen.model.camera import Camera
+from lightpen.model.lens_field import LensField
 
 DISTORTION = np.array([-0.082, 0.105, 3e-4, -2e-4, 1 / 3])
 OPENCV = """%YAML:1.0
@@ -452,6 +454,73 @@ def test_what_is_no_covariance_is_refused(
 ) -> None:
     text = f"{OPENCV}intrinsics_covariance: {covariance.tolist()}\n"
     assert sentence in refusal(tmp_path, text)
+
+
+def measured_field() -> LensField:
+    rng = np.random.default_rng(4)
+    field = LensField.of(2448, 2048, 0.02, 700.0)
+    root = rng.normal(size=(len(field.nodes), 60))
+    return replace(
+        field,
+        values=rng.normal(size=(len(field.nodes), 2)),
+        covariance=root @ root.T / 1e4,
+    )
+
+
+def test_a_lens_field_is_read_back_to_the_last_digit(tmp_path: Path) -> None:
+    expected, path = measured_field(), tmp_path / "cam.yaml"
+    write_camera(replace(camera(), lens_field=expected), path)
+    found = read_camera(path).lens_field
+    assert found is not None
+    np.testing.assert_array_equal(found.values, expected.values)
+    np.testing.assert_array_equal(found.covariance, expected.covariance)
+    assert (found.columns, found.rows) == (expected.columns, expected.rows)
+    assert (found.amplitude, found.length) == (0.02, 700.0)
+
+
+def test_opencv_reads_a_file_with_a_lens_field(tmp_path: Path) -> None:
+    field, path = measured_field(), tmp_path / "cam.yaml"
+    write_camera(replace(camera(), lens_field=field), path)
+    storage = read_by_opencv(path)
+    values = storage.getNode("lens_field").getNode("values").mat()
+    np.testing.assert_array_equal(values, field.values)
+    storage.release()
+
+
+def test_amplitude_and_length_alone_are_a_field_that_was_not_measured(
+    tmp_path: Path,
+) -> None:
+    text = OPENCV + "lens_field: {amplitude: 0.03, correlation_length: 600}\n"
+    found = read_camera(saved(tmp_path, text)).lens_field
+    assert found is not None
+    np.testing.assert_array_equal(found.values, 0.0)
+    np.testing.assert_allclose(np.diag(found.covariance), 0.03**2)
+
+
+@pytest.mark.parametrize(
+    ("field", "sentence"),
+    [
+        ("{amplitude: -1, correlation_length: 600}", "amplitude -1 px and"),
+        ("{amplitude: 0.1, correlation_length: 2}", "length 2 px; .* from 10 px"),
+        ("{amplitude: 0.1}", "has no correlation_length"),
+        ("{amplitude: 0.1, correlation_length: 600, sigma: 1}", "sigma"),
+        (
+            "{amplitude: 0.1, correlation_length: 600, values: 1, columns: 99, rows: 2}",
+            "99 columns and 2 rows",
+        ),
+        (
+            "{amplitude: 0.1, correlation_length: 600, columns: 2, rows: 2, "
+            "values: [1, 1, 1, 1, 1, 1, 1, 1], "
+            "covariance: [1, 9, 0, 0, 9, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}",
+            "covariance of the lens field of cam.yaml is not",
+        ),
+    ],
+)
+def test_a_flaw_of_a_lens_field_is_named(
+    tmp_path: Path, field: str, sentence: str
+) -> None:
+    with pytest.raises(FileError, match=sentence):
+        read_camera(saved(tmp_path, f"{OPENCV}lens_field: {field}\n"))
 
 
 @pytest.mark.parametrize("deviations", [[0.1] * 8, [-0.1] * 9])
