@@ -912,6 +912,22 @@ def test_a_file_alone_is_opened_in_the_window(tmp_path: Path, words: list[str]) 
     assert desktop.opened == [file]
 
 
+def test_the_menu_opens_the_window_without_a_file() -> None:
+    desktop = WitnessingDesktop()
+
+    assert main(["open"], desktop) == 0
+    assert desktop.opened == [None]
+
+
+@pytest.mark.parametrize("name", ["no/such.lightpen", "such.lightpen", "/tip.json"])
+def test_a_file_that_is_missing_is_named(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([name], desktop := WitnessingDesktop()) == 2
+    assert f"The file {name} does not exist." in capsys.readouterr().err
+    assert desktop.opened == []
+
+
 def test_a_name_that_cannot_be_looked_up_is_no_mistake_of_the_program() -> None:
     name = 300 * "x"  # no system has names so long
     with suppress(SystemExit):

@@ -25,7 +25,7 @@ from lightpen.commands.desktop import Desktop, add_desktop, add_open, add_report
 from lightpen.commands.tips import add_tips
 from lightpen.errors import CalibrationError, LightpenError, UsageError
 from lightpen.logs import LEVEL_VARIABLE, LEVELS, log_level, running_log, write_log_to
-from lightpen.messages import Message
+from lightpen.messages import Message, message
 
 # Each with what adds its options, which is imported only for what was given.
 COMMANDS = (
@@ -64,6 +64,7 @@ COMMANDS = (
     ("export", "write a tip as other programs read it", "export:add_export"),
     ("stream", "send pose and tip live to other programs", "stream:add_stream"),
 )
+OPENED = (".lightpen", ".json")  # suffixes of the files that the window opens
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
 # What to type about what the core says, by its codes.
 ADVICE = {
@@ -91,7 +92,10 @@ def main(arguments: Sequence[str] | None = None, desktop: Desktop | None = None)
     """
     given = sys.argv[1:] if arguments is None else arguments
     parser, commands = _parser(given, desktop)
-    if desktop is not None and _is_file_to_open(given, commands):
+    if desktop is not None and _names_file(given, commands):
+        if _is_absent(Path(given[0])):
+            _complain(message("cli.no-such-file", path=given[0]))
+            return BAD_INPUT
         given = ["open", *given]
     # argparse takes "-90." and "-9e1" for options, but not with a blank before them.
     options = parser.parse_args(
@@ -210,11 +214,16 @@ def _parser(
     return parser, commands.choices
 
 
-def _is_file_to_open(given: Sequence[str], commands: Collection[str]) -> bool:
-    """Return whether there is nothing but a file, as icons hand it over."""
-    if len(given) != 1 or given[0] in commands:
+def _names_file(given: Sequence[str], commands: Collection[str]) -> bool:
+    """Return whether a file is all that is given, as by a double click."""
+    if len(given) != 1 or given[0] in commands or given[0].startswith("-"):
         return False
+    path = Path(given[0])
+    return len(path.parts) > 1 or path.suffix in OPENED or not _is_absent(path)
+
+
+def _is_absent(path: Path) -> bool:
     try:
-        return Path(given[0]).exists()
-    except OSError:  # it is not to be looked at, which the window says
-        return True
+        return not path.exists()
+    except OSError:  # no access, which the window says
+        return False

@@ -3,10 +3,13 @@
 Where there is no X server, the wizard is walked without a screen.
 """
 
+import configparser
 import os
+import shlex
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from ctypes.util import find_library
@@ -74,3 +77,36 @@ def test_on_a_real_screen() -> None:
     with display() as name:
         on_screen = {"DISPLAY": name, "QT_QPA_PLATFORM": "xcb"}
         assert "2 passed" in passed(FILE, on_screen)
+
+
+def test_the_entry_in_the_menu_opens_the_window(tmp_path: Path) -> None:
+    lack = why_no_screen() or ("" if shutil.which("xwininfo") else "no xwininfo")
+    if lack:
+        pytest.skip(lack)
+    program = Path(sys.executable).with_name("lightpen")
+    own = {f"XDG_{name}_HOME": str(tmp_path) for name in ("CONFIG", "DATA")}
+    environment = os.environ | own
+    environment.pop("QT_QPA_PLATFORM", None)
+    subprocess.run([program, "--install-desktop-entry"], env=environment, check=True)
+    parser = configparser.RawConfigParser()
+    parser.read(tmp_path / "applications" / "lightpen.desktop", encoding="utf-8")
+    words = shlex.split(parser["Desktop Entry"]["Exec"])
+    command = [word for word in words if word != "%f"]  # a menu has no file
+
+    with display() as name:
+        environment |= {"DISPLAY": name, "QT_QPA_PLATFORM": "xcb"}
+        with subprocess.Popen(command, env=environment) as window:
+            try:
+                until = time.monotonic() + LONGEST_S
+                while "Lightpen" not in windows_of(name):
+                    assert window.poll() is None, "it ended"
+                    assert time.monotonic() < until, "no window"
+                    time.sleep(0.2)
+            finally:
+                window.terminate()
+
+
+def windows_of(name: str) -> str:
+    """Return the list of all windows of a display."""
+    listing = ["xwininfo", "-display", name, "-root", "-tree"]
+    return subprocess.run(listing, capture_output=True, text=True, check=True).stdout

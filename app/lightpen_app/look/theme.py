@@ -239,6 +239,8 @@ def apply_theme(application: QApplication, colors: Colors) -> None:
     application.setPalette(_palette(colors))
     application.setStyleSheet("")  # Qt replaces a sheet four times slower than none
     application.setStyleSheet(sheet)
+    # On Windows a new sheet brings back the system's fonts of tables, lists and menus.
+    QApplication.setFont(font(TextSize.BODY))
 
 
 def style_sheet(colors: Colors) -> str:

@@ -9,6 +9,7 @@ from types import TracebackType
 
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QFont, QFontDatabase, QFontMetrics, QGuiApplication
+from PySide6.QtWidgets import QApplication
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.detection.pen_detection import detect_pen
@@ -27,12 +28,24 @@ from lightpen.simulator.swings import paper_camera
 from lightpen.swing.preparation import Preparation
 from lightpen_app.application import Wizard, has_display, make_application
 from lightpen_app.crash import versions
-from lightpen_app.look.theme import FAMILIES, load_fonts
+from lightpen_app.look.theme import FAMILIES, LIGHT, apply_theme, load_fonts
 from lightpen_app.self_test.report import SelfTestError, Tip
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Settings
 
 TICK_MS = 50
+# The classes to which a platform gives fonts of its own.
+CLASSES_WITH_FONTS = (
+    "QAbstractItemView",
+    "QHeaderView",
+    "QListView",
+    "QMenu",
+    "QMenuBar",
+    "QMessageBox",
+    "QStatusBar",
+    "QTableView",
+    "QTreeView",
+)
 
 
 class Walk(QObject):
@@ -187,6 +200,11 @@ class Desk:
         for letter in LETTERS:
             if not any(each.inFontUcs4(ord(letter)) for each in metrics):
                 raise SelfTestError(f"The fonts have no {letter}.")
+        apply_theme(self._application, LIGHT)
+        for name in CLASSES_WITH_FONTS:
+            family = QApplication.font(name).family()
+            if family != FAMILIES[0]:
+                raise SelfTestError(f"{name} is shown in {family}, not {FAMILIES[0]}.")
         return ", ".join(FAMILIES)
 
     def tested_record(self) -> str:

@@ -5,6 +5,7 @@ MESSAGES = {
     "archive.no-server": "No server is named. Set the variable {variable} to its address, postgresql://user:password@host/database.",
     "archive.no-such-kind": "{name} is no kind of entry. There are: {kinds}.",
     "log.no-such-level": "{variable} is {found}, which is no level of the log. Set it to one of: {levels}.",
+    "cli.no-such-file": "The file {path} does not exist. Check the name and the folder.",
     "cli.board-suffix": "A board is written as PDF, but {name} does not end in .pdf. Choose such a name.",
     "cli.rig-needed": "Those of several cameras need --rig FILE in place of --camera.",
     "cli.one-of-each-camera": "The rig has {n_cameras} cameras: give one for each, in the order of its file ({names}), and a pattern in quotation marks.",

@@ -63,13 +63,15 @@ def add_desktop(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
 
 
 def add_open(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
-    """Add the words of ``lightpen open``."""
+    """Add ``lightpen open``."""
     parser.set_defaults(run=lambda options: desktop.show_window(options.swing))
     parser.add_argument(
         "swing",
+        nargs="?",  # the menu of a desktop starts the program without a file
         type=Path,
         metavar="SWING",
-        help="record of a swing, the file swing.lightpen in it, or a result",
+        help="record of a swing, the file swing.lightpen in it, or a result; "
+        "without it the window opens as usual",
     )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QFontDatabase, QFontInfo
+from PySide6.QtGui import QFont, QFontDatabase, QFontInfo
 from PySide6.QtWidgets import QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
@@ -34,6 +34,7 @@ from lightpen_app.look.theme import (
     style_sheet,
     text_label,
 )
+from lightpen_app.self_test.desk import CLASSES_WITH_FONTS
 from lightpen_app.widgets.state_banner import StateBanner
 
 PALETTES = pytest.mark.parametrize("colors", [DARK, LIGHT], ids=["dark", "light"])
@@ -226,6 +227,18 @@ def test_the_grid_holds_the_type_scale() -> None:
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_bundled_fonts_are_in_use(family: str) -> None:
     assert QFontDatabase.styles(family) == ["Bold", "Regular"]
+
+
+@pytest.mark.parametrize("name", CLASSES_WITH_FONTS)
+def test_a_theme_takes_fonts_of_the_platform_from_tables_lists_and_menus(
+    qapp: QApplication, name: str
+) -> None:
+    QApplication.setFont(QFont("DejaVu Sans Mono", 8), name)  # as Windows does
+
+    apply_theme(qapp, DARK)
+    apply_theme(qapp, LIGHT)
+
+    assert QApplication.font(name).family() == FAMILIES[0]
 
 
 def test_plain_and_bold_text_come_from_the_bundled_font() -> None:
