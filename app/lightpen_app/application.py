@@ -63,9 +63,9 @@ class Wizard(QObject):
     make_pages : callable
         Returns the pages in the order of the steps.
     folder : Path
-        For records, results, sounds and crash reports.
+        Data folder.
     around : SourceEnvironment, optional
-        What simulated and recorded sources go by.
+        Environment of simulated and recorded sources.
     """
 
     def __init__(

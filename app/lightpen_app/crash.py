@@ -40,7 +40,7 @@ class CrashHook(QObject):
     Parameters
     ----------
     folder : Path
-        Where the reports go; it is made when it is needed.
+        Folder of the reports, created when needed.
 
     Signals
     -------

@@ -26,7 +26,7 @@ class Demo(QObject):
     Parameters
     ----------
     workbench : Workbench
-        With a simulated source.
+        Workbench with a simulated source.
     is_watched : bool
         Whether somebody looks on, who needs time to read.
 

@@ -21,7 +21,7 @@ def write_paper(result: Path, out: Path | None, language: str) -> Path:
     result : Path
         An accepted result, or what ``lightpen calibrate`` wrote.
     out : Path or None
-        Where to; None for a name of its own in the current folder.
+        Output file; None for a default name in the current folder.
 
     Returns
     -------

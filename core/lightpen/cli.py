@@ -86,7 +86,7 @@ def main(arguments: Sequence[str] | None = None, desktop: Desktop | None = None)
     Parameters
     ----------
     arguments : sequence of str, optional
-        Those of the process unless given.
+        By default the arguments of the process.
     desktop : Desktop, optional
         Without it a command must be given.
     """

@@ -9,7 +9,7 @@ class LightpenError(Exception):
     Parameters
     ----------
     told : Message or str
-        What was found, what is needed and what to do; or the code of such a message.
+        Message or its code: what was found, what is needed, what to do.
     **values : Value
         Of a message given by its code.
     """

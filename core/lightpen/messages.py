@@ -69,8 +69,8 @@ class Message:
     code : str
         Key of the template in the catalogue. It stays when the words change.
     values : mapping of str to Value
-        By field of the template, a name of `str.format`. Several messages as one value
-        are joined by commas.
+        Values for the fields of the template, named as for `str.format`. A tuple of
+        messages is joined by commas.
     """
 
     code: str

@@ -151,7 +151,7 @@ def file_uncertain(
     share : float
         U (k = 2) by that alone, mm.
     advice : Message
-        What it is and what to do, to be put after "from".
+        Cause and remedy, completing "from ...".
     assumed : bool
         Whether the file leaves its uncertainty out.
     """
@@ -197,7 +197,7 @@ def tip_changed(
     distance : float
         How far it is from there, mm.
     date : str
-        Of the earlier result.
+        Date of the earlier result.
     axis : str
         Of the pen's frame, along which it is least explained.
     difference, uncertainty : float
@@ -221,7 +221,7 @@ def change_beyond_limit(distance: float, date: str, limit: float) -> Message:
     distance : float
         How far it is from there, mm.
     date : str
-        Of the earlier result.
+        Date of the earlier result.
     limit : float
         Of the tip, mm.
     """

@@ -44,9 +44,9 @@ def vertical_layout(
     Parameters
     ----------
     place : QWidget or QLayout
-        What it lies in.
+        Parent of the layout.
     cells : QWidget, int or tuple
-        What it holds at first, see `fill`.
+        Initial content, see `fill`.
     spacing : int
         Between the cells, px; -1 for that of the style.
     margins : int, tuple or None

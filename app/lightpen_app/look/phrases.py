@@ -236,7 +236,7 @@ def lean_phrase(
     Parameters
     ----------
     present : Posture or None
-        Where the pen is, if it is seen.
+        Current posture, if the pen is detected.
     heading : float
         The operator's right as the camera sees it, rad.
     """

@@ -87,7 +87,7 @@ class FileSounds:
     Parameters
     ----------
     folder : Path
-        Where the files are written when they are first needed.
+        Folder for the sound files, which are written when first needed.
     play_file : callable
         Begins to play a file and returns at once.
     """

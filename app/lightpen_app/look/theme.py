@@ -70,7 +70,7 @@ class Colors:
     text, muted : str
         Words; both are read on every ground.
     accent, on_accent : str
-        What is active, and words on it.
+        Colour of active elements, and of text on it.
     good, warn, bad : str
         States, as words and signs on every ground.
     on_good, on_warn, on_bad : str

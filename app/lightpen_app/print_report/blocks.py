@@ -62,7 +62,7 @@ class Block:
     keeps : bool
         Whether what follows stands on the same page.
     head : Block or None
-        What is repeated above it where it is the first of a page.
+        Block that is repeated at the top of each page.
     """
 
     paint: Callable[[QPainter], None]
@@ -79,7 +79,7 @@ class Column:
     Attributes
     ----------
     share : float
-        Of the width, beside those of the other columns.
+        Relative width of the column.
     """
 
     title: str

@@ -91,9 +91,9 @@ class Chart:
     Attributes
     ----------
     names : tuple of str
-        Of the series, in their order; shown beside the title.
+        Names of the series in their order, shown beside the title.
     mark : Mark
-        What stands before the names.
+        Symbol before the names.
     """
 
     title: str
@@ -109,7 +109,7 @@ class AxisWords:
     Attributes
     ----------
     labels : tuple of str
-        In place of numbers below the axis, at 0, 1, 2 and so on.
+        Labels below the axis at 0, 1, 2 ... instead of numbers.
     """
 
     x: str = ""

@@ -26,7 +26,7 @@ class ReportContent:
     reestimated : ReestimatedPoses or None
         Its images, where the file holds enough for that.
     entered : ArchivePlace or None
-        Where in an archive it is entered, if it is.
+        Archive entry of the calibration.
     """
 
     calibration_file: CalibrationFile
@@ -59,9 +59,9 @@ class PrintReportControl(QObject):
     Parameters
     ----------
     place : SavePlace
-        Where PDFs are saved.
+        Folder for saved PDFs.
     page : QWidget
-        Whose windows are opened.
+        Parent of windows.
 
     Signals
     -------

@@ -43,12 +43,11 @@ class Margins:
     Attributes
     ----------
     title, subject : str
-        What it is, and of what.
+        Title and subject of the report.
     number : str
-        Which it is.
+        Number of the report.
     badges : tuple of str
-        What nobody may miss, in capitals.
-    foot : str
+        Prominent labels in capitals, such as SIMULATED.
     """
 
     title: str
@@ -107,8 +106,6 @@ def paint_page(paper: PrintReport, number: int, painter: QPainter) -> None:
 
     Parameters
     ----------
-    number : int
-        Of the page, from 1.
     painter : QPainter
         One unit of it is a dot; its origin is the corner of the paper.
     """

@@ -26,9 +26,9 @@ class PrintReportWindow(Translated, QWidget):
     Parameters
     ----------
     place : SavePlace
-        Where PDFs are saved.
+        Folder for saved PDFs.
     stem : str
-        What the name of its PDF begins with.
+        Beginning of the default file name.
 
     Signals
     -------

@@ -48,7 +48,7 @@ def paper_of(
     reestimated : ReestimatedPoses or None
         The images of the calibration; some plots are left out without.
     entered : ArchivePlace, optional
-        Where in an archive the calibration is entered, if it is.
+        Archive entry of the calibration.
     """
     blocks = all_sections(calibration_file, reestimated, entered)
     return PrintReport(

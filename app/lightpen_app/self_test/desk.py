@@ -129,8 +129,6 @@ def record_swing(folder: Path, files: Path) -> None:
 
     Parameters
     ----------
-    folder : Path
-        Of the record.
     files : Path
         Folder for the files of camera and pen.
 

@@ -23,7 +23,7 @@ class Check:
     Attributes
     ----------
     found : str
-        What is there, or what is wrong with it.
+        Result or fault.
     """
 
     name: str

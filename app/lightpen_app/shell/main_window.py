@@ -62,13 +62,13 @@ class MainWindow(ResponsiveLayout, QMainWindow):
     Parameters
     ----------
     pages : sequence of Page
-        In the order of the steps; at least one.
+        Pages in the order of the steps, at least one.
     settings : Settings
         Where the window's place is kept.
     preferences : Preferences
-        What is in use now.
+        Current preferences.
     notifications : Notifications
-        What is to be read; what a page published, by its key, goes with the page.
+        Notifications; those of a page, by its key, are removed with the page.
 
     Signals
     -------

@@ -22,7 +22,7 @@ class OptionsMenu(Translated, QMenu):
     Parameters
     ----------
     preferences : Preferences
-        What is in use now.
+        Current preferences.
 
     Attributes
     ----------

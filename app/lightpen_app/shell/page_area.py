@@ -118,7 +118,7 @@ class PageArea(QFrame):
     Parameters
     ----------
     pages : sequence of QWidget
-        At least one; the first is shown.
+        Pages, at least one; the first is shown.
     """
 
     def __init__(self, pages: Sequence[QWidget], parent: QWidget | None = None) -> None:

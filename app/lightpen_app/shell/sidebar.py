@@ -35,9 +35,9 @@ class Subject:
     Attributes
     ----------
     names : Names
-        Of the swing there is; else those that are chosen.
+        Names of the swing, or the selected ones without a swing.
     origin : Origin or None
-        What its images are of; None where the swing does not say.
+        Origin of the images; None if the swing does not state it.
     statuses : StationStatus
         How all tips stand.
     """

@@ -17,7 +17,7 @@ class MainAction:
     Attributes
     ----------
     text : str
-        What it does, a verb first.
+        Label, a verb first.
     why_not : str
         Why it cannot be pressed now; empty when it can. The reason is shown.
     at_screen : bool

@@ -17,7 +17,7 @@ class SimulatorControls(Translated, QFrame):
     Parameters
     ----------
     live : LiveView
-        Whose operator it is.
+        Live view with the simulated operator.
     """
 
     def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:

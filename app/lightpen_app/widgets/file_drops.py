@@ -12,7 +12,7 @@ class FileDrops(QObject):
     Parameters
     ----------
     place : QWidget
-        With all that is in it; it becomes the parent.
+        Widget that accepts drops, with its children; it becomes the parent.
 
     Signals
     -------

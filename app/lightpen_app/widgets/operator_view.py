@@ -33,7 +33,7 @@ class OperatorValue:
     Attributes
     ----------
     instruction : str
-        What to do, a few words.
+        Instruction in a few words.
     hint : str
         A sentence more.
     count : str
@@ -43,7 +43,7 @@ class OperatorValue:
     fraction : float or None
         How much is done, 0 to 1.
     keys : str
-        What keys of this view do now, besides leaving it.
+        Keys of this view besides closing it.
     """
 
     instruction: str = ""

@@ -36,9 +36,9 @@ class DisplayedPosture:
     tip_pen : (3,) array
         Where its tip is, mm.
     posture, target : Posture or None
-        As it is, and as it should be.
+        Current and target posture.
     heading : float
-        By how much what the camera sees is turned for the operator, as in `DialValue`.
+        Rotation from the camera's view to the operator's, as in `DialValue`.
     """
 
     pen: Pen

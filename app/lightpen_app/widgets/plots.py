@@ -63,7 +63,7 @@ class Axes:
     Attributes
     ----------
     title : str
-        What is shown, with its unit.
+        Quantity with its unit.
     x, y : str
         Names of the axes; empty to leave one out.
     """
@@ -313,7 +313,7 @@ class TracePlot(Plot):
     Parameters
     ----------
     curves : sequence of Curve
-        Of more than one, the names stand beside the title in their colours.
+        Curves; names are shown in their colours if there are several.
     y_zero : bool
         Always show the zero.
     y_log : bool

@@ -46,7 +46,7 @@ class DialValue:
     n_upright, n_upright_needed : int
         The same for the upright pen.
     posture, target : Posture or None
-        Where the pen is, and where it should go.
+        Current and target posture of the pen.
     turns : tuple of two floats or None
         Least and greatest turn kept, rad.
     turns_needed : tuple of two floats or None

@@ -50,7 +50,8 @@ class ResponsiveLayout(_Base):
     narrow_below, low_below : int
         px; with less width or height it is short of room.
     large_from, vast_from : QSize or None
-        From this on it has plenty, or more than that; None where that changes nothing.
+        Sizes from which the layout is large or very large; None if that makes no
+        difference.
     """
 
     narrow_below = 0

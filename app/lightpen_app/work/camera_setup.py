@@ -28,9 +28,9 @@ class CameraSetup(QObject):
     Parameters
     ----------
     settings : Settings
-        Where it is remembered how cameras are set up.
+        Settings that store the camera set-up.
     around : SourceEnvironment
-        What simulated and recorded sources go by.
+        Environment of simulated and recorded sources.
 
     Signals
     -------

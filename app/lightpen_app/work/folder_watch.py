@@ -13,10 +13,6 @@ LOOKING_MS = 5000  # from one look to the next
 class FolderWatch(QObject):
     """Looks at the data folder now and then, and lets other windows know of this one.
 
-    Parameters
-    ----------
-    folder : Path
-
     Signals
     -------
     counted(int)

@@ -29,8 +29,6 @@ class LibraryWatch(QObject):
     ----------
     folder : Path
         The data folder.
-    logbook : LazyLogbook
-        Of that folder.
     rule : DueRule
         How long a tip may be in force that has no rule of its own.
     now : callable
@@ -132,7 +130,7 @@ class LibraryWatch(QObject):
         Parameters
         ----------
         asked : object
-            What is told of when it is kept, or is not.
+            Identifies the request in the signals about its outcome.
         """
         self._asked.append((asked, change))
         if self._changing is None:

@@ -112,7 +112,7 @@ class LiveView(QObject):
     stream : PoseStream
         Tells other programs what the first camera shows.
     notifications : Notifications
-        Where it is published what is wrong with a camera.
+        Receives messages about camera faults.
 
     Signals
     -------

@@ -21,7 +21,7 @@ class RunView(QObject, Generic[S, E]):
     status : S
         Before anything was told.
     notifications : Notifications
-        Where it is published what could not be done.
+        Receives messages about failures.
 
     Signals
     -------

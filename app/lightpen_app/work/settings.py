@@ -41,7 +41,7 @@ class Preferences:
     distance_m : float
         From the operator's eyes to the screen, m.
     data_folder : str
-        For swings and results, from the next start on; empty for the usual one.
+        Data folder from the next start on; empty for the default.
     streams : bool
         Whether other programs may follow the pen,
     stream_address, stream_port : str and int

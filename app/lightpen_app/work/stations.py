@@ -92,7 +92,7 @@ def station_of(
     Parameters
     ----------
     unread : FilePaths
-        Of the files that are still being read: they stay remembered.
+        Paths of files that are still being read; they are kept.
     """
     second, tip = preparation.second, preparation.nominal_tip
     camera_file, pen_file = preparation.camera_file, preparation.pen_file

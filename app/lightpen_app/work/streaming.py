@@ -19,8 +19,6 @@ class Streaming(QObject):
 
     Parameters
     ----------
-    archive : FolderArchive
-        Of the accepted results.
     clock : Clock
         The one that the cameras go by.
 

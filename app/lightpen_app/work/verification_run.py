@@ -27,10 +27,8 @@ class VerificationRun(RunView[VerificationStatus, SessionEventKind]):
 
     Parameters
     ----------
-    archive : FolderArchive
-        Of the accepted results.
     folder : Path
-        What is found is kept in it.
+        Data folder.
     now : callable
         Returns date and time with the time zone.
 

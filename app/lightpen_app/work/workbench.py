@@ -36,18 +36,16 @@ class Workbench(QObject):
     Parameters
     ----------
     folder : Path
-        For records, results and sample files.
+        Data folder.
     around : SourceEnvironment, optional
-        What simulated and recorded sources go by.
+        Environment of simulated and recorded sources.
 
     Attributes
     ----------
-    notifications : Notifications
-        What is to be read.
     selection : Selection
-        What is chosen at the station.
+        Selection at the station.
     run, verification : SwingRun and VerificationRun
-        What is done with swings and verifications.
+        Running swing and verification.
     live : LiveView
         The images of the cameras.
     camera : CameraSetup
@@ -63,7 +61,7 @@ class Workbench(QObject):
     archive_writer : ArchiveWriter
         Enters what was kept in files.
     save_place : SavePlace
-        Where results are saved for use elsewhere.
+        Folder for saving results.
     """
 
     def __init__(

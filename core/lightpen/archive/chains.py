@@ -41,7 +41,7 @@ class CopyResult:
     Attributes
     ----------
     n_new : int
-        That were not there yet.
+        Number of new entries.
     """
 
     n_new: int
@@ -76,7 +76,7 @@ def append(
     Parameters
     ----------
     record : str, optional
-        As JSON; the event has its hash.
+        Record as JSON; the event contains its hash.
 
     Raises
     ------
@@ -187,7 +187,7 @@ class ArchivedFiles:
     Parameters
     ----------
     chain : str
-        Whose entries are never changed.
+        Chain of the data folder; its entries are never changed.
     """
 
     def __init__(self, database: Database, chain: str) -> None:
@@ -255,7 +255,7 @@ def sound_entry(row: Row[Any]) -> StoredEntry | None:
     Parameters
     ----------
     row : Row
-        With all columns; others may follow them.
+        Row with all columns of an entry.
     """
     columns = {column.name: row._mapping[column] for column in ENTRIES.c}
     if not isinstance(columns["text"], str):

@@ -36,9 +36,9 @@ class ArchiveCheckResult:
     Attributes
     ----------
     n_files : int
-        That entries vouch for and that were read, images among them.
+        Number of files checked, images included.
     findings : tuple of Message
-        What is not as it was entered; empty where all is.
+        Differences from the entries; empty if there are none.
     """
 
     n_entries: int

@@ -29,13 +29,13 @@ class DueTip:
     Attributes
     ----------
     entry : StoredEntry
-        That put it in force.
+        Entry of the acceptance.
     calibrated : datetime
-        Of one that was put in force again, when it was calibrated all the same.
+        Date of the calibration, also if the result was reinstated later.
     due : datetime
-        By its age.
+        Due date by age.
     n_swings : int
-        Of its pen since it was calibrated.
+        Swings of the pen since the calibration.
     n_left : int or None
         Swings until it is due by their count; None if any number may be made.
     """
@@ -65,11 +65,11 @@ def due_tips(
     Parameters
     ----------
     chain : str
-        That is at home where they are in force.
+        Chain of the data folder in which the tips are current.
     rule : DueRule
-        Of the station, for tips that have none of their own.
+        Station rule for tips without their own.
     library : Library, optional
-        Whose tips may have one, and whose retired ones are left out.
+        Library with the rules of tips; retired tips are omitted.
     """
     found = (
         last_accepted(database, pen, tip, chain=chain)

@@ -66,9 +66,9 @@ class FileHash(Struct, frozen=True):
     Attributes
     ----------
     place : str
-        From the data folder, or absolute where it is outside of it.
+        Path relative to the data folder, or absolute if outside of it.
     n_bytes : int or None
-        From its start, that the hash is of; of all of it if None.
+        Length of the hashed beginning; None for the whole file.
     """
 
     place: str
@@ -82,25 +82,24 @@ class Event(Struct, frozen=True):
     Attributes
     ----------
     at : datetime
-        By the clock of its station.
+        Time of the station's clock.
     program : str
         Name and version.
     grade : str
         Verdict on a calibration; empty of anything else, and where there was none.
     why : StoredMessage or None
-        What the grade is for.
+        Reason of the grade.
     reason : str
-        In the words of the operator; of a note its text.
+        Reason given by the operator; of a comment, its text.
     change : TipChange or None
         Since the tip as found, which was in force before.
     outcome : TrialOutcome or None
-        What became of a verification or the calibration of a camera.
+        Outcome of a verification or a camera calibration.
     swing : str
         Folder of the swing that it is of, as `FileHash.place`; may be empty.
     settings : mapping
-        What the swing was captured with, and what was required of it; of a
-        verification what was verified, of limits what they are from then on, and of
-        the library the item likewise.
+        Settings and limits of a swing, task of a verification, new values of limits or
+        of a library item.
     result : FileHash or None
         The file that put a tip in force, or took it back; of what is no swing, the
         file that tells of it.
@@ -108,7 +107,7 @@ class Event(Struct, frozen=True):
         The record of the swing, whose journal names the images with their hashes; of
         a verification the journals of its touches; of the library a picture.
     record_sha256 : str or None
-        Of the record as JSON.
+        Checksum of the record as JSON.
     concerns : str or None
         Hash of the entry that it restores, takes back, or is a note on.
     """
@@ -147,9 +146,9 @@ class Entry(Struct, frozen=True):
     Attributes
     ----------
     chain : str
-        Of which data folder.
+        Identifier of the data folder's chain.
     number : int
-        In the chain, from 1.
+        Number in the chain, from 1.
     previous : str
         Hash of the entry before.
     since : datetime
@@ -172,8 +171,6 @@ class StoredEntry:
     ----------
     text : str
         Canonical JSON: names sorted, no blanks, ASCII.
-    sha256 : str
-        Of the text.
     """
 
     entry: Entry
@@ -188,11 +185,9 @@ class ChainHead:
     Attributes
     ----------
     number : int
-        Of the last entry; 0 of an empty chain.
-    sha256 : str
-        Of the last entry.
+        Number of the last entry; 0 for an empty chain.
     since : datetime or None
-        Of the last entry.
+        Time of the last entry.
     """
 
     chain: str

@@ -34,7 +34,7 @@ class FilesCheck:
     Attributes
     ----------
     n_files : int
-        That were read so far.
+        Number of files read so far.
     """
 
     def __init__(self, data: Path | None) -> None:

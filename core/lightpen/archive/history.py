@@ -35,8 +35,6 @@ class Line:
 
     Attributes
     ----------
-    number : int
-        In its chain.
     entry : StoredEntry or None
         None if it was changed since it was entered.
     """

@@ -190,9 +190,7 @@ class Logbook:
         Parameters
         ----------
         by : Names
-            Who restores it, and at which station.
-        reason : str
-            In their words.
+            Operator who reinstates it, and station.
 
         Raises
         ------

@@ -89,8 +89,8 @@ def last_accepted(
     Parameters
     ----------
     chain : str, optional
-        At home in which data folder; of any station unless given. Which is in force at
-        one, its files of results say.
+        Chain of a data folder; by default any. The current result of a station is in
+        its result files.
     """
     condition = (
         (ENTRIES.c.pen == searchable(pen))

@@ -26,13 +26,11 @@ def restored_result(
     Parameters
     ----------
     record : str or None
-        Of the entry, as JSON.
+        Record of the entry, as JSON.
     data : Path
         Data folder.
     by : Names
-        Who restores it, and at which station.
-    reason : str
-        In their words.
+        Operator who reinstates it, and station.
 
     Raises
     ------

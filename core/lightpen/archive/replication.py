@@ -24,12 +24,10 @@ class Replicator:
 
     Parameters
     ----------
-    database : Database
-        Of the station.
     chain : str
-        That is at home there.
+        Chain of the data folder.
     address : str
-        Of the server; see `lightpen.archive.database.open_server`.
+        Address of the server; see `lightpen.archive.database.open_server`.
 
     Attributes
     ----------

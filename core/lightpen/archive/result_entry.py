@@ -17,9 +17,9 @@ class ArchivePlace:
     Attributes
     ----------
     number : int
-        In its chain, from 1.
+        Number in its chain, from 1.
     sha256, previous : str
-        Of the entry, and of the one before it.
+        Hashes of the entry and of its predecessor.
     """
 
     number: int
@@ -33,7 +33,7 @@ def entry_of_file(result: Path, sha256: str) -> ArchivePlace | None:
     Parameters
     ----------
     sha256 : str
-        Of the file as it was read.
+        Checksum of the file as read.
 
     Returns
     -------

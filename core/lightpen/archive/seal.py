@@ -41,9 +41,7 @@ class Seal(Struct, frozen=True):
     Attributes
     ----------
     heads : tuple of SealedHead, or str
-        Of all chains; of the first seals one hash of them all.
-    sha256 : str
-        Of the file.
+        Heads of all chains; in the first version one hash of them all.
     """
 
     heads: tuple[SealedHead, ...] | Digest

@@ -17,9 +17,9 @@ def statuses(
     Parameters
     ----------
     chain : str
-        That is at home at the station.
+        Chain of the station's data folder.
     rule : DueRule
-        For tips that have none of their own.
+        Rule for tips without their own.
     """
     in_force = {}
     for tip in due_tips(database, chain, rule, library):

@@ -49,7 +49,7 @@ class DeliveredFrame:
     data : (N,) array
         A copy of what was sent.
     number : int
-        By the camera.
+        Frame number of the camera.
     padding : int
         Bytes at the end of each row.
     is_complete : bool

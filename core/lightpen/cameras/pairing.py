@@ -257,7 +257,7 @@ def not_synchronised(lag_ms: float | None, px_per_mm: float | None) -> Message |
     Parameters
     ----------
     px_per_mm : float or None
-        At the pen; None where that is not known.
+        Scale at the pen; None if unknown.
     """
     if lag_ms is None or abs(lag_ms) < LEAST_LAG_MS:
         return None

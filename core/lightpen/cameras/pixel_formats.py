@@ -34,7 +34,7 @@ class PixelFormat:
     Attributes
     ----------
     bits : int
-        Of a value; full scale is ``2**bits - 1``.
+        Bits per value; full scale is ``2**bits - 1``.
     n_channels : int
         Values of a pixel.
     to_grey : int or None

@@ -76,16 +76,15 @@ class Frame:
     host_ts_ns : int
         When the image was there, by the monotonic clock of the machine.
     device_ts_ns : int or None
-        By the clock of the camera.
+        Time stamp of the camera, ns.
     exposure_us, gain_db : float or None
-        That this image was taken with; None where that is not known, as shortly after a
-        change.
+        Exposure and gain of this image; None if unknown, as shortly after a change.
     pixel_format : str
         Name in the GenICam Pixel Format Naming Convention.
     bits : int
         Full scale is ``2**bits - 1``.
     others : tuple of Frame
-        Those that the other cameras of a rig took at this moment.
+        Simultaneous frames of the other cameras of a rig.
     """
 
     image: Image
@@ -206,7 +205,7 @@ class RegionLimits:
     width, height : Range
         ``high`` is that of the sensor.
     x_step, y_step : int
-        Of the place of a region; 0 where it cannot be moved.
+        Step of the region's position; 0 if it is fixed.
     """
 
     width: Range
@@ -245,7 +244,7 @@ class CameraCapabilities:
     width, height : int
         Of the images, px.
     pixel_formats : tuple of str
-        That are offered, the usual one first.
+        Available formats, the default first.
     exposure_us, gain_db, frame_rate, packet_size : Range or None
         None if it cannot be set.
     gain_in_db : bool
@@ -253,7 +252,7 @@ class CameraCapabilities:
     regions : RegionLimits or None
         None if the region cannot be set.
     triggers : tuple of TriggerMode
-        That are offered, free running first.
+        Available modes, free running first.
     has_link : bool
         Whether images come over a cable that may lose some.
     waits : bool

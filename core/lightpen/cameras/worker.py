@@ -70,9 +70,9 @@ class CameraWorker:
     camera : ImageCamera
         Not open; used by the worker only from now on.
     settings : CameraSettings
-        To be applied, again at each reconnection.
+        Settings to apply, again after each reconnection.
     known : mapping of str to CameraSettings
-        By serial numbers; a camera that is among them gets these instead.
+        Settings by serial number, used instead for these cameras.
     on_event : callable
         Called in the thread of the worker with what happens; must return at once and
         not call `stop`.

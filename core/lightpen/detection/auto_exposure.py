@@ -47,7 +47,7 @@ class AutoExposure:
     asked : CameraSettings
         Exposure and gain to be set; images taken with others are passed over.
     level : float
-        Of the brightest LED in the last image, fraction of the full scale.
+        Brightest LED of the last image, as a fraction of full scale.
     saturating : float
         Least light (exposure in us, times gain) that saturated an LED so far.
     """

@@ -200,7 +200,7 @@ def measure_disc(
     image : (H, W) array
         The whole image.
     box : PixelBox
-        Where the region is; a few pixels too small does no harm.
+        Bounding box of the region; it may be a few pixels too small.
     level : float
         An intensity that the region exceeds and its background does not, digital
         numbers.

@@ -30,10 +30,8 @@ def advise(
 
     Parameters
     ----------
-    settings : CameraSettings
-        In force.
     caps : CameraCapabilities or None
-        Of the camera; without it, nothing of the camera can be set.
+        Capabilities of the camera; None if nothing can be set.
     """
     if not exposure.peaks:
         return Advice.SHOW_PEN

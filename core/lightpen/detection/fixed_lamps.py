@@ -39,7 +39,7 @@ def masked_lights(
     mask : (M, 3) array or None
         Circles of stray light: centre x, y and radius, px.
     full_scale : int, optional
-        As of `lightpen.detection.spots.detect_spots`.
+        See `lightpen.detection.spots.detect_spots`.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def fixed_lamps(masked: FloatArray, detections: Sequence[PenDetection]) -> Float
     masked : (N, M, 2) array
         Lights in masked circles, px; NaN where an image shows none.
     detections : sequence of PenDetection
-        Of the N images, whose spots that are no LEDs may be lamps, too.
+        Detections in the N images; their unlabelled spots may be lamps.
 
     Returns
     -------

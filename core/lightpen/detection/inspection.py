@@ -25,7 +25,7 @@ class Exposure:
     Attributes
     ----------
     peaks : tuple of float
-        Of each LED, as a fraction of the full scale; 1 where it is clipped.
+        Peak of each LED as a fraction of full scale; 1 if saturated.
     are_leds : bool
         False where no LED could be told, and these are of all that is bright.
     leds : tuple of int
@@ -72,7 +72,7 @@ class Inspection:
     Attributes
     ----------
     exposure : Exposure
-        Of the LEDs; of all spots where no LED is labelled.
+        Exposure of the LEDs, or of all spots if no LED is labelled.
     edge_width : float
         Median width of their rims from dark to bright, px; NaN without any.
     chosen : (N,) array of int
@@ -165,7 +165,7 @@ class StraySearch:
     Attributes
     ----------
     images : tuple of Spots
-        What was bright in the images so far.
+        Bright spots in the images so far.
     n_with_pen : int
         Images of them that show the pen all the same.
     """

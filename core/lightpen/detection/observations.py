@@ -62,8 +62,7 @@ class Observations:
     details : tuple of Message or None
         More on that, where the reason does not say all.
     advice : Message or None
-        What may be wrong with the set as a whole; None when most images that have
-        spots are labelled.
+        Likely problem of the whole set; None if most images with spots are labelled.
     """
 
     names: tuple[str, ...]

@@ -62,11 +62,11 @@ class PenDetection:
     spots : Spots or None
         All that was found in the image.
     labels : Labels or None
-        Which spot is which LED.
+        Assignment of spots to LEDs.
     others : tuple of PenDetection
-        In the images that the other cameras of a rig took at this moment.
+        Detections in the simultaneous images of the other cameras of a rig.
     posed_by : int
-        Which camera of the rig the pose is by, from 0.
+        Index of the camera that determines the pose, from 0.
     """
 
     pixels: FloatArray
@@ -146,9 +146,9 @@ def detect_pen(
     mask : (M, 3) array, optional
         Circles of stray light to leave out: centre x, y and radius, px.
     before : PenDetection, optional
-        Of the image before, which tells where to look first. Where the LEDs are there,
-        that settles it, also for an image that would be refused on its own; where they
-        are not, the image is looked at on its own.
+        Detection in the previous image, whose LED positions are searched first. If the
+        LEDs are found there, this decides, even for an image that would be rejected on
+        its own; otherwise the whole image is searched.
     full_scale : int, optional
         Brightest value a pixel can have; see `lightpen.detection.spots.detect_spots`.
     is_followed : bool

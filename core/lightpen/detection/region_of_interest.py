@@ -18,7 +18,7 @@ class RegionOfInterest:
     mask : (M, 3) array or None
         Circles of stray light to leave out: centre x, y and radius, px.
     others : tuple of RegionOfInterest
-        In the images of the other cameras of a rig.
+        Regions in the images of the other cameras of a rig.
     """
 
     camera: Camera | None = None

@@ -35,7 +35,7 @@ def observe_rig_images(
     Parameters
     ----------
     pairing : Pairing
-        Which images of the sources are of the same moment.
+        Simultaneous images of the sources.
     masks : sequence of (M, 3) array or None, optional
         Circles of stray light before each camera: centre x, y and radius, px.
 

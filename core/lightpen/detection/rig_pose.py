@@ -20,11 +20,6 @@ from lightpen.model.rig import Rig
 @dataclass(frozen=True, eq=False)
 class RigReprojection:
     """Reprojection errors in the images of all cameras, those of one after another.
-
-    Attributes
-    ----------
-    cameras : tuple of CameraReprojection
-        With the pixels of each.
     """
 
     rig: Rig
@@ -98,7 +93,7 @@ def see_together(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:
     Parameters
     ----------
     detection : PenDetection
-        By the first camera, with those by the others.
+        Detection of the first camera, with those of the others.
 
     Returns
     -------

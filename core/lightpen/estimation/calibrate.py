@@ -117,7 +117,6 @@ class Calibration:
 
     Attributes
     ----------
-    cameras : tuple of CameraImages
     reasons : tuple of Reason
         Why an image was left out; `Reason.NONE` for the used ones.
     used : (N,) array of bool
@@ -131,11 +130,11 @@ class Calibration:
     bundle : Bundle
         The bundle adjustment.
     stated : Priors
-        Of the files, and what is assumed in their place.
+        Priors from the files, with defaults where these state none.
     priors : Priors
         The same with contradicted numbers released.
     assumptions : Assumptions
-        In place of uncertainties that the files do not state.
+        Default uncertainties where the files state none.
     growth : float
         Thermal expansion of the pen against its file, relative.
     contradictions : tuple of Contradiction
@@ -147,7 +146,7 @@ class Calibration:
     instrument : Instrument
         Cameras and pen as adjusted, for measurements with this tip.
     lags : tuple of TimeLag or None
-        Of each camera of a rig but the first.
+        Time lag of each camera of a rig but the first.
     """
 
     cameras: tuple[CameraImages, ...]
@@ -228,15 +227,16 @@ def calibrate_rig(
     Parameters
     ----------
     rig : Rig
-        As its files have it.
+        Rig as in its files.
     pen : Pen
-        As its file has it.
+        Pen as in its file.
     observations : sequence of Observations
-        Of each camera, all of the same N moments.
+        Observations of each camera at the same N instants.
     assumptions : Assumptions
-        In place of uncertainties that the files do not state.
+        Default uncertainties where the files state none.
     second : SecondSwing or None
-        Of the same pen in another cone, before a single camera that has not moved.
+        Swing of the same pen in a second cone, with the same single camera, not moved
+        in between.
 
     Raises
     ------
@@ -266,8 +266,6 @@ class _SingleCameraFits:
 
     Attributes
     ----------
-    observations : tuple of Observations
-        Of each camera.
     steady : tuple of SteadyImages
         The same with the camera's own motion removed.
     pixels : (N, C, L, 2) array
@@ -309,14 +307,11 @@ class _Start:
         The file's cameras where the images put them.
     extrinsics : (6 (C - 1),) array or None
         Their extrinsics less those of the rig file, rad and mm; None of one camera.
-    lags : tuple of TimeLag or None
     reasons : (N, C) array of Reason
     moments : (M,) array of int
         Moments of which an image takes part.
     pixels : (M, C, L, 2) array
         Of these, px; NaN of images that do not take part.
-    joint : JointFit
-        Of these.
     """
 
     rig: Rig

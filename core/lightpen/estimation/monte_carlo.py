@@ -72,7 +72,6 @@ class Trials:
         Covariance of the seat from image to image, mm^2.
     edge_widths : (N,) array
         Of the rims, px; NaN where no areas are known.
-    seed : int
     """
 
     camera: Camera

@@ -46,9 +46,7 @@ class PivotCalibration:
     covariance : (6, 6) array
         Of (tip_pen, pivot_cam), with residuals that hang together, mm^2.
     groups : PoseGroups or None
-        Where the poses have two tips or pivots; the fit is that of the larger group.
-    warnings : tuple of Message
-        What the user should look into.
+        Set if the poses have two tips or pivots; the fit uses the larger group.
     """
 
     fit: PivotFit

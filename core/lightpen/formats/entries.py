@@ -28,7 +28,8 @@ class Entries:
     name : str or Message
         Name of the file, or of a place in it, for messages.
     values : dict
-        By the name without case and underscores: the name in the file, and the value.
+        Entry names without case and underscores; each maps to the name in the file and
+        the value.
     """
 
     name: str | Message

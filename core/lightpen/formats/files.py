@@ -50,7 +50,7 @@ def read_bytes(path: Path, what: Message, limit: int) -> bytes:
     Parameters
     ----------
     what : Message
-        What the file is, for messages: "camera file".
+        File type for messages, such as "camera file".
     limit : int
         Largest size, bytes. It is checked before anything is read.
 
@@ -100,7 +100,7 @@ def read_text(path: Path, what: Message, limit: int) -> str:
     Parameters
     ----------
     what : Message
-        What the file is, for messages.
+        File type for messages.
     limit : int
         Largest size, bytes.
 

@@ -45,7 +45,7 @@ class Inputs:
     Attributes
     ----------
     camera : InputFile
-        Of the first camera, if there are several.
+        File of the first camera.
     observations : tuple of InputFile
         The images, the video or the file of LED centres.
     nominal_tip : (3,) array or None
@@ -53,7 +53,7 @@ class Inputs:
     origin : Origin or None
         Origin of the images; None if unknown.
     units : str or None
-        Of the pen file, where it states none.
+        Units of a pen file that states none.
     led_diameter : float or None
         Of the LED discs, mm, where the pen file does not state it.
     """

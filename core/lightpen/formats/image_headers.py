@@ -66,8 +66,6 @@ def read_image_header(stream: BinaryIO, name: str | Message) -> ImageHeader:
     ----------
     stream : BinaryIO
         The file, at its first byte; it is left anywhere.
-    name : str or Message
-        Of the image, for messages.
 
     Raises
     ------

@@ -110,7 +110,7 @@ def look_at_all(
     memory_a_pixel : int
         Memory of processing, bytes per pixel; limits the threads by `WORK_MEMORY`.
     n_threads : int, optional
-        At most; by default as many as there are processors.
+        Maximum number of threads; by default the number of processors.
     """
     keep_freed_memory()
     room = MemoryRoom(WORK_MEMORY)

@@ -100,7 +100,7 @@ def open_files(
     camera_path, pen_path, rig_path : Path or None
         None if there was no such file.
     units : str, optional
-        Of a pen file that states none.
+        Units of a pen file that states none.
     """
     camera_file, pen_file, rig_file, faults = None, None, None, []
     try:

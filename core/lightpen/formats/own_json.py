@@ -41,7 +41,7 @@ def parse_own_json(data: bytes, shape: type[T]) -> T:
     Parameters
     ----------
     shape : type
-        As for `msgspec`; unknown entries are ignored.
+        Type as for `msgspec`; unknown entries are ignored.
 
     Raises
     ------

@@ -40,7 +40,7 @@ def pair_images(names: Sequence[Sequence[str]], cameras: Sequence[str]) -> Pairi
     Parameters
     ----------
     names : sequence of sequence of str
-        Of the images of each camera, in their order.
+        Image names of each camera, in their order.
     cameras : sequence of str
         Names of the cameras.
 

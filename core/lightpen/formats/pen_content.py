@@ -52,9 +52,9 @@ def agreed_unit(stated: str, given: str | None, name: str) -> str:
     Parameters
     ----------
     stated, given : str
-        By the file and by the user; empty where none is.
+        Units from the file and from the user; empty if not given.
     name : str
-        Of the file, as it is shown.
+        Displayed name of the file.
 
     Raises
     ------

@@ -154,7 +154,7 @@ def write_pen(pen: Pen, path: Path, parent_sha256: str = "") -> None:
     path : Path
         Name that ends in .csv or .json.
     parent_sha256 : str, optional
-        Of the file that the pen was made better from.
+        Checksum of the file from which the pen was improved.
 
     Raises
     ------

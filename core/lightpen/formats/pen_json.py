@@ -42,7 +42,7 @@ def from_json(tree: Tree, units: str | None, name: str) -> PenContent:
     units : str or None
         Unit of its lengths, where it does not say.
     name : str
-        Of the file, as it is shown.
+        Displayed name of the file.
 
     Raises
     ------

@@ -18,9 +18,9 @@ class StoredMessage(Struct, frozen=True):
     Attributes
     ----------
     code : str
-        Of its template in `lightpen.catalogue`.
+        Code of a template in `lightpen.catalogue`.
     values : mapping of str to StoredValue
-        By field of the template; what is not a number is None.
+        Values for the fields of the template; None for a value that is not finite.
     """
 
     code: str

@@ -70,9 +70,9 @@ class Table:
         Parameters
         ----------
         names : sequence of sequences of str
-            For each column the names it may have, the preferred one first.
+            Accepted names of each column, the preferred one first.
         what : Message
-            What the table holds, for messages.
+            Content of the table for messages.
 
         Raises
         ------
@@ -125,7 +125,7 @@ class Table:
         Parameters
         ----------
         columns : sequence of k int
-            Which columns, from 0.
+            Indices of the columns, from 0.
 
         Returns
         -------
@@ -148,7 +148,7 @@ class Table:
         Parameters
         ----------
         column : int
-            Which column, from 0.
+            Index of the column, from 0.
 
         Returns
         -------
@@ -202,7 +202,7 @@ def read_table(path: Path, what: Message, limit: int) -> Table:
     Parameters
     ----------
     what : Message
-        What the file is, for messages.
+        File type for messages.
     limit : int
         Largest size, bytes.
 

@@ -60,9 +60,9 @@ def parse_upgraded(data: bytes, shape: type[T], kind: str) -> T:
     Parameters
     ----------
     shape : type
-        Of the newest format, as of `parse_own_json`.
+        Type of the newest format, as in `parse_own_json`.
     kind : str
-        Of the file, a key of `UPGRADES`.
+        Kind of the file, a key of `UPGRADES`.
 
     Raises
     ------

@@ -72,7 +72,7 @@ def adjust_board(
     Parameters
     ----------
     start : BoardState
-        With the intrinsics as their files have them, where ``stated`` says so.
+        Start values; intrinsics as in the files where ``stated`` is set.
     stated : tuple of (4 + n, 4 + n) array or None
         Information of the intrinsics of each camera beside the views; none where None.
 
@@ -135,8 +135,6 @@ def view_information(
 
     Parameters
     ----------
-    state : BoardState
-        With the poses of these views.
     image_size : tuple of int
         Outside of which no point is seen.
 

@@ -24,7 +24,7 @@ class BoardState:
     rotations, translations : (C, 3, 3) and (C, 3) array
         Of cam_from_rig, mm.
     poses : BoardPoses
-        Of rig_from_board.
+        Poses of rig_from_board.
     shape : (5,) array
         Stretch, shear, and three bends, mm.
     """

@@ -76,7 +76,7 @@ class Board:
         Side of a marker of a ChArUco board, gap between markers, or diameter of the
         circles, mm; 0 of a chessboard.
     dictionary : str
-        Of the markers, as OpenCV names it; empty without markers.
+        Marker dictionary, by its OpenCV name; empty without markers.
     """
 
     kind: BoardKind

@@ -70,22 +70,20 @@ class CameraCalibration:
 
     Attributes
     ----------
-    camera : Camera
-        With its covariance.
     views : Views
-        In which the board was found; points that were left out are NaN.
+        Views with a detected board; excluded points are NaN.
     left_out : tuple of str
         Views that fit no other.
     n_points_left_out : int
-        In the views that take part.
+        Excluded points in the accepted views.
     held_out : (V,) array
         Distance of the points of each view by the others, px rms.
     correlation : float
-        By which the variances of independent noise were multiplied.
+        Factor applied to the variances of independent noise.
     halves : ViewHalves or None
         None where there are too few views.
     remarks : tuple of Message
-        What is not as it should be.
+        Warnings.
     """
 
     camera: Camera

@@ -81,7 +81,7 @@ def cover(views: Views, poses: BoardPoses) -> BoardCoverage:
     Parameters
     ----------
     poses : BoardPoses
-        Of cam_from_board.
+        Poses of cam_from_board.
     """
     normals = poses.rotations[..., 2]
     tilts = np.arccos(np.clip(np.abs(normals[:, 2]), 0, 1))

@@ -35,7 +35,6 @@ class Choice:
 
     Attributes
     ----------
-    n_coefficients : int
     held_out : float
         Distance of points in views that were not fitted to, with 5 coefficients, px
         rms.

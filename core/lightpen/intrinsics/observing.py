@@ -38,8 +38,6 @@ class ObservedBoard:
 
     Attributes
     ----------
-    views : Views
-        In which a camera saw it.
     unseen : tuple of str
         Names of the images, or moments, in which none did.
     """

@@ -39,9 +39,9 @@ class PairLag:
     Attributes
     ----------
     views, sigma : float
-        Of the time between two views.
+        Lag in view intervals, and its standard deviation.
     interval_ms : float or None
-        That time, if it is known.
+        Interval between two views, if known.
     px_per_ms : float
         What a millisecond costs at the pen's speed of 100 mm/s.
     """
@@ -137,7 +137,7 @@ def calibrate_pair(
     Parameters
     ----------
     cameras : tuple of Camera, optional
-        As their files have them; found from the views as well unless given.
+        Cameras as in their files; by default they are estimated from the views as well.
     interval_ms : float, optional
         Time between two views, if they are a sequence.
 

@@ -17,10 +17,10 @@ class BoardTolerances:
     flatness : float
         By how much its corners bend away from the plane, mm.
     squareness : float
-        Of the ratio of its lengths along x and y, and of its right angle, relative:
-        a printer stretches the paper along its way.
+        Relative tolerance of the aspect ratio and of the right angle: printers stretch
+        the paper along its path.
     scale : float
-        Of all its lengths together, relative. No view tells it.
+        Relative tolerance of the scale. No view determines it.
     """
 
     flatness: float = 0.1

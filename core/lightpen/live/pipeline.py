@@ -103,8 +103,6 @@ class Live:
         Applied when they are opened.
     runner : SwingRunner
         Takes every image, except during a verification.
-    clock : Clock, optional
-        Of the cameras.
     known : mapping of str to CameraSettings
         Settings by serial number, in place of ``settings``.
     verifier : VerificationRunner, optional

@@ -27,7 +27,7 @@ class SourceEnvironment:
     Attributes
     ----------
     scene : Scene
-        What the simulated camera sees.
+        Scene of the simulated camera.
     now : callable
         Returns date and time with the time zone.
     """

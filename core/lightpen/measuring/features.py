@@ -43,7 +43,6 @@ class Feature:
 
     Attributes
     ----------
-    kind : FeatureKind
     origin : (3,) array
         mm: centre of point, circle, slot, sphere; of line, plane, cylinder and cone the
         point nearest to the mean of the points.

@@ -58,9 +58,10 @@ class FeatureModel:
     Attributes
     ----------
     distances : callable
-        Of points (N, 3) in the frame of the feature, with its sizes (S,).
+        Distances of points (N, 3) in the feature's frame, given its sizes (S,).
     free : tuple of int
-        Which translations along x y z (0 to 2) and rotations (3 to 5) change it.
+        Indices of the translations along x y z (0 to 2) and rotations (3 to 5) that
+        change the feature.
     sizes : tuple of str
         Names; lengths in mm, angles in rad.
     """

@@ -19,26 +19,27 @@ class Assumptions:
     focal_length : float
         Relative.
     aspect : float
-        Of fy / fx.
+        Relative standard uncertainty of fy / fx.
     principal_point : float
         Of cx and of cy, px.
     k1, k2, tangential : float
-        Of the distortion coefficients; ``tangential`` of p1 and of p2.
+        Standard uncertainty of the distortion coefficients; ``tangential`` applies to
+        p1 and p2.
     scale : float
-        Of all LED coordinates of a pen together, relative.
+        Relative standard uncertainty of the scale of all LED coordinates.
     expansion : float
         Thermal, of the pen, 1/K: 2e-6 of carbon fibre to 23e-6 of aluminium.
     expansion_share : float
-        Of a stated expansion, relative.
+        Relative standard uncertainty of a stated expansion coefficient.
     temperature_c : float or None
-        Of the pen during the swing; None if it was not measured.
+        Temperature of the pen during the swing, degrees Celsius; None if not measured.
     temperature : float
-        Of that temperature, K.
+        Standard uncertainty of the temperature, K.
     warmth : float
-        Of how much warmer the pen is than at its measurement, where the temperature
-        during the swing was not measured, K.
+        Standard uncertainty of the temperature difference from the LED measurement, if
+        the temperature during the swing was not measured, K.
     diameter : float
-        Of the LED discs, relative.
+        Relative standard uncertainty of the LED disc diameter.
     form_error : float
         Of where the ball sits, as ball and cone are not round, along each axis in each
         form in which it may follow the lean, mm.

@@ -72,8 +72,8 @@ class Camera:
     temperature_c : float or None
         Of the camera at its calibration, degrees Celsius.
     lens_field : LensField or None
-        What the distortion leaves, as the calibration of the camera found it. Not part
-        of the projection: it is removed from observed pixels by `without_lens_field`.
+        Residual field beyond the distortion model, from the camera calibration. Not
+        part of the projection: `without_lens_field` removes it from observed pixels.
     """
 
     width: int

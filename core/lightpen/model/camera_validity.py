@@ -21,7 +21,7 @@ def unmodelled_effects_of(
     temperature_c : float, optional
         At the station, degrees Celsius.
     serial : str
-        Of the camera in use, where it tells it.
+        Serial number of the camera in use; empty if unknown.
 
     Returns
     -------

@@ -75,7 +75,7 @@ class Pen:
     expansion_sigma : float or None
         Its standard uncertainty, 1/K; None if not stated.
     temperature_c : float or None
-        At which the LEDs were measured; None if not stated.
+        Temperature of the LED measurement, degrees Celsius; None if not stated.
     led_covariance : (3 L, 3 L) array or None
         Of all LED coordinates but for the scale that they share, mm^2; None if no more
         than ``led_sigma`` is known.

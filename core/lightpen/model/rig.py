@@ -29,7 +29,7 @@ class Rig:
         Of the rotation vectors (left, rad) and translations (mm) of all but the first
         camera, in this order camera by camera.
     names : tuple of str
-        Of the cameras, for people; none of a camera alone.
+        Display names of the cameras; empty for a single camera.
 
     References
     ----------

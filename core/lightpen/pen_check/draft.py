@@ -30,9 +30,7 @@ class CellError:
     Attributes
     ----------
     row, column : int
-        From 0; the columns are those of `COLUMNS`.
-    flaw : Message
-        What is wrong with it.
+        Indices from 0; columns as in `COLUMNS`.
     """
 
     row: int
@@ -182,7 +180,7 @@ def check_draft(draft: PenDraft, pen: Pen | None = None) -> DraftCheck:
     Parameters
     ----------
     pen : Pen, optional
-        Of which it is the draft, unchanged; a draft shows fewer digits.
+        Original pen of an unmodified draft, which shows fewer digits.
     """
     if not draft.rows:
         return DraftCheck()
@@ -251,7 +249,7 @@ def mended(draft: PenDraft, finding: Finding) -> PenDraft:
     Parameters
     ----------
     draft : PenDraft
-        Of the pen that was compared, in the same frame.
+        Draft of the compared pen, in the same frame.
     finding : Finding
         One that `can_be_mended`.
     """

@@ -61,7 +61,7 @@ class FrameCheck:
     Attributes
     ----------
     checks : tuple of RuleCheck
-        In the order of `Rule`.
+        Checks in the order of `Rule`.
     error : Message or None
         Why the pen cannot be used, with LED and amount.
     remark : Message or None

@@ -76,7 +76,7 @@ class Finding:
     axes : str
         Coordinates that two LEDs have of each other: "y", or "x/y" for either.
     advice : Message or None
-        What is likely wrong with the files as a whole, and what to do.
+        Likely problem of the files as a whole, and the remedy.
     """
 
     what: MatchFinding
@@ -109,7 +109,7 @@ class PenMatch:
     sigma : float
         Standard deviation of one image coordinate, px; NaN where no pen was found.
     findings : tuple of Finding
-        What is wrong, the worst first.
+        Findings, the most serious first.
     """
 
     n_views: int

@@ -48,8 +48,6 @@ def find_unknown_leds(
 
     Parameters
     ----------
-    poses : Poses
-        Of N views.
     pixels : sequence of N arrays (K, 2)
         Spots of each view that are no LED, px.
     """

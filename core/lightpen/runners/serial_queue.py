@@ -25,8 +25,6 @@ class SerialQueue:
 
     Parameters
     ----------
-    name : str
-        Of the thread.
     on_bug : callable
         Done next after an act that ended by a bug; not after a bug of its own.
     """
@@ -200,8 +198,6 @@ class BackgroundTask:
 
     Parameters
     ----------
-    start : StartThread
-        Of the queue.
     on_bug : callable
         Done when the computation ended by a bug; it is then still there.
     on_progress : callable

@@ -38,7 +38,7 @@ class HotSpot:
     width : float
         Standard deviation of its Gaussian, in radii.
     share : float
-        Of its light in the brightness of its middle.
+        Fraction of the central brightness that the spot contributes.
     """
 
     place: tuple[float, float]

@@ -64,7 +64,7 @@ class ImagePlan:
     Attributes
     ----------
     index : int
-        From 0.
+        Index of the image, from 0.
     rotation, translation : (3, 3) and (3,) array
         cam_from_pen at mid-exposure; mm.
     flags : tuple of str
@@ -232,7 +232,7 @@ def camera_turn(scene: Scene, share: float) -> FloatArray:
     Parameters
     ----------
     share : float
-        Of the whole turn.
+        Fraction of the whole rotation.
     """
     right, down = scene.camera_turn * share * np.array(TURN) / scene.camera.fx
     return rotation_from_vector(np.array([-down, right, 0.0]))

@@ -72,8 +72,6 @@ def row_of_cameras(n_cameras: int, baseline: float, binning: int = 1) -> Rig:
         2 to 4.
     baseline : float
         From the first to the last, mm.
-    binning : int
-        As for `paper_camera`.
     """
     u, _, w = PAPER_CONE
     places = np.linspace(-baseline / 2, baseline / 2, n_cameras)

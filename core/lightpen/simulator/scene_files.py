@@ -210,11 +210,6 @@ def scene_truth(plan: ScenePlan, folder: str = "images/") -> Json:
     """Return the ground truth of a set, as JSON.
 
     Lengths in mm, pixels in px, angles in degrees; see `NOTES`.
-
-    Parameters
-    ----------
-    folder : str
-        Of the images, beside the truth.
     """
     scene = plan.scene
     camera = scene.camera

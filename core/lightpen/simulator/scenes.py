@@ -102,9 +102,8 @@ class Scene:
     swing : str
         Kind of swing, see `lightpen.simulator.postures.draw_postures`.
     faces : str
-        What the LEDs look like inside their rims: evenly lit, a hot spot off the middle
-        in each its own way, a dome whose bright part moves with the view, or a dark
-        middle.
+        Look of the LEDs: evenly lit, an off-centre hot spot, a dome whose bright part
+        moves with the view, or a dark centre.
     led_noise : float
         Standard deviation of the measured LED coordinates about the truth, mm.
     pen : Pen
@@ -117,7 +116,7 @@ class Scene:
         By which the image shifts from the first to the last one, as the camera turns,
         px; live, in a minute.
     viewpoint : int
-        Which camera of several it is, from 0; it chooses the noise.
+        Index of the camera in the rig, from 0; it selects the noise.
     """
 
     n_images: int = 60

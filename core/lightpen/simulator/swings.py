@@ -155,7 +155,8 @@ def swing_poses(
     tip_pen, cone_cam : (3,) array
         Tip in the pen frame and bottom of the cone in the camera frame, mm.
     shows : callable, optional
-        In which frames every LED is so; by default those that ``camera`` sees.
+        Condition that every LED must meet in a frame; by default, visibility in
+        ``camera``.
     """
     pen = pen or paper_pen()
     camera = camera or paper_camera()
@@ -204,8 +205,6 @@ def swing_from_postures(
 
     Parameters
     ----------
-    postures : Postures
-        Of F frames.
     tip_pen, cone_cam : (3,) array
         mm.
     tips_cam : (F, 3) array, optional
@@ -241,8 +240,6 @@ def slip_tip(
 
     Parameters
     ----------
-    swing : Swing
-        Of F frames.
     frames : (F,) bool array
         Frames that slip.
     distances : (F,) array or float
@@ -274,8 +271,6 @@ def simulate_centers(
 
     Parameters
     ----------
-    pen : Pen
-        With L LEDs.
     rotations, translations : (F, 3, 3) and (F, 3) array
         cam_from_pen; mm.
     sigma : float

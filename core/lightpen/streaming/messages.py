@@ -52,7 +52,7 @@ def pose_messages(
     tip : StreamedTip or None
         None without a current tip: only the pose is sent.
     number : int
-        Of the image.
+        Number of the image.
     at : float
         Time of exposure, s since 1970 (UTC).
     """

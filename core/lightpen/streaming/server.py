@@ -44,7 +44,7 @@ class StreamPlace:
     Attributes
     ----------
     address : str
-        Of this computer in the network that may listen; the loopback for none.
+        Local network address to listen on; empty for the loopback.
     port : int
         0 for any that is free.
     """

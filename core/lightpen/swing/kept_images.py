@@ -52,7 +52,7 @@ class AcceptedImages:
     joint : JointFit or None
         The joint fit, as soon as the postures allow one.
     assumed : Assumptions
-        What stands in for what the files do not state.
+        Default uncertainties where the files state none.
     prediction : UncertaintyPrediction or None
         Normal equations for the prediction of U, with the joint fit.
     predicted : PredictedUncertainty

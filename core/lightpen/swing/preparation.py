@@ -75,11 +75,6 @@ class SourceChoice:
 @dataclass(frozen=True)
 class CameraInUse:
     """The camera that images come from.
-
-    Attributes
-    ----------
-    settings : CameraSettings
-        In force.
     """
 
     serial: str
@@ -93,7 +88,7 @@ class SecondCamera:
     Attributes
     ----------
     rig_file : RigFile or None
-        Where both cameras stand, and their intrinsics.
+        Extrinsics and intrinsics of both cameras.
     image_size : pair of int or None
         Width and height of its images, px; None while there are none.
     in_use : CameraInUse or None
@@ -151,7 +146,7 @@ class Preparation:
     mask : (M, 3) array
         Circles of stray light: centre x, y and radius, px.
     assumptions : Assumptions
-        What stands in for what the files do not state.
+        Default uncertainties where the files state none.
     has_unsaved_leds : bool
         Whether LEDs were edited or opened that are not those of the file in use.
     second : SecondCamera or None

@@ -37,7 +37,7 @@ class Resumable:
     setup : SwingSetup
         Of the record's own files.
     state : SwingState
-        With all images that the record acknowledged.
+        State with all images in the journal.
     """
 
     record: Record

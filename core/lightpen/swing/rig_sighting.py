@@ -42,7 +42,7 @@ def seen_by_rig(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:
     Parameters
     ----------
     detection : PenDetection
-        By the first camera, with those by the others at that moment.
+        Detection of the first camera, with the simultaneous ones of the others.
 
     Returns
     -------

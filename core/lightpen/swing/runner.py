@@ -35,12 +35,10 @@ class SwingRunner:
     ----------
     records : Path
         Folder that a new swing's record is made in.
-    archive : FolderArchive
-        Of the accepted results.
     now : callable
         Returns date and time with the time zone.
     logbook : LazyLogbook, optional
-        For the outcome of swings; without one, it is in the files alone.
+        Archive for the outcome of swings; without it the outcome is only in files.
     """
 
     def __init__(
@@ -134,19 +132,14 @@ class SwingRunner:
         Parameters
         ----------
         reason : str
-            For accepting it despite findings.
+            Reason for accepting the result despite findings.
         signature : Signature, optional
-            Of a supervisor, where one is required.
+            Signature of a supervisor, if one is required.
         """
         self._queue.ask(lambda: self._workflow.accept(reason, signature))
 
     def revoke(self, result: Result, operator: str) -> None:
         """Revoke a result in favour of the one before.
-
-        Parameters
-        ----------
-        operator : str
-            Who revokes it.
         """
         self._queue.ask(lambda: self._workflow.revoke(result, operator))
 
@@ -189,9 +182,9 @@ class SwingRunner:
         Parameters
         ----------
         detection : PenDetection or None
-            In the image; None if its size is wrong.
+            Detection in the image; None if the image has the wrong size.
         setup : SwingSetup, optional
-            That the image was searched with; images of another swing are ignored.
+            Setup of the detection; images of another swing are ignored.
         n_images : int, optional
             Length of the recording, which is replayed in a loop; the swing ends with
             the last image.

@@ -83,8 +83,8 @@ class SwingEvent:
     Attributes
     ----------
     numbers : tuple of int
-        Of images: the one kept, or those that were kept and are now dropped; of a field
-        that is full: its row and column on the dial.
+        Numbers of the accepted image or of the images that are no longer accepted; for
+        a full field, its row and column on the dial.
     """
 
     what: SwingEventKind
@@ -100,7 +100,7 @@ class SwingSetup:
     mask : (M, 3) array or None
         Circles of stray light: centre x, y and radius, px.
     assumptions : Assumptions
-        What stands in for what the files do not state.
+        Default uncertainties where the files state none.
     beside : Rig or None
         The camera with others beside it, where there are any.
     other_masks : tuple of (M, 3) array
@@ -207,7 +207,7 @@ class SwingState:
     time : float
         Of the last image, s.
     message : Message
-        What the operator should do or know now.
+        Instruction or information for the operator.
     kept : AcceptedImages
         The images and the running fit.
     next_number : int
@@ -215,9 +215,7 @@ class SwingState:
     n_dropped : mapping of Reason to int
         Postures that were new but of no use.
     seat : Seat or None
-        Where the tip was found to rest.
-    recent : tuple of RecentDetection
-        Of the last second.
+        Position of the seated tip.
     last_seen : float
         When the pen was seen last, s.
     strayed_since : float or None
@@ -229,7 +227,7 @@ class SwingState:
     heading : float or None
         The operator's right as the camera sees it, rad; None until it is learnt.
     target : Posture or None
-        Where to lean the pen next.
+        Next posture to guide to.
     target_since : float
         When the target was chosen, s.
     slipped_at : float or None

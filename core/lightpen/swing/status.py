@@ -31,19 +31,19 @@ class SwingStatus:
     Attributes
     ----------
     setup : SwingSetup or None
-        What it is captured with; stays when the swing is left.
+        Setup of the swing; kept when the swing is left.
     state : SwingState or None
         None while there is no swing.
     record_folder : Path or None
-        Where it is recorded.
+        Folder of the record.
     names : Names
-        Who calibrates what with it.
+        Station, operator, pen, tip and cone.
     solution : Solution or None
         The tip by its images; None until it is solved.
     origin : Origin or None
-        What its images are of.
+        Origin of the images.
     assessment : SwingAssessment or None
-        What the solution is worth, beside what is in force.
+        Assessment of the solution, compared with the current result.
     result : Result or None
         The result that was accepted.
     revoked : Result or None

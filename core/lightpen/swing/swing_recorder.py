@@ -48,21 +48,21 @@ def capture_image(
     Parameters
     ----------
     writer : RecordWriter
-        Of the record that belongs to the state.
+        Writer of the swing's record.
     image : (H, W) array
         Grey image of the camera's size, 8 or 16 bit.
     detection : PenDetection
-        What it shows.
+        Detection in the image.
     time : float
         When it was taken, s.
     device_time_ns : int, optional
-        By the clock of the camera.
+        Time stamp of the camera, ns.
     stats : Stats, optional
         What became of the camera's images since the swing began.
     rule : Rule, optional
-        What the image does to the swing; that of a live one by default.
+        How the image changes the swing; by default the rule for live images.
     others : sequence of SecondaryView, optional
-        What the other cameras of a rig saw at that moment.
+        Simultaneous images of the other cameras of a rig.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def take_recorded_image(
     time : float
         When it is read, s.
     n_images : int
-        Of the recording.
+        Number of images in the recording.
     is_known : bool
         Whether it was taken before the swing was interrupted.
 
@@ -185,7 +185,7 @@ class FrameCounters:
     total : Stats
         Since the swing began.
     last : Stats or None
-        What the camera had counted by the last image; None before the first.
+        Camera counters at the last image; None before the first.
     """
 
     total: Stats = field(default_factory=Stats)

@@ -77,12 +77,10 @@ class SwingWorkflow:
     ----------
     records : Path
         Folder that a new swing's record is made in.
-    archive : FolderArchive
-        Of the accepted results.
     now : callable
         Returns date and time with the time zone.
     logbook : LazyLogbook or None
-        For the outcome of swings; without one, it is in the files alone.
+        Archive for the outcome of swings; without it the outcome is only in files.
     """
 
     def __init__(

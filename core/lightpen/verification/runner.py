@@ -31,8 +31,6 @@ class VerificationRunner:
 
     Parameters
     ----------
-    archive : FolderArchive
-        Of the accepted results.
     data : Path
         Data folder, in which results are kept.
     now : callable
@@ -76,8 +74,9 @@ class VerificationRunner:
         Parameters
         ----------
         detection : PenDetection or None
-            What it shows, if it is of the right size.
+            Detection in the image; None if the image has the wrong size.
         region : RegionOfInterest
-            What was looked for; images looked at for something else are not taken.
+            Region searched in this image; images searched for another region are
+            ignored.
         """
         self._queue.ask_and_wait(lambda: self._workflow.take(frame, detection, region))

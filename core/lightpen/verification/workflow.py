@@ -80,8 +80,6 @@ class VerificationWorkflow:
 
     Parameters
     ----------
-    archive : FolderArchive
-        Of the accepted results.
     data : Path
         Data folder, in which results are kept.
     now : callable

@@ -47,7 +47,7 @@ class CaptureState:
     Attributes
     ----------
     sought : Board or None
-        What is looked for; None while no views are taken.
+        Board to detect; None while no views are captured.
     capture : Capture or None
         The views so far; None before the first image.
     outline : (4, 2) array or None

@@ -34,8 +34,6 @@ class BoardOverlay:
         Points seen in each part of the image; empty ones are filled.
     arrows : (M, 4) array or None
         Residuals: place and value, px; drawn enlarged.
-    uncertainty : UncertaintyMap or None
-        Of projections.
     """
 
     points: FloatArray | None = None

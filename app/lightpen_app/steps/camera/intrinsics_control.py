@@ -23,7 +23,7 @@ class IntrinsicsControl(QObject):
     Parameters
     ----------
     page : QWidget
-        Whose window it is in which a camera is calibrated.
+        Parent of the calibration window.
     """
 
     def __init__(

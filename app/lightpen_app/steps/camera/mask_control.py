@@ -18,9 +18,8 @@ class MaskControl(QObject):
 
     Parameters
     ----------
-    panel : StrayLightPanel
     images : LivePanel
-        Where the mask is drawn and marked.
+        Live images on which the mask is drawn.
     """
 
     def __init__(

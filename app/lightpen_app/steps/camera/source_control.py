@@ -56,7 +56,7 @@ class BesideControl(QObject):
     Parameters
     ----------
     panel : SourcePanel
-        Where they are offered.
+        Panel that offers the sources.
     """
 
     def __init__(

@@ -70,7 +70,6 @@ class LedState:
         The table without changes.
     invalid_file : Path or None
         The file that it was opened from, where that cannot be used.
-    in_use : PenFile or None
     """
 
     draft: PenDraft = field(default_factory=PenDraft)
@@ -111,10 +110,6 @@ class LedState:
 
 class LedDraft(QObject):
     """Holds the state of the LED table; changes of it can be undone.
-
-    Attributes
-    ----------
-    edits : QUndoStack
 
     Signals
     -------

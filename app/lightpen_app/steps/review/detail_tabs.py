@@ -22,10 +22,8 @@ class DetailTabs(QTabWidget):
 
     Parameters
     ----------
-    run : SwingRun
-        With the solution.
     place : SavePlace
-        Where plots are saved.
+        Folder for saved plots.
 
     Signals
     -------

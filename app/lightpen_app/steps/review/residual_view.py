@@ -25,7 +25,7 @@ class Arrows:
     points, residuals : (N, 2) array
         px.
     scale : float
-        By which the residuals are enlarged.
+        Magnification of the residuals.
     """
 
     points: FloatArray

@@ -29,13 +29,10 @@ class ResultExport(QObject):
 
     Parameters
     ----------
-    run : SwingRun
-        With the tip.
-    place : SavePlace
     draw_plots : callable
         Returns all plots as pictures; only the page can draw them.
     page : QWidget
-        Whose windows are opened.
+        Parent of dialogs.
 
     Signals
     -------

@@ -115,7 +115,7 @@ class ReviewedResult:
     Attributes
     ----------
     names : Names
-        Of what was swung.
+        Names of the swing.
     """
 
     solution: Solution

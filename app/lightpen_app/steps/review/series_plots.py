@@ -130,7 +130,7 @@ class LinePlot(NamedPlot):
     Parameters
     ----------
     curves : sequence of Curve
-        At most three.
+        Curves, at most three.
     x_column : str
         Name of the column of x in the CSV file.
     """

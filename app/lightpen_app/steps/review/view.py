@@ -29,15 +29,6 @@ ANY_WIDTH = 16777215  # QWIDGETSIZE_MAX
 
 class ReviewView(ResponsiveLayout, Translated, QWidget):
     """Shows a solved swing, the result beside its details.
-
-    Attributes
-    ----------
-    question, reason : QuestionBar, ReasonBar
-    cancel, repeat, capture_more, accept, verify, take_back : PushButton
-    result : ResultPanel
-    tools : ResultTools
-    next_tips : NextTipsRow
-    tabs : DetailTabs
     """
 
     narrow_below = 112 * GRID  # px; then it has the result in a tab

@@ -64,9 +64,9 @@ def review_page_state(
     Parameters
     ----------
     named : Names
-        What is chosen at the step Start.
+        Selection at the step Start.
     main : MainAction
-        What the main button does.
+        Action of the main button.
     """
     translate, verdict = QCoreApplication.translate, status.verdict
     why_locked, is_accepted = why_not_changed(status), status.result is not None

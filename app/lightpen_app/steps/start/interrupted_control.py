@@ -42,7 +42,7 @@ class InterruptedControl(QObject):
     Parameters
     ----------
     panel : InterruptedPanel
-        That lists what is found.
+        List of the interrupted swings.
     settle : callable
         Takes over what is being typed on the page.
 

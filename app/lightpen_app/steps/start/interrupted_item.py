@@ -31,7 +31,7 @@ class RowWords:
     Attributes
     ----------
     resume, discard, keep : pair of str
-        What a button says, and its name for who cannot see the row.
+        Label of each button, and its accessible name.
     """
 
     heading: str

@@ -23,7 +23,7 @@ class LargeScreenPanel(QWidget):
     Parameters
     ----------
     logbook : LazyLogbook
-        Of the archive that tells of the tip.
+        Archive with the status of tips.
     """
 
     def __init__(self, logbook: LazyLogbook, parent: QWidget | None = None) -> None:

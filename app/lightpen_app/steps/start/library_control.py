@@ -35,9 +35,9 @@ class LibraryControl(QObject):
     Parameters
     ----------
     names : NamesForm
-        Whose lists it fills.
+        Form whose lists are filled.
     question : QuestionBar
-        In which it asks whether an unknown barcode is to be added.
+        Asks whether an unknown barcode is to be added.
     page : QWidget
         Above which the dialog opens.
 

@@ -53,7 +53,7 @@ class RequestedChange:
     is_new : bool
         Whether the item is to be added.
     signature : Signature or None
-        Of a supervisor, where one has to sign.
+        Signature of a supervisor, if one is required.
     """
 
     item: AnyItem

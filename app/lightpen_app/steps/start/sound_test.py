@@ -21,7 +21,7 @@ class SoundTest(Translated, QWidget):
     Parameters
     ----------
     step_ms : int, optional
-        From one sound to the next.
+        Interval between two sounds.
     """
 
     def __init__(

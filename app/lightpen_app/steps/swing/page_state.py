@@ -58,9 +58,9 @@ class SwingPageState:
     Attributes
     ----------
     value, operator_value : OperatorValue
-        What the page shows, and what the operator view.
+        Content of the page and of the operator view.
     note : str
-        What the count leaves out.
+        Images that are not counted.
     stand : DisplayedPosture or None
         How the pen is drawn in space.
     why_not_side : str

@@ -19,9 +19,9 @@ class RemainingImages:
     Attributes
     ----------
     n_images : int
-        To go, rounded up to what the estimate is worth.
+        Remaining images, rounded to the accuracy of the estimate.
     n_kept : int
-        With how many images that was estimated.
+        Number of images at the time of the estimate.
     has_risen : bool
         Whether more are to go than was told before, though none were dropped.
     """

@@ -45,7 +45,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
 
     Attributes
     ----------
-    dial : LeaningDial
     side, start_over : PushButton
         The buttons at the upper right.
     """

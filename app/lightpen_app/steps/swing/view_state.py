@@ -65,7 +65,7 @@ class SwingViewState:
     connection : Connection
         How the camera is.
     seen : str
-        What the last image shows, a few words.
+        Content of the last image in a few words.
     has_fault : bool
         Whether the swing was paused because an image could not be recorded.
     solving : float or None
@@ -75,7 +75,7 @@ class SwingViewState:
     stillness : float
         How long the pen has been upright and still after the verdict: 1 is enough.
     origin : Origin or None
-        What the images are of.
+        Origin of the images.
     is_simulated : bool
         Whether the pen is led by the mouse, so that it leans as the camera sees it.
     is_away : bool

@@ -58,13 +58,13 @@ class VerifyView:
     Attributes
     ----------
     operator : OperatorValue
-        What is shown in the operator view, too.
+        Content of the operator view.
     lamps : StatusMessage
         The drift of fixed lamps, unless it is the verdict.
     titles : tuple of str
-        Of the tasks, with how far each is.
+        Titles of the tasks with their progress.
     task : VerificationTask or None
-        At hand.
+        Current task.
     reading : float or None
         How much of recorded images is read, 0 to 1; None while none are.
     """

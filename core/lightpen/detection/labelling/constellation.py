@@ -66,7 +66,7 @@ def constellation_of(pen: Pen, certain: int = MIN_CERTAIN_LEDS) -> Constellation
     Parameters
     ----------
     pen : Pen
-        With at least four LEDs, not all on one line.
+        Pen with at least four LEDs that are not collinear.
     certain : int
         LEDs to be explained before a labelling is believed, if it has that many.
     """

@@ -123,8 +123,6 @@ def shifted_poses(
 
     Parameters
     ----------
-    sight : SpotArrays
-        Of one image.
     R : (3, 3) array
     t : (3,) array
         Predicted cam_from_pen.

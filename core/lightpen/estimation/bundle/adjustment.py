@@ -47,7 +47,7 @@ class Adjustment:
     unshrunk : Bundle
         The fit with these priors as assumed; its covariance is the uncertainty.
     priors : Priors
-        Of ``unshrunk``, contradicted numbers released.
+        Priors of ``unshrunk`` with contradicted numbers released.
     """
 
     bundle: Bundle

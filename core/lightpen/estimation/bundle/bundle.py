@@ -58,7 +58,7 @@ class Bundle:
     Attributes
     ----------
     state : BundleState
-        With the cameras and the pen as adjusted.
+        State with adjusted cameras and pen.
     values : (p,) array
         Deviations from the files; tip and cone are 0.
     components : Components
@@ -187,9 +187,7 @@ def fit_bundle(
     pixels : (N, C, L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     start : BundleState
-        With cameras and pen as their files have them.
-    modes : SeatModes
-        Of seat and drift.
+        Start values, with cameras and pen as in their files.
     inflation : float
         Factor on the variance of the noise beside the priors, for correlated noise.
     places : (6 (C - 1),) array, optional

@@ -22,7 +22,7 @@ class Components(NamedTuple):
     drift : Component
         Of the cone over the whole range of each drift mode, mm.
     jitter : RandomEffect
-        Of the seat from image to image.
+        Seating from image to image.
     """
 
     leds: Component

@@ -38,13 +38,13 @@ class Contradiction:
     what : Message
         Name of it.
     stated, stated_uncertainty : float
-        What the file says; U (k = 2), in ``unit``.
+        Value in the file and its U (k = 2), in ``unit``.
     estimated, estimated_uncertainty : float
         Estimate of the images without it; U (k = 2), in ``unit``.
     deviations : float
         Their difference in standard deviations.
     camera : str
-        Of a rig, which the file is about; empty of a camera alone.
+        Camera whose file is concerned; empty for a single camera.
     of_rig : bool
         Whether it is the rig's file that says so, and not the camera's.
     of_pen : bool
@@ -119,7 +119,7 @@ class ContradictedInputs:
     numbers : dict of tuple of int
         Indices of the numbers by index of the file; the rig's file is the last.
     priors : Priors
-        With these numbers released.
+        Priors with the contradicted numbers released.
     """
 
     priors: Priors
@@ -142,8 +142,6 @@ def find_contradicted_inputs(
     ----------
     bundle : Bundle
         Fitted with the priors of ``before``.
-    priors : Priors
-        As stated.
     excess : (p, p) array or None
         See `lightpen.estimation.bundle.noise_correlation.Correlation`.
 
@@ -203,7 +201,7 @@ def find_pen_contradictions(
     Parameters
     ----------
     pen : Pen
-        As its file has it.
+        Pen as in its file.
 
     Returns
     -------

@@ -32,7 +32,7 @@ class FileNumber:
     Attributes
     ----------
     value : float
-        As stated, in ``unit``.
+        Stated value in ``unit``.
     by : (k,) array
         Derivative of the number by the unknowns.
     along : (k,) array
@@ -40,7 +40,7 @@ class FileNumber:
     size : float
         Unit of the unknowns in ``unit``.
     camera : str
-        Of the rig, if its file states the number.
+        Name of the camera whose file states it.
     """
 
     what: Message
@@ -88,7 +88,6 @@ class FileFit:
 
     Attributes
     ----------
-    numbers : tuple of FileNumber
     stated : (k, k) array
         Covariance that the file states.
     information, right : (k, k) and (k,) array

@@ -67,7 +67,7 @@ def read_diameter(
     Parameters
     ----------
     state : BundleState
-        Where the pen is in each image.
+        State with the pose in each image.
     areas : (N, C, L) array
         Areas of the imaged discs, px^2; NaN where not known.
     edge_widths : (N, C) array

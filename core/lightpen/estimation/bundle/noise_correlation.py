@@ -52,7 +52,8 @@ class Correlation:
     factor : float
         Ratio of that to the covariance by independent noise, on average.
     components : Components or None
-        Of LEDs, seat and drift beside correlated noise; None without correlation.
+        Components of LEDs, seat and drift in addition to correlated noise; None without
+        correlation.
     excess : (p, p) array or None
         Covariance of the fitted values by equation (13), less that of the fit; None
         without correlation.
@@ -135,9 +136,7 @@ class _NoiseModel(NamedTuple):
     cost : float
         Twice the negative logarithm of the restricted likelihood.
     variance : float
-        Of the noise, in units of that by which LEDs were weighted.
-    components : Components
-        Of the errors beside it.
+        Noise variance, relative to that of the LED weights.
     """
 
     cost: float

@@ -50,13 +50,14 @@ class Priors:
     Attributes
     ----------
     cameras : tuple of Prior
-        Of the intrinsics of each camera.
+        Intrinsics of each camera.
     extrinsics : Prior or None
-        Of all cameras but the first, as `Rig.covariance`; None of a single camera.
+        Extrinsics of all cameras but the first, as in `Rig.covariance`; None for a
+        single camera.
     scale : Prior
-        Of the pen, by its measurement: relative, of all its coordinates.
+        Relative scale of all LED coordinates, from the LED measurement.
     temperature : Prior
-        Of the same, by its temperature.
+        Scale by temperature.
     diameter : Prior
         Of the discs, mm.
     led_sigma : float or None
@@ -68,9 +69,9 @@ class Priors:
     center_bias : float
         Standard deviation of errors of a centre that repeat with the posture, px.
     reading : DiameterReading or None
-        Of the discs by the areas of their images.
+        Disc diameter from the image areas.
     separation : ConeSeparation or None
-        Of the second cone from the first.
+        Separation of the second cone from the first.
     """
 
     cameras: tuple[Prior, ...]

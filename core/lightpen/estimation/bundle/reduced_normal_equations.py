@@ -20,7 +20,8 @@ class WhitenedEquations(NamedTuple):
     information : (p, p) array
     gradient : (p,) array
     squares : float
-        Of the residuals, unknowns of single images eliminated.
+        Sum of the squared residuals after the unknowns of single images were
+        eliminated.
     log_volume : float
         Log determinants of the noise and of the eliminated unknowns.
     n_free : int

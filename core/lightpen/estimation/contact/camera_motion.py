@@ -72,7 +72,7 @@ class SteadyImages:
     Attributes
     ----------
     observations : Observations
-        With the motion removed.
+        Observations with the camera motion removed.
     path : CameraPath or None
         None without a fixed lamp in view.
     """

@@ -47,9 +47,9 @@ def measure_leds(rig: Rig, pen: Pen, pixels: FloatArray, joint: JointFit) -> Led
     Parameters
     ----------
     rig : Rig
-        As the joint fit has it.
+        Rig of the joint fit.
     pen : Pen
-        As the file gives it.
+        Pen as in its file.
     pixels : (N, C, L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     """

@@ -35,8 +35,6 @@ class PosedImages:
         Why an image is left out.
     posed : (M,) array of int
         Images that have a pose.
-    poses : Poses
-        Of these.
     fitted : (F,) array of int
         Images whose pose most LEDs agree with; ``pivot`` is of these.
     kept : (K,) array of int
@@ -141,7 +139,7 @@ def require_images(
     reasons : (N,) array of Reason
         Why others are left out.
     advice : Message or None
-        What may be wrong with the set as a whole.
+        Likely problem of the whole set.
 
     Raises
     ------

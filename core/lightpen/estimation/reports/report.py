@@ -58,8 +58,6 @@ def calibration_record(
     ----------
     method : str
         ``"joint"`` or ``"two-stage"``, of the tip.
-    limits : SwingLimits
-        By which the calibration is judged.
     """
     result = result_of(calibration, method)
     tip, nominal = result.tip_pen, inputs.nominal_tip

@@ -28,7 +28,7 @@ def calibration_text(
     Parameters
     ----------
     origin : Origin, optional
-        What the images are of, where that is known.
+        Origin of the images, if known.
     """
     results = {name: result_of(calibration, name) for name in METHODS}
     chosen = results[method]

@@ -217,8 +217,6 @@ def change_doubt(change: Change, date: str, limit: float | None) -> Message | No
 
     Parameters
     ----------
-    date : str
-        Of the result in force before.
     limit : float or None
         Of the tip for the distance from there, mm; None if it has none.
     """
@@ -235,13 +233,11 @@ def judge_change(
     Parameters
     ----------
     verdict : Verdict
-        On the tip by itself; what is wrong with that counts more.
+        Verdict on the tip alone; its findings take precedence.
     change : Change or None
         Since the result in force; None if there is none.
-    date : str
-        Of that result.
     limit : float, optional
-        As of `change_doubt`.
+        See `change_doubt`.
     """
     if verdict.grade is not Grade.PASS or change is None:
         return verdict

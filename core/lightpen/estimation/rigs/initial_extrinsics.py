@@ -30,7 +30,7 @@ class InitialExtrinsics:
     rig : Rig
         With the file's cameras, without a covariance.
     lags : tuple of TimeLag or None
-        Of each camera but the first; None where the images do not tell it.
+        Time lag of each camera but the first; None if the images do not determine it.
     apart : (N, C) array of bool
         Images that are of other moments than those of the cameras before.
     """
@@ -54,7 +54,7 @@ def find_initial_extrinsics(
     Parameters
     ----------
     parts : sequence of PosedImages
-        Of each camera, all of the same N moments.
+        Images of each camera at the same N instants.
 
     Raises
     ------

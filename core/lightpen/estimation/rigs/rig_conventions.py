@@ -74,8 +74,6 @@ def require_usual_rig(
     ----------
     pixels : (N, C, L, 2) array
         What the cameras saw, px.
-    parts : sequence of PosedImages
-        Of each camera.
 
     Raises
     ------

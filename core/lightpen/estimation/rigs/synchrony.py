@@ -120,7 +120,7 @@ class TimeLag:
     Attributes
     ----------
     value, sigma : float
-        In times between two images; with its standard deviation.
+        Lag in image intervals, and its standard deviation.
     turn : float
         That it makes of the usual motion, rad.
     """
@@ -158,11 +158,6 @@ def require_same_moments(
     one: PenRotations, other: PenRotations, name: str
 ) -> RelativeRotation:
     """Return how the other camera is turned, if its images are of the same moments.
-
-    Parameters
-    ----------
-    name : str
-        Of the other camera.
 
     Raises
     ------

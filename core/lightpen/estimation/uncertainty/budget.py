@@ -130,7 +130,7 @@ class Budget:
         Variance between blocks over that of independent noise, and of a jitter of the
         seat where there is one; 1 on average.
     autocorrelation : float
-        Of the errors of one coordinate from one image to the next; 0 where not
+        Correlation of one coordinate's errors between successive images; 0 if not
         significant.
     correlation_factor : float
         Factor on the covariance of independent noise.
@@ -228,9 +228,7 @@ def contributions_of(
     Parameters
     ----------
     bundle : Bundle
-        With unshrunk priors.
-    priors : Priors
-        Of the bundle.
+        Adjustment with unshrunk priors.
     n_images : float
         Images that take part.
     noise : (6, 6) array

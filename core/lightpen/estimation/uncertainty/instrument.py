@@ -30,7 +30,7 @@ class Parameters(NamedTuple):
     cameras : tuple of slice
         Intrinsics of each camera.
     extrinsics : slice
-        Where all cameras but the first stand, as `Rig.covariance` has it.
+        Extrinsics of all cameras but the first, as in `Rig.covariance`.
     """
 
     tip: slice

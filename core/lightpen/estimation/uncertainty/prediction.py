@@ -138,7 +138,7 @@ def predict_uncertainty(
     joint : JointFit
         The fit to them.
     before : UncertaintyPrediction or None
-        Of the first of these images.
+        Prediction for the first of these images.
     """
     n_images = len(pixels)
     state = BundleState(rig, pen, joint.tip_pen, joint.cone_cam, joint.rotations)

@@ -46,7 +46,7 @@ class SecondImages:
         Parameters
         ----------
         first : BundleState
-            Of the first swing.
+            State of the first swing.
         pixels : (N, 1, L, 2) array
             Its images, px.
         """

@@ -35,15 +35,15 @@ class CalibrationFile:
     Attributes
     ----------
     sha256 : str
-        Of the whole file.
+        Checksum of the whole file.
     calibration : CalibrationRecord
         The record.
     grade : Grade
         Verdict on it when it was accepted, else by itself.
     why : StoredMessage
-        What the grade is for.
+        Reason of the grade.
     doubts : tuple of StoredMessage
-        What else there was to look into.
+        Further warnings.
     origin : Origin or None
         None where it does not say.
     names : Names
@@ -195,11 +195,6 @@ def read_calibration(path: Path) -> CalibrationFile:
 
 def parse_calibration(data: bytes, path: Path) -> CalibrationFile:
     """Return the calibration that a file holds.
-
-    Parameters
-    ----------
-    path : Path
-        Of the file, for messages.
 
     Raises
     ------

@@ -43,9 +43,7 @@ class Recomputed:
     Attributes
     ----------
     method : str
-        Which estimator the tip of the record is by.
-    limits : SwingLimits
-        By which it is judged.
+        Estimator of the recorded tip.
     """
 
     calibration: Calibration

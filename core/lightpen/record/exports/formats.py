@@ -35,7 +35,7 @@ class ExportFormat:
     Attributes
     ----------
     name : str
-        As the command line has it.
+        Name on the command line.
     suffix : str
         End of the names of its files.
     text : callable

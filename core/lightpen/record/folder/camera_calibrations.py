@@ -43,13 +43,13 @@ class CameraTrial:
     Attributes
     ----------
     serial : str
-        Of the camera; empty where the images are from a folder.
+        Serial number of the camera; empty for images from a folder.
     images : mapping of str to str
         SHA-256 of each view by its name: of its file, or of the pixels of a live image.
     found : CameraCalibration or None
         None of one that was abandoned.
     camera_file : InputFile or None
-        That was written; None of one that was not accepted.
+        Camera file that was written; None if the calibration was not accepted.
     """
 
     outcome: TrialOutcome

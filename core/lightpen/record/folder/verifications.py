@@ -45,11 +45,9 @@ class StoredVerification(Struct, frozen=True):
     Attributes
     ----------
     verification : str
-        What was verified; "conclusion" of what says how all of it ended.
-    ended : TrialOutcome or None
-        Of a conclusion.
+        Kind of the task; "conclusion" for the end of the session.
     reason, supervisor : str
-        Of a conclusion, where a tip is used though it did not pass.
+        Conclusion only: why a tip is used that did not pass, and who approved it.
     """
 
     program: ProgramName

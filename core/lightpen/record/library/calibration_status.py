@@ -33,8 +33,6 @@ class StationStatus:
 
     Attributes
     ----------
-    library : Library
-        As it is now.
     in_force : mapping of (pen, tip) to CurrentResult
         Tips of real pens in force at the station.
     now : datetime or None

@@ -55,9 +55,9 @@ class Author:
     Attributes
     ----------
     reason : str
-        In their words; may be empty.
+        Reason in the author's words; may be empty.
     signature : Signature or None
-        Of a supervisor, where there is a password.
+        Signature of a supervisor, needed if a password is set.
     """
 
     station: str = ""

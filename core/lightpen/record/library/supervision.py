@@ -49,7 +49,7 @@ class Supervision:
     password_hash : str
         Empty where there is no password: then anybody may change limits.
     limits : mapping of str to StationLimits
-        By the name of the station.
+        Limits by station name.
     """
 
     password_hash: str = ""
@@ -71,9 +71,9 @@ class LimitsChange(Struct, omit_defaults=True):
     Attributes
     ----------
     password : str
-        As Argon2 makes it; empty where it stays.
+        Argon2 hash; empty if unchanged.
     limits : mapping of str to float or None
-        By `Limit.key`; None where only the password was changed.
+        Limits by `Limit.key`; None if only the password was changed.
     """
 
     format: int

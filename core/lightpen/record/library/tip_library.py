@@ -80,7 +80,7 @@ class Item(Struct, frozen=True, kw_only=True):
     Attributes
     ----------
     id : str
-        By which it is named everywhere; on its label as a barcode.
+        Unique identifier, printed as a barcode on the label.
     due : date or None
         Last day on which it may be used before it is looked after: of a pen, when its
         LEDs are to be measured again, of a tip its ball, of a cone its seat.
@@ -128,7 +128,6 @@ class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
         limit but the uncertainty of the change.
     max_days, max_swings : int or None
         Its own `DueRule`; None for that of the station.
-    picture : Picture or None
     """
 
     kind: ClassVar[ItemKind] = ItemKind.TIP
@@ -163,14 +162,10 @@ class LibraryChange(Struct, frozen=True, kw_only=True):
 
     Attributes
     ----------
-    operator : str
-        Who made it.
     supervisor : str
-        Who signed it, where a supervisor had to.
-    item : ListedPen, ListedTip or ListedCone
-        As it is from then on.
+        Supervisor who signed the change; empty if none was needed.
     reason : str
-        In the words of who made it; may be empty.
+        Reason in the operator's words; may be empty.
     """
 
     format: int
@@ -192,7 +187,7 @@ class Library:
     Attributes
     ----------
     pens, tips, cones : mapping of str to item
-        By their ids, in the order in which they came.
+        Items by id, in order of creation.
     """
 
     pens: Mapping[str, ListedPen] = field(default_factory=dict)

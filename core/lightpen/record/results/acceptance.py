@@ -65,13 +65,11 @@ def accept(
     Parameters
     ----------
     solution : Solution
-        Of a record, as it is on the disk.
-    now : datetime
-        With its time zone.
+        Solution of a record on disk.
     reason : str
         Why it is accepted though it is to be checked.
     signature : Signature, optional
-        Of a supervisor, where it takes one.
+        Signature of a supervisor, if one is required.
 
     Raises
     ------

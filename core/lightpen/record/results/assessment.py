@@ -47,13 +47,13 @@ class SwingAssessment:
     Attributes
     ----------
     last : Result or None
-        In force for this pen and tip; None if there is none, or it cannot be read.
+        Current result of this pen and tip; None if there is none or it cannot be read.
     change : Change or None
         Since that.
     max_change : float or None
         Limit of the tip for the distance from that, mm; None if it has none.
     doubts : tuple of Message
-        What to look into besides the reason of the verdict, what matters most first.
+        Warnings besides the reason of the verdict, the most important first.
     """
 
     verdict: Verdict
@@ -67,11 +67,6 @@ def assess(
     archive: FolderArchive, record: Record, solution: Solution
 ) -> SwingAssessment:
     """Judge a solved swing by itself, and beside what is in force.
-
-    Parameters
-    ----------
-    record : Record
-        Of the solution.
     """
     names, origin = recorded_names(record), recorded_origin(record)
     limits = recorded_limits(record)

@@ -86,7 +86,7 @@ class FolderArchive:
         Parameters
         ----------
         operator : str
-            Who takes it back.
+            Operator who revokes it.
 
         Raises
         ------

@@ -61,7 +61,7 @@ class ResultHeading(Struct):
     pen, tip, record : str or None
         None where a later version does not say; else as `Names` and `Result`.
     origin : str or None
-        What its images are of; None where it does not say.
+        Origin of the images; None if not stated.
     takes_back : str or None
         Name of the result's file, without suffix, that is taken back; None of a result.
     """
@@ -85,7 +85,7 @@ class Withdrawal(Struct, frozen=True):
     takes_back : str
         Name of the result's file, without suffix.
     operator : str
-        Who takes it back.
+        Operator who revokes it.
     """
 
     takes_back: str
@@ -114,7 +114,7 @@ class TipChange(Struct, frozen=True):
     as_found_mm, as_found_expanded_uncertainty_mm : triple of float
         The tip that was in force until then, pen frame, and its U (k = 2).
     limit_mm : float or None
-        Of the tip for its distance from there; None if it had none.
+        Limit of the tip for this change; None if it has none.
     """
 
     accepted: ZonedTime
@@ -188,8 +188,6 @@ class Result:
 
     Attributes
     ----------
-    accepted : datetime
-        With its time zone.
     grade : Grade
         Verdict at acceptance.
     record : Path
@@ -198,15 +196,15 @@ class Result:
         Numbers of the images of the swing that were not taken out; None of one that
         puts an older tip in force again.
     origin : Origin or None
-        What its images are of; None where neither it nor its swing says.
+        Origin of the images; None if neither the result nor its swing states it.
     reason : str
         Why it was accepted though its grade is no pass, in the words of who did.
     supervisor : str
-        Who accepted it beyond the limit of its station; empty where nobody had to.
+        Supervisor who approved a result outside the limits; empty if none was needed.
     why : StoredMessage or None
-        What its grade is for.
+        Reason of the grade.
     doubts : tuple of StoredMessage
-        What else there was to look into.
+        Further warnings.
     change : TipChange or None
         Since the result that was in force; None if there was none.
     restores : str or None
@@ -255,7 +253,7 @@ def result_bytes(result: Result, record: str) -> bytes:
     Parameters
     ----------
     record : str
-        Where the folder of its swing is, as it is to be written.
+        Path of the swing's folder as written in the file.
     """
     names = result.names
     rest = CALIBRATION + json_bytes(result.calibration).rstrip(b"\n") + END
@@ -291,7 +289,7 @@ def withdrawal_bytes(result: Result, name: str, operator: str, now: datetime) ->
     name : str
         Of the result's file, without suffix.
     operator : str
-        Who takes it back.
+        Operator who revokes it.
     """
     return with_checksum(
         json_bytes(
@@ -315,11 +313,6 @@ def has_head(start: bytes) -> bool:
 def parse_heading(start: bytes, file: Path) -> ResultHeading:
     """Return whose result a file holds, by its start with the head, or the whole of it.
 
-    Parameters
-    ----------
-    file : Path
-        For the sentence.
-
     Raises
     ------
     FileError
@@ -333,11 +326,6 @@ def parse_heading(start: bytes, file: Path) -> ResultHeading:
 
 def parse_withdrawal(data: bytes, file: Path) -> Withdrawal:
     """Return what a file holds that takes a result back.
-
-    Parameters
-    ----------
-    file : Path
-        For the sentence.
 
     Raises
     ------
@@ -357,8 +345,6 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
 
     Parameters
     ----------
-    file : Path
-        For the sentence.
     locate : callable
         Returns the folder of a swing by what is written.
 

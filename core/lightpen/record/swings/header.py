@@ -54,7 +54,7 @@ class FileCopy(Struct, frozen=True, omit_defaults=True):
     Attributes
     ----------
     data : bytes
-        Of a record that is to be made; the header does not hold it.
+        Content for a new record; not stored in the header.
     """
 
     name: str
@@ -76,7 +76,6 @@ class RigCopies(Struct, frozen=True):
 
     Attributes
     ----------
-    rig_file : FileCopy
     camera_files : tuple of FileCopy
         The files of the other cameras.
     masks_px : tuple of tuples
@@ -97,20 +96,18 @@ class Header(Struct, frozen=True, kw_only=True):
 
     Attributes
     ----------
-    created : datetime
-        With its time zone.
     program : str
         Name and version.
     units : str or None
-        Of a pen file that does not say.
+        Units given for a pen file without units.
     led_diameter_mm, nominal_tip_mm : float, triple of float or None
-        In place of those of the pen file.
+        Values that replace those of the pen file.
     mask_px : tuple of triples
         Circles of stray light: centre x, y and radius.
     settings : mapping
-        What else the program wants to keep: exposure, limits, camera serial.
+        Additional settings: exposure, limits, camera serial number.
     rig : RigCopies or None
-        Of a swing before several cameras.
+        Copies for a swing with several cameras.
     """
 
     format: int = field(default_factory=partial(newest_format, SWING))

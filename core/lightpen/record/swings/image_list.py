@@ -17,7 +17,7 @@ class ImageRow:
     Attributes
     ----------
     number : int
-        In the record.
+        Number in the record.
     misfit : float
         Root mean square residual with the tip in the cone, px; NaN without the pen.
     n_leds : int

@@ -21,7 +21,7 @@ class DamagedSwing:
     Attributes
     ----------
     message : Message
-        What is damaged, and what to do.
+        Damage found, and the remedy.
     """
 
     folder: Path
@@ -35,9 +35,9 @@ class InterruptedSwings:
     Attributes
     ----------
     interrupted : tuple of Record
-        Those that wait to be gone on with; they have images.
+        Interrupted swings with images, which can be resumed.
     under_way : tuple of Record
-        Those that somebody writes to just now.
+        Swings that another process is recording.
     """
 
     interrupted: tuple[Record, ...] = ()

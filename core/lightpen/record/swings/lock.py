@@ -23,8 +23,6 @@ def lock_journal(journal: IO[bytes], folder: Path) -> None:
     ----------
     journal : file
         Open to be written.
-    folder : Path
-        Of its record, for the sentence.
 
     Raises
     ------

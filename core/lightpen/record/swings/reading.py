@@ -75,7 +75,7 @@ class RecordedImage:
     time : float
         s, by the clock of the session that took it.
     device_time_ns : int or None
-        By the clock of the camera.
+        Time stamp of the camera, ns.
     pixels : (L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     rotation, translation : (3, 3) and (3,) array
@@ -83,9 +83,9 @@ class RecordedImage:
     stats : Stats
         What became of the camera's images since the swing began.
     others : tuple of SecondaryImage
-        Of the other cameras of a rig at this moment.
+        Simultaneous images of the other cameras of a rig.
     touch : int
-        Of a verification that it belongs to, from 1; 0 of a swing.
+        Number of the touch in a verification, from 1; 0 in a swing.
     """
 
     number: int
@@ -121,7 +121,7 @@ class Record:
     more : pair of int or None
         Least and greatest number of images that were asked for after a verdict.
     length : int
-        Of what was read of the journal, bytes.
+        Length of the journal that was read, bytes.
     """
 
     folder: Path

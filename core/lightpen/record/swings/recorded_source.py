@@ -36,21 +36,17 @@ class RecordSource:
 
     Attributes
     ----------
-    folder : Path
-        Of the record.
     images : ImageSource
         All images, in the order of capture; a damaged one raises `FileError` when
         loaded.
-    rig : Rig or None
-        Of several cameras.
     other_images : tuple of ImageSource
-        Of the other cameras of a rig, of the same moments.
+        Simultaneous images of the other cameras of a rig.
     masks : tuple of (M, 3) array
         Circles of stray light before each camera: centre x, y and radius, px.
     assumptions : Assumptions
-        What stands in for what the files do not state.
+        Default uncertainties where the files state none.
     origin : Origin or None
-        What the images are of; None where the record does not say.
+        Origin of the images; None if not recorded.
     units, led_diameter
         As of `Header`.
     """

@@ -42,9 +42,9 @@ class Solution:
     numbers : (N,) array of int
         Of the images, in the record.
     observations : Observations
-        What all N images show, whether they take part or not.
+        Detections in all N images, accepted or not.
     others : tuple of Observations
-        What those of the other cameras of a rig show, of the same moments.
+        Simultaneous detections of the other cameras of a rig.
     taken_out : mapping of int to str
         Numbers of images that do not take part, and why.
     residuals : (N, C, L, 2) array

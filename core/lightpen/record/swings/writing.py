@@ -57,7 +57,7 @@ class SecondaryView:
     pixels : (L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     device_time_ns : int or None
-        By the clock of the camera.
+        Time stamp of the camera, ns.
     """
 
     image: Image
@@ -188,13 +188,13 @@ class RecordWriter:
         time : float
             s.
         device_time_ns : int, optional
-            By the clock of the camera.
+            Time stamp of the camera, ns.
         stats : Stats, optional
             What became of the camera's images since the swing began.
         others : sequence of SecondaryView, optional
-            Of the other cameras of a rig, in their order.
+            Images of the other cameras of a rig, in their order.
         touch : int
-            Of a verification that it belongs to, from 1.
+            Number of the touch in a verification, from 1.
 
         Returns
         -------
@@ -294,7 +294,7 @@ def make_record_folder(root: Path, names: Names, now: datetime) -> Path:
     Parameters
     ----------
     root : Path
-        That the records are in.
+        Folder of the records.
 
     Raises
     ------

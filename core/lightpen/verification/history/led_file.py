@@ -47,7 +47,7 @@ class ImprovedPen:
     Attributes
     ----------
     pen : Pen
-        With the covariance of its LEDs.
+        Pen with the covariance of its LEDs.
     moves : (L, 3) array
         New less old places of the LEDs, mm.
     pooled : tuple of str
@@ -104,7 +104,7 @@ def improve_pen(
     Parameters
     ----------
     scale : Scale, optional
-        Of the pen by certified lengths.
+        Scale of the pen from certified lengths.
     report : callable, optional
         Called with the fraction done, 0 to 1; what it raises ends the work.
 

@@ -46,12 +46,11 @@ class SwingOfPen:
 
     Attributes
     ----------
-    name : str
     shifts : (L, 3) array
         Of the LEDs since the first swing, pen frame, mm; NaN where not seen.
     growth : float or None
-        Of the pen since the first swing, relative; None where the cone or the camera
-        moved in between.
+        Relative growth of the pen since the first swing; None if the cone or the camera
+        was moved in between.
     """
 
     name: str
@@ -85,7 +84,7 @@ def examine_pen(
     Parameters
     ----------
     camera : Camera or None
-        Of all of them, as its file has it; without it the growth is not determined.
+        Camera of all swings as in its file; without it the growth is not determined.
     leds : (L, 3) array
         As the pen file has them, mm.
 

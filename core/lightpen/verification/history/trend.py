@@ -69,7 +69,7 @@ class Comparison:
     Attributes
     ----------
     change : Change
-        From the earlier to the later.
+        From the earlier to the later calibration.
     is_same_tip : bool
         Whether both are of the same pen and tip.
     """
@@ -86,7 +86,7 @@ def trend_of(database: Database, wanted: EntryFilter) -> Trend:
     Parameters
     ----------
     wanted : EntryFilter
-        With a pen and a tip; entries of all kinds but calibrations are left out.
+        Filter with a pen and a tip; only entries of calibrations are used.
     """
     accepted = replace(wanted, kinds=(Kind.ACCEPTED,))
     found = lines(database, accepted, 0, LONGEST)
@@ -160,7 +160,7 @@ def repeatability_of(
     Parameters
     ----------
     entries : tuple of StoredEntry
-        Those that put a tip in force again are left out: nothing was measured anew.
+        Reinstated tips are ignored, since nothing was measured.
     tolerance, reference, touched
         As `measure_repeatability` takes them.
     """

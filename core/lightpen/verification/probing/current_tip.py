@@ -30,10 +30,8 @@ class CurrentTip:
 
     Attributes
     ----------
-    names : Names
-        Of what is chosen now.
     origin : Origin
-        What the images of its verification are of.
+        Origin of the images of the verification.
     nominal_tip, cone_cam : (3,) array or None
         mm; the cone of the calibration is not known before another camera.
     masks : tuple of (M, 3) array
@@ -79,7 +77,7 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> Curre
     Parameters
     ----------
     preparation : Preparation
-        With names and both files.
+        Preparation with names and both files.
 
     Raises
     ------

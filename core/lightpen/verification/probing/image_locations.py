@@ -53,13 +53,11 @@ class ImageLocation:
 
     Attributes
     ----------
-    images : tuple of ImageSource
-        Of each camera.
     masks : tuple of (M, 3) array or None
         Circles of stray light before each camera: centre x, y and radius, px.
     touches : tuple of int or None
-        Which touch each image is of, from 1, or 0 where it takes no part; None of
-        images without that information.
+        Number of the touch of each image, from 1; 0 if the image belongs to none. None
+        for images without numbers.
     """
 
     name: str
@@ -108,8 +106,8 @@ def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> ImageLocation
     Parameters
     ----------
     rig : Rig, optional
-        That the images are of; what is given is then a place for each camera, or a
-        folder that holds one for each.
+        Rig of the images. The place then lists one place per camera, or is a folder
+        with one sub-folder per camera.
 
     Raises
     ------
@@ -168,11 +166,6 @@ def _of_each_camera(where: tuple[str, ...], rig: Rig) -> tuple[str, ...]:
 
 def runs_at(place: str, rig: Rig | None = None) -> tuple[str, ...]:
     """Return the runs at a place: itself, or the folders in it if they hold the images.
-
-    Parameters
-    ----------
-    rig : Rig, optional
-        That the images are of.
 
     Raises
     ------

@@ -111,7 +111,7 @@ class ProbingState:
     path : tuple of array
         Where the tip was before, (3,) each, mm.
     taken : tuple of StillFrames
-        What was touched.
+        Points probed so far.
     places : tuple of TipObservation
         One image of each.
     """

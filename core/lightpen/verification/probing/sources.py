@@ -51,12 +51,10 @@ class ProbingRun:
 
     Attributes
     ----------
-    name : str
-        Of its folder or file.
     rejected : tuple of RejectedFrame
         Images that belong to no touch, and why.
     lamps : LampObservations
-        What the images show of fixed lamps.
+        Fixed lamps in the images.
     """
 
     name: str

@@ -23,15 +23,15 @@ def verification_record(
     Parameters
     ----------
     kind : str
-        What was verified.
+        Kind of the task.
     entries : mapping
-        What was found.
+        Results of the task.
     assessment : VerificationAssessment or None
         None of what is measured and not judged.
     limits : mapping of str to float
         That it was judged by, mm.
     inputs : mapping
-        What it was made from.
+        Input files.
     """
     record = {
         **record_heading(local_now()),

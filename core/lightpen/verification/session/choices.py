@@ -17,9 +17,9 @@ class VerificationChoices:
     Attributes
     ----------
     kinds : tuple of str
-        Of the tasks, in their order.
+        Selected tasks in their order.
     options : tuple of TaskOptions
-        Of tasks, chosen or not, whose options are not the usual ones.
+        Options that differ from the defaults, of selected tasks or not.
     n_frames : int
         Images of a point.
     """

@@ -90,21 +90,19 @@ class SessionState:
 
     Attributes
     ----------
-    touching : ProbingState
-        Of the run at hand.
     touches : tuple of ProbedPoint
         Measured for it.
     runs : tuple of tuple of ProbedPoint
         Runs of the task at hand that are done.
     trouble : Message or None
-        What was wrong with the last point, or why the points do not suffice yet
-        though they are as many as needed.
+        Problem with the last point, or why the points do not suffice although their
+        number does.
     found : mapping of str to Found
-        By kind of the tasks that are done.
+        Results of the completed tasks by kind.
     visits : tuple of tuple of ProbedPoint
-        Of the cone that is the drift reference, so far.
+        Visits of the reference cone so far.
     pending : tuple of PendingDriftCheck
-        What was found since the last visit, which does not count the drift yet.
+        Results since the last visit, which do not include the drift yet.
     """
 
     touching: ProbingState = field(default_factory=ProbingState)

@@ -50,17 +50,17 @@ class VerificationStatus:
     setup, state
         None until the tip is read.
     region : RegionOfInterest or None
-        What its images are looked at for.
+        Region searched in the images of the verification.
     began : datetime or None
         When its first image came.
     files : tuple of Path
-        Where what was found is kept.
+        Result files.
     lamp_drift : LampDrift or None
         The drift of fixed lamps in view, up to the last finished task.
     is_here : bool
         Whether an operator is present.
     accepted_by : str
-        Who accepted the tip though something was found against it.
+        Supervisor who accepted the tip despite findings.
     refusal : Message or None
         Why nothing can be verified.
     """

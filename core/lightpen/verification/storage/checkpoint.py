@@ -80,11 +80,11 @@ class VerificationCheckpoint(Struct, frozen=True):
     tip_file : str
         Name of the result that is verified.
     tip_sha256, pen_sha256 : str
-        Of it, and of the pen file.
+        Checksums of the tip and of the pen file.
     seen_by : tuple of str
         Hashes of the camera files.
     runs : tuple of CountingRun
-        In the order of time.
+        Runs in order of time.
     files : tuple of str
         Names of the records that were written of it.
     unwritten : tuple of str
@@ -123,7 +123,7 @@ class InterruptedVerification:
     under_way : VerificationCheckpoint or None
         None where its file is damaged.
     trouble : Message or None
-        What is the matter with it.
+        Why it cannot be resumed.
     """
 
     path: Path
@@ -248,7 +248,7 @@ class UnlistedRecords:
     files : tuple of str
         The oldest first.
     kinds : tuple of str
-        What each is of.
+        Task kind of each record.
     """
 
     files: tuple[str, ...] = ()
@@ -257,11 +257,6 @@ class UnlistedRecords:
 
 def written_since(folder: Path, under_way: VerificationCheckpoint) -> UnlistedRecords:
     """Return what was written after the file of a verification.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the verifications.
 
     Raises
     ------

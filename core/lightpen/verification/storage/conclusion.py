@@ -40,7 +40,7 @@ class Conclusion:
     reason : str
         Why the tip is used though something was found against it; else empty.
     supervisor : str
-        Who allowed it; empty where it took none.
+        Supervisor who approved it; empty if none was needed.
     """
 
     outcome: TrialOutcome

@@ -60,7 +60,7 @@ class PointRecord:
     Attributes
     ----------
     journal : InputFile
-        With the checksum of each image in it.
+        Journal with the checksum of each image.
     """
 
     folder: Path
@@ -171,7 +171,7 @@ class PointImages:
         Parameters
         ----------
         folder : Path
-            Of the records of all touches.
+            Folder of all records of touches.
 
         Raises
         ------

@@ -56,8 +56,8 @@ def read_runs(
     Parameters
     ----------
     setup : SessionSetup
-        With how far the camera moved meanwhile, where that is known; fixed lamps in
-        the images count besides.
+        Setup with the camera motion in between, if known; fixed lamps in the images are
+        used in addition.
     """
     rig = tip.viewers.rig
     places = [touch_place((run,), rig) for run in runs_at(place, rig)]

@@ -70,9 +70,9 @@ class ResumedVerification:
     unwritten : tuple of str
         Tasks that are done and have no record yet.
     lamps : LampObservations
-        What the images of the touches show of fixed lamps.
+        Fixed lamps in the images of the touches.
     read : tuple of CompletedTask
-        What recorded images had found, as they find it now.
+        Results of recorded images, computed again.
     """
 
     under_way: VerificationCheckpoint
@@ -97,7 +97,7 @@ def resume_verification(
     Parameters
     ----------
     preparation : Preparation
-        With the names and the files of it.
+        Preparation with the names and files of the session.
 
     Raises
     ------

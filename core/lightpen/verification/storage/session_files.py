@@ -48,9 +48,9 @@ class PendingRecord:
     record_of : callable
         Returns it by the files of the session before it.
     task : VerificationTask or None
-        That it is of; None of a conclusion.
+        Task of the record; None for a conclusion.
     ends : CheckpointFile or None
-        Of the session, where this record concludes it.
+        Checkpoint file of the session that this record concludes.
     """
 
     record_of: Callable[[tuple[InputFile, ...]], Mapping[str, Any]]
@@ -161,7 +161,7 @@ class SessionKeeping:
     Attributes
     ----------
     images : PointImages
-        Of live touches.
+        Images of live touches.
     """
 
     def __init__(

@@ -34,16 +34,16 @@ class TaskImages:
     Attributes
     ----------
     origin : Origin or None
-        What they are of; None where a record does not say.
+        Origin of the images; None if not recorded.
     files : tuple of InputFile
-        Of a live camera those through which the pen was held still: each by its
-        number, with the hash of its pixels.
+        Live camera: the images of each touch while the pen was still, with number and
+        hash of the pixels.
     rejected : tuple of RejectedFrame
-        Those that belong to no touch, and why.
+        Images that belong to no touch, with the reason.
     lamp_drift : LampDrift or None
         The drift of fixed lamps in view so far.
     records : tuple of PointRecord
-        Where those of a live camera are kept, run by run.
+        Live camera: records of the images, run by run.
     """
 
     origin: Origin | None

@@ -73,8 +73,6 @@ class Articulation(Found):
 
     Attributes
     ----------
-    names : tuple of str
-        Of the postures.
     locations : (N, 3) array
         Mean of each posture, camera frame, mm.
     spreads : (N,) array

@@ -132,8 +132,6 @@ class CircleRun:
 
     Attributes
     ----------
-    name : str
-        Of the run.
     left_out : tuple of ProbedPoint
         Off the ring: the pen was lifted.
     radius : float

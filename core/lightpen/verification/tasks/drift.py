@@ -64,8 +64,6 @@ class Drift(Found):
 
     Attributes
     ----------
-    names : tuple of str
-        Of the visits.
     moves : (N, 3) array
         Of the drift reference since the first visit, camera frame, mm.
     uncertainties : (N, 3) array

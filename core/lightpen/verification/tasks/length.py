@@ -70,7 +70,6 @@ class LengthRun:
 
     Attributes
     ----------
-    ends : pair of tuples of ProbedPoint
     measured : float
         mm.
     uncertainty : float
@@ -92,7 +91,6 @@ class Scale:
 
     Attributes
     ----------
-    factor : float
     uncertainty : float
         U (k = 2) of it.
     uncertainty_before : float

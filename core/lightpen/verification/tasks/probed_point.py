@@ -93,8 +93,6 @@ class ProbedPoint:
         Derivative by the parameters of the instrument.
     rotation : (3, 3) array
         Of cam_from_pen.
-    names : tuple of str
-        Of its images.
     rms : float
         Root mean square residual of an LED in them, px.
     """

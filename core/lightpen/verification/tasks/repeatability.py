@@ -124,7 +124,7 @@ class Repeatability:
     touched : RepeatedPoint or None
         A fixed point touched with the tip.
     points_to : Message or None
-        What the scatter points to beside that of the fixed point.
+        What the scatter indicates, other than that of the fixed point.
     """
 
     tips: tuple[TipEstimate, ...]
@@ -229,7 +229,7 @@ def _is_larger(one: float, other: float, variance: float) -> bool:
     Parameters
     ----------
     variance : float
-        Of the logarithm of the ratio of both variances.
+        Variance of the logarithm of the variance ratio.
     """
     if not (one > 0 and other > 0):
         return one > 0

@@ -55,7 +55,7 @@ class NumberOption:
     Attributes
     ----------
     name : str
-        Of the attribute of the options.
+        Attribute of the options.
     unknown : Message or None
         Shown in place of 0, which then stands for a number that must be entered.
     argument, help : str
@@ -83,11 +83,12 @@ class SurfaceOption:
     Attributes
     ----------
     labels : tuple of Message
-        In the order of `Surface`.
+        Labels in the order of `Surface`.
     words : mapping of str to Surface
-        Of the command line, the usual one first; used with the diameter of the ball.
+        Values of the command-line option, the default first; they need the ball
+        diameter.
     ball_help : str
-        Of the option for the diameter.
+        Help of the option for the ball diameter.
     """
 
     name: str
@@ -188,11 +189,9 @@ class TaskProgress:
     Attributes
     ----------
     points : tuple of ProbedPoint
-        Of the run at hand.
+        Points of the current run.
     runs : tuple of tuple of ProbedPoint
-        That are done.
-    n_runs : int
-        In all.
+        Completed runs.
     cones : tuple of array
         Cones that were touched in tasks before, camera frame, mm.
     """
@@ -255,13 +254,13 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     Attributes
     ----------
     kind : str
-        In records and settings.
+        Name in records and settings.
     summary, run_help : str
-        What the help of the command line says of it, and of a run.
+        Help texts of the command and of one run.
     title : Message
         A noun.
     purpose : Message
-        What the operator does; beside the box that chooses the task.
+        Instruction shown beside the check box of the task.
     first, another, other_run : Message
         Few words on what to do next: for the first point, for another one, and for the
         first point of another run.
