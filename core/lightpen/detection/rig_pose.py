@@ -19,8 +19,7 @@ from lightpen.model.rig import Rig
 
 @dataclass(frozen=True, eq=False)
 class RigReprojection:
-    """Reprojection errors in the images of all cameras, those of one after another.
-    """
+    """Reprojection errors in the images of all cameras, camera by camera."""
 
     rig: Rig
     cameras: tuple[CameraReprojection, ...]

@@ -1,4 +1,4 @@
-"""The residual field of a lens: what its distortion model leaves, smooth over the image.
+"""The residual field of a lens: smooth residuals of its distortion model.
 
 A camera observes a point at ``pixels(point) + field``. Each component of the field is a
 Gaussian process with the covariance ``a^2 exp(-d^2 / (2 l^2))`` of two pixels at the
@@ -65,9 +65,7 @@ class LensField:
         nodes = _grid(width, height, columns, rows)
         covariance = amplitude**2 * correlation(nodes, nodes, length)
         values = np.zeros((len(nodes), 2))
-        return cls(
-            width, height, columns, rows, amplitude, length, values, covariance
-        )
+        return cls(width, height, columns, rows, amplitude, length, values, covariance)
 
     @cached_property
     def nodes(self) -> FloatArray:

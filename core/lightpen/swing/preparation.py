@@ -74,8 +74,7 @@ class SourceChoice:
 
 @dataclass(frozen=True)
 class CameraInUse:
-    """The camera that images come from.
-    """
+    """The camera that images come from."""
 
     serial: str
     settings: CameraSettings

@@ -139,8 +139,7 @@ class SwingRunner:
         self._queue.ask(lambda: self._workflow.accept(reason, signature))
 
     def revoke(self, result: Result, operator: str) -> None:
-        """Revoke a result in favour of the one before.
-        """
+        """Revoke a result in favour of the one before."""
         self._queue.ask(lambda: self._workflow.revoke(result, operator))
 
     def set_aside(self) -> None:

@@ -28,8 +28,7 @@ ANY_WIDTH = 16777215  # QWIDGETSIZE_MAX
 
 
 class ReviewView(ResponsiveLayout, Translated, QWidget):
-    """Shows a solved swing, the result beside its details.
-    """
+    """Shows a solved swing, the result beside its details."""
 
     narrow_below = 112 * GRID  # px; then it has the result in a tab
     vast_from = QSize(240 * GRID, 140 * GRID)  # px; then the result is larger

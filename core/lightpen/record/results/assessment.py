@@ -66,8 +66,7 @@ class SwingAssessment:
 def assess(
     archive: FolderArchive, record: Record, solution: Solution
 ) -> SwingAssessment:
-    """Judge a solved swing by itself, and beside what is in force.
-    """
+    """Judge a solved swing by itself, and beside what is in force."""
     names, origin = recorded_names(record), recorded_origin(record)
     limits = recorded_limits(record)
     verdict = judge(solution.calibration, limits)
