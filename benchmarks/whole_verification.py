@@ -49,8 +49,8 @@ def verified(seed: int = 1) -> Verified:
     choices = VerificationChoices(
         (FIXED_POINT.kind, CIRCLE.kind, LENGTH.kind),
         (
-            CircleOptions(radius=SIMULATED_RADIUS),
-            LengthOptions(length=SIMULATED_LENGTH),
+            CircleOptions(SIMULATED_RADIUS, 0.001),
+            LengthOptions(SIMULATED_LENGTH, 0.001),
         ),
     )
     instrument = _instrument(scene, np.random.default_rng(seed))

@@ -87,7 +87,7 @@ N_RECORDED = 60  # images that are reviewed
 N_SHOWN = 40  # live images that a page is shown
 CHOICES = VerificationChoices(
     (FIXED_POINT.kind, CIRCLE.kind, LENGTH.kind),
-    (CircleOptions(radius=SIMULATED_RADIUS), LengthOptions(length=SIMULATED_LENGTH)),
+    (CircleOptions(SIMULATED_RADIUS, 0.001), LengthOptions(SIMULATED_LENGTH, 0.001)),
 )
 N_ON_RING = 7  # touches when the verification is drawn
 N_HELD = 10  # images through which the pen is held still

@@ -40,8 +40,8 @@ CHOICES = VerificationChoices(
     tuple(task.kind for task in PAPER),
     (
         FixedPointOptions(n_touches=4),
-        CircleOptions(radius=SIMULATED_RADIUS),
-        LengthOptions(length=SIMULATED_LENGTH),
+        CircleOptions(SIMULATED_RADIUS, 0.001),
+        LengthOptions(SIMULATED_LENGTH, 0.001),
     ),
     n_frames=3,
 )

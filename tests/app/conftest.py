@@ -144,6 +144,9 @@ def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
     """Images come, and plots are drawn, less often than usual: each takes long."""
     monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", 7.0)
     monkeypatch.setattr("lightpen_app.steps.swing.page.PLOTTING_MS", 1000)
+    # Nobody in a test presses a key twice by accident, unless it says so.
+    monkeypatch.setattr("lightpen_app.shell.action_bar.GUARD_MS", 0)
+    monkeypatch.setattr("lightpen_app.steps.review.page.READING_MS", 0)
 
 
 @pytest.fixture

@@ -99,21 +99,22 @@ class Walk(QObject):
             return False
         if not status.verdict.can_be_accepted:
             raise SelfTestError(f"The tip cannot be accepted: {status.verdict}.")
-        return self._press_on("swing", self._accept)
+        if self._window.page().key == "review":
+            self._next = self._accept
+        else:
+            self._press_main()
+        return False
 
     def _accept(self) -> bool:
-        return self._press_on("review", self._end)
-
-    def _end(self) -> bool:
-        return self._workbench.run.status.result is not None
-
-    def _press_on(self, key: str, then: Callable[[], bool]) -> bool:
-        """Press the main button of a page once it can be, and go on."""
-        page = self._window.page()
-        if page.key == key and not page.main_action().why_not:
-            self._window.press_main()
-            self._next = then
+        if self._workbench.run.status.result is not None:
+            return True
+        self._press_main()
         return False
+
+    def _press_main(self) -> None:
+        """Press the main button, which takes no key at once."""
+        if not self._window.page().main_action().why_not:
+            self._window.press_main()
 
 
 N_IMAGES = 60

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QDeadlineTimer, Qt, Signal
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QFrame, QWidget
 from typing_extensions import override
@@ -16,10 +16,14 @@ from lightpen_app.widgets.translated import Translated
 
 MAIN_WIDTH = 22 * GRID + 34  # px; with the padding and the border
 HEIGHT, LOW_HEIGHT = 9 * GRID, 8 * GRID  # px, at least
+GUARD_MS = 800  # after which a key is meant for what the main button does by now
 
 
 class ActionBar(Translated, QFrame):
     """One main button, with the reason when it cannot be pressed.
+
+    Its first moments with another meaning, or on another page, are for what is still
+    being pressed: a second Enter does nothing.
 
     Signals
     -------
@@ -34,6 +38,7 @@ class ActionBar(Translated, QFrame):
         super().__init__(parent)
         self.setObjectName("bottom_bar")
         self._status_holds: Callable[[], bool] | None = None
+        self._guard = QDeadlineTimer()  # expired
 
         # Widgets
         self._why_not = text_label(TextSize.BODY, Tone.WARN)
@@ -51,7 +56,7 @@ class ActionBar(Translated, QFrame):
 
         # Connections
         self._back.clicked.connect(self.back_pressed)
-        self._main.clicked.connect(self.main_pressed)
+        self._main.clicked.connect(self._on_main_clicked)
 
         self.set_room(SizeClass())
         self.set_status("")
@@ -59,6 +64,8 @@ class ActionBar(Translated, QFrame):
 
     def set_action(self, action: MainAction, *, can_go_back: bool) -> None:
         """Show another main action."""
+        if action.text != self._main.text():
+            self.guard()
         self._main.setText(action.text)
         if action.why_not and self._main.hasFocus():
             self.setFocus()  # kept for the button, until it can be pressed again
@@ -106,9 +113,17 @@ class ActionBar(Translated, QFrame):
         if self._main.isEnabled():
             self._main.click()
 
+    def guard(self) -> None:
+        """Ignore the main button for a moment: it is about to do something else."""
+        self._guard = QDeadlineTimer(GUARD_MS)
+
     def focus_main(self) -> None:
         """Put the focus on the main button."""
         self._main.setFocus(Qt.FocusReason.TabFocusReason)
+
+    def _on_main_clicked(self) -> None:
+        if self._guard.hasExpired():
+            self.main_pressed.emit()
 
     def _retranslate(self) -> None:
         self._back.setText(self.tr("Back"))

@@ -1,6 +1,7 @@
 """The window of the wizard: steps at the left, one page, one main button."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from PySide6.QtCore import QEvent, QPoint, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QAction, QCloseEvent, QGuiApplication, QIcon, QKeyEvent
@@ -27,9 +28,10 @@ from lightpen_app.shell.page_area import PageArea
 from lightpen_app.shell.sidebar import Sidebar, Subject
 from lightpen_app.shell.step_list import Status, Step, list_steps
 from lightpen_app.shell.stream_dialog import StreamDialog, StreamState
-from lightpen_app.steps.page import Page
+from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.widgets.keys import ENTER_KEYS, PAGE_KEYS
 from lightpen_app.widgets.operator_view import OperatorView
+from lightpen_app.widgets.prompt_bar import AskingBar
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.settings import Preferences, Settings, data_folder
@@ -142,8 +144,9 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         notifications.withdrawn.connect(self._notice.drop)
         notifications.status_changed.connect(self._action_bar.set_status)
         self._sidebar.subject_told.connect(self._operator_view.set_subject)
-        for page in self._pages:
-            self._connect_page(page)
+        self._questions = [page.findChildren(AskingBar) for page in self._pages]
+        for page, questions in zip(self._pages, self._questions, strict=True):
+            self._connect_page(page, questions)
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         application.focusChanged.connect(self._on_focus_changed)
@@ -181,6 +184,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self.page().left()
         self._now = index
         self._action_bar.set_status("")
+        self._action_bar.guard()
         self._notifications.withdraw(*(page.key for page in self._pages))
         self._area.show_page(self.page())
         self._tell_attention()
@@ -307,8 +311,10 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             self._refresh()
             self._help_window.set_language(self._options.value().language)
 
-    def _connect_page(self, page: Page) -> None:
+    def _connect_page(self, page: Page, questions: Sequence[AskingBar]) -> None:
         page.changed.connect(self._refresh)
+        for question in questions:
+            question.asking_changed.connect(self._refresh)
         page.advance_requested.connect(self.advance)
         page.step_requested.connect(self._on_step_requested)
         page.operator_value_changed.connect(self._operator_view.set_value)
@@ -386,9 +392,17 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         ]
         self._sidebar.set_steps(list_steps(statuses, self._now))
         self._area.set_heading(page.title(), page.lead(), page.lead_tone())
-        self._action_bar.set_action(page.main_action(), can_go_back=self._now > 0)
+        self._action_bar.set_action(self._main_action(), can_go_back=self._now > 0)
         for each in self._hands_free_actions:
             each.setEnabled(page.is_hands_free())
+
+    def _main_action(self) -> MainAction:
+        """Return the main action of the page, which waits for an open question."""
+        action = self.page().main_action()
+        questions = self._questions[self._now]
+        if action.why_not or all(question.isHidden() for question in questions):
+            return action
+        return replace(action, why_not=self.tr("Answer the question first."))
 
     def _focus_page(self) -> None:
         """Put the focus on the control that the page chose, or on its first one."""

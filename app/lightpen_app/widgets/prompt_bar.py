@@ -1,5 +1,6 @@
 """What bars that ask something in the page have in common."""
 
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QWidget
 from shiboken6 import isValid
 from typing_extensions import override
@@ -11,7 +12,14 @@ class AskingBar(QFrame):
     """Hidden until it asks; what had the focus before has it again afterwards.
 
     Else it would go to whatever comes next, such as a button that Enter then presses.
+
+    Signals
+    -------
+    asking_changed()
+        It asks, or no longer.
     """
+
+    asking_changed = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -28,3 +36,4 @@ class AskingBar(QFrame):
         elif not visible and is_inside and before is not None and isValid(before):
             before.setFocus()
         super().setVisible(visible)
+        self.asking_changed.emit()

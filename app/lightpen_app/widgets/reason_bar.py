@@ -1,8 +1,12 @@
 """A question in the page that takes a reason, and a signature, for an answer."""
 
-from PySide6.QtCore import Signal
+from collections.abc import Sequence
+from functools import partial
+from unicodedata import east_asian_width
+
+from PySide6.QtCore import QCoreApplication, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QAbstractButton, QWidget
+from PySide6.QtWidgets import QAbstractButton, QMenu, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.layouts import grid_layout
@@ -15,6 +19,24 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
 
 LONGEST_REASON = 200  # characters
+LEAST_LETTERS = 10  # of a reason that says something; an ideograph counts twice
+
+
+def n_letters(text: str) -> int:
+    """Return the number of letters of a text; a wide one counts twice."""
+    return sum(1 + (east_asian_width(c) in "WF") for c in text if c.isalpha())
+
+
+def usual_reasons() -> tuple[str, ...]:
+    """Return why a result that needs checking may be accepted."""
+    translate = QCoreApplication.translate
+    return (
+        translate("ReasonBar", "The tip was replaced or refitted."),
+        translate("ReasonBar", "The pen was repaired or its LEDs were measured again."),
+        translate("ReasonBar", "The station is being set up."),
+        translate("ReasonBar", "The cause was found and has no effect on this tip."),
+        translate("ReasonBar", "The accuracy is sufficient for this measurement."),
+    )
 
 
 class ReasonBar(AskingBar):
@@ -38,6 +60,11 @@ class ReasonBar(AskingBar):
         self._text = text_label(TextSize.BODY)
         self._edit = EnterEdit()
         self._edit.setMaxLength(LONGEST_REASON)
+        self._usual = PushButton()
+        self._menu = QMenu(self._usual)
+        self._usual.setMenu(self._menu)
+        self._too_short = text_label(TextSize.SMALL)
+        self._least = 1
         self._supervisor = SupervisorFields()
         self._decline = PushButton()
         self._give = PushButton()
@@ -45,11 +72,13 @@ class ReasonBar(AskingBar):
 
         # Layout
         layout = grid_layout(self, margins=(2 * GRID, GRID, GRID, GRID))
-        layout.addWidget(self._text, 0, 0, 1, 3)
+        layout.addWidget(self._text, 0, 0, 1, 4)
         layout.addWidget(self._edit, 1, 0)
-        layout.addWidget(self._supervisor, 2, 0)
-        layout.addWidget(self._decline, 1, 1)
-        layout.addWidget(self._give, 1, 2)
+        layout.addWidget(self._usual, 1, 1)
+        layout.addWidget(self._too_short, 2, 0, 1, 4)
+        layout.addWidget(self._supervisor, 3, 0)
+        layout.addWidget(self._decline, 1, 2)
+        layout.addWidget(self._give, 1, 3)
         layout.setColumnStretch(0, 1)
 
         # Connections
@@ -70,8 +99,29 @@ class ReasonBar(AskingBar):
         if not (is_typing and event.key() in ENTER_KEYS):
             super().keyPressEvent(event)
 
-    def set_words(self, question: str, field: str, yes: str, no: str) -> None:
-        """Change the question, the name of its field, and its answers."""
+    def set_words(
+        self,
+        question: str,
+        field: str,
+        yes: str,
+        no: str,
+        reasons: Sequence[str] | None = None,
+    ) -> None:
+        """Change the question, the name of its field, and its answers.
+
+        Parameters
+        ----------
+        reasons : sequence of str, optional
+            A list to choose from. What is typed in place of them must have at least
+            `LEAST_LETTERS`; without a list, anything will do.
+        """
+        self._least = 1 if reasons is None else LEAST_LETTERS
+        self._usual.setVisible(reasons is not None)
+        self._usual.setText(QCoreApplication.translate("ReasonBar", "Reasons"))
+        self._menu.clear()
+        for reason in reasons or ():
+            choose = partial(self._edit.setText, reason)
+            self._menu.addAction(reason).triggered.connect(choose)
         self._text.setText(question)
         self.setAccessibleName(question)
         self._edit.setAccessibleName(field)
@@ -104,10 +154,18 @@ class ReasonBar(AskingBar):
 
     def _is_whole(self) -> bool:
         is_asked = self._supervisor.isVisibleTo(self)
-        return bool(self._reason()) and (self._supervisor.is_filled() or not is_asked)
+        is_said = bool(self._reason()) and n_letters(self._reason()) >= self._least
+        return is_said and (self._supervisor.is_filled() or not is_asked)
 
     def _refresh(self) -> None:
         self._give.setEnabled(self._is_whole())
+        n_typed = n_letters(self._reason())
+        self._too_short.setVisible(bool(self._reason()) and n_typed < self._least)
+        self._too_short.setText(
+            QCoreApplication.translate(
+                "ReasonBar", "Enter at least {0} letters; there are {1}."
+            ).format(self._least, n_typed)
+        )
 
     def _on_given(self) -> None:
         if self._is_whole():

@@ -91,7 +91,7 @@ def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
     for option in task.fields:
         match option:
             case NumberOption(argument=str() as argument) if argument:
-                is_needed = option.unknown is not None
+                is_needed = option.unknown is not None and not option.is_optional
                 parser.add_argument(
                     argument,
                     dest=option.name,

@@ -32,6 +32,7 @@ from lightpen_app.shell.step_list import StepButton, StepState
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_resources import SOURCE_LANGUAGE
@@ -54,7 +55,10 @@ class Leaf(Page):
         self.log: list[str] = []
         self.field = QLineEdit()
         self.button = QPushButton(name)
+        self.asks = QuestionBar()
+        self.asks.set_words(lambda: Question("Really?", "Yes", "No"))
         layout = QVBoxLayout(self)
+        layout.addWidget(self.asks)
         layout.addWidget(self.field)
         layout.addWidget(self.button)
 
@@ -218,6 +222,47 @@ def test_escape_neither_leaves_the_page_nor_closes_the_window(
 
     assert shell.window.isVisible()
     assert shell.pages[0].log == ["entered"]
+
+
+def test_a_key_pressed_twice_leads_on_by_one_step(
+    shell: Shell, press: Callable[[Key], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lightpen_app.shell.action_bar.GUARD_MS", 60_000)
+
+    for key in (Key.Key_Return, Key.Key_Return, Key.Key_PageDown):
+        press(key)
+    QTest.mouseClick(shell.main_button, Qt.MouseButton.LeftButton)
+
+    assert shell.shown == "Camera"
+
+
+def test_a_key_meant_for_what_the_button_did_before_does_nothing(
+    shell: Shell, press: Callable[[Key], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lightpen_app.shell.action_bar.GUARD_MS", 60_000)
+    shell.pages[0].name = "Another"
+    shell.pages[0].changed.emit()
+
+    press(Key.Key_Return)
+
+    assert shell.pages[0].log == ["entered"]
+
+
+def test_an_open_question_disables_the_main_button(
+    shell: Shell, press: Callable[[Key], None]
+) -> None:
+    question = shell.pages[0].asks
+    question.ask()
+
+    press(Key.Key_PageDown)
+
+    assert shell.shown == "Start"
+    assert not shell.main_button.isEnabled()
+    assert "Answer the question first." in shell.window.words()
+
+    question.hide()
+    press(Key.Key_PageDown)
+    assert shell.shown == "Camera"
 
 
 def test_a_main_action_that_is_not_possible_says_why(

@@ -194,7 +194,7 @@ def test_a_tip_of_another_pen_is_refused(verifier: Verifier) -> None:
         (VerificationChoices((LENGTH.kind,)), "verification.no-length"),
         (
             VerificationChoices(
-                (CIRCLE.kind,), (CircleOptions(radius=30.0, surface=Surface.BORE),)
+                (CIRCLE.kind,), (CircleOptions(30.0, 0.001, Surface.BORE),)
             ),
             "verification.no-ball",
         ),

@@ -4,11 +4,13 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QTimer, Slot
+from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import QApplication, QWidget
 from typing_extensions import override
 
 from lightpen.estimation.reports.verdict import Grade, NextStep
 from lightpen.record.results.acceptance import takes_supervisor
+from lightpen.record.results.assessment import SwingAssessment
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.steps.page import MainAction, Page
@@ -34,6 +36,7 @@ from lightpen_app.work.workbench import Workbench
 if TYPE_CHECKING:
     from lightpen_app.steps.review.images_panel import ImagesPanel
 
+READING_MS = 1000  # from the first sight of a result to its acceptance, at least
 
 class ReviewPage(Page):
     """The step Review."""
@@ -49,8 +52,10 @@ class ReviewPage(Page):
         # Widgets
         place = workbench.save_place
         self._view = view = ReviewView(self._run, place)
-        self._acceptance = QTimer(self)
-        self._acceptance.setSingleShot(True)
+        self._acceptance, self._reading = QTimer(self), QTimer(self)
+        for timer in (self._acceptance, self._reading):
+            timer.setSingleShot(True)
+        self._painted: SwingAssessment | None = None  # what was seen since the page is shown
         self._next = NextTipsControl(
             self._selection, self._run, workbench.library, view.next_tips
         )
@@ -65,6 +70,7 @@ class ReviewPage(Page):
         self._run.refused.connect(self._on_run_troubled)
         self._run.progressed.connect(view.set_progress)
         self._acceptance.timeout.connect(self.changed)
+        self._reading.timeout.connect(self.changed)
         view.cancel.clicked.connect(self._runner.cancel)
         view.capture_more.clicked.connect(self._runner.capture_more)
         view.repeat.clicked.connect(self._ask_to_repeat)
@@ -106,7 +112,10 @@ class ReviewPage(Page):
     @override
     def main_action(self) -> MainAction:
         # The second click of a double one must not go on at once.
-        return review_action(self._run.status, is_new=self._acceptance.isActive())
+        status, painted = self._run.status, self._painted
+        is_read = painted is status.assessment and not self._reading.isActive()
+        is_new = self._acceptance.isActive()
+        return review_action(status, is_new=is_new, is_read=is_read)
 
     @override
     def run_main_action(self) -> None:
@@ -137,6 +146,18 @@ class ReviewPage(Page):
     def entered(self) -> None:
         self._on_run_changed()
         self._refresh()
+
+    @override
+    def left(self) -> None:
+        self._painted = None
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        assessment = self._run.status.assessment
+        if assessment is not self._painted:
+            self._painted = assessment
+            self._reading.start(READING_MS)
 
     @override
     def unsaved(self) -> str:

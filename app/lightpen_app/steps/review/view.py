@@ -15,7 +15,7 @@ from lightpen_app.steps.review.view_state import ReviewPageState
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
-from lightpen_app.widgets.reason_bar import ReasonBar
+from lightpen_app.widgets.reason_bar import ReasonBar, usual_reasons
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.translated import Translated
@@ -153,6 +153,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
             self.tr("Reason"),
             self.tr("Accept with reason"),
             self.tr("Do not accept"),
+            usual_reasons(),
         )
 
     @override

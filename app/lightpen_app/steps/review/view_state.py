@@ -117,13 +117,17 @@ def returns_to_swing(before: SwingStatus, now: SwingStatus) -> bool:
     return captures_more or now.solution is None
 
 
-def review_action(status: SwingStatus, *, is_new: bool) -> MainAction:
+def review_action(
+    status: SwingStatus, *, is_new: bool, is_read: bool = True
+) -> MainAction:
     """Return what the main button does now.
 
     Parameters
     ----------
     is_new : bool
         Whether the tip was accepted a moment ago.
+    is_read : bool
+        Whether the result was shown long enough to be read before it is accepted.
     """
     translate = QCoreApplication.translate
     if status.result is not None:
@@ -133,6 +137,8 @@ def review_action(status: SwingStatus, *, is_new: bool) -> MainAction:
     match None if verdict is None else verdict.next_step:
         case None | NextStep.ACCEPT:
             text = translate("ReviewPage", "Accept")
+            if not is_read:
+                why_not = why_not or translate("ReviewPage", "Read the result first.")
             return MainAction(text, why_not, at_screen=True)
         case NextStep.CAPTURE_MORE if not status.is_recording:
             return MainAction(translate("ReviewPage", "Capture more"), why_not)

@@ -49,6 +49,7 @@ class EntryPresenter(QObject):
         names.station_changed.connect(self._on_station_changed)
         names.nominal_tip_changed.connect(self._on_nominal_tip_changed)
         library.chosen.connect(self._on_item_chosen)
+        library.unknown_declined.connect(self._on_unknown_declined)
         limits.value_changed.connect(self._on_limits_changed)
         assumed.value_changed.connect(self._on_assumed_changed)
         self._typing.timeout.connect(self._take_names)
@@ -94,6 +95,13 @@ class EntryPresenter(QObject):
         else:
             names = replace(now.names, cone=name)
             self._selection.set_preparation(replace(now, names=names))
+
+    def _on_unknown_declined(self) -> None:
+        """Have the tip chosen anew: a barcode was that of another one."""
+        self._take_names()
+        now = self._selection.preparation
+        self._selection.set_preparation(now.renamed(replace(now.names, tip="")))
+        self.tip_named.emit()
 
     def _on_station_changed(self, name: str) -> None:
         """Bring back a known station; a new one takes over the present choices."""

@@ -45,9 +45,13 @@ class LibraryControl(QObject):
     -------
     chosen(ItemKind, str)
         An item was chosen, in a list, in the dialog or by its barcode.
+    unknown_declined()
+        A barcode is of no tip in the library, and none is to be added: whatever tip is
+        in the field is not the one at hand.
     """
 
     chosen = Signal(object, str)
+    unknown_declined = Signal()
 
     def __init__(
         self,
@@ -75,6 +79,7 @@ class LibraryControl(QObject):
         names.item_chosen.connect(self.chosen)
         names.library_requested.connect(self.open)
         question.agreed.connect(self._on_agreed)
+        question.declined.connect(self.unknown_declined)
 
         question.set_words(self._asking)
 

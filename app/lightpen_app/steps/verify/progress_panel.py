@@ -11,7 +11,7 @@ from lightpen_app.steps.verify.presenter import VerifyView
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import Question, QuestionBar
-from lightpen_app.widgets.reason_bar import ReasonBar
+from lightpen_app.widgets.reason_bar import ReasonBar, usual_reasons
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.translated import Translated
@@ -101,6 +101,7 @@ class ProgressPanel(Translated, QWidget):
             self.tr("Reason"),
             self.tr("Accept with reason"),
             self.tr("Do not accept"),
+            usual_reasons(),
         )
         self._accept.setText(self.tr("Accept..."))
         self._accept.setToolTip(self.tr("Use the tip with a reason"))

@@ -470,6 +470,8 @@ def _screen(
 def _missing(options: CircleOptions, ball_diameter: float | None) -> Message | None:
     if not options.radius:
         return message("verification.no-radius")
+    if not options.radius_uncertainty:
+        return message("verification.no-certified-uncertainty")
     if options.surface is not Surface.GROOVE and not ball_diameter:
         return message("verification.no-ball")
     return None

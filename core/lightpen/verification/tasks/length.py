@@ -308,6 +308,8 @@ def _screen(
 def _missing(options: LengthOptions, ball_diameter: float | None) -> Message | None:
     if not options.length:
         return message("verification.no-length")
+    if not options.length_uncertainty:
+        return message("verification.no-certified-uncertainty")
     if options.surface is not Surface.GROOVE and not ball_diameter:
         return message("verification.no-ball")
     return None

@@ -58,6 +58,8 @@ class NumberOption:
         Attribute of the options.
     unknown : Message or None
         Shown in place of 0, which then stands for a number that must be entered.
+    is_optional : bool
+        Whether the command line takes 0 for one that is not stated.
     argument, help : str
         Option of the command line; empty where it has none.
     is_of_artefact : bool
@@ -71,6 +73,7 @@ class NumberOption:
     unit: str = "mm"
     decimals: int = 4
     unknown: Message | None = None
+    is_optional: bool = False
     argument: str = ""
     help: str = ""
     is_of_artefact: bool = True
@@ -116,6 +119,8 @@ def certificate_option(name: str) -> NumberOption:
         name,
         message("option.certificate-uncertainty"),
         most=LARGEST_U,
+        unknown=message("option.unknown"),
+        is_optional=True,
         argument="--certified-uncertainty",
         help="U (k = 2) of what is certified",
     )

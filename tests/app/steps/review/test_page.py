@@ -220,6 +220,7 @@ class Bed:
         page.show()
         page.entered()
         self.qtbot.waitUntil(lambda: the(page, ResultPanel).value() is not None)
+        self.qtbot.waitUntil(lambda: not is_unread(page))
         return page
 
 
@@ -253,6 +254,10 @@ def page(bed: Bed) -> ReviewPage:
     """Return the page of a good swing."""
     bed.solve()
     return bed.show()
+
+
+def is_unread(page: ReviewPage) -> bool:
+    return page.main_action().why_not == "Read the result first."
 
 
 def the(parent: QWidget, kind: type[W]) -> W:

@@ -599,6 +599,18 @@ def test_an_unknown_barcode_is_offered_to_be_added(desk: Desk) -> None:
     desk.click("Close")
 
 
+def test_an_unknown_barcode_that_is_not_added_leaves_no_other_tip_chosen(
+    desk: Desk,
+) -> None:
+    assert desk.workbench.selection.preparation.names.tip == "T-10"
+    desk.scan("T-77")
+    desk.click("Not now")
+
+    assert desk.workbench.selection.preparation.names.tip == ""
+    assert desk.text_of("Probe tip") == ""
+    assert desk.page.main_action().why_not
+
+
 def test_the_barcode_of_a_retired_tip_chooses_nothing(desk: Desk) -> None:
     desk.add(TIP)
     retire_item(desk.data, ItemKind.TIP, "T-7", ANN, local_now())
