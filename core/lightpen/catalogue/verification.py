@@ -112,7 +112,7 @@ MESSAGES = {
     "verification.other-file": "{path} is not a {what}, or was modified after it was written. Give the original JSON file.",
     "verification.no-task": "No task is chosen. Choose at least one.",
     "verification.no-radius": "The radius of the ring is not specified. Enter the certified one.",
-    "verification.no-certified-uncertainty": "The uncertainty of the certified value is not specified. Enter U (k = 2) of its certificate.",
+    "verification.no-certificate-u": "The uncertainty of the certified value is not specified. Enter U (k = 2) of its certificate.",
     "verification.no-ball": "The ball diameter is not specified; a ring or a length probed on its surfaces needs it. Enter it with the tip.",
     "verification.no-length": "The length is not specified. Enter the certified one.",
     "verification.no-tip": "Tip {tip} of pen {pen} has no accepted calibration. Calibrate it and accept the result; then it can be verified.",

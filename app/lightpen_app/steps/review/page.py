@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 READING_MS = 1000  # from the first sight of a result to its acceptance, at least
 
+
 class ReviewPage(Page):
     """The step Review."""
 
@@ -55,7 +56,7 @@ class ReviewPage(Page):
         self._acceptance, self._reading = QTimer(self), QTimer(self)
         for timer in (self._acceptance, self._reading):
             timer.setSingleShot(True)
-        self._painted: SwingAssessment | None = None  # what was seen since the page is shown
+        self._painted: SwingAssessment | None = None  # since it is shown
         self._next = NextTipsControl(
             self._selection, self._run, workbench.library, view.next_tips
         )

@@ -471,7 +471,7 @@ def _missing(options: CircleOptions, ball_diameter: float | None) -> Message | N
     if not options.radius:
         return message("verification.no-radius")
     if not options.radius_uncertainty:
-        return message("verification.no-certified-uncertainty")
+        return message("verification.no-certificate-u")
     if options.surface is not Surface.GROOVE and not ball_diameter:
         return message("verification.no-ball")
     return None

@@ -309,7 +309,7 @@ def _missing(options: LengthOptions, ball_diameter: float | None) -> Message | N
     if not options.length:
         return message("verification.no-length")
     if not options.length_uncertainty:
-        return message("verification.no-certified-uncertainty")
+        return message("verification.no-certificate-u")
     if options.surface is not Surface.GROOVE and not ball_diameter:
         return message("verification.no-ball")
     return None
