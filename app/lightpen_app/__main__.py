@@ -9,7 +9,7 @@ SELF_TEST = "--self-test"
 
 
 class Launchers:
-    """What can be started beside the commands; each is imported when it is wanted.
+    """Starts window, demo, self-test and reports; imports each when needed.
 
     Commands start faster without the window's libraries.
     """
@@ -33,7 +33,7 @@ class Launchers:
         return run_demo(make_pages)
 
     def test_itself(self, report: Path) -> int:
-        """Try what the program needs, and write a report."""
+        """Test the installation and write a report."""
         from lightpen_app.self_test.run import test_program
 
         return test_program(report)
@@ -63,7 +63,7 @@ class Launchers:
         return languages()
 
     def write_paper(self, result: Path, out: Path | None, language: str) -> Path:
-        """Write the record on paper of a calibration as PDF; return where it is."""
+        """Write the calibration report as PDF; return its path."""
         from lightpen_app.reporting import write_paper
 
         return write_paper(result, out, language)

@@ -56,7 +56,7 @@ _logger = logging.getLogger(__name__)
 
 
 class Wizard(QObject):
-    """The window and all that serves it.
+    """The window with its workbench and services.
 
     Parameters
     ----------
@@ -115,14 +115,14 @@ class Wizard(QObject):
         self._stream()
 
     def _show_subject(self) -> None:
-        """Show on every page the swing there is, else what is chosen."""
+        """Show the current swing on every page, or the selection."""
         now, chosen = self.workbench.run.status, self.workbench.selection.preparation
         self.window.set_subject(
             subject_of(now, chosen, self.workbench.library.statuses)
         )
 
     def _on_folder_doubted(self, trouble: str) -> None:
-        """Say where another data folder is chosen while nothing can be kept in it."""
+        """Advise another data folder while this one cannot be written."""
         folder = str(self.workbench.folder)
         self.window.set_unwritable(folder if trouble else "", trouble)
 
@@ -269,7 +269,7 @@ def _shown(application: QApplication, wizard: Wizard, signals: EndSignals) -> in
 
 
 def _end(application: QApplication, wizard: Wizard, number: int) -> None:
-    """Close the window at a signal, and all that waits above it for an answer."""
+    """Close the window and its dialogs after a signal."""
     wizard.window.close_unasked()
     application.exit(128 + number)  # the exit status by which shells know a signal
 
@@ -292,7 +292,7 @@ def ended(wizard: Wizard, status: int) -> int:
 
 
 def _tell_but_hints(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
-    """Hand on what Qt says, but for what each hidden window makes it say."""
+    """Forward Qt's messages, except geometry hints of hidden windows."""
     if "propagateSizeHints" not in text:
         print(text, file=sys.stderr)
 

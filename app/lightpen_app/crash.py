@@ -1,4 +1,4 @@
-"""What happens when the program meets a bug of its own: a report, and on it goes.
+"""Handling of internal errors: a report is written and the program continues.
 
 An exception that nobody caught does not end the program: what was captured is on the
 disk, and the operator is told in one sentence. A crash inside a library, which ends
@@ -59,7 +59,7 @@ class CrashHook(QObject):
         self._previous = sys.excepthook, threading.excepthook
 
     def install(self) -> None:
-        """Take over exceptions that nobody caught, on every thread."""
+        """Handle uncaught exceptions on all threads."""
         self._previous = sys.excepthook, threading.excepthook
         sys.excepthook = self.report
         threading.excepthook = self._report_thread
@@ -121,7 +121,7 @@ class CrashHook(QObject):
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what the program is made of, by name."""
+    """Return the versions of the program and its libraries."""
     found = {"Python": platform.python_version(), "Qt": qVersion()}
     for package in PACKAGES:
         try:

@@ -1,4 +1,4 @@
-"""The demo: a simulated operator goes through the whole wizard by itself."""
+"""The demo: a simulated operator uses the whole wizard."""
 
 from dataclasses import replace
 

@@ -113,7 +113,7 @@ def _data_folder() -> Path:
 
 
 def _quoted(program: str) -> str:
-    """Return a path as the key Exec wants it, whatever characters it has."""
+    """Return a path quoted for the key Exec."""
     escaped = re.sub(r'(["`$\\])', r"\\\1", program).replace("%", "%%")
     return '"' + escaped.replace("\\", "\\\\") + '"'
 

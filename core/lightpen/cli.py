@@ -143,7 +143,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _complain(trouble: Message) -> None:
-    """Print what is wrong, and what to type about it."""
+    """Print an error, with advice for the command line."""
     advice = [ADVICE[each.code] for each in trouble.parts() if each.code in ADVICE]
     print(shown(" ".join(map(str, ["lightpen:", trouble, *advice]))), file=sys.stderr)
     _logger.error("%s: %s", trouble.code, trouble)
@@ -178,7 +178,7 @@ class _Parser(argparse.ArgumentParser):
 def _parser(
     given: Sequence[str], desktop: Desktop | None
 ) -> tuple[argparse.ArgumentParser, Collection[str]]:
-    """Return the parser of what was given, and the names of the commands."""
+    """Return the parser, and the names of the commands."""
     has_window = desktop is not None
     parser = _Parser(
         prog="lightpen",
@@ -215,7 +215,7 @@ def _parser(
 
 
 def _names_file(given: Sequence[str], commands: Collection[str]) -> bool:
-    """Return whether a file is all that is given, as by a double click."""
+    """Return whether the only argument is a file, as after a double click."""
     if len(given) != 1 or given[0] in commands or given[0].startswith("-"):
         return False
     path = Path(given[0])

@@ -20,7 +20,7 @@ class LightpenError(Exception):
 
 
 class FileError(LightpenError):
-    """A file cannot be read or written, or does not hold what is needed."""
+    """A file cannot be read or written, or has the wrong content."""
 
 
 class NameTakenError(FileError):

@@ -1,4 +1,4 @@
-"""Python's interpreter as the program wants it, from its start to its end."""
+"""Start and end of the Python interpreter."""
 
 import gc
 import os

@@ -124,7 +124,7 @@ def _intake() -> "_Intake | None":
 
 
 class _Intake(QueueHandler):
-    """Words each record, keeps the last ones and queues them for the writer."""
+    """Formats each record, keeps the last ones and queues them for the writer."""
 
     def __init__(self, handlers: list[logging.Handler]) -> None:
         queue: SimpleQueue[Any] = SimpleQueue()
@@ -194,7 +194,7 @@ class _LogFile(RotatingFileHandler):
 
     @override
     def doRollover(self) -> None:
-        """Begin a new file, or go on with this one where another process holds it."""
+        """Begin a new file, or keep this one if another process has it open."""
         self._let_go()
         path = Path(self.baseFilename)
         with suppress(OSError):

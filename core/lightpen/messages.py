@@ -56,7 +56,7 @@ CATALOGUE: Mapping[str, str] = ChainMap(
 
 
 def in_english(template: str) -> str:
-    """Return a template as it is written."""
+    """Return a template unchanged."""
     return template
 
 

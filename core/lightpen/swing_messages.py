@@ -1,4 +1,4 @@
-"""What the operator is told while the pen swings, and of the tip that came of it."""
+"""Messages during a swing and about its result."""
 
 from collections.abc import Iterable
 from enum import StrEnum, unique
@@ -82,7 +82,7 @@ MOST_SIDES = message("side.most")
 
 
 def starts_in(seconds: int) -> Message:
-    """Tell when images begin to be kept."""
+    """Message: time until the capture begins."""
     return message(Code.STARTS_IN, seconds=seconds)
 
 
@@ -97,27 +97,27 @@ def bad_fit(noise: float, usual: float) -> Message:
 
 
 def tip_slipped(n_dropped: int) -> Message:
-    """Tell that the tip has left its place, and how many images that costs."""
+    """Message: the tip has slipped, with the number of images lost."""
     return message(Code.TIP_SLIPPED, n_dropped=n_dropped)
 
 
 def tip_elsewhere(distance: float) -> Message:
-    """Tell that the tip rests in another place, and how far away, mm."""
+    """Message: the tip rests in another place, with the distance, mm."""
     return message(Code.TIP_ELSEWHERE, distance=distance)
 
 
 def images_read(n_read: int, n_images: int) -> Message:
-    """Tell how many images of a recording are read."""
+    """Message: number of images read from a recording."""
     return message(Code.IMAGES_READ, n_read=n_read, n_images=n_images)
 
 
 def too_few_images(n_kept: int, needed: int) -> Message:
-    """Tell that fewer images are kept than the limits ask for."""
+    """Message: fewer images than the limit."""
     return message(Code.TOO_FEW_IMAGES, n_kept=n_kept, needed=needed)
 
 
 def too_little_tilt(n_images: int, directions: Iterable[int]) -> Message:
-    """Tell how many images are missing, in which directions of the dial (0 to 7)."""
+    """Message: missing images by direction of the dial (0 to 7)."""
     sides = tuple(SIDES[direction] for direction in sorted(set(directions)))
     return message(
         Code.TOO_LITTLE_TILT,
@@ -127,7 +127,7 @@ def too_little_tilt(n_images: int, directions: Iterable[int]) -> Message:
 
 
 def not_upright(n_images: int) -> Message:
-    """Tell how many images of the upright pen are missing."""
+    """Message: missing images of the upright pen."""
     return message(Code.NOT_UPRIGHT, n_images=n_images)
 
 
@@ -144,7 +144,7 @@ def cannot_get_below(floor: float, limit: float) -> Message:
 def file_uncertain(
     uncertainty: float, limit: float, share: float, advice: Message, assumed: bool
 ) -> Message:
-    """Tell that U (k = 2) of the tip is above its limit by what a file says, mm.
+    """Message: a file's uncertainty raises U (k = 2) above its limit, mm.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def file_uncertain(
 
 
 def file_contradicted(why: Message) -> Message:
-    """Tell what the images say against a file."""
+    """Message: the images contradict a file."""
     return message(Code.FILE_CONTRADICTED, why=why)
 
 
@@ -183,14 +183,14 @@ def not_simultaneous(camera: str, lag: float) -> Message:
 
 
 def camera_moved(distance: float) -> Message:
-    """Tell how far cone and camera moved against each other during the swing, mm."""
+    """Message: motion between cone and camera during the swing, mm."""
     return message(Code.CAMERA_MOVED, distance=distance)
 
 
 def tip_changed(
     distance: float, date: str, axis: str, difference: float, uncertainty: float
 ) -> Message:
-    """Tell that a tip is not where it was, beyond what U explains.
+    """Message: the tip has changed by more than the combined U.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def tip_changed(
 
 
 def change_beyond_limit(distance: float, date: str, limit: float) -> Message:
-    """Tell that a tip is further from where it was than its limit allows.
+    """Message: the tip has changed by more than its limit.
 
     Parameters
     ----------
@@ -234,12 +234,12 @@ def last_unknown(why: Message) -> Message:
 
 
 def halves_differ(difference: float, usual: float) -> Message:
-    """Tell how far apart odd and even images put the tip, and U (k = 2) of it, mm."""
+    """Message: difference between odd and even images, and its U (k = 2), mm."""
     return message(Code.HALVES_DIFFER, difference=difference, usual=usual)
 
 
 def many_dropped(n_dropped: int, n_images: int) -> Message:
-    """Tell how many of the images that show the pen do not take part."""
+    """Message: number of excluded images that show the pen."""
     return message(Code.MANY_DROPPED, n_dropped=n_dropped, n_images=n_images)
 
 
@@ -249,7 +249,7 @@ def leds_off(sigma: float, uncertainty: float) -> Message:
 
 
 def led_displaced(led: int, distance: float) -> Message:
-    """Tell which LED is not where the LED file has it, and how far off it is, mm."""
+    """Message: an LED is not at its file position, with the distance, mm."""
     return message(Code.LED_DISPLACED, led=led, distance=distance)
 
 

@@ -1,1 +1,1 @@
-"""Words, numbers, colours and sounds: how things look and are said."""
+"""Texts, numbers, colours and sounds."""

@@ -1,10 +1,10 @@
-"""What a screen reader says at once, wherever the focus is."""
+"""Announcements for a screen reader, independent of the focus."""
 
 from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent
 from PySide6.QtWidgets import QWidget
 
 
 def announce(widget: QWidget, text: str) -> None:
-    """Have a text about a widget said, where somebody listens."""
+    """Announce a text of a widget, if a screen reader is active."""
     if text and QAccessible.isActive():
         QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(widget, text))

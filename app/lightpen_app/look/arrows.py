@@ -47,7 +47,7 @@ def arrow_lines(
 
 
 def arrow_scale(residuals: FloatArray, image_width: float) -> float:
-    """Return by how much to enlarge residuals (N, 2), px, to be seen on an image.
+    """Return the magnification for residuals (N, 2), px, on an image.
 
     Arrows then are about a thirtieth of its width; the factor is 1, 2 or 5 times a
     power of ten.

@@ -23,7 +23,7 @@ def own_name(language: str) -> str:
 
 
 def system_language() -> str:
-    """Return the language of the system where the program has it, else English."""
+    """Return the language of the system if available, else English."""
     system = QLocale.system()
     for language in languages():
         if QLocale(language).language() == system.language():

@@ -94,7 +94,7 @@ def grid_layout(
 
 
 def fill(layout: QBoxLayout, *cells: Cell) -> None:
-    """Add cells: widgets, with stretch and alignment if wanted, and gaps."""
+    """Add cells: widgets, optionally with stretch and alignment, and gaps."""
     for cell in cells:
         if isinstance(cell, int):
             layout.addStretch(cell)

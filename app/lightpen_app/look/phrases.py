@@ -1,4 +1,4 @@
-"""The words for what the core says in codes, in the language that is chosen."""
+"""Phrases for codes of the core, in the selected language."""
 
 import math
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ WORTH_A_TURN = math.radians(15)  # about the pen's own axis, to be told of
 
 @dataclass(frozen=True)
 class Instruction:
-    """What an operator is told.
+    """Instruction to an operator.
 
     Attributes
     ----------
@@ -255,7 +255,7 @@ def lean_phrase(
 
 
 def n_images_text(n_images: int) -> str:
-    """Return how many images, such as "12 images"."""
+    """Return a number of images, such as "12 images"."""
     if n_images == 1:
         return _translated(QT_TRANSLATE_NOOP("phrases", "1 image"))
     many = _translated(QT_TRANSLATE_NOOP("phrases", "{0} images"))
@@ -268,7 +268,7 @@ def missing_input_text(lack: MissingInput) -> str:
 
 
 def first_missing(missing_inputs: Sequence[MissingInput]) -> str:
-    """Return what is missing first, a sentence; nothing where all is there."""
+    """Return the first missing input as a sentence; empty if complete."""
     return missing_input_text(missing_inputs[0]) if missing_inputs else ""
 
 
@@ -283,7 +283,7 @@ def share_text(name: ContributionName) -> str:
 
 
 def phase_text(phase: Phase, pause: Pause = Pause.NONE) -> str:
-    """Return the word of where a swing stands; a pause has one of its own."""
+    """Return the name of a swing's phase; a pause has its own."""
     return _translated(_PAUSES.get(pause, _PHASES[phase]))
 
 
@@ -293,7 +293,7 @@ def grade_text(grade: Grade) -> str:
 
 
 def origin_text(origin: Origin | None) -> str:
-    """Return the word of what images are of; None where nothing says."""
+    """Return the name of an origin; None if unknown."""
     return _translated(_ORIGINS[origin])
 
 
@@ -310,7 +310,7 @@ def accepted_phrase(origin: Origin | None) -> Instruction:
 
 
 def _by_own_sides(message: Message, heading: float) -> Message:
-    """Tell sides as the operator has them who sees the camera's right at an angle."""
+    """Convert directions from the camera's view to the operator's."""
     sides = message.values["sides"]
     if sides == MOST_SIDES:
         return message

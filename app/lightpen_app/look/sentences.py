@@ -1,4 +1,4 @@
-"""What the core says, in the language that is chosen."""
+"""Messages of the core in the selected language."""
 
 from PySide6.QtCore import QCoreApplication
 

@@ -1,4 +1,4 @@
-"""Signs that say a state by their shape, drawn so that no font is needed."""
+"""Symbols for states, told apart by shape and drawn without a font."""
 
 from enum import Enum, auto
 

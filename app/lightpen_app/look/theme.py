@@ -47,7 +47,7 @@ class Appearance(StrEnum):
 
 
 class Tone(Enum):
-    """What a colour says; it is never the only one to say it."""
+    """Meaning of a colour; a symbol or word always repeats it."""
 
     PLAIN = "text"
     QUIET = "muted"
@@ -100,7 +100,7 @@ class Colors:
     pointer: str
 
     def tone(self, tone: Tone) -> QColor:
-        """Return the colour that says it."""
+        """Return the tone of the state."""
         return QColor(getattr(self, tone.value))
 
     def on_tone(self, tone: Tone) -> QColor:
@@ -183,7 +183,7 @@ def _linear(value: float) -> float:
 
 
 def load_fonts() -> None:
-    """Add the bundled fonts for the application, as large as the system wants text."""
+    """Load the bundled fonts and set the application's font at the system's size."""
     system = QFontDatabase.systemFont(QFontDatabase.SystemFont.GeneralFont)
     set_text_scale(scale_for(system.pointSizeF(), sys.platform))
     for file in sorted((RESOURCES / "fonts").glob("*.ttf")):
@@ -192,7 +192,7 @@ def load_fonts() -> None:
 
 
 def scale_for(points: float, platform: str) -> float:
-    """Return by how much text is enlarged, by the size of the system's font."""
+    """Return the magnification of text from the size of the system's font."""
     usual = USUAL_POINTS.get(platform, USUAL_POINTS_ELSEWHERE)
     return min(max(points / usual, 1.0), LARGEST_SCALE)
 
@@ -263,7 +263,7 @@ def text_label(size: TextSize = TextSize.BODY, tone: Tone = Tone.PLAIN) -> QLabe
 
 
 def set_tone(widget: QWidget, tone: Tone) -> None:
-    """Let a widget's words say something else by their colour."""
+    """Set the tone of a widget's text."""
     _set_styled(widget, "tone", tone.value)
 
 
@@ -273,7 +273,7 @@ def set_size(widget: QWidget, size: TextSize) -> None:
 
 
 def _set_styled(widget: QWidget, name: str, value: str) -> None:
-    """Change a property that the style sheet goes by."""
+    """Set a property used by the style sheet."""
     if widget.property(name) == value:
         return
     widget.setProperty(name, value)

@@ -1,4 +1,4 @@
-"""The mark of texts that are translated where they are shown, not where they stand."""
+"""Marks texts for translation where they are defined."""
 
 from typing import TYPE_CHECKING
 

@@ -34,7 +34,7 @@ def unbroken(text: str) -> str:
 
 
 def _parted(word: str) -> str:
-    """Part a long word behind its marks; a part without any, where it must be."""
+    """Split a long word after its punctuation, or anywhere if there is none."""
     parts = re.findall(rf"[^/\\_,;.]{{1,{LONGEST_WORD}}}[/\\_,;.]?|[/\\_,;.]", word)
     return BREAK.join(parts)
 

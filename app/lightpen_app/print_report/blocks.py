@@ -49,7 +49,7 @@ class PrintSize(IntEnum):
 
 @dataclass(frozen=True)
 class Block:
-    """Something that stands whole on one page.
+    """A part of a report that is not split across pages.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Column:
 
 
 def print_font(size: float, *, bold: bool = False) -> QFont:
-    """Return the program's font as it is printed, without hints for a screen."""
+    """Return the program's font for printing, without screen hinting."""
     result = font(float(size), bold=bold)
     result.setHintingPreference(QFont.HintingPreference.PreferNoHinting)
     return result
@@ -167,7 +167,7 @@ def table(
     strong: Sequence[int] = (),
     size: float = PrintSize.BODY,
 ) -> tuple[Block, ...]:
-    """Return a table whose heads are repeated where it goes on on another page.
+    """Return a table whose header is repeated on each page.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def draw_text(
 
 
 def text_height(text: str, size: float, width: float, *, bold: bool = False) -> float:
-    """Return how much room words take in lines of a width, dots."""
+    """Return the height of a text wrapped to a width, dots."""
     return LEADING * size * _lines(text, size, width, LEFT, bold=bold).lineCount()
 
 

@@ -104,7 +104,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class AxisWords:
-    """What stands beside the axes.
+    """Labels of the axes.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ def fitting_size(title: str, room: float) -> float:
 
 
 def padded_range(x: FloatArray, y: FloatArray, *, from_zero: bool = False) -> PlotRange:
-    """Return the range that shows all that is a number, with room around."""
+    """Return the range of all finite values, with a margin."""
     x_low, x_high = _reach(x)
     y_low, y_high = _reach(y)
     if from_zero:
@@ -253,7 +253,7 @@ def _paint_dot(painter: QPainter, point: QPointF, series: int) -> None:
 
 
 def _filling(series: int) -> QColor:
-    """Return a colour that is told from the others by how dark it is, too."""
+    """Return a fill colour that differs in brightness from the others."""
     return QColor((LIGHT.accent, LIGHT.partial, LIGHT.panel)[series])
 
 
@@ -300,7 +300,7 @@ def _paint_below(painter: QPainter, plane: Plane, words: AxisWords) -> None:
 
 
 def _reach(values: FloatArray) -> tuple[float, float]:
-    """Return the least and the most of what is a number, never the same."""
+    """Return minimum and maximum of the finite values, never equal."""
     known = values[np.isfinite(values)]
     if not len(known):
         return 0.0, 1.0
@@ -319,7 +319,7 @@ def _ticks(low: float, high: float) -> list[float]:
 
 
 def _tick_texts(ticks: Sequence[float]) -> list[str]:
-    """Return numbers with the decimals that tell one from the next."""
+    """Return numbers with enough decimals to differ."""
     step = ticks[1] - ticks[0] if len(ticks) > 1 else abs(ticks[0]) or 1.0
     decimals = next(d for d in range(12) if round(step, d) == round(step, 12))
     return [number_text(tick, decimals) for tick in ticks]

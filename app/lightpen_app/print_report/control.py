@@ -1,4 +1,4 @@
-"""Shows the record on paper of a result on the disk, in a window of its own."""
+"""Opens the report of a result file in its own window."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class ReportContent:
 
 
 def read_calibration_file(file: Path) -> ReportContent:
-    """Return what a file has that is put on paper.
+    """Read what a report contains.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def read_calibration_file(file: Path) -> ReportContent:
 
 
 class PrintReportControl(QObject):
-    """Reads a file beside the window, and opens another one with its pages.
+    """Reads a file in the background and opens a window with its report.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ UNKNOWN = "\u2013"
 def image_blocks(
     calibration: CalibrationRecord, reestimated: ReestimatedPoses | None
 ) -> Iterable[Block]:
-    """Return what became of the images, with their plots."""
+    """Return the images by state, with their plots."""
     images, coverage = calibration.images, calibration.coverage
     tilt, turn = coverage.tilt_deg, coverage.turn_deg
     yield heading(translate("paper", "Images"))

@@ -58,7 +58,7 @@ def misfit_chart(calibration: CalibrationRecord) -> Chart:
 
 
 def led_chart(calibration: CalibrationRecord) -> Chart:
-    """Return what is left at each LED."""
+    """Return the residuals of each LED."""
     rms = np.array([led.rms_px for led in calibration.leds], dtype=np.float64)
     means = np.array([led.mean_px for led in calibration.leds], dtype=np.float64)
     labels = tuple(str(led.led) for led in calibration.leds)
@@ -112,7 +112,7 @@ def running_chart(reestimated: ReestimatedPoses, tip: FloatArray) -> Chart:
 
 
 def certainty_chart(reestimated: ReestimatedPoses, limit: float) -> Chart:
-    """Return how U (k = 2) fell from image to image, beside its limit, mm."""
+    """Return U (k = 2) over the number of images, with its limit, mm."""
     steady = _steady(reestimated)
     numbers = reestimated.numbers[steady].astype(np.float64)
     values = MICROMETRES * reestimated.uncertainties[steady]
@@ -121,7 +121,7 @@ def certainty_chart(reestimated: ReestimatedPoses, limit: float) -> Chart:
 
 
 def residual_chart(reestimated: ReestimatedPoses) -> Chart:
-    """Return what is left at LEDs as enlarged arrows, as they lie in the image."""
+    """Return the residuals as enlarged arrows at their image positions."""
     starts, vectors = reestimated.points, reestimated.residuals
     if len(starts) > MANY:
         starts, vectors = cell_means(starts, vectors)
@@ -151,7 +151,7 @@ def residual_chart(reestimated: ReestimatedPoses) -> Chart:
 
 
 def histogram_chart(reestimated: ReestimatedPoses) -> Chart:
-    """Return how residuals are distributed, beside the normal curve."""
+    """Return the histogram of the residuals with the normal curve."""
     values = reestimated.residuals.ravel()
     reach = float(np.abs(values).max(initial=1e-6))
     counts, edges = np.histogram(values, N_BINS, (-reach, reach))
@@ -189,7 +189,7 @@ def posture_chart(reestimated: ReestimatedPoses) -> Chart:
 
 
 def coverage_chart(calibration: CalibrationRecord) -> Chart:
-    """Return how many images lie in each field of the dial."""
+    """Return the number of images in each field of the dial."""
     coverage = calibration.coverage
     inner, outer = np.degrees(TILT_RINGS)
     places = [(0.0, 0.0, coverage.upright)]

@@ -32,7 +32,7 @@ CHART = 50 * MM  # high
 
 
 def result_blocks(calibration_file: CalibrationFile) -> Iterable[Block]:
-    """Return tip and cone with U, beside other tips, and what to look into."""
+    """Return tip and cone with U, earlier tips, and warnings."""
     calibration = calibration_file.calibration
     tip, u = np.array(calibration.tip_pen_mm), _uncertainty(calibration)
     rows = [
@@ -121,7 +121,7 @@ def _as_found_rows(change: TipChange) -> list[tuple[str, ...]]:
 
 
 def _as_found_text(change: TipChange) -> str:
-    """Return how far the tip as found was off, against its limit."""
+    """Return the deviation of the tip as found, with its limit."""
     decimals = decimals_for(max(change.expanded_uncertainty_mm))
     off = number_text(change.distance_mm, decimals)
     words = {
@@ -145,7 +145,7 @@ def _as_found_text(change: TipChange) -> str:
 
 
 def rule_blocks(calibration_file: CalibrationFile) -> Iterable[Block]:
-    """Return by what the verdict is given."""
+    """Return the decision rule of the verdict."""
     calibration = calibration_file.calibration
     yield heading(translate("paper", "Decision rule"))
     for part in decision_rule(calibration.verdict.limits):

@@ -1,4 +1,4 @@
-"""Pieces on pages: where each stands, and what every page has above and below."""
+"""Page layout of a report: position of blocks, header and footer."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ BADGE_PADDING = 40.0
 
 @dataclass(frozen=True)
 class PlacedBlock:
-    """A piece, and how far below the top of a page's room it stands, dots."""
+    """A block and its position below the top of the page, dots."""
 
     block: Block
     top: float
@@ -146,7 +146,7 @@ def _paint_header(margins: Margins, painter: QPainter) -> None:
 
 
 def _paint_badges(badges: Sequence[str], painter: QPainter) -> None:
-    """Draw badges from the right, words in frames: colour is not what tells them."""
+    """Draw framed badges from the right; their words do not depend on colour."""
     right, top = WIDTH, HEADER + 1.6 * PrintSize.BODY
     for text in reversed(badges):
         width = text_width(text, PrintSize.BODY, bold=True) + 2 * BADGE_PADDING

@@ -88,7 +88,7 @@ class PrintReportWindow(Translated, QWidget):
             self.deleteLater()
 
     def n_pages(self) -> int:
-        """Return how many pages are shown."""
+        """Return the number of pages."""
         return self._pages.pageCount()
 
     def _retranslate(self) -> None:

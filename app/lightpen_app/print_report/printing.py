@@ -85,7 +85,7 @@ def paint_on(paper: PrintReport, device: QPagedPaintDevice) -> None:
 
 
 def paper_stem(calibration_file: CalibrationFile) -> str:
-    """Return what the name of its PDF begins with."""
+    """Return the beginning of the default file name."""
     if calibration_file.accepted is None:
         return calibration_file.path.stem
     return export_stem(
@@ -110,7 +110,7 @@ def _margins(calibration_file: CalibrationFile) -> Margins:
 
 
 def _badges(calibration_file: CalibrationFile) -> tuple[str, ...]:
-    """Return what nobody may miss: of what it is, its grade, whether it counts."""
+    """Return the badges: origin, grade, and whether the result is current."""
     badges = []
     if calibration_file.origin is not Origin.LIVE:
         badges.append(origin_text(calibration_file.origin))

@@ -1,4 +1,4 @@
-"""What a record on paper says, section by section, from what the file states."""
+"""Sections of a calibration report."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -60,7 +60,7 @@ def all_sections(
 
 
 def title_text() -> str:
-    """Return what the paper is."""
+    """Return the title of the report."""
     return translate("paper", "Calibration report")
 
 
@@ -168,7 +168,7 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
 def _proof(
     calibration_file: CalibrationFile, entered: ArchivePlace | None
 ) -> Iterable[Block]:
-    """Return what binds the paper to its file; the signatures stand on its page."""
+    """Return the hashes that bind the report to its file, and the signature fields."""
     return (replace(block, keeps=True) for block in _binding(calibration_file, entered))
 
 

@@ -1,1 +1,1 @@
-"""``lightpen --self-test REPORT.json``: the program tries itself where it is."""
+"""``lightpen --self-test REPORT.json``: tests an installation."""

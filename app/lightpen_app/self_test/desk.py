@@ -126,7 +126,7 @@ SCENE = Scene(n_images=N_IMAGES, camera=paper_camera(binning=2), led_noise=0.0)
 
 
 def record_swing(folder: Path, files: Path) -> None:
-    """Render the images of `SCENE` and record them, each with what it shows.
+    """Render the images of `SCENE` and record them with their detections.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ LETTERS = "Aaµ°±光笔校准"
 
 
 class Desk:
-    """An application with a data folder of its own.
+    """An application with its own data folder.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ class Desk:
         self._application = make_application(sys.argv[:1])
 
     def versions(self) -> dict[str, str]:
-        """Return the versions of what the program is made of."""
+        """Return the versions of the program and its libraries."""
         return versions()
 
     def platform(self) -> str:

@@ -1,4 +1,4 @@
-"""What a self-test finds, as it is written."""
+"""The report of a self-test."""
 
 import json
 import platform
@@ -13,7 +13,7 @@ from threading import Lock
 
 
 class SelfTestError(Exception):
-    """Something is not as the program needs it; the text says what."""
+    """A test failed; the text says why."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Report:
 
     @contextmanager
     def check(self, name: str) -> Iterator[list[str]]:
-        """Try something; its body appends what it finds.
+        """Run a test; its body appends the findings.
 
         What goes wrong is noted before it is raised again.
         """
@@ -84,7 +84,7 @@ class Report:
             self.checks.append(Check(name, ok, "; ".join(found), seconds))
 
     def write(self) -> None:
-        """Write what is known by now."""
+        """Write the present findings."""
         entries = {
             "ok": self.ok,
             "system": platform.platform(),

@@ -51,7 +51,7 @@ OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg")
 
 
 def test_program(file: Path) -> int:
-    """Try all that the program needs, write a report, and return the exit status.
+    """Test the installation, write a report, and return the exit status.
 
     The report is written whatever happens, beside it a picture of the wizard.
     """

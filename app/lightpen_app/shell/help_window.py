@@ -1,4 +1,4 @@
-"""Help about one step, and what it links, in a window of its own."""
+"""Help for one step, in its own window, with linked pages."""
 
 from pathlib import PurePosixPath
 

@@ -40,7 +40,7 @@ FRAME = QSize(GRID, 5 * GRID)  # of a window, at most; not known before it is sh
 
 
 def fitted_place(place: QRect, available: QRect) -> QRect:
-    """Return the place of a window without its frame, within what a screen has."""
+    """Return the frame of a window, moved inside a screen."""
     size = place.size().boundedTo(available.size() - FRAME)
     last = available.bottomRight() - QPoint(size.width() - 1, size.height() - 1)
     left = max(available.left(), min(place.left(), last.x()))
@@ -171,7 +171,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         return self._pages[self._now]
 
     def go_to(self, index: int) -> None:
-        """Show a page, or say why it is closed."""
+        """Show a page, or say why it is locked."""
         if index == self._now:
             return
         why_closed = self._pages[index].why_closed()
@@ -207,11 +207,11 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._action_bar.press_main()
 
     def set_unwritable(self, folder: str, trouble: str) -> None:
-        """Say why nothing can be kept in the data folder, until that is empty."""
+        """Show why the data folder cannot be written; an empty text ends it."""
         self._notice.set_unwritable(folder, trouble)
 
     def show_crash_report(self, path: str) -> None:
-        """Tell that the program met a bug of its own; path "" if none is written."""
+        """Report an internal error; path "" if no report was written."""
         if path:
             text = self.tr(
                 "An internal error occurred. The program can continue; all images "
@@ -226,12 +226,12 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._notifications.tell("crash", text)
 
     def close_unasked(self) -> None:
-        """Close without a question, as there may be nobody to answer."""
+        """Close without a question, since nobody may be present."""
         self._asks = False
         self.close()
 
     def set_subject(self, subject: Subject) -> None:
-        """Show on every page what is calibrated, and what its images are of."""
+        """Show the item and the origin of its images on every page."""
         self._sidebar.set_subject(subject)
 
     def set_stream(self, state: StreamState) -> None:
@@ -240,11 +240,11 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._stream_dialog.set_state(state)
 
     def steps(self) -> tuple[Step, ...]:
-        """Return the list of steps as it is shown."""
+        """Return the list of steps."""
         return self._sidebar.steps()
 
     def words(self) -> tuple[str, ...]:
-        """Return what the window itself says now, besides the page."""
+        """Return the texts of the window without those of the page."""
         said = (self._sidebar.subject(), *self._area.words(), *self._action_bar.words())
         return tuple(filter(None, said))
 
@@ -321,7 +321,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         page.data_folder_requested.connect(self._on_data_folder_asked)
 
     def _make_actions(self) -> None:
-        """Make the actions whose keys work wherever the focus is."""
+        """Create the actions with application-wide keys."""
         self._help_action = self._action(Qt.Key.Key_F1, self._on_help_triggered)
         self._operator_action = QAction(self)
         self._operator_action.setCheckable(True)
@@ -376,13 +376,13 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     @override
     def _use_room(self) -> None:
-        """Arrange what is about the page as the size of the window allows."""
+        """Adapt the layout around the page to the window size."""
         self._area.set_room(self._room)
         self._sidebar.set_room(self._room)
         self._action_bar.set_room(self._room)
 
     def _refresh(self) -> None:
-        """Show what the pages say of themselves now."""
+        """Show the status of the pages."""
         page = self.page()
         statuses = [
             Status(
@@ -421,7 +421,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._action_bar.focus_main()
 
     def _on_focus_changed(self, before: QWidget | None, now: QWidget | None) -> None:
-        """Let the page choose where the focus goes when what had it has vanished.
+        """Let the page set the focus after the focused widget was removed.
 
         Qt gives it to whatever comes next, such as a button that Enter then presses.
         """
@@ -452,7 +452,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             self._action_bar.press_main()
 
     def _on_advance_wanted_afar(self) -> None:
-        """Go on for an operator who does not see the page: never ask anything on it."""
+        """Advance for an operator away from the screen, without questions."""
         page = self.page()
         if page.is_hands_free() and page.is_complete():
             self._on_advance_pressed()

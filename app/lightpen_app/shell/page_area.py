@@ -23,7 +23,7 @@ from lightpen_app.widgets.translated import Translated
 
 
 class NoticeBar(Translated, QFrame):
-    """Hidden until it has something to say; Close puts it away.
+    """Bar for a message, hidden without one; Close hides it.
 
     While nothing can be kept in the data folder, whatever is told of it says where
     another one is chosen, and is told once.
@@ -59,7 +59,7 @@ class NoticeBar(Translated, QFrame):
         self.hide()
 
     def text(self) -> str:
-        """Return what it says; empty while it is hidden."""
+        """Return the message; empty while hidden."""
         return self._text.text()
 
     def show_text(self, text: str, tone: Tone = Tone.BAD) -> None:
@@ -76,12 +76,12 @@ class NoticeBar(Translated, QFrame):
         self.value_changed.emit(text)
 
     def drop(self, text: str) -> None:
-        """Take a sentence away whose cause is gone, and no other."""
+        """Remove a message whose cause has ended."""
         if self.text() in (text, self._with_way(text)):
             self.clear()
 
     def set_unwritable(self, folder: str, trouble: str) -> None:
-        """Say why nothing can be kept in the data folder, until that is empty."""
+        """Show why the data folder cannot be written; an empty text ends it."""
         if trouble:
             self._unwritable, self._fault = folder, trouble
             self.show_text(trouble)
@@ -160,7 +160,7 @@ class PageArea(QFrame):
         self._place_notice()
 
     def words(self) -> tuple[str, ...]:
-        """Return what is said about the page."""
+        """Return the texts about the page."""
         return self._notice.text(), self._title.text(), self._lead.text()
 
     def show_page(self, page: QWidget) -> None:
@@ -191,7 +191,7 @@ class PageArea(QFrame):
             self._heading.setSpacing(GRID)
 
     def _place_notice(self) -> None:
-        """Lay the notice over title and lead, but not over what is typed in."""
+        """Place the notice over title and lead, but not over input fields."""
         notice = self._notice
         width = self.width() - 2 * GRID
         place = QRect(GRID, GRID // 2, width, notice.heightForWidth(width))

@@ -1,4 +1,4 @@
-"""The left side of the window: what is calibrated, the steps, and where help is."""
+"""The left side of the window: item, steps and help."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ WIDTH, NARROW_WIDTH = 30 * GRID, 18 * GRID
 
 @dataclass(frozen=True)
 class Subject:
-    """What is calibrated, for all that is shown besides the steps.
+    """Item under calibration, as shown beside the steps.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Subject:
 def subject_of(
     status: SwingStatus, chosen: Preparation, statuses: StationStatus
 ) -> Subject:
-    """Return what is calibrated: by the swing there is, else by what is chosen."""
+    """Return the item of the current swing, or the selected one."""
     if status.state is not None:
         return Subject(status.names, status.origin, statuses)
     return Subject(chosen.names, chosen.origin, statuses)
@@ -128,7 +128,7 @@ class Sidebar(Translated, QFrame):
         self._reveal_present()
 
     def subject(self) -> str:
-        """Return what is being calibrated, in words, a line for each name."""
+        """Return the item in words, one line for each name."""
         return self._subject.text()
 
     def standing(self) -> StatusMessage:
@@ -136,13 +136,13 @@ class Sidebar(Translated, QFrame):
         return self._standing.value()
 
     def set_subject(self, subject: Subject) -> None:
-        """Say what is being calibrated, and what its images are of."""
+        """Show the item and the origin of its images."""
         if subject != self._value:
             self._value = subject
             self._show_subject()
 
     def set_stream(self, status: StreamStatus) -> None:
-        """Say where the pen can be followed, and how many do; nothing if nowhere."""
+        """Show the address of the stream and its number of clients."""
         self._streamed = status
         remark = StatusMessage()
         if status.place is not None:
@@ -154,7 +154,7 @@ class Sidebar(Translated, QFrame):
         self._stream.set_value(remark)
 
     def _reveal_present(self) -> None:
-        """Scroll to the step at which somebody is."""
+        """Scroll to the current step."""
         present = self._steps.present()
         if present is not None:
             self._scroll.ensureWidgetVisible(present, 0, 0)

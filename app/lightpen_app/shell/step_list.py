@@ -27,7 +27,7 @@ class StepState(Enum):
 
 @dataclass(frozen=True)
 class Status:
-    """What a page says of itself.
+    """Status of a page.
 
     Attributes
     ----------
@@ -225,7 +225,7 @@ class StepList(Translated, QWidget):
         return tuple(button.value() for button in self._buttons)
 
     def present(self) -> StepButton | None:
-        """Return the button of the step at which somebody is."""
+        """Return the button of the current step."""
         found = (b for b in self._buttons if b.value().state is StepState.NOW)
         return next(found, None)
 

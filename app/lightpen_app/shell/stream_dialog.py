@@ -1,4 +1,4 @@
-"""Whether others may follow the pen live, from where, and who does."""
+"""Settings of the live stream, with its address and clients."""
 
 from dataclasses import dataclass, field
 
@@ -21,7 +21,7 @@ FIRST_PORT = 1024  # of those that take no administrator
 
 @dataclass(frozen=True)
 class StreamState:
-    """How the stream is, for those who show it.
+    """State of the stream.
 
     Attributes
     ----------
@@ -84,13 +84,13 @@ class StreamDialog(Translated, QDialog):
         self._retranslate()
 
     def place(self) -> StreamPlace:
-        """Return where the stream is to be listened to."""
+        """Return the address of the stream."""
         return StreamPlace(
             self._address.currentText().strip(), round(self._port.value())
         )
 
     def set_value(self, *, is_on: bool, place: StreamPlace) -> None:
-        """Show what is chosen."""
+        """Show the settings."""
         self._on.setChecked(is_on)
         self._address.setCurrentText(place.address)
         self._port.setValue(place.port)
@@ -102,7 +102,7 @@ class StreamDialog(Translated, QDialog):
         self._refresh()
 
     def words(self) -> str:
-        """Return what is said of the stream."""
+        """Return the texts about the stream."""
         return self._told.value().text
 
     def _refresh(self) -> None:

@@ -31,7 +31,7 @@ class MainAction:
 
 
 class Page(Translated, QWidget):
-    """Base of the pages; what raises NotImplementedError here, each page says.
+    """Base of the pages; methods that raise NotImplementedError are abstract.
 
     A page takes the room that it is given: what needs more scrolls in it, or is
     arranged otherwise.
@@ -73,7 +73,7 @@ class Page(Translated, QWidget):
         raise NotImplementedError
 
     def lead(self) -> str:
-        """Return what the step is for, one sentence shown below the title."""
+        """Return the purpose of the step, a sentence below the title."""
         return ""
 
     def lead_tone(self) -> Tone:
@@ -81,11 +81,11 @@ class Page(Translated, QWidget):
         return Tone.QUIET
 
     def is_complete(self) -> bool:
-        """Return whether all that the step asks for is there."""
+        """Return whether the step is complete."""
         raise NotImplementedError
 
     def is_doubtful(self) -> bool:
-        """Return whether what is complete was taken with doubts."""
+        """Return whether the step was completed with warnings."""
         return False
 
     def why_closed(self) -> str:
@@ -93,15 +93,15 @@ class Page(Translated, QWidget):
         return ""
 
     def main_action(self) -> MainAction:
-        """Return what the main button does now."""
+        """Return the present action of the main button."""
         raise NotImplementedError
 
     def run_main_action(self) -> None:
-        """Do it; a page that has more to do than to go on overrides this."""
+        """Run the main action; by default, go to the next step."""
         self.advance_requested.emit()
 
     def show_missing_input(self) -> None:
-        """Put the focus where that can be given for want of which it cannot go on."""
+        """Focus the first missing input."""
 
     def is_hands_free(self) -> bool:
         """Return whether the operator is at the cone, away from the keys.
@@ -111,7 +111,7 @@ class Page(Translated, QWidget):
         return False
 
     def toggle_pause(self) -> None:
-        """Pause or go on, when Space is pressed."""
+        """Pause or resume on Space."""
 
     def first_control(self) -> QWidget | None:
         """Return what has the focus at first; None for the first one there is."""

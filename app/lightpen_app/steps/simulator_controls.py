@@ -36,7 +36,7 @@ class SimulatorControls(Translated, QFrame):
 
 
 def set_words(button: QAbstractButton, text: str, told: str) -> None:
-    """Set the text of a button, and what it does."""
+    """Set the text of a button and its tool tip."""
     button.setText(text)
     button.setToolTip(told)
     button.setAccessibleDescription(told)

@@ -1,4 +1,4 @@
-"""The mark that says where the camera stands about a dial."""
+"""The mark for the camera's position at a dial."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ DISTANCE = 1.085  # from the middle of the dial to that of the mark; rim = 1
 
 @dataclass(frozen=True, eq=False)
 class CameraPosition:
-    """Where a camera stands.
+    """Position of a camera.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class CameraPosition:
 def draw_camera(
     painter: QPainter, room: QRectF, stand: CameraPosition, words: str, color: QColor
 ) -> None:
-    """Draw a camera that looks at a dial, and words beside it that stay in a room."""
+    """Draw a camera that faces a dial, with a label inside a rectangle."""
     rim = stand.rim
     body = 0.055 * rim
     painter.save()
@@ -76,7 +76,7 @@ def draw_camera(
 
 
 def _shortage(turn: float, box: QRectF, room: QRectF, stand: CameraPosition) -> float:
-    """Return by how much words leave their room or cover the dial, px.
+    """Return by how much a label leaves its rectangle or covers the dial, px.
 
     Their box is about the mark and is turned by an angle in degrees, clockwise.
     """

@@ -1,4 +1,4 @@
-"""A field for a day, which may be left empty."""
+"""A field for a date, which may be empty."""
 
 from datetime import date
 
@@ -13,7 +13,7 @@ EXAMPLE = date(2026, 8, 14)
 
 
 class DateField(Translated, EnterEdit):
-    """A day as 2026-08-14; what is no day is marked, and counts as none.
+    """A date such as 2026-08-14; an invalid one is marked and ignored.
 
     Signals
     -------

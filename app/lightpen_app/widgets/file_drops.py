@@ -7,7 +7,7 @@ from typing_extensions import override
 
 
 class FileDrops(QObject):
-    """Takes what is dropped on a widget, one file or folder of this machine.
+    """Accepts one local file or folder dropped on a widget.
 
     Parameters
     ----------

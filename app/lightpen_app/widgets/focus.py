@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QWidget
 
 
 def give_focus(widget: QWidget) -> None:
-    """Give a widget the focus where it is seen.
+    """Focus a widget and make it visible.
 
     Qt gives it to those on hidden pages, too, and takes it from who is typing.
     """

@@ -143,7 +143,7 @@ class ImageView(Translated, QWidget):
         return self._zoom
 
     def set_zoom(self, zoom: float, about: QPointF | None = None) -> None:
-        """Enlarge, with a place of the widget staying where it is."""
+        """Zoom about a fixed point of the widget."""
         if self._size.isEmpty():
             return
         place = QPointF(self.rect().center()) if about is None else about

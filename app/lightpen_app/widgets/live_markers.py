@@ -1,4 +1,4 @@
-"""The rings that tell what a live image shows."""
+"""Rings for the spots of a live image."""
 
 from collections.abc import Iterator
 
@@ -14,7 +14,7 @@ CLEARANCE = 2.0  # image px between spot and ring, at least
 
 
 def live_markers(seen: LiveImage) -> tuple[Marker, ...]:
-    """Return a ring about each spot, with its number where it is an LED.
+    """Return a ring for each spot, numbered for LEDs.
 
     Spots that are no LED are dashed; without intrinsics and pen file nobody can tell,
     and all rings are plain.
@@ -49,7 +49,7 @@ def stray_markers(circles: FloatArray, label: str) -> Iterator[Marker]:
 
 
 def _free_angles(places: FloatArray) -> FloatArray:
-    """Return in which direction most room is beside each of (N, 2) places, rad."""
+    """Return the direction with most room at each of (N, 2) places, rad."""
     offsets = places[:, None] - places[None]
     distances = np.linalg.norm(offsets, axis=-1)
     np.fill_diagonal(distances, np.inf)

@@ -16,7 +16,7 @@ PAGE_KEYS = (Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 
 
 class NumberField(QDoubleSpinBox):
-    """A spin box whose text is set in as in other fields, with a decimal point.
+    """A spin box with a decimal point and the margins of other fields.
 
     A decimal comma that is typed becomes a point; it would be passed over otherwise,
     and "3,5" be taken for 35. A number beyond the limits becomes the nearest limit once
@@ -61,7 +61,7 @@ class NumberField(QDoubleSpinBox):
         return super().fixup(text) if nearest is None else self.textFromValue(nearest)
 
     def _nearest(self, text: str) -> float | None:
-        """Return the limit that a typed number is beyond; None where it is not."""
+        """Return the limit that a typed number exceeds; None if within."""
         digits = text.strip().removesuffix(self.suffix().strip()).strip()
         if not NUMBER.fullmatch(digits):
             return None
@@ -74,7 +74,7 @@ class NumberField(QDoubleSpinBox):
 
     @override
     def setValue(self, value: float) -> None:
-        """Show another number; where it is the same, what is being typed stays."""
+        """Set the number; an unchanged one keeps the text being typed."""
         bounded = min(max(value, self.minimum()), self.maximum())
         is_same = self.textFromValue(bounded) == self.textFromValue(self.value())
         if not (is_same and self.hasFocus()):
@@ -82,7 +82,7 @@ class NumberField(QDoubleSpinBox):
 
     @override
     def setSuffix(self, suffix: str) -> None:
-        """Show another unit; where it is the same, what is being typed stays."""
+        """Set the unit; an unchanged one keeps the text being typed."""
         if suffix != self.suffix():
             super().setSuffix(suffix)
 

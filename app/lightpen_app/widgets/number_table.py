@@ -37,7 +37,7 @@ class Figures:
 
 
 class NumberTable(QTableWidget):
-    """Shows figures whole, without scrolling; Ctrl+C copies what is selected."""
+    """Shows a table without scrolling; Ctrl+C copies the selection."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

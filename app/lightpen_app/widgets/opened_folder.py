@@ -7,7 +7,7 @@ from PySide6.QtGui import QDesktopServices
 
 
 def open_folder(folder: Path) -> str:
-    """Show a folder, or return the sentence that says where it is."""
+    """Open a folder in the file manager, or return a message with its path."""
     if QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
         return ""
     words = QCoreApplication.translate(

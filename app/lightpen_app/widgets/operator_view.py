@@ -1,4 +1,4 @@
-"""The view for the operator at the cone: a window of its own, in large letters."""
+"""The operator view: a window in large letters, legible from the cone."""
 
 from dataclasses import dataclass, field
 
@@ -126,7 +126,7 @@ class OperatorView(Translated, QWidget):
         self._resize_letters()
 
     def value(self) -> OperatorValue:
-        """Return what is shown."""
+        """Return the value."""
         return self._value
 
     def set_value(self, value: OperatorValue) -> None:
@@ -150,7 +150,7 @@ class OperatorView(Translated, QWidget):
         self._resize_letters()
 
     def set_subject(self, text: str, is_marked: bool = False) -> None:
-        """Say what is being calibrated, such as pen and tip.
+        """Show the item, such as pen and tip.
 
         Parameters
         ----------
@@ -261,7 +261,7 @@ def other_screen(present: QScreen, screens: list[QScreen]) -> QScreen:
 
 
 def _dots_per_inch(screen: QScreen) -> float:
-    """Return the pixels per inch of a screen, or the usual if it does not tell."""
+    """Return the pixels per inch of a screen, or a default."""
     told = screen.physicalDotsPerInch()
     low, high = CREDIBLE_DPI
     return told if low <= told <= high else USUAL_DPI

@@ -1,4 +1,4 @@
-"""What images are of, as a remark that stands beside all that comes of them."""
+"""Origin of images as a remark beside their results."""
 
 from lightpen.model.origin import Origin
 from lightpen_app.look.phrases import origin_text
@@ -8,7 +8,7 @@ from lightpen_app.widgets.sign_label import StatusMessage
 
 
 def origin_message(origin: Origin | None) -> StatusMessage:
-    """Return the word for images that are not of a live camera; nothing for those."""
+    """Return the remark on images that are not live; empty otherwise."""
     if origin is Origin.LIVE:
         return StatusMessage()
     tone = Tone.ACTIVE if origin is Origin.RECORDED else Tone.WARN

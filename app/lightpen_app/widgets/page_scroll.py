@@ -34,13 +34,13 @@ class PageScroll(QScrollArea):
 
     @override
     def setWidget(self, widget: QWidget) -> None:
-        """Show another content, on the ground of what is behind."""
+        """Set the content, with the background of the parent."""
         super().setWidget(widget)
         widget.setAutoFillBackground(False)
         self.viewport().setAutoFillBackground(False)
 
     def reveal(self, widget: QWidget) -> None:
-        """Scroll to a widget whose words may just have become more."""
+        """Scroll to a widget whose text may have grown."""
         content, around = self.widget(), widget.parentWidget()
         assert content is not None
         while around is not None and around is not self:
@@ -58,7 +58,7 @@ class PageScroll(QScrollArea):
         return super().focusNextPrevChild(next)
 
     def _on_range_changed(self) -> None:
-        """Keep in view what was revealed while other words around it change."""
+        """Keep the revealed widget visible while others change."""
         if self._revealed is not None:
             self.ensureWidgetVisible(self._revealed, 0, 0)
 
@@ -94,7 +94,7 @@ class ShrinkingScrollContent(QWidget):
             vertical_layout(self, content)
 
     def set_squeezed(self, squeezed: bool) -> None:
-        """Let it be made as small as it can be, or give it all that it asks for."""
+        """Allow the minimum size, or give the size hint."""
         self._is_squeezed = squeezed
         self.updateGeometry()
 

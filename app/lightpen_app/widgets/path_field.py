@@ -15,7 +15,7 @@ QUOTES = "\"'"
 
 
 class EnterEdit(QLineEdit):
-    """A line whose Enter key ends the editing and does nothing else.
+    """A line edit whose Enter key only ends editing.
 
     Where nothing was edited, Enter is left to the window.
     """
@@ -70,7 +70,7 @@ class PathField(QWidget):
         self._edit.setToolTip(value)
 
     def edit(self) -> QLineEdit:
-        """Return the line, for the label that goes with it."""
+        """Return the line edit, for its label."""
         return self._edit
 
     def set_faulty(self, faulty: bool) -> None:
@@ -78,7 +78,7 @@ class PathField(QWidget):
         set_tone(self._edit, Tone.BAD if faulty else Tone.PLAIN)
 
     def add_button(self, button: QPushButton) -> None:
-        """Put a button beside the line."""
+        """Add a button beside the line."""
         self._layout.addWidget(button)
 
     def pick(
@@ -106,7 +106,7 @@ class PathField(QWidget):
             self.path_chosen.emit(path)
 
     def _typed(self) -> str:
-        """Return what was typed, without the quotes that a desktop copies along."""
+        """Return the text without the quotes added by a desktop."""
         text = self._edit.text().strip()
         for quote in QUOTES:
             if len(text) > 1 and text.startswith(quote) and text.endswith(quote):

@@ -27,7 +27,7 @@ SHARE_BELOW = 0.16  # of the height, below the cone
 
 @dataclass(frozen=True, eq=False)
 class DisplayedPosture:
-    """How a pen stands in its cone.
+    """Posture of a pen in its cone.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class DisplayedPosture:
 
 
 class PenInSpace(Translated, QWidget):
-    """Draws a pen in its cone, and the outline of where it should go."""
+    """Draws a pen in its cone and the outline of the target posture."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -58,7 +58,7 @@ class PenInSpace(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> DisplayedPosture | None:
-        """Return what is drawn."""
+        """Return the value."""
         return self._value
 
     def set_value(self, value: DisplayedPosture | None) -> None:

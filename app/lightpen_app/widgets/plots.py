@@ -74,7 +74,7 @@ class Axes:
 
 
 class _ReadableAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
-    """An axis whose decades read 10, 20, 50, 100, and not 1e+02.
+    """An axis with decades as 10, 20, 50, 100 instead of 1e+02.
 
     Of numbers that would overlap only as many are drawn as there is room for.
     """
@@ -194,7 +194,7 @@ class Plot(QWidget):
         return ("\n".join(lines) + "\n").encode()
 
     def columns(self) -> Mapping[str, Column]:
-        """Return what is shown, by the name of their column in the CSV file."""
+        """Return the displayed data by CSV column."""
         return self._columns
 
     def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -203,7 +203,7 @@ class Plot(QWidget):
         return (left, right), (low, high)
 
     def n_items(self) -> int:
-        """Return of how many items the plot is made."""
+        """Return the number of plot items."""
         return len(self._item.items)
 
     @override
@@ -227,7 +227,7 @@ class Plot(QWidget):
             self._restyle()
 
     def _named_curves(self) -> tuple[str, ...]:
-        """Return the names that stand beside the title."""
+        """Return the names beside the title."""
         return ()
 
     def _fitted_title_px(self) -> int:
@@ -239,7 +239,7 @@ class Plot(QWidget):
         return max(min(int(largest * room / max(needed, 1.0)), largest), LEAST_TITLE)
 
     def _restyle(self) -> None:
-        """Colour what is there already; a subclass colours its curves besides."""
+        """Update the colours; subclasses add their curves."""
         colors = colors_of(self.palette())
         self._graphics.setBackground(colors.panel)
         self._title_px = self._fitted_title_px()
@@ -278,7 +278,7 @@ class Plot(QWidget):
         )
 
     def _fit_numbered(self, n: int, y: FloatArray) -> None:
-        """Show all of what is numbered from 1 to n along the plot."""
+        """Fit the range to items numbered 1 to n."""
         self._fit(np.array([0.5, max(n, N_LEAST) + 0.5]), y)
 
 
@@ -301,7 +301,7 @@ def _cell(column: Column, row: int) -> str:
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve: its column in the CSV file, and its name beside the title."""
+    """A curve: its CSV column and its name beside the title."""
 
     column: str
     name: str = ""
@@ -387,7 +387,7 @@ class TracePlot(Plot):
         self._place_words()
 
     def words_cover(self) -> float:
-        """Return how much of the curves the words of the limit cover, px."""
+        """Return the part of the curves that the limit's label covers, px."""
         assert self._limit is not None
         label = self._limit.label
         return self._n_covered(label.orthoPos, label.anchors[0])
@@ -442,7 +442,7 @@ class TracePlot(Plot):
         self._place_words()
 
     def _n_covered(self, place: float, side: tuple[float, float]) -> float:
-        """Return how much of the curves and of the edges words would cover, px."""
+        """Return the part of curves and edges that a label would cover, px."""
         assert self._limit is not None
         (left, right), (low, high) = self.ranges()
         area, words = self._item.vb, self._limit.label.textItem.boundingRect()

@@ -68,7 +68,7 @@ class DialValue:
 
     @property
     def n_fields(self) -> int:
-        """Fields in which images are wanted."""
+        """Number of fields in which images are required."""
         return int(np.sum(self.needed > 0)) + (self.n_upright_needed > 0)
 
     @property
@@ -123,7 +123,7 @@ class PostureDial(Translated, QWidget):
         self._describe()
 
     def value(self) -> DialValue:
-        """Return what is shown."""
+        """Return the value."""
         return self._value
 
     def set_value(self, value: DialValue) -> None:
@@ -214,7 +214,7 @@ class PostureDial(Translated, QWidget):
         return middle, rim, bar
 
     def _images(self, place: _Field) -> tuple[int, int]:
-        """Images kept and wanted in a field."""
+        """Return the accepted and required images of a field."""
         value = self._value
         if place.ring == 0:
             return value.n_upright, value.n_upright_needed

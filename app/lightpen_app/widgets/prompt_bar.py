@@ -9,7 +9,7 @@ from lightpen_app.look.theme import Tone, set_tone
 
 
 class AskingBar(QFrame):
-    """Hidden until it asks; what had the focus before has it again afterwards.
+    """A bar for a question, hidden without one; it returns the focus.
 
     Else it would go to whatever comes next, such as a button that Enter then presses.
 

@@ -33,7 +33,7 @@ class PushButton(QPushButton):
         self._least_width = least_width
 
     def set_why_not(self, why_not: str, told: str = "") -> None:
-        """Disable it and say why not, or enable it and tell what it does."""
+        """Disable the button with a reason, or enable it with a tool tip."""
         self.setEnabled(not why_not)
         self.setToolTip(why_not or told)
         self.setAccessibleDescription(why_not or told)

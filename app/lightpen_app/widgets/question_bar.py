@@ -15,7 +15,7 @@ from lightpen_app.widgets.translated import Translated
 
 
 class Question(NamedTuple):
-    """What is asked, and what its answers say."""
+    """A question with the labels of its answers."""
 
     text: str = ""
     yes: str = ""
@@ -67,7 +67,7 @@ class QuestionBar(Translated, AskingBar):
     def ask_about(
         self, words: Callable[[], Question], on_yes: Callable[[], object]
     ) -> None:
-        """Ask something else; what is agreed to is then done."""
+        """Replace the question and the action on consent."""
         self._on_yes = on_yes
         self.set_words(words)
         self.ask()

@@ -94,7 +94,7 @@ class ReasonBar(AskingBar):
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Keep Enter in a field that lacks something from what is behind the bar."""
+        """Keep Enter in an incomplete field from the widgets behind."""
         is_typing = not isinstance(self.window().focusWidget(), QAbstractButton)
         if not (is_typing and event.key() in ENTER_KEYS):
             super().keyPressEvent(event)
@@ -130,7 +130,7 @@ class ReasonBar(AskingBar):
         self._decline.setText(no)
 
     def ask(self, *, of_supervisor: bool = False) -> None:
-        """Show the question and wait for what is typed, by a supervisor or anybody."""
+        """Ask and wait for a text, signed by a supervisor if required."""
         self._is_given = False
         self._edit.clear()
         self._supervisor.clear()

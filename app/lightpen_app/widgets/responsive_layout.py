@@ -61,7 +61,7 @@ class ResponsiveLayout(_Base):
     _room = SizeClass()
 
     def _use_room(self) -> None:
-        """Arrange what is shown as `_room` allows."""
+        """Arrange the content for the size class."""
         raise NotImplementedError
 
     @override

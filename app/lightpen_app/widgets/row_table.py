@@ -32,7 +32,7 @@ class RowTable(QTableView):
         across.setStretchLastSection(True)
 
     def show_other_words(self) -> None:
-        """Show what the model says now, in the language that is chosen."""
+        """Update the texts in the selected language."""
         model = self.model()
         across = Qt.Orientation.Horizontal
         model.headerDataChanged.emit(across, 0, model.columnCount() - 1)

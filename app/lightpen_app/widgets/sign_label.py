@@ -63,7 +63,7 @@ class SignLabel(QWidget):
         self.hide()
 
     def value(self) -> StatusMessage:
-        """Return what is shown."""
+        """Return the value."""
         return self._value
 
     def set_value(self, value: StatusMessage) -> None:

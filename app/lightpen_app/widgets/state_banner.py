@@ -200,7 +200,7 @@ class StateBanner(QWidget):
         painter.drawArc(place, 90 * 16, round(-360 * 16 * fraction))
 
     def detail_px(self) -> float:
-        """Return the size of the letters of the sentence as it is drawn now, px."""
+        """Return the present font size of the sentence, px."""
         return self._detail_px
 
     def _draw_words(self, painter: QPainter, box: QRectF, ink: QColor) -> None:

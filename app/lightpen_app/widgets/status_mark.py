@@ -1,4 +1,4 @@
-"""How a tip stands, as a remark that is beside its name wherever it shows."""
+"""Status of a tip as a remark beside its name."""
 
 from PySide6.QtCore import QCoreApplication, QRectF, Qt
 from PySide6.QtGui import QIcon, QPainter, QPixmap
@@ -38,12 +38,12 @@ WORST_FIRST = (TipStatus.RETIRED, TipStatus.OVERDUE, TipStatus.UNCALIBRATED)
 
 
 def status_text(standing: TipStatus) -> str:
-    """Return the word for how something stands."""
+    """Return the name of a status."""
     return QCoreApplication.translate(CONTEXT, _WORDS[standing])
 
 
 def status_message(standing: TipStatus | None) -> StatusMessage:
-    """Return how something stands as a remark; none where that is not known."""
+    """Return a remark on a status; None if unknown."""
     if standing is None:
         return StatusMessage()
     return StatusMessage(status_text(standing), *_MARKS[standing])

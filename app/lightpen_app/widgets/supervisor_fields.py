@@ -47,7 +47,7 @@ class SupervisorFields(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> Signature:
-        """Return who signs."""
+        """Return the signature."""
         return Signature(self._name.text().strip(), self._password.text())
 
     def is_filled(self) -> bool:
@@ -55,7 +55,7 @@ class SupervisorFields(Translated, QWidget):
         return bool(self.value().name and self.value().password)
 
     def clear(self) -> None:
-        """Forget what was typed."""
+        """Clear the fields."""
         self._name.clear()
         self._password.clear()
 

@@ -1,4 +1,4 @@
-"""Widgets whose texts follow the language that is chosen."""
+"""Widgets with texts in the selected language."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""How a tip developed: x, y, z and U over its calibrations, beside their limits."""
+"""Trend of a tip: x, y, z and U over its calibrations, with limits."""
 
 import numpy as np
 import pyqtgraph as pg
@@ -113,7 +113,7 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
         self._retranslate()
 
     def plots(self) -> tuple[TrendPlot, ...]:
-        """Return the plots of x, y, z and U; none as long as there was no trend."""
+        """Return the plots of x, y, z and U; empty without a trend."""
         return self._plots
 
     def value(self) -> Trend:
@@ -156,7 +156,7 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
             plot.mark(found[0] if found else None)
 
     def words(self) -> str:
-        """Return what is said over the plots."""
+        """Return the text above the plots."""
         return self._told.text()
 
     @override

@@ -1,1 +1,1 @@
-"""What runs behind the window, as objects of Qt; no rules of its own."""
+"""Qt objects around the core's runners; no rules."""

@@ -1,4 +1,4 @@
-"""What is entered in the archive because of what was kept in files."""
+"""Enters events of stored files in the archive."""
 
 from collections.abc import Callable
 from datetime import datetime
@@ -14,7 +14,7 @@ from lightpen_app.work.notifications import Notifications
 
 
 class ArchiveWriter(QObject):
-    """Enters beside the window what files of a data folder tell of."""
+    """Enters the events of a data folder's files in the background."""
 
     def __init__(
         self,
@@ -31,7 +31,7 @@ class ArchiveWriter(QObject):
         self._notifications = notifications
 
     def enter_owed(self) -> None:
-        """Enter what files tell of that the archive does not yet."""
+        """Enter events that the archive lacks."""
         logbook = self._logbook
         Job(lambda _: logbook.enter_owed(), self).start()
 

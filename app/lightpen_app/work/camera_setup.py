@@ -80,7 +80,7 @@ class CameraSetup(QObject):
         self.live.open(cameras, CameraSettings(), clock, known)
 
     def search(self, kind: str, producer: str) -> None:
-        """Look for the cameras of a source, by a GenTL producer where it needs one.
+        """Search for the cameras of a source, with a GenTL producer if needed.
 
         Of a search before nothing is told any more.
         """

@@ -1,4 +1,4 @@
-"""The files that are chosen: read beside the window, and why one cannot be."""
+"""The selected files, read in the background, with reasons for failures."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,7 +18,7 @@ from lightpen_app.work.stations import FilePaths
 
 
 class ChosenFiles(QObject):
-    """Reads the files of a station, those beside images, and the samples.
+    """Reads the files of a station, those beside images, and samples.
 
     One reading at a time; of the one before nothing is told any more.
 
@@ -68,7 +68,7 @@ class ChosenFiles(QObject):
         self._read_samples()
 
     def use_files(self, files: FilesBeside) -> None:
-        """Choose the files that stand beside recorded images, once they are read."""
+        """Select the files beside recorded images once they are read."""
         self._withdraw()
         self._read(lambda _: open_files(files.camera, files.pen), self._on_chosen_read)
 
@@ -165,7 +165,7 @@ def _files(preparation: Preparation) -> tuple[object, ...]:
 def _of_source(
     opened: OpenedFiles, source: SourceChoice, now: Preparation
 ) -> OpenedFiles:
-    """Return what was read for a source, without what the one chosen now rules out."""
+    """Return the files read for a source, unless the selection overrides them."""
     held = replace(
         now, source=source, camera_file=opened.camera_file, pen_file=opened.pen_file
     ).with_source(now.source)

@@ -1,4 +1,4 @@
-"""Whether the data folder can be written, and how many windows use it."""
+"""Access to the data folder, and the number of windows that use it."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ LOOKING_MS = 5000  # from one look to the next
 
 
 class FolderWatch(QObject):
-    """Looks at the data folder now and then, and lets other windows know of this one.
+    """Checks the data folder periodically and announces this window.
 
     Signals
     -------

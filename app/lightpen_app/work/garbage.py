@@ -1,4 +1,4 @@
-"""Python's garbage collector, kept to the thread of the window.
+"""Python's garbage collector, restricted to the GUI thread.
 
 The collector runs in whatever thread happens to allocate. It may free a Qt object there
 whose thread is another one, and Qt ends the program (PYSIDE-810).

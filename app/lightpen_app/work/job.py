@@ -70,7 +70,7 @@ class Job(QObject):
         QThreadPool.globalInstance().start(self._run)
 
     def cancel(self) -> None:
-        """Ask the job to stop at its next report; its outcome is then not told."""
+        """Request a stop at the next progress report; the result is discarded."""
         self._cancelled.set()
 
     def _run(self) -> None:
@@ -120,4 +120,4 @@ class Job(QObject):
 
 
 def _tell_nothing() -> None:
-    """Do as one does who was told to stop."""
+    """No-op for a cancelled job."""

@@ -1,4 +1,4 @@
-"""The tip library and how all tips stand, read and changed beside the window."""
+"""The tip library and the status of tips, read and changed in the background."""
 
 from collections import deque
 from collections.abc import Callable
@@ -23,7 +23,7 @@ Change = Callable[[], Library]
 
 
 class LibraryWatch(QObject):
-    """Knows the library of a data folder, and tells when it is another one.
+    """Watches the library of a data folder and signals changes.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class LibraryWatch(QObject):
 
     @property
     def statuses(self) -> StationStatus:
-        """How all tips stand, with the library, as they were read last."""
+        """Status of all tips, with the library, as last read."""
         return self._statuses
 
     @property
@@ -91,7 +91,7 @@ class LibraryWatch(QObject):
             self.refresh()
 
     def refresh(self) -> None:
-        """Read it anew; the last to ask is told."""
+        """Read it again; only the last request is answered."""
         if self._is_over:
             return
         if self._reading is not None:

@@ -98,7 +98,7 @@ class DisplayedImage:
 
 
 class LiveView(QObject):
-    """Opens a camera, or two beside each other, and tells what they show.
+    """Opens one or two cameras and signals their images.
 
     Of two, one is `chosen`: what is asked, told and set is of it, but for `failed`,
     `configured`, which are of both.
@@ -169,7 +169,7 @@ class LiveView(QObject):
         clock: Clock | None = None,
         known: Mapping[str, CameraSettings] | None = None,
     ) -> None:
-        """Show another camera, or two; those before are closed.
+        """Open one or two cameras; earlier ones are closed.
 
         A camera whose serial number is among the ``known`` gets the settings there.
         """
@@ -192,7 +192,7 @@ class LiveView(QObject):
         live.start()
 
     def close(self) -> None:
-        """Close the camera; what it still had to tell is not told.
+        """Close the camera; pending signals are dropped.
 
         A dead camera may take seconds, so this does not wait: see `await_closed`. A
         swing that is captured waits for the next camera.
@@ -217,7 +217,7 @@ class LiveView(QObject):
             self._set_connection(c, Connection.CLOSED)
 
     def await_closed(self, timeout_s: float = CLOSING_TIME) -> bool:
-        """Wait until every camera that was closed has let go of its device.
+        """Wait until all closed cameras have released their devices.
 
         Returns
         -------
@@ -242,11 +242,11 @@ class LiveView(QObject):
 
     @property
     def chosen(self) -> int:
-        """Number of the camera that is asked and told of, from 0."""
+        """Number of the selected camera, from 0."""
         return self._chosen
 
     def choose(self, camera: int) -> None:
-        """Ask and tell of another camera, by its number from 0, if it is there."""
+        """Select another camera by its number from 0, if it exists."""
         if camera == self._chosen or camera >= self.n_cameras:
             return
         self._chosen = camera
@@ -264,7 +264,7 @@ class LiveView(QObject):
 
     @property
     def worst_connection(self) -> Connection:
-        """How that camera is which keeps a swing from its images."""
+        """The worst connection state of the cameras of a swing."""
         connections = [state.connection for state in self._states]
         return min(connections, key=_WORST_FIRST.index)
 
@@ -293,12 +293,12 @@ class LiveView(QObject):
         return self.capabilities_of(self._chosen)
 
     def capabilities_of(self, camera: int) -> CameraCapabilities | None:
-        """Return what a camera can do, by its number from 0."""
+        """Return the capabilities of a camera by its number from 0."""
         return None if self._live is None else self._live.worker(camera).caps
 
     @property
     def stats(self) -> Stats:
-        """What became of the images of this camera, and of pairs with the other."""
+        """Frame counters of this camera and of the pairs."""
         if self._live is None:
             return Stats()
         own = self._live.worker(self._chosen).stats
@@ -306,7 +306,7 @@ class LiveView(QObject):
 
     @property
     def lag_ms(self) -> float | None:
-        """By how much the second camera is later; None while that is not known."""
+        """Time lag of the second camera; None if unknown."""
         return None if self._live is None else self._live.lag_ms
 
     @property
@@ -321,7 +321,7 @@ class LiveView(QObject):
             self._live.set_region(region)
 
     def set_watched(self, watched: bool) -> None:
-        """Say whether anybody looks at the images, of this camera and later ones."""
+        """Set whether images are displayed, for present and later cameras."""
         self._is_watched = watched
         if self._live is not None:
             self._live.set_watched(watched)
@@ -355,12 +355,12 @@ class LiveView(QObject):
             self._live.worker(self._chosen).configure(settings)
 
     def set_following(self, follows: bool) -> None:
-        """Let the simulated operator do what the swing asks for, or leave it."""
+        """Set whether the simulated operator follows the swing."""
         operator = self._operator
         self._run.follower = GuidedOperator(operator) if follows and operator else None
 
     def set_touching(self, touches: bool) -> None:
-        """Let the simulated operator touch what is verified, or leave it."""
+        """Set whether the simulated operator follows the verification."""
         operator = self._operator
         self._verification.probing_operator = (
             ProbingOperator(operator) if touches and operator else None
@@ -390,7 +390,7 @@ class LiveView(QObject):
         self._notifications.tell((self, "closing"), sentence)
 
     def _tell(self, camera: int, cause: str, error: LightpenError) -> None:
-        """Say what is wrong with a camera, of two with its number."""
+        """Report a camera fault, with the camera's number if there are two."""
         words = worded(error.message)
         if self.n_cameras > 1:
             words = self.tr("Camera {0}: {1}").format(camera + 1, words)

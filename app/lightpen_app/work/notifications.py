@@ -1,4 +1,4 @@
-"""What the user is told: published once, shown wherever somebody subscribes."""
+"""Notifications: published once, shown by all subscribers."""
 
 from collections.abc import Hashable
 
@@ -8,7 +8,7 @@ from lightpen_app.look.theme import Tone
 
 
 class Notifications(QObject):
-    """The sentences that are to be read, each until its cause is gone.
+    """The active notifications, each until its cause has ended.
 
     Signals
     -------
@@ -29,7 +29,7 @@ class Notifications(QObject):
         self._texts: dict[Hashable, str] = {}
 
     def text(self, cause: Hashable) -> str:
-        """Return what is to be read because of a cause; empty if nothing is."""
+        """Return the text of a cause; empty without one."""
         return self._texts.get(cause, "")
 
     def tell(self, cause: Hashable, text: str, tone: Tone = Tone.BAD) -> None:
@@ -44,7 +44,7 @@ class Notifications(QObject):
         self.status_changed.emit(text)
 
     def withdraw(self, *causes: Hashable) -> None:
-        """Take back what was published because of causes: they are gone."""
+        """Withdraw the notifications of causes that have ended."""
         for cause in causes:
             text = self._texts.pop(cause, "")
             if text:

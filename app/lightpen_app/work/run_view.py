@@ -1,4 +1,4 @@
-"""What a runner tells on its threads, as signals of Qt on the thread of the GUI."""
+"""Signals of a runner's threads, forwarded to the GUI thread."""
 
 from threading import Lock
 from typing import Generic, TypeVar
@@ -14,7 +14,7 @@ E = TypeVar("E")
 
 
 class RunView(QObject, Generic[S, E]):
-    """Shows the GUI what a runner does; commands are given to that directly.
+    """Forwards the status of a runner to the GUI; commands go to the runner.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class RunView(QObject, Generic[S, E]):
 
     @property
     def status(self) -> S:
-        """What the runner told last, as the GUI knows it."""
+        """The last status received."""
         return self._status
 
     @property
@@ -83,7 +83,7 @@ class RunView(QObject, Generic[S, E]):
             self._told.emit()
 
     def on_progress(self, fraction: float) -> None:
-        """Hand on how far it is."""
+        """Forward the progress."""
         self._progress_told.emit(fraction)
 
     def on_fault(self, message: Message) -> None:
@@ -109,7 +109,7 @@ class RunView(QObject, Generic[S, E]):
         self._compare(before, newest)
 
     def _compare(self, before: S, now: S) -> None:
-        """Tell what is different beyond `changed`; by default, nothing."""
+        """Emit signals for differences beyond `changed`; none by default."""
 
     def _on_progress_told(self, fraction: float) -> None:
         self._progress = fraction

@@ -43,12 +43,12 @@ class SavePlace:
         self.settings.set_export_folder(str(folder))
 
     def mark(self) -> str:
-        """Return what stands on a picture; nothing where a live camera took it."""
+        """Return the mark on pictures; empty for a live camera."""
         origin = self.run.status.origin
         return "" if origin in (None, Origin.LIVE) else origin_text(origin)
 
     def stem(self) -> str:
-        """Return what the name of a file begins with."""
+        """Return the beginning of a file name."""
         status = self.run.status
         moment = self.now() if status.result is None else status.result.accepted
         return export_stem(status.names, moment, status.origin)

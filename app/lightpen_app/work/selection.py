@@ -33,7 +33,7 @@ def trial_of(preparation: Preparation) -> Preparation:
 
 
 def is_trial_ready(preparation: Preparation) -> bool:
-    """Return whether a trial may be swung."""
+    """Return whether a trial can begin."""
     return preparation.names == TRIAL and not preparation.missing_inputs()
 
 
@@ -85,7 +85,7 @@ class Selection(QObject):
         return self._settings.stations()
 
     def choose_station(self, name: str) -> None:
-        """Take over what was chosen last at a station, its files still to be read."""
+        """Restore the last selection at a station; its files are read later."""
         station = self._settings.station(name) if name else Station()
         before = self._preparation
         chosen = preparation_of(name, station, before)
@@ -105,7 +105,7 @@ class Selection(QObject):
         self._follow(before)
 
     def observe(self, preparation: Preparation) -> None:
-        """Take over what cameras or files tell of themselves; it is not remembered."""
+        """Apply data from cameras or files; not stored."""
         before, self._preparation = self._preparation, preparation
         self._follow(before)
 
@@ -120,7 +120,7 @@ class Selection(QObject):
         self.changed.emit(self._preparation)
 
     def set_due_rule(self, rule: DueRule) -> None:
-        """Remember how long a tip may be in force where nothing is laid down."""
+        """Store the calibration interval of the station."""
         self._settings.set_due_rule(rule)
         self.changed.emit(self._preparation)
 

@@ -93,7 +93,7 @@ class Settings(QObject):
 
     @property
     def file(self) -> Path:
-        """Where the settings are kept."""
+        """Path of the settings."""
         return self._file
 
     @property
@@ -102,14 +102,14 @@ class Settings(QObject):
         return self._fault
 
     def preferences(self) -> Preferences:
-        """Return what the user chose; at first, the language of the system."""
+        """Return the preferences; at first in the system's language."""
         usual = Preferences(language=system_language())
         read = _read(self._content.get("preferences", {}), usual)
         known = read.language if read.language in languages() else usual.language
         return replace(read, language=known)
 
     def set_preferences(self, preferences: Preferences) -> None:
-        """Remember what the user chose."""
+        """Store the preferences."""
         self._save("preferences", _entries(preferences))
 
     def stations(self) -> tuple[str, ...]:
@@ -117,11 +117,11 @@ class Settings(QObject):
         return tuple(sorted(self._content.get("stations", {})))
 
     def station(self, name: str) -> Station:
-        """Return what was chosen last at a station; defaults for a new one."""
+        """Return the last selection at a station; defaults for a new one."""
         return _read(self._content.get("stations", {}).get(name), Station())
 
     def set_station(self, name: str, station: Station) -> None:
-        """Remember what was chosen at a station."""
+        """Store the selection at a station."""
         if not name:
             raise ValueError("`name` of a station must not be empty.")
         self._save("stations", {name: _entries(station)})
@@ -167,15 +167,15 @@ class Settings(QObject):
         self._save("last", {"laboratory": asdict(laboratory)})
 
     def due_rule(self) -> DueRule:
-        """Return how long a tip may be in force."""
+        """Return the calibration interval."""
         return _read(self._content.get("due"), DueRule())
 
     def set_due_rule(self, rule: DueRule) -> None:
-        """Remember how long a tip may be in force."""
+        """Store the calibration interval."""
         self._save("due", _entries(rule))
 
     def restore_geometry(self, window: QWidget) -> bool:
-        """Put a window where it was when the program ended; False if never."""
+        """Restore the geometry of a window; False if never stored."""
         saved = self._content.get("windows", {}).get(window.objectName())
         if not isinstance(saved, str):
             return False
@@ -196,7 +196,7 @@ class Settings(QObject):
             return not self._is_writing
 
     def _save(self, section: str, entries: dict[str, Any]) -> None:
-        """Remember entries; those that are as they were need not be written."""
+        """Store entries; unchanged ones are not written."""
         known = self._content.get(section, {})
         new = {n: e for n, e in entries.items() if n not in known or known[n] != e}
         changes = {(section, name): entry for name, entry in new.items()}
@@ -226,7 +226,7 @@ class Settings(QObject):
                 self._written.emit(trouble, not unwritten)
 
     def _on_written(self, trouble: Message | None, is_written: bool) -> None:
-        """Tell what went wrong, once, and when it is over; until then try again."""
+        """Report a failure once, and its end; retry until then."""
         before = self._why_unwritten
         self._why_unwritten = None if is_written else trouble
         if not is_written:
@@ -237,7 +237,7 @@ class Settings(QObject):
             self.troubled.emit(trouble)
 
     def _taken_changes(self, unwritten: Changes) -> Changes:
-        """Return what is to be written next; nothing if only the old is left."""
+        """Return the entries to write next; empty without changes."""
         with self._lock:
             is_new = bool(self._changes)
             changes = unwritten | self._changes
@@ -252,20 +252,20 @@ def settings_file() -> Path:
 
 
 def data_folder(preferences: Preferences) -> Path:
-    """Return where records and crash reports are kept, as chosen or as is usual."""
+    """Return the data folder, selected or default."""
     if preferences.data_folder:
         return Path(preferences.data_folder)
     return platformdirs.user_data_path("lightpen", appauthor=False)
 
 
 def _entries(value: Group) -> dict[str, Any]:
-    """Return the fields of a value as they are kept."""
+    """Return the fields of a value for storing."""
     entries: dict[str, Any] = json.decode(json.encode(value))
     return entries
 
 
 def _read(saved: object, default: Group) -> Group:
-    """Return a default with what was saved of it and makes sense."""
+    """Return a default updated with valid stored fields."""
     found: dict[str, Any] = {}
     for name, kind in get_type_hints(type(default)).items():
         if isinstance(saved, dict) and name in saved:

@@ -55,7 +55,7 @@ def load(file: Path) -> LoadedSettings:
 
 
 def with_changes(content: Content, changes: Changes) -> Content:
-    """Return settings with what was changed."""
+    """Return the settings with changes applied."""
     sections = {name: dict(entries) for name, entries in content.items()}
     for (section, name), entry in changes.items():
         sections.setdefault(section, {})[name] = entry
@@ -63,7 +63,7 @@ def with_changes(content: Content, changes: Changes) -> Content:
 
 
 def save(file: Path, content: Content, changes: Changes) -> Message | None:
-    """Write what was changed, and return what its user should know of it.
+    """Write changes and return a message if needed.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ Triple: TypeAlias = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class StoredCamera:
-    """Where the images of a camera come from, and what is left out of them.
+    """Stored source of a camera's images, and its mask.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Station:
 
 
 def preparation_of(name: str, station: Station, before: Preparation) -> Preparation:
-    """Return what was chosen last at a station of a name, its files still to be read.
+    """Return the last selection at a station; its files are read later.
 
     A source of a later version is passed over.
     """
@@ -87,7 +87,7 @@ def preparation_of(name: str, station: Station, before: Preparation) -> Preparat
 def station_of(
     preparation: Preparation, choices: VerificationChoices, unread: FilePaths
 ) -> Station:
-    """Return what a station keeps.
+    """Return the stored form of a station.
 
     Parameters
     ----------

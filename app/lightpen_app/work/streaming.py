@@ -1,4 +1,4 @@
-"""The live stream of pose and tip as an object of Qt: what is wanted, and how it is."""
+"""The live stream of pose and tip as a Qt object: settings and state."""
 
 from functools import partial
 
@@ -15,7 +15,7 @@ from lightpen_app.work.job import Job, Report
 
 
 class Streaming(QObject):
-    """Opens and closes the stream, and has it tell of the tip in force.
+    """Opens and closes the stream and updates its tip.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Streaming(QObject):
 
     @property
     def status(self) -> StreamStatus:
-        """Where it can be listened to, and by how many it is."""
+        """Address and number of clients."""
         return self.stream.status
 
     @property
@@ -65,7 +65,7 @@ class Streaming(QObject):
 
     @property
     def trouble(self) -> str:
-        """Why nobody can listen, in words; empty where one can or is not to."""
+        """Why the stream is unavailable; empty if it runs or is off."""
         return self._fault
 
     def want(self, place: StreamPlace | None) -> None:
@@ -81,7 +81,7 @@ class Streaming(QObject):
             self.read_tip()
 
     def read_tip(self) -> None:
-        """Read which tip is in force, as it may be another one."""
+        """Read the current tip, which may have changed."""
         if self._reading is not None:
             self._reading.cancel()
             self._reading = None
@@ -96,13 +96,13 @@ class Streaming(QObject):
         job.start()
 
     def shut_down(self) -> None:
-        """Let nobody listen any more, once all jobs have ended."""
+        """Close the stream after all jobs have ended."""
         # What a job has still to tell begins nothing more.
         self._wanted = self._opened = None
         self.stream.close()
 
     def _follow(self) -> None:
-        """Open or close the stream as wanted, off this thread: names are looked up."""
+        """Open or close the stream in a job, since names are looked up."""
         if self._opening is not None or self._wanted == self._opened:
             return
         self._opened = place = self._wanted
@@ -142,7 +142,7 @@ class Streaming(QObject):
 
 
 def _what_counts(preparation: Preparation) -> tuple[object, ...]:
-    """Return what the tip in force depends on."""
+    """Return what the current tip depends on."""
     return (
         *(preparation.names, preparation.origin, preparation.second is None),
         *(preparation.camera_file, preparation.pen_file),

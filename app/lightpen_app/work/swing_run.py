@@ -1,4 +1,4 @@
-"""The runner of a swing as an object of Qt: what it tells, as signals."""
+"""The runner of a swing as a Qt object with signals."""
 
 import os
 from collections.abc import Callable
@@ -66,7 +66,7 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
 
     @property
     def archive(self) -> FolderArchive:
-        """Where accepted results are kept."""
+        """Archive of accepted results."""
         return self._archive
 
     @property

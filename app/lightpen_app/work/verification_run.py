@@ -1,4 +1,4 @@
-"""The runner of a verification as an object of Qt: what it tells, as signals."""
+"""The runner of a verification as a Qt object with signals."""
 
 from collections.abc import Callable
 from datetime import datetime

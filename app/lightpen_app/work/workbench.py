@@ -31,7 +31,7 @@ SETTINGS = "settings"  # cause of a notification
 
 
 class Workbench(QObject):
-    """Holds each model; who needs one asks for it when made, and keeps that alone.
+    """Creates and connects the models; each page receives those it needs.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class Workbench(QObject):
         settings.relieved.connect(self._on_settings_relieved)
 
     def start(self) -> None:
-        """Take over what was chosen last, and open the camera."""
+        """Restore the last selection and open the camera."""
         if self.settings.trouble is not None:
             self._on_settings_troubled(self.settings.trouble)
         folder = self.folder  # a job that knew its parent would outlive it
@@ -121,7 +121,7 @@ class Workbench(QObject):
         self.camera.open()
 
     def shut_down(self, timeout_s: float = CLOSING_TIME) -> bool:
-        """Close the camera, cancel what is under way, and wait until all has ended.
+        """Close the camera, cancel running jobs and wait for their end.
 
         Returns
         -------

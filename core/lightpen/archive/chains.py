@@ -36,7 +36,7 @@ BATCH = 200  # entries that are copied in one transaction
 
 @dataclass(frozen=True)
 class CopyResult:
-    """What became of entries that were to be copied.
+    """Result of copying entries.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ def copy_entries(
 
 
 def heads(database: Database) -> tuple[ChainHead, ...]:
-    """Return how far each chain has come."""
+    """Return the head of each chain."""
     with database.reading() as connection:
         rows = connection.execute(select(CHAINS).order_by(CHAINS.c.chain)).all()
     return tuple(ChainHead(row.chain, row.number, row.sha256) for row in rows)
@@ -180,7 +180,7 @@ def entry_of_result(database: Database, chain: str, place: str) -> StoredEntry |
 
 
 class ArchivedFiles:
-    """The places of the result files and swings that a chain tells of.
+    """The paths of the result files and swings in a chain.
 
     What was read once is kept, so that of a long chain only its new entries are.
 
@@ -197,7 +197,7 @@ class ArchivedFiles:
         self._kinds: dict[str, str] = {}  # of the last entry of a swing
 
     def read(self) -> None:
-        """Read what was entered since.
+        """Read the entries added since the last call.
 
         Raises
         ------
@@ -366,7 +366,7 @@ def _require_next(head: ChainHead, new: list[StoredEntry]) -> None:
 def _named(
     entries: Sequence[StoredEntry], records: Mapping[str, str]
 ) -> dict[str, str]:
-    """Return the records that entries vouch for, having looked at each."""
+    """Return the records that entries refer to, after reading each."""
     named = {}
     for each in entries:
         wanted = each.entry.event.record_sha256

@@ -107,14 +107,14 @@ def check_file(archive: Path, data: Path, report: Report) -> ArchiveCheckResult:
 
 
 def _last_written(archive: Path) -> int | None:
-    """Return when a file at rest was written, ns; None while a program has it open."""
+    """Return when a closed file was last written, ns; None if a program has it open."""
     if is_open(archive) or not archive.exists():
         return None
     return archive.stat().st_mtime_ns
 
 
 def _told(stage: Iterator[Message]) -> Iterator[Message]:
-    """Yield what a stage finds, and why it cannot go on."""
+    """Yield the findings of a stage, and the error that ended it."""
     try:
         yield from stage
     except LightpenError as error:
@@ -147,7 +147,7 @@ def _broken_seal(database: Database, ends: tuple[ChainHead, ...]) -> Iterator[Me
 def _walked(
     database: Database, head: ChainHead, files: FilesCheck | None, report: Report
 ) -> Iterator[Message]:
-    """Yield what is not right from the first entry of a chain to its last.
+    """Check a chain from its first entry to its last, and yield the findings.
 
     Entries that are added meanwhile are walked over, too.
     """
@@ -184,7 +184,7 @@ def _walked(
 
 
 def _head_now(database: Database, head: ChainHead) -> ChainHead:
-    """Return how far a chain has come by now; as far as before if it is gone."""
+    """Return the present head of a chain, or the earlier one if the chain is gone."""
     return next((h for h in heads(database) if h.chain == head.chain), head)
 
 
@@ -233,7 +233,7 @@ def _changed_records(database: Database) -> Iterator[Message]:
 
 
 def _lost_records(database: Database) -> Iterator[Message]:
-    """Yield the entries whose record is missing."""
+    """Yield entries without their record."""
     is_there = exists().where(RECORDS.c.sha256 == ENTRIES.c.record_sha256)
     lost = select(ENTRIES.c.chain, ENTRIES.c.number).where(
         ENTRIES.c.record_sha256 != "", ~is_there

@@ -105,7 +105,7 @@ class Database:
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """Read what is there at one moment.
+        """Read within one transaction.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class Database:
             yield connection
 
     def close(self) -> None:
-        """Let go of it, once those who use it now are done."""
+        """Close it after its present users have finished."""
         self._uses.end(LONGEST_FAREWELL_S)
         self.engine.pool.dispose()
 
@@ -370,7 +370,7 @@ def _found_version(connection: Connection) -> str | None:
 
 
 def _make_or_migrate(connection: Connection) -> None:
-    """Make the tables or bring them up to date, if nobody else has meanwhile."""
+    """Create or migrate the tables, unless another process has done so."""
     if connection.dialect.name == "postgresql":
         connection.execute(text(f"SELECT pg_advisory_xact_lock({MIGRATING})"))
     found = _found_version(connection)
@@ -400,7 +400,7 @@ def _migrate(connection: Connection, found: str) -> None:
 
 @contextmanager
 def _looking_at(path: Path) -> Iterator[None]:
-    """Say that a file may not be looked at."""
+    """Raise an error for a file that may not be read."""
     try:
         yield
     except OSError as error:
@@ -409,7 +409,7 @@ def _looking_at(path: Path) -> Iterator[None]:
 
 @contextmanager
 def _telling(name: str) -> Iterator[None]:
-    """Say what is the matter with a database as the user can understand it."""
+    """Translate errors of the database into messages for the user."""
     try:
         yield
     except SQLAlchemyError as error:
@@ -422,7 +422,7 @@ def _telling(name: str) -> Iterator[None]:
 
 
 def _reason(error: SQLAlchemyError) -> str:
-    """Return what the database says, without what was asked of it."""
+    """Return the database's message without the statement."""
     said = str(getattr(error, "orig", None) or type(error).__name__).strip()
     return printable(said.splitlines()[0].strip().rstrip("."))
 

@@ -47,7 +47,7 @@ class DueTip:
     n_left: int | None
 
     def is_due(self, now: datetime) -> bool:
-        """Return whether it is to be calibrated before it measures.
+        """Return whether it needs calibration before it is used.
 
         So it is where its age is not known: its day is still to come, by a clock that
         was set back, or was ahead then.
@@ -122,7 +122,7 @@ def _due_tip(
 
 
 def _swings(database: Database, chain: str, since: datetime) -> dict[str, list[int]]:
-    """Return when each real pen was swung since, in order, as the column has it."""
+    """Return the times of the real swings of each pen since then, in order."""
     found = (
         select(ENTRIES.c.pen, ENTRIES.c.since_us)
         .where(

@@ -42,7 +42,7 @@ Chain: TypeAlias = Annotated[str, Meta(pattern="^[0-9a-f]{32}$")]
 
 
 class Kind(StrEnum):
-    """What an entry tells of."""
+    """Kind of an entry."""
 
     ACCEPTED = "accepted"
     RESTORED = "restored"
@@ -77,7 +77,7 @@ class FileHash(Struct, frozen=True):
 
 
 class Event(Struct, frozen=True):
-    """Something that happened, as it is entered.
+    """An event to be entered.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ class Entry(Struct, frozen=True):
 
 @dataclass(frozen=True)
 class StoredEntry:
-    """An entry as it is kept.
+    """An entry as stored.
 
     Attributes
     ----------
@@ -244,5 +244,5 @@ def text_sha256(text: str) -> str:
 
 
 def this_program() -> str:
-    """Return what an entry says of the program that makes it."""
+    """Return name and version of the program for an entry."""
     return f"lightpen {__version__}"

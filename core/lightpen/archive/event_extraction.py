@@ -1,4 +1,4 @@
-"""What happened, told by the files of a data folder: results, swings, the library."""
+"""Events extracted from the files of a data folder: results, swings, library."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ from lightpen.record.swings.solving import Solution, record_inputs
 
 @dataclass(frozen=True)
 class ExtractedEvent:
-    """What happened, as it is to be entered.
+    """An event to be entered, with its files.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class ExtractedEvent:
 
 
 def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
-    """Return what a file says that put a tip in force, or took it back.
+    """Return the event of a result file or of a revocation.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
 
 
 def account_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
-    """Return what a file says that changed the tip library.
+    """Return the event of a change of the tip library.
 
     Raises
     ------
@@ -114,14 +114,14 @@ def account_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
 def account_of_abandoned(
     results: FolderArchive, record: Record, at: datetime
 ) -> ExtractedEvent:
-    """Return what a swing says that was left without a tip."""
+    """Return the event of a swing that was abandoned."""
     return ExtractedEvent(_event_of_swing(results, record, Kind.ABANDONED, at))
 
 
 def account_of_unreadable(
     results: FolderArchive, folder: Path, at: datetime, why: Message
 ) -> ExtractedEvent:
-    """Return all that can be said of a swing that was set aside and cannot be read."""
+    """Return the event of a discarded swing that cannot be read."""
     event = Event(
         kind=Kind.ABANDONED,
         at=at,
@@ -139,7 +139,7 @@ def account_of_refused(
     assessment: SwingAssessment,
     at: datetime,
 ) -> ExtractedEvent:
-    """Return what a solved swing says whose tip was not accepted.
+    """Return the event of a solved swing whose tip was rejected.
 
     Raises
     ------

@@ -55,7 +55,7 @@ class _LastLine(Struct):
 
 
 def deliver(database: Database, chain: str, server: Database) -> CopyResult:
-    """Copy what a server does not have of a chain yet.
+    """Copy the entries of a chain that a server lacks.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def deliver(database: Database, chain: str, server: Database) -> CopyResult:
 
 
 def export_entries(database: Database, path: Path) -> int:
-    """Write all entries of an archive into a new file, and return how many there are.
+    """Write all entries of an archive to a new file; return their number.
 
     Raises
     ------

@@ -44,7 +44,7 @@ class FilesCheck:
         self.n_files = 0
 
     def findings(self, entries: Iterable[StoredEntry]) -> Iterator[Message]:
-        """Yield what is not right with the files of entries."""
+        """Check the files of entries and yield the findings."""
         if self._data is None:
             return
         for each in entries:
@@ -75,7 +75,7 @@ class FilesCheck:
                 yield from filter(None, found)
 
     def _unreadable(self, data: Path, swing: str) -> Iterator[Message]:
-        """Yield what is damaged of a swing behind what its entries vouch for."""
+        """Yield damage of a swing after the part that its entries cover."""
         if swing in self._swings:
             return
         try:
@@ -111,7 +111,7 @@ def _images(data: Path, journal: FileHash) -> Iterator[FileHash]:
 
 
 def _finding(data: Path, number: int, file: FileHash) -> Message | None:
-    """Return what is not right with a file that an entry vouches for."""
+    """Return what differs between a file and its entry."""
     path = data / file.place
     try:
         content = path.read_bytes()

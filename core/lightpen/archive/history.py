@@ -1,4 +1,4 @@
-"""The history that an archive tells: its entries as lines, and what followed each."""
+"""The history of the archive: one line for each entry, with its later events."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from lightpen.archive.tables import ENTRIES
 
 
 class TipState(StrEnum):
-    """What became of a tip that was put in force; nothing of other entries."""
+    """Later state of an accepted tip."""
 
     NONE = ""
     IN_FORCE = "in force"
@@ -31,7 +31,7 @@ class TipState(StrEnum):
 
 @dataclass(frozen=True)
 class Line:
-    """An entry, and what became of it.
+    """An entry and its later events.
 
     Attributes
     ----------

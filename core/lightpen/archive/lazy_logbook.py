@@ -35,7 +35,7 @@ class LazyLogbook:
     def enter_owed(
         self, report: Callable[[float], None] = lambda fraction: None
     ) -> tuple[Message, ...]:
-        """Enter what the files tell of; see `lightpen.archive.logbook.Logbook`."""
+        """Enter events from files; see `lightpen.archive.logbook.Logbook`."""
         logbook = self._open()
         return () if logbook is None else logbook.enter_owed(report)
 

@@ -23,7 +23,7 @@ BATCH = 1000  # entries that are read at one time
 
 
 def save_entries(database: Database, wanted: EntryFilter, path: Path) -> int:
-    """Write the entries looked for, the newest first, and return how many there are.
+    """Write the entries of a filter, the newest first; return their number.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def entries_csv(entries: Iterable[StoredEntry]) -> str:
 
 
 def entries_json(entries: Iterable[StoredEntry]) -> str:
-    """Return entries as they are kept, each with its hash."""
+    """Return entries as stored, each with its hash."""
     listed = [{"sha256": each.sha256, **json.loads(each.text)} for each in entries]
     return json.dumps(listed, indent=1) + "\n"
 

@@ -1,4 +1,4 @@
-"""The logbook of a station: all that happens in a data folder is entered in its chain.
+"""The logbook of a station: enters the events of a data folder in its chain.
 
 One rule joins it to the files. A result file puts a tip in force, or takes it back, the
 journal of a swing says that it was set aside, and changes of the tip library, limits,
@@ -68,7 +68,7 @@ _logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ReplicationState:
-    """How far a server has what was entered.
+    """Progress of the replication to a server.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class Logbook:
     def enter_owed(
         self, report: Callable[[float], None] = lambda fraction: None
     ) -> tuple[Message, ...]:
-        """Enter what the files tell of and the archive does not yet.
+        """Enter events from files that the archive does not have yet.
 
         Parameters
         ----------
@@ -164,7 +164,7 @@ class Logbook:
             self._enter(account_of_refused(self._results, solution, assessment, at))
 
     def enter_note(self, about: StoredEntry, text: str, operator: str) -> None:
-        """Enter what somebody has to say of an entry.
+        """Enter a comment on an entry.
 
         Raises
         ------
@@ -216,7 +216,7 @@ class Logbook:
         return result
 
     def delivery(self) -> ReplicationState | None:
-        """Return how far the server has what was entered; None if there is no server.
+        """Return the progress of the replication; None without a server.
 
         Raises
         ------
@@ -232,7 +232,7 @@ class Logbook:
         return ReplicationState(max(0, ends.get(self.chain, 0) - n_delivered), trouble)
 
     def close(self) -> None:
-        """Let go of the archive, and seal its file if nobody else has it open.
+        """Close the archive, and seal its file unless another process has it open.
 
         Raises
         ------
@@ -283,7 +283,7 @@ class Logbook:
 
 
 def _taking_back(event: Event, back: StoredEntry) -> Event:
-    """Return the event of a taking back with what is known of the result."""
+    """Return the event of a revocation with the data of the result."""
     of, operator = back.entry.event, event.names.operator
     return structs.replace(
         event,

@@ -25,7 +25,7 @@ _KINDS_IN_FORCE = [kind.value for kind in IN_FORCE_BY]
 
 @dataclass(frozen=True)
 class EntryFilter:
-    """Which entries are looked for; what is empty or None leaves all.
+    """Filter for entries; an empty or None field matches all.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class EntryFilter:
 
 
 def n_wanted(database: Database, wanted: EntryFilter) -> int:
-    """Return how many entries are looked for."""
+    """Return the number of matching entries."""
     count = select(func.count()).select_from(ENTRIES).where(condition_of(wanted))
     with database.reading() as connection:
         return connection.execute(count).scalar_one()
@@ -108,7 +108,7 @@ def last_accepted(
 
 
 def calibrating(database: Database, entry: StoredEntry) -> StoredEntry:
-    """Return the entry of the calibration whose tip an entry put in force again.
+    """Return the calibration entry of a reinstated tip.
 
     It is the entry itself if that was the calibration, or if the other is not here.
     """
@@ -123,7 +123,7 @@ def calibrating(database: Database, entry: StoredEntry) -> StoredEntry:
 
 
 def of_chain(chain: str) -> ColumnElement[bool]:
-    """Return the condition that an entry is of a chain, for those few else found.
+    """Return a condition on the chain, for rare entries.
 
     No index of chains is used for it: most entries are of one.
     """

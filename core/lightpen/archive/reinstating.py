@@ -1,4 +1,4 @@
-"""An older tip put in force again: a new result, of what was calibrated then."""
+"""Reinstating an older tip: a new result from an earlier calibration."""
 
 from dataclasses import replace
 from datetime import datetime
@@ -62,7 +62,7 @@ def restored_result(
 
 
 def with_change(result: Result, last: Result | None) -> Result:
-    """Return a result that tells how far its tip lies from that in force before."""
+    """Return a result with the change from the tip that was current before."""
     if last is None:
         return result
     change = change_since(

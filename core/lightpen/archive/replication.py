@@ -1,4 +1,4 @@
-"""Bringing what a station enters to a server, whenever it answers.
+"""Replication of a station's entries to a server whenever it is reachable.
 
 The archive of the station itself is what waits to be delivered: it has every entry
 before the server does, and keeps it. So nothing is lost while the server is away, and
@@ -20,7 +20,7 @@ AGAIN_S = 30.0  # after a server did not answer
 
 
 class Replicator:
-    """Delivers in a thread of its own, until it is closed.
+    """Replicates in its own thread until closed.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Replicator:
         self._is_due.set()
 
     def close(self, timeout_s: float) -> None:
-        """End, once what is being delivered is there or the time is over."""
+        """Finish the current transfer, within a time limit, and end."""
         self._is_ending.set()
         self._is_due.set()
         self._thread.join(timeout_s)

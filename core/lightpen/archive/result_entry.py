@@ -1,4 +1,4 @@
-"""Where a result is entered in the archive beside it, which is only read."""
+"""The archive entry of a result; the archive is opened read-only."""
 
 from contextlib import closing, suppress
 from dataclasses import dataclass

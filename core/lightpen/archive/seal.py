@@ -1,4 +1,4 @@
-"""The seal of an archive's file: its hash, and how far it had come, when it was closed.
+"""The seal of an archive file: its hash and heads at closing.
 
 Chains and hashes tell of every entry and record that was changed, but a file of SQLite
 has bytes that belong to neither. As long as nothing was entered since, the file must be
@@ -54,7 +54,7 @@ def seal_of(archive: Path) -> Path:
 
 
 def close_sealed(database: Database) -> None:
-    """Close an archive, and seal its file if nobody else has it open.
+    """Close an archive, and seal its file unless another process has it open.
 
     A seal that is damaged, or tells of entries which the archive does not hold, stays
     as it is, to be found.
@@ -135,7 +135,7 @@ def is_sealed_otherwise(archive: Path, ends: tuple[ChainHead, ...], seal: Seal) 
 
 
 def sealed_heads(ends: tuple[ChainHead, ...]) -> tuple[SealedHead, ...]:
-    """Return how far chains have come, as a seal tells it."""
+    """Return the heads stored in a seal."""
     return tuple(SealedHead(head.chain, head.number, head.sha256) for head in ends)
 
 

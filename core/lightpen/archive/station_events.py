@@ -1,4 +1,4 @@
-"""What happens at a station besides swings: limits, verifications, cameras."""
+"""Events of a station besides swings: limits, verifications, cameras."""
 
 from collections.abc import Iterator
 from hashlib import sha256
@@ -33,7 +33,7 @@ FOLDERS = (
 
 
 def station_files(data: Path) -> Iterator[Path]:
-    """Yield the files that tell of such things, of each kind the oldest first.
+    """Yield the files of such events, for each kind the oldest first.
 
     Raises
     ------
@@ -45,12 +45,12 @@ def station_files(data: Path) -> Iterator[Path]:
 
 
 def is_station_file(file: Path) -> bool:
-    """Return whether a file tells of such things."""
+    """Return whether a file belongs to such an event."""
     return file.parent.name in FOLDERS
 
 
 def account_of_station(results: FolderArchive, file: Path) -> ExtractedEvent:
-    """Return what a file says of limits, of a verification or of a camera.
+    """Return the event of a limits, verification or camera file.
 
     Raises
     ------

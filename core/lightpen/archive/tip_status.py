@@ -1,4 +1,4 @@
-"""How the tips of a station stand, by what its archive tells."""
+"""Calibration status of a station's tips, from its archive."""
 
 from datetime import datetime
 
@@ -12,7 +12,7 @@ from lightpen.record.library.tip_library import Library
 def statuses(
     database: Database, chain: str, rule: DueRule, library: Library, now: datetime
 ) -> StationStatus:
-    """Return how all tips of a station stand now.
+    """Return the current status of all tips of a station.
 
     Parameters
     ----------

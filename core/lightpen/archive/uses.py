@@ -8,7 +8,7 @@ from lightpen.errors import ArchiveError
 
 
 class UseCount:
-    """Counts those who use an archive, until no more are let in."""
+    """Counts the users of an archive and admits no more once it is closing."""
 
     def __init__(self) -> None:
         self._changed = Condition()
@@ -17,7 +17,7 @@ class UseCount:
 
     @property
     def are_over(self) -> bool:
-        """Whether nobody is let in any more."""
+        """Whether new users are refused."""
         return self._is_over
 
     @contextmanager
@@ -41,7 +41,7 @@ class UseCount:
                 self._changed.notify_all()
 
     def end(self, timeout_s: float) -> None:
-        """Let nobody in any more, and wait for those who use it, so long at most."""
+        """Refuse new users and wait for the present ones, up to a time limit."""
         with self._changed:
             self._is_over = True
             self._changed.wait_for(lambda: self._n == 0, timeout_s)

@@ -88,7 +88,7 @@ class Device(Protocol):
         """
 
     def close(self) -> None:
-        """Release everything; may be called twice and on a dead camera."""
+        """Release everything; safe to call twice and on a lost camera."""
 
     def start(self) -> None:
         """Start streaming."""

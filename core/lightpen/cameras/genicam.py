@@ -157,7 +157,7 @@ def _told(serial: str) -> AbstractContextManager[None]:
 
 
 def _quietly(act: Callable[[], object]) -> None:
-    """Suppress the errors of a camera that may be dead."""
+    """Suppress errors of a camera that may be lost."""
     from genicam import genapi, gentl
 
     with suppress(genapi.GenericException, gentl.GenericException):

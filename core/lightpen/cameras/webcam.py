@@ -102,7 +102,7 @@ class WebcamDevice:
             capture.release()
 
     def start(self) -> None:
-        """Do nothing: it streams as soon as it is open."""
+        """Do nothing: it streams once it is open."""
 
     def stop(self) -> None:
         """Do nothing."""
@@ -119,7 +119,7 @@ class WebcamDevice:
         return DeliveredFrame(data, width, height, self._n_read)
 
     def probe(self) -> None:
-        """Do nothing: `fetch` tells."""
+        """Do nothing: `fetch` reports failures."""
 
 
 def _find(producer: str) -> tuple[FoundDevice, ...]:

@@ -63,7 +63,7 @@ _logger = logging.getLogger(__name__)
 
 
 class CameraWorker:
-    """Runs a camera in a thread of its own.
+    """Runs a camera in its own thread.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ class CameraWorker:
             self._reconnect()
 
     def _is_wanted(self) -> bool:
-        """Return whether an image is wanted after the pause."""
+        """Return whether an image is due after the pause."""
         rest = self._rest
         if rest is not None and self._is_stopped:
             self._is_stopped = False
@@ -469,7 +469,7 @@ class CameraWorker:
 
 
 def merged_settings(before: CameraSettings, now: CameraSettings) -> CameraSettings:
-    """Return settings, completed by those before."""
+    """Return settings, completed by earlier ones."""
     given = {f.name: getattr(now, f.name) for f in fields(now)}
     return replace(before, **{n: v for n, v in given.items() if v is not None})
 

@@ -1,4 +1,4 @@
-"""``lightpen archive``: check what was entered, list it, send it, and take it up."""
+"""``lightpen archive``: check, list, send and import entries."""
 
 import argparse
 from collections.abc import Callable
@@ -16,7 +16,7 @@ DataFolder: TypeAlias = Callable[[], Path]
 
 
 def usual_data_folder() -> Path:
-    """Return where records, results and the archive are kept unless chosen."""
+    """Return the default data folder."""
     return platformdirs.user_data_path("lightpen", appauthor=False)
 
 

@@ -67,7 +67,7 @@ def number_from(
 
 
 def add_pen_options(parser: argparse.ArgumentParser) -> None:
-    """Add what a pen file may leave out."""
+    """Add options for what a pen file may omit."""
     parser.add_argument(
         "--units",
         choices=sorted(UNITS),

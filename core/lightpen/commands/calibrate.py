@@ -76,7 +76,7 @@ def add_calibrate(parser: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Calibrated:
-    """A calibration and what it was made from; hashes are read when asked for."""
+    """A calibration and its input; hashes are read when needed."""
 
     calibration: Calibration
     nominal_tip: FloatArray | None
@@ -132,7 +132,7 @@ def _from_json(options: argparse.Namespace) -> _Calibrated:
 
 
 def _require_none_given(options: argparse.Namespace, record: Path) -> None:
-    """Refuse what a record brings itself."""
+    """Reject options that duplicate the content of a record."""
     own = (
         "camera rig pen units led-diameter nominal-tip camera-sigma scale-sigma "
         "temperature temperature-sigma form-error center-bias second-cone distance "
@@ -249,7 +249,7 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
 
 
 def _origin(*files: Path) -> Origin:
-    """Return what a calibration from files is of."""
+    """Return the origin of a calibration from files."""
     return Origin.SIMULATED if any(map(is_simulated, files)) else Origin.RECORDED
 
 

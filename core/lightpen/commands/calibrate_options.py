@@ -1,4 +1,4 @@
-"""What can be said to ``lightpen calibrate``, and what it means."""
+"""The options of ``lightpen calibrate``."""
 
 import argparse
 from dataclasses import replace
@@ -20,7 +20,7 @@ SMALLEST_SHARE, LARGEST_SHARE = 1e-9, 0.1
 
 
 def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
-    """Add the images of a swing, and all that can be said of them."""
+    """Add the images of a swing and their options."""
     parser.add_argument(
         "images",
         nargs="*",
@@ -129,7 +129,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _share(text: str) -> float:
-    """Return a part of one, which may be given in per cent."""
+    """Return a fraction, which may be given in per cent."""
     number = finite(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
     if not SMALLEST_SHARE <= number <= LARGEST_SHARE:
         raise argparse.ArgumentTypeError(
@@ -139,7 +139,7 @@ def _share(text: str) -> float:
 
 
 def assumptions_of(options: argparse.Namespace) -> Assumptions:
-    """Return what is assumed where files are silent."""
+    """Return the default uncertainties."""
     assumed = USUAL
     if options.camera_sigma is not None:
         assumed = with_focal_length(assumed, options.camera_sigma)

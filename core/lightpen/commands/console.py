@@ -22,7 +22,7 @@ Command: TypeAlias = Callable[[argparse.Namespace], int]
 
 
 def shown(text: str) -> str:
-    """Return a text in which names of files say nothing to the terminal."""
+    """Return a text with control characters of file names escaped."""
     return "\n".join(map(printable, text.split("\n")))
 
 
@@ -68,7 +68,7 @@ def require_other_file(record: Path | None, *inputs: Path | None) -> None:
 
 
 def write_record(path: Path, record: Mapping[str, Any] | Struct) -> None:
-    """Write a record as JSON that tells when it was changed."""
+    """Write a record as JSON with a checksum."""
     write_whole(path, record_bytes(record))
 
 
@@ -102,6 +102,6 @@ def progress(title: str) -> Iterator[Callable[[float], None]]:
 
 
 def _drop_output() -> None:
-    """Keep what is not printed yet from failing again as the program ends."""
+    """Discard unprinted output, so that the program does not fail again at its end."""
     if sys.stdout is not None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

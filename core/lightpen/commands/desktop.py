@@ -1,4 +1,4 @@
-"""What the command line starts beside its own commands: all that needs Qt."""
+"""The commands that need Qt."""
 
 import argparse
 from functools import partial
@@ -19,7 +19,7 @@ class Desktop(Protocol):
         """Play a calibration with a simulated operator."""
 
     def test_itself(self, report: Path) -> int:
-        """Try what the program needs, and write a report."""
+        """Test the installation and write a report."""
 
     def install_entry(self) -> int:
         """Put the program into the menu of the desktop."""
@@ -34,11 +34,11 @@ class Desktop(Protocol):
         """Return the languages of the program, English first."""
 
     def write_paper(self, result: Path, out: Path | None, language: str) -> Path:
-        """Write the record on paper of a calibration as PDF; return where it is."""
+        """Write the calibration report as PDF; return its path."""
 
 
 def add_desktop(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
-    """Add what is started without a command."""
+    """Add the options without a command."""
     parser.set_defaults(run=partial(_start, desktop))
     starts = parser.add_mutually_exclusive_group()
     starts.add_argument(

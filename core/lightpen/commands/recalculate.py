@@ -34,7 +34,7 @@ TITLE, COLUMN = 30, 13  # characters
 
 @dataclass(frozen=True, eq=False)
 class Recalculated:
-    """A calibration solved again from the LED centres that it keeps.
+    """A calibration solved again from its LED centres.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ def _workers(options: argparse.Namespace) -> Iterator[Map]:
 
 
 def _require_files(files: list[CalibrationFile], options: argparse.Namespace) -> None:
-    """Refuse calibrations that were made with other files than those given."""
+    """Reject calibrations with other input files."""
     given = sha256(options.camera), sha256(options.pen)
     for file in files:
         if (file.camera_sha256, file.pen_sha256) != given:

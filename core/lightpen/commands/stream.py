@@ -126,7 +126,7 @@ def _stream(options: argparse.Namespace) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Listened:
-    """What is streamed: the images, and what is looked for in them."""
+    """The images to stream, with camera and pen."""
 
     images: ImageCamera
     region: RegionOfInterest
@@ -134,7 +134,7 @@ class _Listened:
 
 
 def _listened(options: argparse.Namespace) -> _Listened:
-    """Return what is streamed: files as given, or as they stand beside the images."""
+    """Return the images to stream, with files as given or found beside them."""
     beside, mask = FilesBeside(), None
     source = source_named(options.source)
     if source is None or source.camera is None or source is RECORDED:
@@ -170,7 +170,7 @@ def _listened(options: argparse.Namespace) -> _Listened:
 
 
 def _play(listened: _Listened, stream: PoseStream) -> None:
-    """Look for the pen in all images, as long as some come, and tell who listens."""
+    """Detect the pen in all images and send its pose to the clients."""
     failures: list[LightpenError] = []
 
     def note(event: WorkerEvent) -> None:

@@ -110,7 +110,7 @@ def _add_author(action: argparse.ArgumentParser) -> None:
 
 
 def _or_nothing(kind: Callable[[str], T]) -> Callable[[str], T | object]:
-    """Return what reads a value, or that it is to be forgotten."""
+    """Return a parser of a value that accepts an empty text for no value."""
 
     def read(text: str) -> T | object:
         return FORGOTTEN if text.strip() == NOTHING else kind(text)

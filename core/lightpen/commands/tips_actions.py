@@ -160,7 +160,7 @@ def _set_retired(options: argparse.Namespace, *, is_retired: bool) -> None:
 
 
 def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:
-    """Return an item with what was said of it."""
+    """Return an item with the given entries."""
     if options.note is not None:
         item = structs.replace(item, note=options.note)
     if options.due is not None:
@@ -208,7 +208,7 @@ def _author(options: argparse.Namespace) -> Author:
 
 
 def _tell(options: argparse.Namespace, item: AnyItem, library: Library) -> None:
-    """Enter a change in the archive, and say what there is now."""
+    """Enter a change in the archive and print the new state."""
     data = _data(options)
     try:
         with closing(Logbook(data)) as logbook:
@@ -234,7 +234,7 @@ def _statuses(data: Path, library: Library, max_days: int | None) -> StationStat
 
 
 def _record(item: AnyItem, found: StationStatus) -> dict[str, Any]:
-    """Return what is said of an item, and how it stands."""
+    """Return the entries of an item and its status."""
     entries: dict[str, Any] = {"kind": item.kind.value}
     entries |= {n: e for n, e in to_builtins(item).items() if n != "type"}
     standing = found.of_item(item.kind, item.id)

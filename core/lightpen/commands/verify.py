@@ -75,7 +75,7 @@ from lightpen.verification.tasks.task import (
 
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
-    """Add ``lightpen verify`` and what it verifies."""
+    """Add ``lightpen verify`` and its tasks."""
     kinds = parser.add_subparsers(required=True, metavar="WHAT")
     for task in TASKS:
         _add_task(kinds.add_parser(task.command, help=task.summary), task)

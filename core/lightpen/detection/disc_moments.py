@@ -82,7 +82,7 @@ class PixelBox(NamedTuple):
         return (self.right - self.left) * (self.bottom - self.top)
 
     def grown(self, margin: int, shape: tuple[int, ...]) -> "PixelBox":
-        """Return the box with a margin, kept inside an image of that shape."""
+        """Return the box with a margin, clipped to the image."""
         return PixelBox(
             max(self.left - margin, 0),
             max(self.top - margin, 0),
@@ -109,7 +109,7 @@ class PixelBox(NamedTuple):
         return all(abs(a - b) <= tolerance for a, b in zip(self, other, strict=True))
 
     def overlap(self, other: "PixelBox") -> int:
-        """Return how many pixels both boxes share."""
+        """Return the number of common pixels."""
         width = min(self.right, other.right) - max(self.left, other.left)
         height = min(self.bottom, other.bottom) - max(self.top, other.top)
         return max(width, 0) * max(height, 0)

@@ -143,7 +143,7 @@ def _with_jumps(paths: Sequence[FloatArray]) -> list[FloatArray]:
 
     @cache
     def agreeing(a: int, b: int) -> int:
-        """Return how many lights go the step from one place to the other."""
+        """Return the number of lamps that moved by this step."""
         is_near = np.linalg.norm(every - steps[a, b], axis=1) <= STAYS
         return len(np.unique(lights[is_near]))
 

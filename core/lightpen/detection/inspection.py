@@ -185,7 +185,7 @@ class StraySearch:
 
     @property
     def is_dark(self) -> bool:
-        """Whether nothing at all was bright, nor moved, in most images."""
+        """Whether most images show neither a bright nor a moving spot."""
         n_lit = sum(len(spots) > 0 for spots in self.images)
         return n_lit < max(STRAY_SHARE * len(self.images), 1)
 
@@ -196,7 +196,7 @@ class StraySearch:
         )
 
     def circles(self) -> FloatArray:
-        """Return circles to mask, (M, 3), see `lasting_light`; none beside a pen."""
+        """Return circles to mask, (M, 3), see `lasting_light`; none at a pen."""
         return np.zeros((0, 3)) if self.shows_pen else lasting_light(self.images)
 
 

@@ -83,7 +83,7 @@ class PenDetection:
 
     @property
     def rig_pixels(self) -> FloatArray:
-        """Centres by all cameras of a rig, (C, L, 2), px; NaN where it is not seen."""
+        """Centres in all cameras of a rig, (C, L, 2), px; NaN where not detected."""
         return np.stack([self.pixels, *(other.pixels for other in self.others)])
 
     @property

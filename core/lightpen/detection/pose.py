@@ -350,7 +350,7 @@ def _image_sigmas(residuals: FloatArray) -> FloatArray:
 def _curvature(
     J: FloatArray, residuals: FloatArray, weights: FloatArray, sigmas: FloatArray
 ) -> FloatArray:
-    """Return by how much weights that fall as residuals grow lessen J^T W J, (N, 6, 6).
+    """Return the reduction of J^T W J by falling weights, (N, 6, 6).
 
     With it the steps on the Cauchy loss are Newton's, which converge at once where
     those on the weights alone take a sixth of the way left each.

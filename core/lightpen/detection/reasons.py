@@ -66,7 +66,7 @@ _WORDS = {
 
 
 def counted(n_images: int, reason: Reason) -> Message:
-    """Return how many images do not take part for a reason."""
+    """Return the number of excluded images by reason."""
     return message(
         "calibrate.images-of-a-reason", n_images=n_images, reason=reason.words
     )

@@ -121,7 +121,7 @@ def _responsive(seen: Observations, images: IntArray) -> Observations:
 
 
 def _with_exchange(rig: Rig, c: int, trouble: Message) -> Message:
-    """Return the error of a camera's images, and whose size they have."""
+    """Return the error of a camera's images, and the camera with that size."""
     told = of_camera(rig.names[c], trouble)
     size = trouble.values.get("size")
     if not isinstance(size, Message):

@@ -43,7 +43,7 @@ class RigReprojection:
 
 
 def derivatives_in_rig(J: FloatArray, turn: FloatArray) -> FloatArray:
-    """Return derivatives (..., 6) by a pose in a camera as those by it in the rig.
+    """Convert derivatives (..., 6) by the camera pose into those by the rig pose.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ class SpotFlaw(IntFlag):
 
 @dataclass(frozen=True, eq=False)
 class Spots:
-    """The spots of one image that may be LEDs, brightest first.
+    """The candidate spots of an image, brightest first.
 
     Attributes
     ----------
@@ -269,7 +269,7 @@ def _quantile(values: MatLike, share: float) -> int:
 
 
 def _has_smears(scene: _Survey) -> bool:
-    """Return whether an image without spots, nor uneven background, shows light."""
+    """Return whether an image without spots or background gradient shows light."""
     level = scene.background + LEVEL_SIGMAS * scene.noise
     lit = cv2.countNonZero(cv2.threshold(scene.thinned, level, 1, cv2.THRESH_BINARY)[1])
     low, high = SMEARED_FRACTIONS
@@ -307,7 +307,7 @@ def _thinned(image: Image, stride: int) -> MatLike:
 
 
 def _find_discs(scene: _Survey, budget: Iterator[int]) -> list[Disc]:
-    """Return whatever may be an LED, each once."""
+    """Return all regions that may be LEDs."""
     rise = scene.peak - scene.background
     level = scene.background + max(LEVEL_SIGMAS * scene.noise, LEVEL_OF_PEAK * rise)
     height, width = scene.image.shape
@@ -433,7 +433,7 @@ def _measured(
 
 
 def _resembles_disc(disc: Disc) -> bool:
-    """Tell whether a region may be an LED that is cut or merged with something."""
+    """Return whether a region may be a cut or merged LED."""
     major, minor = disc.moments.axes
     return disc.moments.roundness > MIN_ROUNDNESS and major < MAX_AXIS_RATIO * minor
 

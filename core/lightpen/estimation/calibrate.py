@@ -349,7 +349,7 @@ def _fit_single_cameras(
 
 
 def _find_start(inputs: _Inputs, single: _SingleCameraFits) -> _Start:
-    """Find the cameras' extrinsics by the images, whatever the rig file says, and fit.
+    """Estimate the extrinsics from the images alone, and fit.
 
     A file that contradicts them grossly is refused.
     """

@@ -1,4 +1,4 @@
-"""The uncertainty of a tip by Monte Carlo [1]_, to check what is linear in the budget.
+"""Monte Carlo evaluation of the tip's uncertainty [1]_, as a check of the budget.
 
 The estimate is taken for the truth. Each trial draws files of camera and pen about it,
 by what the files state of themselves or what is assumed in its place, a seat and a
@@ -93,7 +93,7 @@ class Trials:
 
 @dataclass(frozen=True, eq=False)
 class MonteCarlo:
-    """A tip by many trials, beside the linear budget.
+    """The tip from many trials, compared with the linear budget.
 
     Attributes
     ----------
@@ -211,7 +211,7 @@ def run_monte_carlo(
 
 
 def run_trial(trials: Trials, number: int) -> FloatArray | None:
-    """Return the error of the tip in one trial, (3,), mm; None where it has none."""
+    """Return the error of the tip in one trial, (3,), mm; None if it fails."""
     rng = np.random.default_rng([trials.seed, number])
     levers = (trials.pen.leds - trials.tip_pen) @ np.swapaxes(trials.rotations, 1, 2)
     exact = ellipse_centers(

@@ -419,7 +419,7 @@ def _matrix_lines(name: str, matrix: FloatArray) -> list[str]:
 
 
 def _decimal(value: float) -> str:
-    """Return the shortest text that reads back the same, as YAML 1.1 wants a float."""
+    """Return the shortest round-trip text of a float in YAML 1.1."""
     text = repr(float(value))
     if "e" in text and "." not in text:
         return text.replace("e", ".0e")

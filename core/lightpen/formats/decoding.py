@@ -93,7 +93,7 @@ def decode_image(data: bytes, name: str) -> Image:
 
 
 def bits_of(image: Image) -> int:
-    """Return the depth of an image; a file of 16 bits does not say how many it uses."""
+    """Return the bit depth of an image; 16-bit files do not state it."""
     if image.itemsize == 1:
         return 8
     return 12 if int(image.max(initial=0)) < 2**12 else 16
@@ -224,7 +224,7 @@ def _most_png_data(data: bytes) -> int:
 
 
 def _check_jpeg(data: bytes, name: str) -> None:
-    """Refuse a JPEG whose end is missing or which never ends."""
+    """Reject a JPEG without a proper end."""
     if data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda"):
         raise cut_off_image(name)
     n_scans = data.count(b"\xff\xda")

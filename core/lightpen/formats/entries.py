@@ -132,7 +132,7 @@ class Entries:
         return value.strip() if isinstance(value, str) else ""
 
     def refuse_others(self, *names: str) -> None:
-        """Refuse unknown entries, which may be misspelt.
+        """Reject unknown entries, which may be misspelt.
 
         Raises
         ------
@@ -167,7 +167,7 @@ class Entries:
 
 
 def counted_numbers(count: int) -> Message:
-    """Return how many numbers, such as "2 numbers"."""
+    """Return a count of numbers, such as "2 numbers"."""
     if count == 1:
         return message("count.one-number")
     return message("count.numbers", count=count)

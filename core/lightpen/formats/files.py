@@ -133,7 +133,7 @@ def read_text(path: Path, what: Message, limit: int) -> str:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file whole, or leave what was there untouched.
+    """Write a file atomically.
 
     The data goes to a new file in the same folder, which takes the place of the old
     one only when all of it is on the disk; what a write that was killed has left there

@@ -50,7 +50,7 @@ def record_heading(created: datetime) -> dict[str, Any]:
 
 
 def file_entry(file: InputFile) -> FileRecord:
-    """Return a file with its hash, and its content where that is kept."""
+    """Return a file with its hash and, if stored, its content."""
     content = b64encode(file.content or b"").decode()
     return FileRecord(file.path.name, file.sha256, content)
 

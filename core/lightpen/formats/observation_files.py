@@ -183,7 +183,7 @@ def _check_no_pair_twice(
 
 
 def _pose_columns(table: Table) -> tuple[list[int], list[int]]:
-    """Return the columns of the pose and those, if any, of its covariance."""
+    """Return the columns of the pose and, if present, of its covariance."""
     what = message("table.of-poses")
     if table.header:
         with_covariance = any(name in table.header for (name,) in _COVARIANCE)
@@ -213,7 +213,7 @@ def _check_repeated(table: Table, poses: FloatArray) -> None:
 
 
 def _checked_rotations(table: Table, matrices: FloatArray) -> FloatArray:
-    """Return rotations; those given with few digits are orthonormalised."""
+    """Return rotations, orthonormalised if given with few digits."""
     large = np.abs(matrices).max(axis=(1, 2)) > 2
     safe = np.where(large[:, None, None], 0.0, matrices)
     deviations = np.abs(safe @ np.swapaxes(safe, 1, 2) - np.eye(3)).max(axis=(1, 2))

@@ -36,7 +36,7 @@ class DamagedError(ValueError):
 
 
 def parse_own_json(data: bytes, shape: type[T]) -> T:
-    """Return what a text holds.
+    """Parse a text strictly.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ _NAME = re.compile(r"\.[0-9a-f]{16}\.part")
 
 @contextlib.contextmanager
 def part_of(target: Path, data: bytes) -> Iterator[Path]:
-    """Write data to a temporary file beside its target.
+    """Write data to a temporary file in the folder of its target.
 
     Raises
     ------

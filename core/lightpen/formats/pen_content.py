@@ -35,7 +35,7 @@ RANGES = {
 
 @dataclass(frozen=True, eq=False)
 class PenContent:
-    """The content of a pen file, mm; None where it states nothing."""
+    """The content of a pen file, mm; None for what it does not state."""
 
     leds: FloatArray
     normals: FloatArray | None
@@ -72,7 +72,7 @@ def agreed_unit(stated: str, given: str | None, name: str) -> str:
 
 
 def checked_number(what: str, number: float, name: str) -> float:
-    """Return what a file of that name states under a name of `RANGES`.
+    """Return a number of a file, checked against `RANGES`.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def check_diameter(diameter: float, name: str) -> None:
 
 
 def unit_normal(normal: FloatArray, place: str | Message) -> FloatArray:
-    """Return a normal (3,) of unit length, unchanged if it has it but for rounding.
+    """Return a normal (3,) of unit length.
 
     Raises
     ------

@@ -59,7 +59,7 @@ def read_pen(
     diameter: float | None = None,
     nominal_tip: FloatArray | None = None,
 ) -> Pen:
-    """Read a pen whose LEDs are given in the pen frame; see the module for the layouts.
+    """Read a pen with LEDs in the pen frame; the module describes the layouts.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ ASYMMETRY = 1e-6  # of the largest variance
 
 
 def from_json(tree: Tree, units: str | None, name: str) -> PenContent:
-    """Return what a document states about a pen.
+    """Return the pen of a JSON document.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ _COLUMN = (
 
 
 def from_table(table: Table, units: str | None) -> PenContent:
-    """Return what a table states about a pen.
+    """Return the pen of a table.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ StoredValue: TypeAlias = Union[
 
 
 class StoredMessage(Struct, frozen=True):
-    """A message, with its words in English for those who read the file.
+    """A message with its English text for readers of the file.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class StoredMessage(Struct, frozen=True):
 
     @classmethod
     def of(cls, told: Message) -> Self:
-        """Return what is kept of a message."""
+        """Return the stored form of a message."""
         values = {name: _stored(value) for name, value in told.values.items()}
         return cls(told.code, str(told), values)
 

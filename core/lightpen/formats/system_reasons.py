@@ -20,6 +20,6 @@ _REASONS = {  # as the C library words them
 
 
 def strerror(error: OSError) -> Message | str:
-    """Return the reason of an error; the system's own text where it is unknown."""
+    """Return the reason of an error, by default the system's text."""
     known = _REASONS.get(error.errno or 0)
     return known or error.strerror or type(error).__name__

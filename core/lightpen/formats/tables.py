@@ -278,7 +278,7 @@ def _clean_numbers(cells: list[str]) -> FloatArray | None:
 
 
 def _filled_lines(text: str, name: str) -> list[tuple[int, str]]:
-    """Return the lines that are neither blank nor comments, with their numbers."""
+    """Return the lines with data and their numbers."""
     if text.count("\n") > MAX_LINES:
         raise FileError("table.too-many-lines", name=name, most=MAX_LINES)
     lines = [
@@ -297,7 +297,7 @@ def _filled_lines(text: str, name: str) -> list[tuple[int, str]]:
 
 
 def _separator(lines: list[str]) -> str | None:
-    """Return what separates columns in most lines; None stands for blanks."""
+    """Return the column separator of most lines; None for blanks."""
     for candidate in (";", "\t", ","):
         if 2 * sum(candidate in line for line in lines) > len(lines):
             return candidate

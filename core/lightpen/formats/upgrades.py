@@ -1,4 +1,4 @@
-"""The formats of files that the program keeps, and how older ones become the newest.
+"""Formats of the program's files, and their upgrades.
 
 The newest format of a kind of file is one more than it has upgrades. To change a
 format, append the function that turns the entries of the format before into those of
@@ -55,7 +55,7 @@ def newest_format(kind: str) -> int:
 
 
 def parse_upgraded(data: bytes, shape: type[T], kind: str) -> T:
-    """Return what a text holds that has its checksum, as the newest format has it.
+    """Parse a text with checksum, upgraded to the newest format.
 
     Parameters
     ----------

@@ -115,7 +115,7 @@ MAX_DECODER_MEMORY = 300_000_000  # bytes, beyond what Python and OpenCV take
 
 
 def count_frames(path: Path) -> int:
-    """Return how many frames a video has; see `videos`.
+    """Return the number of frames of a video; see `videos`.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""Calibrating a camera, or two beside each other, by views of a board."""
+"""Calibration of one camera, or of two together, with views of a board."""

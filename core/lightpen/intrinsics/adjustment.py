@@ -234,7 +234,7 @@ def _cost_of(
 
 
 def _away(state: BoardState, origin: BoardState) -> FloatArray:
-    """Return how far the unknowns are from where the priors have them.
+    """Return the deviations of the unknowns from their priors.
 
     No prior is about the cameras' places.
     """

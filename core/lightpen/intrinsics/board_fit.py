@@ -124,7 +124,7 @@ class BoardFit:
 
 
 def board_points(board: Board, shape: FloatArray) -> FloatArray:
-    """Return the points of a board as it is, (N, 3), mm."""
+    """Return the points of the actual board, (N, 3), mm."""
     return np.asarray(board.points + deformations_of(board) @ shape)
 
 

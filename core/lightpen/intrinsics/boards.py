@@ -57,7 +57,7 @@ class BoardKind(StrEnum):
 
     @property
     def has_markers(self) -> bool:
-        """Whether each of its points has a number of its own."""
+        """Whether its points are numbered."""
         return self in (BoardKind.CHARUCO, BoardKind.LEGACY_CHARUCO, BoardKind.MARKERS)
 
 
@@ -223,7 +223,7 @@ def _check(board: Board, text: str) -> None:
 
 
 def n_markers(board: Board) -> int:
-    """Return how many markers a board shows."""
+    """Return the number of markers on a board."""
     squares = board.columns * board.rows
     return squares if board.kind is BoardKind.MARKERS else squares // 2
 

@@ -1,4 +1,4 @@
-"""The intrinsics of a camera from views of a board, and how far they are to be trusted.
+"""The intrinsics of a camera from views of a board, with their covariance.
 
 Residuals alone certify nothing: what a model with more coefficients gains is asked of
 views that it was not fitted to, halves of the views are compared by what their
@@ -215,7 +215,7 @@ def _parted(views: Views, kept: BoolArray) -> tuple[Views, tuple[str, ...]]:
 
 
 def _n_points_left_out(views: Views, kept: Views) -> int:
-    """Return how many points of the views that take part do not."""
+    """Return the number of excluded points in accepted views."""
     taking_part = np.isin(views.names, kept.names)
     return int(views.seen[taking_part].sum()) - int(kept.seen.sum())
 

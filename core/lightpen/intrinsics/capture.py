@@ -35,7 +35,7 @@ class BoardVisibility(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Capture:
-    """Views that were kept, and the board as it was seen last.
+    """Captured views, and the last detection of the board.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Capture:
     sight: BoardVisibility = BoardVisibility.UNSEEN
 
     def after(self, points: FloatArray | None, time_s: float) -> "Capture":
-        """Return the capture after another image, which is kept if still and new."""
+        """Return the capture after another image, which is added if still and new."""
         if points is None:
             return replace(self, points=None, sight=BoardVisibility.UNSEEN)
         longer = max(self.image_size)
@@ -74,7 +74,7 @@ class Capture:
 
     @property
     def views(self) -> Views:
-        """The views that were kept."""
+        """The captured views."""
         names = tuple(str(number) for number in range(1, len(self.kept) + 1))
         pixels = np.full((len(self.kept), 1, self.board.n_points, 2), np.nan)
         for v, points in enumerate(self.kept):
@@ -88,7 +88,7 @@ class Capture:
 
 
 def wanted_outline(capture: Capture) -> FloatArray:
-    """Return how the board is to be held next, (4, 2), px, from its first corner on.
+    """Return the suggested outline of the board, (4, 2), px, from its first corner on.
 
     Until the camera is known roughly, it is led to the middle, tilted to each side.
     """
@@ -112,7 +112,7 @@ def wanted_outline(capture: Capture) -> FloatArray:
 
 
 def _apart(one: FloatArray, other: FloatArray) -> float:
-    """Return how far apart two sights of a board are, px rms."""
+    """Return the distance between two detections of a board, px rms."""
     squares = np.square(one - other).sum(axis=-1)
     if not np.isfinite(squares).any():
         return np.inf

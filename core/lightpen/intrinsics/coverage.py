@@ -55,7 +55,7 @@ class BoardCoverage:
 
     @property
     def missing(self) -> tuple[Message, ...]:
-        """Messages on what is missing."""
+        """Messages on missing coverage."""
         corners = self.cells[[0, 0, -1, -1], [0, -1, 0, -1]]
         empty = tuple(
             name for name, n in zip(CORNER_NAMES, corners, strict=True) if n == 0
@@ -93,7 +93,7 @@ def cover(views: Views, poses: BoardPoses) -> BoardCoverage:
 
 
 def cells_of(views: Views) -> IntArray:
-    """Return how many points of one camera lie in each part of the image, (6, 8)."""
+    """Return the number of points of one camera in each cell of the image, (6, 8)."""
     places = views.pixels[views.seen] / np.array(views.image_sizes[0])
     at = np.floor(places * np.array([COLUMNS, ROWS])).astype(np.int64)
     at = np.clip(at, 0, [COLUMNS - 1, ROWS - 1])

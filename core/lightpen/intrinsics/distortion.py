@@ -82,7 +82,7 @@ def choose_distortion(
     fitted: BoardFit,
     report: Callable[[float], None],
 ) -> tuple[Choice, BoardFit, FloatArray]:
-    """Return how many coefficients, the fit with them, and the held-out errors."""
+    """Return the number of coefficients, their fit, and the cross-validation errors."""
     few = _Drawn(fitted, None)
     if folds(few.camera):
         few = _unfolded(views, tolerances, few.camera) or few
@@ -151,7 +151,7 @@ class _Drawn:
 
 
 def _unfolded(views: Views, tolerances: BoardTolerances, near: Camera) -> _Drawn | None:
-    """Return the fit with the weakest pull that keeps the image whole, if any does."""
+    """Return the fit with the weakest regularisation that does not fold the image."""
     for pull in PULLS:
         try:
             drawn = _Drawn(fit_camera(views, tolerances, near, pull), pull)

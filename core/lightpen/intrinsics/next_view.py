@@ -1,4 +1,4 @@
-"""The next view of the board: that which lessens the uncertainty most.
+"""The next view of the board: the one that reduces the uncertainty most.
 
 Each of some hundred views that an operator can hold is asked by how much it would
 lessen the uncertainty of projections over the whole image, were it added to those that
@@ -31,7 +31,7 @@ TURNS = ((0, 0), (TILT, 0), (-TILT, 0), (0, TILT), (0, -TILT), (TILT, TILT))
 
 @dataclass(frozen=True, eq=False)
 class SuggestedView:
-    """How the board is to be held.
+    """Suggested pose of the board.
 
     Attributes
     ----------

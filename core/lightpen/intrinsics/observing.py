@@ -1,4 +1,4 @@
-"""From images to views of a board, and why it is not seen where it is not."""
+"""Detection of the board in images, with reasons for failures."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -76,7 +76,7 @@ def observe_board_of_rig(
     board: Board,
     report: Callable[[float], None],
 ) -> ObservedBoard:
-    """Find a board in the images of several cameras, those of a moment together.
+    """Detect a board in simultaneous images of several cameras.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Two cameras beside each other, from views in which both see one board.
+"""Two cameras from views in which both detect one board.
 
 Everything is fitted together: both cameras, the place of the second, the board and its
 poses. A board that looks the same turned round is numbered as the places of the cameras
@@ -34,7 +34,7 @@ SIGNIFICANT = 1.8  # times the variance of independent noise
 
 @dataclass(frozen=True)
 class PairLag:
-    """By how much the second camera is late, if the views are a sequence.
+    """Time lag of the second camera, if the views are a sequence.
 
     Attributes
     ----------
@@ -291,7 +291,7 @@ def _poses(views: Views, cameras: tuple[Camera, ...], place: BoardPoses) -> Boar
 def _lag(
     views: Views, fitted: BoardFit, both: BoolArray, interval_ms: float | None
 ) -> PairLag | None:
-    """Return by how much the second camera is late, from how the board moves.
+    """Return the time lag of the second camera from the motion of the board.
 
     What it sees elsewhere than the first has it goes with how the board moves there.
     """

@@ -111,7 +111,7 @@ def _from_front(points: FloatArray, board: Board) -> FloatArray:
 
 
 def count_corners(image: Image) -> CornerCount | None:
-    """Return how many inner corners of a chessboard are seen; None without one."""
+    """Return the number of inner corners of a chessboard; None without one."""
     grey = _to_8_bit(image)
     flags = THOROUGH | cv2.CALIB_CB_LARGER
     sides = sorted({min(side, max(grey.shape)) for side in (SEARCHED_SMALL, SEARCHED)})
@@ -192,7 +192,7 @@ def _chessboard(
 def _is_board(
     grey: npt.NDArray[np.uint8], points: Any, corners: tuple[int, int]
 ) -> bool:
-    """Tell whether corners are those of one board; some may be another's."""
+    """Return whether corners belong to one board."""
     columns, rows = corners
     grid = np.asarray(points, dtype=np.float64).reshape(rows, columns, 2)
     return _is_even(grid) and is_chequered(grey, grid)

@@ -93,7 +93,7 @@ class _Capture:
 
 
 class Live:
-    """Processes the images of one camera, or of two beside each other, until stopped.
+    """Processes the images of one or two cameras until stopped.
 
     Parameters
     ----------
@@ -188,12 +188,12 @@ class Live:
                 stack.callback(worker.stop)
 
     def set_region(self, region: RegionOfInterest) -> None:
-        """Set what is detected from the next image on; a swing keeps its own."""
+        """Set what is detected from the next image on, except during a swing."""
         self._region = region
         self._pass_seq = self._seen_seq
 
     def set_watched(self, watched: bool) -> None:
-        """Set whether images are viewed; a capture goes on anyway."""
+        """Set whether images are displayed; a capture continues regardless."""
         self._is_watched = watched
 
     def hurry(self) -> None:
@@ -219,14 +219,14 @@ class Live:
                 self._give_up()
 
     def _give_up(self) -> None:
-        """Report an internal error and close the cameras; the swing stays as it is."""
+        """Report an internal error and close the cameras; the swing is kept."""
         self._listener.on_camera(Failed(LightpenError("live.bug")), 0)
         for worker in self._workers:
             with suppress(DeviceLost):  # `stop` tells it
                 worker.stop()
 
     def _captured(self) -> _Capture:
-        """Return what is captured now; the workers deliver all images for it."""
+        """Return the capture in progress, for which the workers deliver all images."""
         status, verified = self._runner.status, self._verified()
         is_swing = verified is None and status.is_capturing
         captured = _Capture(status.setup if is_swing else None, verified)
@@ -315,7 +315,7 @@ class Live:
             self._listener.on_image(image)
 
     def _take_next(self, captured: _Capture, rest: float | None) -> None:
-        """Process the next image, of two cameras those of the next moment.
+        """Process the next image, or the next simultaneous pair.
 
         Parameters
         ----------
@@ -406,7 +406,7 @@ class Live:
         *,
         is_followed: bool = False,
     ) -> LiveImage:
-        """Detect spots, and the pen where it can be."""
+        """Detect spots and, if possible, the pen."""
         if wanted is not self._wanted:
             self._wanted = wanted
             self._last.clear()

@@ -88,7 +88,7 @@ def align_321(primary: Quantity, secondary: Quantity, origin: Quantity) -> Align
 def align_points(
     points: Sequence[Quantity], nominals: FloatArray, weights: FloatArray | None = None
 ) -> Alignment:
-    """Align by points whose places in the part are known.
+    """Align by points with known positions in the part.
 
     Parameters
     ----------

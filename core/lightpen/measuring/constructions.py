@@ -20,7 +20,7 @@ def distance(first: FloatArray, second: FloatArray) -> float:
 
 
 def distance_to_plane(feature: FloatArray, plane: FloatArray) -> float:
-    """Return how far an origin lies before a plane, along its normal, mm."""
+    """Return the signed distance of an origin from a plane, mm."""
     return float((feature[PLACE] - plane[PLACE]) @ _unit(plane[AXIS]))
 
 

@@ -1,4 +1,4 @@
-"""The kinds of features, each as distances in a frame of its own.
+"""The kinds of features, as distance functions in their own frames.
 
 A feature has a frame (origin and axes) and sizes. A point at ``q`` in that frame has
 one to three distances from the feature, each zero on it. Moving the frame by ``t`` and
@@ -21,7 +21,7 @@ TINY = 1e-300  # mm; a point on an axis has no direction from it
 
 
 class FeatureKind(Enum):
-    """The kinds of features; the values are those of a measuring plan."""
+    """Kinds of features, named as in a measuring plan."""
 
     POINT = "point"
     LINE = "line"
@@ -142,7 +142,7 @@ def _cone(q: FloatArray, sizes: FloatArray) -> Distances:
 
 
 def _with_height(in_plane: Distances, q: FloatArray) -> Distances:
-    """Return distances of a flat outline with those from its plane."""
+    """Return distances from a flat outline, with those from its plane."""
     n, _, n_sizes = in_plane.by_sizes.shape
     return Distances(
         np.column_stack([in_plane.values, q[:, 2]]),

@@ -152,7 +152,7 @@ def _advice(axis: FloatArray) -> Message:
 
 
 def dial_counts(rotations: FloatArray) -> IntArray:
-    """Return how many of the postures (N, 3, 3) lie in each field of the dial, (3, 8).
+    """Return the number of postures (N, 3, 3) in each field of the dial, (3, 8).
 
     The rows are upright, leaning, leaning far; the columns the directions from the
     right against the clock, as `DIRECTION_NAMES` has them. All upright ones are in the

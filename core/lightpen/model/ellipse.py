@@ -143,7 +143,7 @@ def conic_images(
 def centers_from_centroids(
     camera: Camera, centroids: FloatArray, shapes: FloatArray
 ) -> FloatArray:
-    """Return the ellipse centres of discs whose area centroids were measured.
+    """Return the ellipse centres of discs from their area centroids.
 
     Distortion moves the centroid of an area off the distorted centre of the area by
     a term of second order, some 0.003 px for a disc of 40 px near the image border.

@@ -8,7 +8,7 @@ EXACT = 1e-6  # standard deviation of what is taken as exact, in its own unit
 
 
 def known_by(covariance: FloatArray) -> FloatArray:
-    """Return the information (k, k) in what a file states with this covariance (k, k).
+    """Return the information (k, k) of a stated covariance (k, k).
 
     Variances are enlarged by 1e-6, since what is stated as exact may be rounded.
     """

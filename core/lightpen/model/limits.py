@@ -125,7 +125,7 @@ class VerificationLimits:
 
 @dataclass(frozen=True)
 class DueRule:
-    """How long a tip may be used before it is calibrated again.
+    """Calibration interval of a tip.
 
     Attributes
     ----------

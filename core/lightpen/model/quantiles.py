@@ -9,7 +9,7 @@ from math import sqrt
 
 @cache
 def normal_quantile(chance: float) -> float:
-    """Return what a standard normal variable exceeds with probability ``chance``."""
+    """Return the quantile that a standard normal variable exceeds with this chance."""
     from scipy.special import ndtri
 
     return -float(ndtri(chance))
@@ -24,5 +24,5 @@ def chi_square_quantile(n_free: int, chance: float) -> float:
 
 
 def chi_quantile(n_free: int, chance: float) -> float:
-    """Return what the length of a standard normal vector of ``n_free`` exceeds."""
+    """Return the quantile of the length of a standard normal vector of ``n_free``."""
     return sqrt(chi_square_quantile(n_free, chance))

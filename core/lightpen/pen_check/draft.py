@@ -95,7 +95,7 @@ class PenDraft:
         )
 
     def with_led(self) -> Self:
-        """Return the draft with one more LED, whose coordinates are to be typed."""
+        """Return the draft with one more LED without coordinates."""
         return replace(self, rows=(*self.rows, ("", "", "", *FACING)))
 
     def without_led(self, row: int) -> Self:
@@ -112,7 +112,7 @@ class PenDraft:
         )
 
     def pen(self) -> Pen:
-        """Return the pen, whose LEDs are still to be checked.
+        """Return the unchecked pen.
 
         Raises
         ------

@@ -77,7 +77,7 @@ class FrameCheck:
 
     @property
     def is_a_pen(self) -> bool:
-        """Whether the LEDs could be those of a pen, in whatever frame."""
+        """Whether the LEDs could be those of a pen in some frame."""
         return self.checks[0].outcome is RuleStatus.MET
 
 
@@ -145,7 +145,7 @@ def _all_open(broken: Rule | None = None) -> tuple[RuleCheck, ...]:
 
 
 def _measured(pen: Pen) -> tuple[RuleCheck, ...]:
-    """Return the checks of LEDs that stand in the paper's layout, in order."""
+    """Return the checks of LEDs in the paper's layout, in order."""
     leds = pen.leds
     back, front = leds[:4], leds[4:]
     amounts = {

@@ -179,7 +179,7 @@ def match_pen(camera: Camera, pen: Pen, views: Sequence[Spots]) -> PenMatch:
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """The LEDs of a pen in N views where it was found."""
+    """The LEDs of a pen in the N views with a detection."""
 
     spots: list[Spots]
     taken: IntArray  # (N, L), spot of each LED, -1 without one

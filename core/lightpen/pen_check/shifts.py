@@ -111,7 +111,7 @@ def triple(point: FloatArray) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class _Found:
-    """An LED that stands out, and the one that does as well or -1."""
+    """An LED that stands out, and the equivalent one or -1."""
 
     led: int
     rival: int

@@ -1,4 +1,4 @@
-"""What could not be done, told until its cause is gone."""
+"""Faults, reported until they are cleared."""
 
 import logging
 from enum import Enum
@@ -12,13 +12,13 @@ _logger = logging.getLogger(__name__)
 
 
 class FaultListener(Protocol):
-    """Who is told; must return soon."""
+    """Listener to faults; must return quickly."""
 
     def on_fault(self, message: Message) -> None:
         """Take a sentence to be read: something could not be done."""
 
     def on_fault_cleared(self, message: Message) -> None:
-        """Take the sentence of a trouble whose cause is gone."""
+        """Receive the end of a fault."""
 
 
 class FaultReporter:
@@ -34,11 +34,11 @@ class FaultReporter:
 
     @property
     def is_any(self) -> bool:
-        """Whether one is told and not over."""
+        """Whether a fault is active."""
         return self._told is not None
 
     def trying(self, act: Act) -> None:
-        """Do something that may fail; then it is told, and all stays as it was."""
+        """Run a function; if it fails, report the fault and keep the state."""
         try:
             act()
         except LightpenError as error:

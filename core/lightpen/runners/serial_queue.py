@@ -1,4 +1,4 @@
-"""One thread that does what it is asked for in turn, and tasks that run beside it."""
+"""A thread that works through a queue, with background tasks."""
 
 from collections.abc import Callable
 from functools import partial
@@ -18,7 +18,7 @@ Report: TypeAlias = Callable[[float], None]
 
 
 class SerialQueue:
-    """Does acts one after the other, in a thread of its own.
+    """Runs queued functions one after the other in its own thread.
 
     The thread outlives a bug: the act in which it happened is not completed, the crash
     goes to `threading.excepthook`, and the next act is done.
@@ -63,7 +63,7 @@ class SerialQueue:
         on_bug: Act,
         on_progress: Report = lambda fraction: None,
     ) -> "Task":
-        """Compute something beside the queue; what comes of it is done in its turn.
+        """Start a computation in the background; its result is queued.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ class SerialQueue:
         return task
 
     def end(self, last: Act = lambda: None) -> None:
-        """Do what was asked for so far and the last, and end.
+        """Run what is queued so far, then the last function, and end.
 
         Nothing comes between that and the end. Running tasks are cancelled.
         """
@@ -155,7 +155,7 @@ class Task:
         self._thread: Thread | None = None
 
     def run(self, function: Act, name: str) -> None:
-        """Run in a thread of its own; once only."""
+        """Run in its own thread, once."""
         self._thread = Thread(target=function, name=name, daemon=True)
         self._thread.start()
 
@@ -165,7 +165,7 @@ class Task:
 
     @property
     def is_cancelled(self) -> bool:
-        """Whether its outcome is not wanted any more."""
+        """Whether the result is no longer needed."""
         return self._cancelled.is_set()
 
     @property
@@ -194,7 +194,7 @@ class StartThread(Protocol):
 
 
 class BackgroundTask:
-    """At most one computation beside a queue; its owner is told what came of it.
+    """At most one computation in the background; its result is queued.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ class BackgroundTask:
 
     @property
     def is_there(self) -> bool:
-        """Whether something is computed whose outcome is awaited."""
+        """Whether a result is pending."""
         return self._task is not None
 
     def begin(
@@ -221,7 +221,7 @@ class BackgroundTask:
         then: Callable[[T], None],
         otherwise: Callable[[Message], None],
     ) -> None:
-        """Have something computed, as `SerialQueue.start` has it.
+        """Start a computation, see `SerialQueue.start`.
 
         When the outcome is told, it is there no more.
         """
@@ -237,7 +237,7 @@ class BackgroundTask:
         self._task = self._start(work, succeed, fail, self._on_bug, self._on_progress)
 
     def drop(self) -> None:
-        """Cancel what is computed; its outcome is not told any more."""
+        """Cancel the computation; its result is discarded."""
         task, self._task = self._task, None
         if task is not None:
             task.cancel()

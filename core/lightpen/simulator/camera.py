@@ -52,7 +52,7 @@ STILL = 0.02  # px moved during the exposure that blur hides
 
 
 class SimulatedCamera:
-    """A camera that looks at a simulated operator with a simulated pen.
+    """A camera with a simulated operator and pen in view.
 
     With a `SkippingClock` images come as fast as they are made, and waits for its
     reader; else it is a live camera, which loses images that are not read in time.
@@ -320,7 +320,7 @@ def _with_gain(scene: Scene, settings: CameraSettings) -> Scene:
 def _pixels_moved(
     scene: Scene, rotations: FloatArray, translations: FloatArray
 ) -> float:
-    """Return how far the fastest LED moves from the first to the last pose, px."""
+    """Return the largest displacement of an LED between the two poses, px."""
     leds, _ = leds_in_camera(scene.pen, rotations[[0, -1]], translations[[0, -1]])
     first, last = scene.camera.project(leds)
     return float(np.linalg.norm(last - first, axis=-1).max())

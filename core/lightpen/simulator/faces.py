@@ -231,7 +231,7 @@ def _light(
     radius: float,
     face: Face,
 ) -> LightArray:
-    """Return the brightness that each line of sight meets, 0 beside the disc."""
+    """Return the brightness along each line of sight, 0 outside the disc."""
     plane = np.column_stack([radius * cam_from_disc[:, :2], center_cam])
     u, v, w = (_single(a) * x + _single(b) * y + _single(c) for a, b, c in inv(plane))
     u, v = u / w, v / w

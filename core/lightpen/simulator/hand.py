@@ -196,7 +196,7 @@ class Operator:
         self._wish(partial(self._aim, None, SWUNG))
 
     def hold(self) -> None:
-        """Hold the pen still as it is."""
+        """Hold the pen still."""
         self._wish(self._aim_here)
 
     def lean_towards(self, tilt: float, direction: float, turn: float) -> None:
@@ -380,7 +380,7 @@ class Operator:
 
 
 def _slipped(slip: _Slip, times: FloatArray) -> FloatArray:
-    """Return how far a slip displaces the tip, (F, 3), mm."""
+    """Return the displacement of the tip by a slip, (F, 3), mm."""
     nearer_end = np.minimum(times - slip.start, slip.end - times)
     share = np.clip(nearer_end / SLIP_TIME, 0, 1)
     return np.asarray(share[:, None] * slip.offset)

@@ -243,7 +243,7 @@ def _lamps(scene: Scene, index: int) -> tuple[Lamp, ...]:
 
 
 def lamps_beside(scene: Scene, share: float) -> tuple[Lamp, ...]:
-    """Return the lamps beside the cone as seen by a rotated camera."""
+    """Return the lamps beside the cone, seen by a rotated camera."""
     if not scene.has_lamp:
         return ()
     camera = scene.camera
@@ -373,7 +373,7 @@ def _turn_that_moves(
 def _pixels_moved(
     scene: Scene, rotation: FloatArray, translation: FloatArray, turn: FloatArray
 ) -> float:
-    """Return how far a small turn about the tip moves the fastest LED, px."""
+    """Return the largest LED displacement by a rotation about the tip, px."""
     leds, _ = leds_in_camera(scene.pen, rotation, translation)
     tip_cam = rotation @ scene.tip_pen + translation
     moves = np.cross(turn, leds - tip_cam)

@@ -1,4 +1,4 @@
-"""Sample pens of several layouts, and sample rigs whose cameras all see the cone."""
+"""Sample pens of several layouts, and sample rigs that observe the cone."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -64,7 +64,7 @@ SAMPLE_PENS: dict[str, Callable[[], Pen]] = {
 
 
 def row_of_cameras(n_cameras: int, baseline: float, binning: int = 1) -> Rig:
-    """Return cameras in a row, given from its middle, where the paper's would stand.
+    """Return cameras in a row about the paper's camera position.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def beside(camera: Camera, cone_cam: FloatArray) -> Rig:
 
 
 def _camera(number: int, binning: int) -> Camera:
-    """Return the paper's camera with a lens of its own."""
+    """Return the paper's camera with another lens."""
     camera = paper_camera(binning)
     longer = 1 + LENS_SPREAD * number
     cx, cy = np.array([camera.cx, camera.cy]) + CENTRE_SPREAD * number / binning

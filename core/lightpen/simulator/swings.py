@@ -53,7 +53,7 @@ class Swing:
 
     @property
     def slipped(self) -> BoolArray:
-        """Frames whose tip is out of the cone, (F,)."""
+        """Frames with the tip out of the cone, (F,)."""
         slipped: BoolArray = np.any(self.tips_cam != self.cone_cam, axis=-1)
         return slipped
 

@@ -30,7 +30,7 @@ WITH_METADATA = 2  # version of the header
 
 @dataclass(frozen=True, eq=False)
 class StreamedTip:
-    """The tip whose position is streamed.
+    """The tip of the stream.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The next posture: that which would lessen the tip's uncertainty most.
+"""The next posture: the one that reduces the tip's uncertainty most.
 
 What an image of a posture would say of tip and cone follows from the contact model
 before it is taken [1]_. Images are taken on the way to a posture as well, so a posture
@@ -173,7 +173,7 @@ def _is_seen(outlook: GuidanceInput, rotations: FloatArray) -> BoolArray:
 def _worth(
     outlook: GuidanceInput, present: FloatArray, rotations: FloatArray
 ) -> FloatArray:
-    """Return by how much the way to postures would shrink the tip's variance, mm^2.
+    """Return the expected reduction of the tip's variance on the way, mm^2.
 
     Per image; ``rotations`` (C, 3, 3) gives (C,).
     """

@@ -128,7 +128,7 @@ def kept_before(
     translations: FloatArray,
     assumed: Assumptions = USUAL,
 ) -> AcceptedImages:
-    """Return images that were kept before an interruption, with their fit.
+    """Return the images accepted before an interruption, with their fit.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def first_images(
 def _leave_out(
     rig: Rig, pen: Pen, kept: AcceptedImages, out: BoolArray, *, is_near: bool = False
 ) -> AcceptedImages:
-    """Return the images but those of ``out`` (N,), and the fit to the rest.
+    """Return the images without ``out`` (N,), and the new fit.
 
     ``is_near`` is for images that are as good as those that stay.
     """
@@ -221,7 +221,7 @@ def _refit(
     *,
     is_near: bool = False,
 ) -> AcceptedImages:
-    """Return the images with a new fit, whose rotations (N, 3, 3) start there."""
+    """Return the images with a new fit that starts at rotations (N, 3, 3)."""
     kept = replace(kept, joint=None, predicted=UNKNOWN_UNCERTAINTY)
     fixed = len(kept) >= MIN_JOINT and posture_spread(starts)[0][0] >= MIN_SPREAD
     seat = kept.seat
@@ -265,7 +265,7 @@ def distance_unit(kept: AcceptedImages) -> float:
 def without_slipped(
     rig: Rig, pen: Pen, kept: AcceptedImages, since: float = np.inf
 ) -> tuple[AcceptedImages, set[int]]:
-    """Leave out the images whose tip is not in the cone.
+    """Exclude images with the tip out of the cone.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class OperatorPresence:
 
     @property
     def has_other_choices(self) -> bool:
-        """Whether the choices differ from those of the present swing."""
+        """Return whether the selection differs from that of the current swing."""
         if self.choices is None or self.begun_with is None:
             return False
         return not self.begun_with.swings_like(self.choices)

@@ -167,7 +167,7 @@ class Preparation:
 
     @property
     def camera(self) -> Camera | None:
-        """The intrinsics, of a rig those of its first camera."""
+        """The intrinsics, of the first camera of a rig."""
         if self.second is not None:
             return None if self.second.rig is None else self.second.rig.cameras[0]
         return None if self.camera_file is None else self.camera_file.camera
@@ -247,7 +247,7 @@ class Preparation:
         return replace(self, second=SecondCamera(source, rig_file))
 
     def without_images(self) -> Self:
-        """Return it as long as no image of its cameras has come."""
+        """Return it while no image of its cameras has been received."""
         second = self.second
         if second is not None:
             second = replace(second, image_size=None, in_use=None)
@@ -278,7 +278,7 @@ class Preparation:
         return replace(self, names=names, nominal_tip=None)
 
     def with_last(self, last: Result) -> Self:
-        """Return it for the tip of a result, whose ball and nominal centre it has."""
+        """Return it for the tip of a result, with its ball and nominal centre."""
         tip, ball_diameter = last.names.tip, last.names.ball_diameter
         names = replace(self.names, tip=tip, ball_diameter=ball_diameter)
         nominal_tip = last.nominal_tip
@@ -288,7 +288,7 @@ class Preparation:
         return replace(self, names=names, nominal_tip=nominal_tip)
 
     def with_listed(self, tip: ListedTip) -> Self:
-        """Return it for a tip of the library, whose ball and nominal centre it has."""
+        """Return it for a tip of the library, with its ball and nominal centre."""
         names = replace(self.names, tip=tip.id, ball_diameter=tip.ball_diameter_mm)
         return replace(self, names=names, nominal_tip=tip.nominal_tip)
 
@@ -366,7 +366,7 @@ class Preparation:
         )
 
     def swing_setup(self) -> SwingSetup:
-        """Return the setup of the swing; nothing may be missing."""
+        """Return the setup of the swing; the preparation must be complete."""
         camera, pen = self.camera, self.pen
         if camera is None or pen is None:
             raise ValueError("`camera_file` and `pen_file` must be chosen.")

@@ -148,7 +148,7 @@ def has_just_slipped(state: SwingState) -> bool:
 
 
 def has_enough(setup: SwingSetup, state: SwingState) -> bool:
-    """Return whether a swing has all that it needs, or as many images as it may."""
+    """Return whether a swing is complete or has reached its maximum."""
     if state.n_kept >= setup.limits.max_images:
         return True
     return state.n_kept > 0 and measure_shortfall(setup, state).is_none
@@ -164,7 +164,7 @@ def stillness(state: SwingState) -> float:
 def start_again(
     setup: SwingSetup, kept: AcceptedImages, next_number: int, time: float = 0.0
 ) -> SwingState:
-    """Return an interrupted swing with the images that it had kept.
+    """Return an interrupted swing with its accepted images.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def _seen(setup: SwingSetup, state: SwingState, detection: PenDetection) -> Tran
 
 
 def _settle(setup: SwingSetup, state: SwingState, seat: Seat) -> Transition:
-    """Begin with a tip at rest, or continue if it is where it was."""
+    """Start with a resting tip, or continue if it is in the same place."""
     events = [SwingEvent(SwingEventKind.SEATED)]
     if state.n_kept and not rests_in_place(state, BATCH):
         if state.n_kept >= FEW:
@@ -301,7 +301,7 @@ def _capturing(
 
 
 def _kept(setup: SwingSetup, state: SwingState, detection: PenDetection) -> Transition:
-    """Keep an image, and drop those that turn out to have slipped."""
+    """Accept an image, and exclude earlier ones that have slipped."""
     number, counts = state.next_number, state.counts
     kept = keep(setup.rig, setup.pen, state.kept, detection, number, state.time)
     kept, dropped = without_slipped(setup.rig, setup.pen, kept)

@@ -56,13 +56,13 @@ class SwingRunner:
 
     @property
     def status(self) -> SwingStatus:
-        """The status as published last; may be read from any thread."""
+        """The last published status; thread-safe."""
         return self._workflow.status
 
     # Commands
 
     def begin(self, preparation: Preparation) -> None:
-        """Begin a new swing; the one before stays on the disk as it is."""
+        """Begin a new swing; the previous one remains on disk."""
         self._queue.ask(lambda: self._workflow.begin(preparation))
 
     def go_on(self, swing: Resumable) -> None:
@@ -123,7 +123,7 @@ class SwingRunner:
         self._queue.ask(lambda: self._workflow.put_back(chosen))
 
     def capture_more(self) -> None:
-        """Capture more images after the verdict, once those of the swing are read."""
+        """Capture more images after the verdict."""
         self._queue.ask(self._workflow.capture_more)
 
     def accept(self, reason: str = "", signature: Signature | None = None) -> None:
@@ -143,7 +143,7 @@ class SwingRunner:
         self._queue.ask(lambda: self._workflow.revoke(result, operator))
 
     def set_aside(self) -> None:
-        """Discard the swing, as before a repetition; its images are kept."""
+        """Discard the swing, for a repetition; its images are kept."""
         self._queue.ask(self._workflow.set_aside)
 
     def start_over(self) -> None:
@@ -155,7 +155,7 @@ class SwingRunner:
         self._queue.ask(self._workflow.abandon)
 
     def open_logbook(self) -> None:
-        """Enter in the archive what is in the files only."""
+        """Enter events in the archive that are in files only."""
         self._queue.ask(self._workflow.open_logbook)
 
     def shut_down(self) -> None:

@@ -84,7 +84,7 @@ def tip_offsets(
 def tip_distances(
     seat: Seat, rotations: FloatArray, translations: FloatArray, covariances: FloatArray
 ) -> FloatArray:
-    """Return how far from the cone poses put the tip, in standard deviations.
+    """Return the distances of the tip from the cone, in standard deviations.
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ def measure_shortfall(setup: SwingSetup, state: SwingState) -> Shortfall:
 
 
 def _n_for_uncertainty(state: SwingState, limits: SwingLimits) -> int:
-    """Return how many images would bring U to its limit; 0 where none can."""
+    """Return the number of images to bring U to its limit; 0 if impossible."""
     limit, floor = limits.max_uncertainty, state.kept.predicted.floor
     if state.kept.uncertainty <= limit or floor >= limit:
         return 0
@@ -146,7 +146,7 @@ def turn_range(pen: Pen, rotations: FloatArray) -> tuple[float, float] | None:
 
 
 def missing(setup: SwingSetup, state: SwingState) -> tuple[Message, ...]:
-    """Return messages on what a swing lacks, for an early finish."""
+    """Return messages on what an early finish would lack."""
     short = measure_shortfall(setup, state)
     found = []
     if short.fields[1:].any():

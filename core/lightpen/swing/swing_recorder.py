@@ -261,7 +261,7 @@ class SwingRecorder:
         )
 
     def _wait(self, before: SwingState, n_images: int) -> Transition | None:
-        """Let an image of a recording go by whose turn it is not.
+        """Skip an image of a recording that is not due.
 
         The recording is shown over and over; each image is read once, in its order.
         One that does not come in a whole pass cannot be read, and is passed over.
@@ -283,7 +283,7 @@ class SwingRecorder:
         self._writer.conclude(DISCARDED)
 
     def close(self) -> None:
-        """Leave the record as it is on the disk."""
+        """Close the record as it is."""
         self._writer.close()
 
 

@@ -316,7 +316,7 @@ class SwingWorkflow:
             self.solve()
 
     def abandon(self) -> None:
-        """Leave the swing as it is on the disk."""
+        """Leave the swing as it is on disk."""
         self._task.drop()
         self._close_record()
         self._publish(SwingStatus(setup=self._status.setup))
@@ -534,11 +534,11 @@ class SwingWorkflow:
         self._publish(replace(status, revoked=result))
 
     def open_logbook(self) -> None:
-        """Enter what is in the files only, in the background."""
+        """Enter events that are in files only, in the background."""
         self._entries.catch_up()
 
     def shut_down(self) -> None:
-        """Leave the swing as it is on the disk, and close the archive."""
+        """Leave the swing as it is on disk, and close the archive."""
         self.abandon()
         self._entries.stop()
         self._faults.trying(self._entries.close)
@@ -594,7 +594,7 @@ class _LogbookEntries:
         self._catching_up: Task | None = None
 
     def catch_up(self) -> None:
-        """Enter what is in the files only, in the background."""
+        """Enter events that are in files only, in the background."""
         if self._logbook is not None:
             self._catching_up = self._start(
                 self._logbook.enter_owed,
@@ -609,7 +609,7 @@ class _LogbookEntries:
             self._tell_fault(trouble)
 
     def enter_owed(self) -> None:
-        """Enter what is in the files only."""
+        """Enter events that are in files only."""
         if self._logbook is not None:
             self._logbook.enter_owed()
 

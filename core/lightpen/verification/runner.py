@@ -51,7 +51,7 @@ class VerificationRunner:
 
     @property
     def status(self) -> VerificationStatus:
-        """The verification as published last; may be read from any thread."""
+        """The last published status; thread-safe."""
         return self._workflow.status
 
     def ask(self, command: Callable[[VerificationWorkflow], None]) -> None:

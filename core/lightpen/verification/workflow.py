@@ -147,7 +147,7 @@ class VerificationWorkflow:
         self._publish(replace(self._status, is_paused=not self._status.is_paused))
 
     def start_over(self) -> None:
-        """Forget all touches, and read the tip in force anew; what is kept stays."""
+        """Discard all touches and read the current tip again; files are kept."""
         self._task.drop()
         self._faults.end()
         self._give_up()
@@ -162,7 +162,7 @@ class VerificationWorkflow:
             self._touch_again(touched_anew(state, task))
 
     def accept(self, reason: str, signature: Signature | None = None) -> None:
-        """Accept the tip though something was found against it, or say why not."""
+        """Accept the tip despite findings, or report why not."""
         self._faults.trying(lambda: self._accept(reason.strip(), signature))
 
     def _accept(self, reason: str, signature: Signature | None) -> None:
@@ -186,7 +186,7 @@ class VerificationWorkflow:
         self._publish(replace(status, files=kept, accepted_by=accepted_by))
 
     def end_task(self) -> None:
-        """End the task at hand with the touches that there are, if they suffice."""
+        """End the current task with its touches, if they suffice."""
         status = self._status
         if status.setup is None or status.state is None:
             return
@@ -278,7 +278,7 @@ class VerificationWorkflow:
         self._publish(replace(self._status, reading=ReadingState.NOTHING))
 
     def shut_down(self) -> None:
-        """Write what is not written yet."""
+        """Write what is still queued."""
         self._task.drop()
         self._give_up()
         self._write()
@@ -288,7 +288,7 @@ class VerificationWorkflow:
     def take(
         self, frame: Frame, detection: PenDetection | None, region: RegionOfInterest
     ) -> None:
-        """Take an image, as `VerificationRunner.take` has it."""
+        """Process an image, see `VerificationRunner.take`."""
         status = self._status
         if not status.is_touching or region is not status.region or detection is None:
             return
@@ -307,7 +307,7 @@ class VerificationWorkflow:
         self._become(transition)
 
     def _new_record(self) -> NewRecord:
-        """Make a record for the images of the run at hand."""
+        """Create a record for the images of the current run."""
         status, preparation = self._status, self._preparation
         assert preparation is not None
         assert status.tip is not None
@@ -394,7 +394,7 @@ class VerificationWorkflow:
         self._publish(VerificationStatus(is_here=self._status.is_here, refusal=why))
 
     def _why_not(self, tip: CurrentTip | None) -> Message | None:
-        """Return why what is chosen cannot be verified."""
+        """Return why the selection cannot be verified."""
         if tip is None:
             return self._status.refusal
         return self._choices.missing(tip.names.ball_diameter)
@@ -436,7 +436,7 @@ class VerificationWorkflow:
         self._write()
 
     def _conclude_done(self) -> None:
-        """Conclude a verification when all that was chosen is found."""
+        """Conclude a verification when all selected tasks are complete."""
         found = self._status.assessment
         if self._status.is_done and found is not None:
             is_kept = found.is_accepted
@@ -445,7 +445,7 @@ class VerificationWorkflow:
             self._write()
 
     def _give_up(self) -> None:
-        """Conclude what was begun and is not done."""
+        """Conclude an incomplete verification."""
         self._keeping.give_up(self._status)
         self._write()
         self._keeping.begin()

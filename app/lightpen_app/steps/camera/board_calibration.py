@@ -39,7 +39,7 @@ class ComputedCamera:
 
 
 class BoardCalibration(QObject):
-    """Computes intrinsics, saves them, and tells what became of each attempt.
+    """Computes intrinsics, saves them, and reports the outcome.
 
     Signals
     -------
@@ -81,7 +81,7 @@ class BoardCalibration(QObject):
         self.told.emit()
 
     def calibrate_by_capture(self) -> None:
-        """Calibrate by the views that were kept."""
+        """Calibrate from the captured views."""
         state = self._capture.state
         if state.capture is not None:
             self._capture.stop()
@@ -117,13 +117,13 @@ class BoardCalibration(QObject):
         job.start()
 
     def conclude(self) -> None:
-        """Give up what was found, and tell what becomes of an attempt that ends now."""
+        """Discard the result, and report the outcome of the attempt."""
         if self._computed is None and self._capture.state.n_kept:
             self.concluded.emit(self._trial(TrialOutcome.ABANDONED))
         self._give_up()
 
     def _give_up(self) -> None:
-        """Compute no more; what was found is not used, unless it is."""
+        """Cancel the computation and discard an unused result."""
         if self._job is not None:
             self._job.cancel()
             self._job = None
@@ -201,7 +201,7 @@ class BoardCalibration(QObject):
 def calibrate_by_views(
     views: Views, hashes: Mapping[str, str], report: Report
 ) -> ComputedCamera:
-    """Calibrate the camera by views that were kept."""
+    """Calibrate the camera from captured views."""
     found = calibrate_camera(views, BoardTolerances(), local_now().date(), report)
     return ComputedCamera(found, hashes)
 

@@ -1,4 +1,4 @@
-"""Views of a board from live images: which are kept, and where it is wanted next."""
+"""Capture of board views from live images, with the next pose suggested."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -42,7 +42,7 @@ class SuggestedOutline:
 
 @dataclass(frozen=True, eq=False)
 class CaptureState:
-    """How the capture of views stands.
+    """State of the capture.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class CaptureState:
 
     @property
     def n_kept(self) -> int:
-        """Number of views that were kept."""
+        """Number of captured views."""
         return 0 if self.capture is None else len(self.capture.kept)
 
 
@@ -92,12 +92,12 @@ class BoardCapture(QObject):
 
     @property
     def state(self) -> CaptureState:
-        """How it stands now."""
+        """The present state."""
         return self._state
 
     @property
     def is_searching(self) -> bool:
-        """Whether an image is being looked at."""
+        """Whether an image is being processed."""
         return self._searching is not None
 
     def start(self, board: Board | None) -> None:
@@ -109,11 +109,11 @@ class BoardCapture(QObject):
         self._become(CaptureState(board))
 
     def stop(self) -> None:
-        """Take no more views; those that were kept stay."""
+        """Stop capturing; captured views are kept."""
         self._become(replace(self._state, sought=None, outline=None))
 
     def take(self, frame: Frame) -> None:
-        """Look at an image, unless one before is still looked at."""
+        """Process an image unless the previous one is still being processed."""
         state, time_s = self._state, frame.host_ts_ns / NANOSECONDS
         if state.sought is None or self._searching is not None:
             return
@@ -158,7 +158,7 @@ class BoardCapture(QObject):
             self._lead()
 
     def _lead(self) -> None:
-        """Find where the board is wanted next."""
+        """Find the next pose to suggest."""
         capture = self._state.capture
         if capture is None or self._leading is not None:
             return
@@ -174,7 +174,7 @@ class BoardCapture(QObject):
             self._become(replace(self._state, outline=wanted.outline))
 
     def _on_leading_ended(self, job: Job, n_kept: int) -> None:
-        """Find it again where more views were kept meanwhile."""
+        """Find it again if views were added meanwhile."""
         if job is self._leading:
             self._leading = None
             if self._state.sought is not None and self._state.n_kept > n_kept:
@@ -199,7 +199,7 @@ def find_outline(capture: Capture, report: Report) -> SuggestedOutline:
 
 
 def sight_text(sight: BoardVisibility) -> str:
-    """Return what is seen of the board, and what to do."""
+    """Return the detection of the board, and an instruction."""
     translate = QCoreApplication.translate
     words = {
         BoardVisibility.UNSEEN: translate("BoardWindow", "Board not detected"),
@@ -217,7 +217,7 @@ def sight_text(sight: BoardVisibility) -> str:
 
 
 def sight_message(state: CaptureState) -> StatusMessage | None:
-    """Return what is said of the last image; None while no views are taken."""
+    """Return the message on the last image; None while no views are captured."""
     if state.sought is None:
         return None
     if state.why_unseen is not None:

@@ -12,7 +12,7 @@ from lightpen_app.steps.camera.board_view import BoardOverlay
 def board_overlay(
     state: CaptureState, found: CameraCalibration | None, *, shows_uncertainty: bool
 ) -> BoardOverlay:
-    """Return what is drawn: of a calibration, else of the views so far."""
+    """Return the overlay of a calibration, or of the views so far."""
     if found is not None and shows_uncertainty:
         return BoardOverlay(uncertainty=uncertainty_over_image(found))
     if found is not None:

@@ -1,4 +1,4 @@
-"""The live image while a camera is calibrated: the board, and where it is wanted."""
+"""The live image during a camera calibration, with the board and its next pose."""
 
 from dataclasses import dataclass
 
@@ -44,14 +44,14 @@ class BoardOverlay:
 
 
 class BoardView(ImageView):
-    """Shows the newest image with what is known of the board."""
+    """Shows the newest image with the detected board."""
 
     def __init__(self) -> None:
         super().__init__()
         self._overlay = BoardOverlay()
 
     def overlay(self) -> BoardOverlay:
-        """Return what is drawn on the image."""
+        """Return the overlay of the image."""
         return self._overlay
 
     def set_overlay(self, overlay: BoardOverlay) -> None:

@@ -1,4 +1,4 @@
-"""Calibrating the camera by a board, live or from a folder, in a window of its own."""
+"""Calibration of a camera with a board, live or from a folder, in a window."""
 
 from functools import partial
 from pathlib import Path
@@ -117,7 +117,7 @@ class BoardWindow(Translated, QWidget):
 
     @property
     def is_searching(self) -> bool:
-        """Whether an image is being looked at."""
+        """Whether an image is being processed."""
         return self._capture.is_searching
 
     def read_folder(self, folder: str) -> None:
@@ -138,7 +138,7 @@ class BoardWindow(Translated, QWidget):
             self._capture.start(self._named_board())
 
     def _named_board(self) -> Board | None:
-        """Return the board that was named, or say why it is none."""
+        """Return the board of the fields, or report why there is none."""
         try:
             board = parse_board(self._board.text())
         except UsageError as error:
@@ -184,7 +184,7 @@ class BoardWindow(Translated, QWidget):
         self._refresh()
 
     def _list_views(self) -> None:
-        """List the views of what was found; the one that is chosen stays so."""
+        """List the views of the result and keep the selection."""
         found, chosen = self._calibration.found, self._worst.currentRow()
         self._worst.clear()
         if found is None:

@@ -55,7 +55,7 @@ class DeviceField(ChoiceField):
         self.set_value(self._value)
 
     def set_name(self, name: str) -> None:
-        """Say what is to be typed."""
+        """Set the label of the field."""
         self.setAccessibleName(name)
         self._edit.setAccessibleName(name)
         self._edit.setPlaceholderText(name)

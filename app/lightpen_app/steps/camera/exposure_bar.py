@@ -25,7 +25,7 @@ class ExposureBar(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> Exposure:
-        """Return what is shown."""
+        """Return the value."""
         return self._value
 
     def set_value(self, value: Exposure) -> None:
@@ -34,7 +34,7 @@ class ExposureBar(Translated, QWidget):
         self._retranslate()
 
     def verdict(self) -> str:
-        """Return what the bar says, in words."""
+        """Return the text of the bar."""
         value = self._value
         if not value.peaks:
             return self.tr("No LED detected")

@@ -10,7 +10,7 @@ from lightpen_app.work.live_view import LiveView
 
 
 class ExposureControl(QObject):
-    """Does what is asked for by the panel of the exposure."""
+    """Carries out requests of the exposure panel."""
 
     def __init__(self, live: LiveView, panel: ExposurePanel) -> None:
         super().__init__(panel)
@@ -23,7 +23,7 @@ class ExposureControl(QObject):
         panel.adjustment_requested.connect(self._on_adjustment_requested)
 
     def end_adjustment(self) -> None:
-        """Leave the exposure as it is now."""
+        """Keep the present exposure."""
         self._on_adjustment_requested(False)
 
     def adjust(self, seen: LiveImage, inspection: Inspection) -> None:

@@ -1,4 +1,4 @@
-"""Exposure and focus: what the image says of them, and what to do."""
+"""Exposure and focus: assessment of the image and advice."""
 
 from collections import deque
 
@@ -89,7 +89,7 @@ class ExposurePanel(Translated, QFrame):
     def set_camera(
         self, caps: CameraCapabilities | None, settings: CameraSettings
     ) -> None:
-        """Show what a camera offers and has in force; None where none is open."""
+        """Show capabilities and settings of a camera; None without one."""
         self._capabilities, self._settings = caps, settings
         exposures = None if caps is None else caps.exposure_us
         gains = None if caps is None else caps.gain_db
@@ -110,7 +110,7 @@ class ExposurePanel(Translated, QFrame):
         self._refresh()
 
     def set_adjustment(self, adjustment: AutoExposure | None) -> None:
-        """Show how the adjustment by the LEDs stands, if there is one."""
+        """Show the state of the automatic exposure, if active."""
         self._adjustment = adjustment
         self._refresh()
 
@@ -261,7 +261,7 @@ class FocusPanel(Translated, QFrame):
         self._refresh()
 
     def clear(self) -> None:
-        """Forget the images, as those of another camera."""
+        """Clear the images of the previous camera."""
         self._widths.clear()
         self._is_saturated = False
         self._meter.set_value(())

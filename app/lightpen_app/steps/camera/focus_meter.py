@@ -50,7 +50,7 @@ class FocusMeter(Translated, QWidget):
         self._retranslate()
 
     def verdict(self) -> str:
-        """Return what is shown, in words."""
+        """Return the text."""
         if not np.isfinite(self._present):
             return self.tr("No LED detected")
         if self._is_saturated:
@@ -60,7 +60,7 @@ class FocusMeter(Translated, QWidget):
         )
 
     def number(self) -> str:
-        """Return the present width as it is shown, with its unit."""
+        """Return the present edge width with its unit."""
         if not np.isfinite(self._present):
             return ""
         return self.tr("{0} px").format(f"{self._present:.1f}")
@@ -103,7 +103,7 @@ class FocusMeter(Translated, QWidget):
         return Sign.WARNING, Tone.WARN
 
     def _draw_number(self, painter: QPainter, colors: Colors) -> float:
-        """Draw the present width, and return where it ends."""
+        """Draw the present edge width and return its right end."""
         baseline = self.height() - GRID
         digits, _, unit = self.number().partition(" ")
         painter.setPen(QColor(colors.text))

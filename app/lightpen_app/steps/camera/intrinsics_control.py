@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class IntrinsicsControl(QObject):
-    """Does what is asked for by the panel of the intrinsics.
+    """Carries out requests of the intrinsics panel.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The intrinsics of the camera: their file, what is in it, and whether it fits."""
+"""The intrinsics of the camera: file, content and match."""
 
 import numpy as np
 from PySide6.QtCore import QDate, QLocale, Qt, Signal
@@ -25,7 +25,7 @@ COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
 
 class IntrinsicsPanel(Translated, QGroupBox):
-    """Shows the file in use beside the size of the live image.
+    """Shows the file in use and the size of the live image.
 
     Signals
     -------
@@ -87,7 +87,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         return self._file
 
     def set_value(self, value: CameraFile | None) -> None:
-        """Show another file in use; a complaint about one that is not goes away."""
+        """Show another file and clear the message about the previous one."""
         if value is self._file:
             return
         self._file = value
@@ -163,7 +163,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
             name.setVisible(bool(fact))
 
     def _checked(self, camera: Camera | None) -> StatusMessage:
-        """Return whether the file goes with the live images."""
+        """Return whether the file matches the live images."""
         if camera is None:
             return StatusMessage(
                 self.tr("Open the intrinsics file of this camera and lens."),
@@ -206,7 +206,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         return StatusMessage(words, Sign.CHECK, Tone.GOOD)
 
     def _told(self, camera: Camera) -> list[str]:
-        """Return what is in the file, a text for each name."""
+        """Return the content of the file, one text for each name."""
         assert self._file is not None
         stated = camera.covariance
         u = None if stated is None else np.sqrt(np.diag(stated)).tolist()

@@ -93,7 +93,7 @@ class LivePanel(Translated, QWidget):
         return self._state.value()
 
     def figures(self) -> str:
-        """Return what the last image shows, and how images come, as far as it fits."""
+        """Return spots and frame rate, as far as there is room."""
         return self._figures.text()
 
     def view(self) -> ImageView:
@@ -101,11 +101,11 @@ class LivePanel(Translated, QWidget):
         return self._view
 
     def spots(self) -> Spots | None:
-        """Return what is bright in the image and not masked; None without one."""
+        """Return the unmasked spots of the image; None without one."""
         return None if self._seen is None else self._seen.spots
 
     def set_image(self, shown: DisplayedImage, stats: Stats) -> None:
-        """Show another image, and what became of those before."""
+        """Show another image and the frame counters."""
         self._seen = shown.seen
         frame = shown.seen.frame
         if self._arrivals and frame.seq <= self._arrivals[-1][1]:
@@ -119,11 +119,11 @@ class LivePanel(Translated, QWidget):
         self._tell()
 
     def set_extra_markers(self, markers: Sequence[Marker]) -> None:
-        """Draw other marks besides the rings about what is seen."""
+        """Draw additional markers."""
         self._extra = tuple(markers)
 
     def set_connection(self, connection: Connection, sentence: str) -> None:
-        """Show how the camera is; ``sentence`` says why no images come."""
+        """Show the connection; ``sentence`` says why no images are received."""
         if connection in WITHOUT_IMAGES or connection is Connection.OPENING:
             self._forget()
         self._connection, self._sentence = connection, sentence
@@ -205,7 +205,7 @@ class LivePanel(Translated, QWidget):
                 return self._sentence
 
     def _tell(self) -> None:
-        """Say what the last image shows, and how images come."""
+        """Describe the last image and the frame rate."""
         seen = self._seen
         assert seen is not None
         height, width = seen.frame.image.shape
@@ -234,14 +234,14 @@ class LivePanel(Translated, QWidget):
         return words
 
     def _is_found(self, ring: Marker) -> bool:
-        """Return whether a ring is about what another mark stands for already."""
+        """Return whether another marker stands for this ring."""
         return ring.tone is not Tone.GOOD and any(
             hypot(ring.x - mark.x, ring.y - mark.y) < mark.radius
             for mark in self._extra
         )
 
     def _rate(self) -> float:
-        """Return how many images come, 1/s."""
+        """Return the frame rate, 1/s."""
         (start, first), (end, last) = self._arrivals[0], self._arrivals[-1]
         seconds = (end - start) * 1e-9
         return (last - first) / seconds if seconds > 0 else 0.0

@@ -14,7 +14,7 @@ from lightpen_app.work.selection import Selection
 
 
 class MaskControl(QObject):
-    """Does what is asked for by the panel of the stray light, and on the image.
+    """Carries out requests of the stray-light panel and of the image.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class MaskControl(QObject):
         images.view().circle_drawn.connect(self._on_circle_drawn)
 
     def show_mask(self) -> None:
-        """Mark what is masked, and what the search for stray light found."""
+        """Show masked circles and the stray light found."""
         self._panel.set_n_masked(len(self._mask))
         masked = mask_markers(self._mask)
         found = stray_markers(self._panel.found(), self.tr("stray"))

@@ -1,4 +1,4 @@
-"""Two cameras at once: the file that says where they stand, and if they keep step."""
+"""Two cameras: the rig file, and their synchronisation."""
 
 import numpy as np
 from PySide6.QtCore import Signal
@@ -63,7 +63,7 @@ class RigPanel(Translated, QGroupBox):
         self._retranslate()
 
     def remark(self) -> StatusMessage:
-        """Return what is told of the file in use."""
+        """Return the remarks on the file in use."""
         return self._told.value()
 
     def problem(self) -> StatusMessage:
@@ -96,7 +96,7 @@ class RigPanel(Translated, QGroupBox):
         self._refresh()
 
     def set_step(self, late: Message | None, n_unpaired: int | None) -> None:
-        """Show by how much the cameras are apart, and how many images found no partner.
+        """Show the time lag and the number of unpaired images.
 
         Nothing is known yet of None of these.
         """
@@ -166,7 +166,7 @@ class RigPanel(Translated, QGroupBox):
 
 
 def _baseline(rig: Rig) -> str:
-    """Return how far the second camera stands from the first, mm."""
+    """Return the baseline, mm."""
     shift = rig.translations[1]
     length = float(np.linalg.norm(shift))
     if rig.covariance is None:

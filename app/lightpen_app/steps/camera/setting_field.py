@@ -29,7 +29,7 @@ class SettingField(NumberField):
             event.accept()  # else the window would press its main button
 
     def set_offered(self, offered: Range, value: float) -> None:
-        """Show what the camera offers and has in force, in the unit of the field."""
+        """Show range and value of the camera in the unit of the field."""
         with QSignalBlocker(self):
             self.setRange(offered.low, offered.high)
             self.setValue(value)

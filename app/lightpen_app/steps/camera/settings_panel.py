@@ -99,18 +99,18 @@ class SettingsPanel(Translated, QGroupBox):
         return self._hint.value()
 
     def counts(self) -> str:
-        """Return what became of the images, in words."""
+        """Return the frame counters in words."""
         return self._counts.text()
 
     def set_stats(self, stats: Stats) -> None:
-        """Show what became of the images of this camera."""
+        """Show the frame counters of this camera."""
         self._stats = stats
         self._retranslate_counts()
 
     def set_camera(
         self, caps: CameraCapabilities | None, settings: CameraSettings
     ) -> None:
-        """Show what a camera offers and has in force; hidden where nothing can be."""
+        """Show capabilities and settings; hidden without any."""
         self._capabilities, self._settings = caps, settings
         is_live = caps is not None and caps.n_images is None
         self.setVisible(is_live)

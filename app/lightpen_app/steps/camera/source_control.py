@@ -1,4 +1,4 @@
-"""What is looked for about a source: its cameras, its library, files beside images."""
+"""Searches for a source: cameras, libraries, files beside images."""
 
 from functools import partial
 
@@ -51,7 +51,7 @@ class SourceSearch(QObject):
 
 
 class BesideControl(QObject):
-    """Offers the files beside recorded images, unless they are in use.
+    """Offers files beside recorded images unless they are in use.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class BesideControl(QObject):
         panel.files_requested.connect(files.use_files)
 
     def follow(self, source: SourceChoice) -> bool:
-        """Offer what goes with a source; return whether it is another than before."""
+        """Offer the files of a source; return whether the source has changed."""
         is_other = source != self._source
         if is_other:
             self._look(source)

@@ -165,7 +165,7 @@ class SourcePanel(Translated, QGroupBox):
         self._refresh()
 
     def set_beside(self, files: FilesBeside) -> None:
-        """Offer files that stand beside the recorded images, or none."""
+        """Offer files beside the recorded images."""
         self._beside = files
         self._refresh_beside()
 

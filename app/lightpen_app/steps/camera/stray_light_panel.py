@@ -81,11 +81,11 @@ class StrayLightPanel(Translated, QGroupBox):
         return self._found
 
     def outcome(self) -> SignLabel:
-        """Return the label of what the search has come to."""
+        """Return the label with the result of the search."""
         return self._outcome
 
     def set_n_masked(self, n_masked: int) -> None:
-        """Say how many circles are left out now."""
+        """Show the number of masked circles."""
         if n_masked != self._n_masked:
             self._n_masked = n_masked
             self._refresh()
@@ -130,7 +130,7 @@ class StrayLightPanel(Translated, QGroupBox):
         self._refresh()
 
     def give_up(self) -> None:
-        """Forget the search and what it found."""
+        """Cancel the search and discard its result."""
         self._search = None
         self._set_found(StraySearch().circles())
         self._refresh()

@@ -21,7 +21,7 @@ NOTICE = "history"  # cause of what is to be read
 
 
 class ArchiveControl(QObject):
-    """Does what the panel of the archive asks for, one thing at a time.
+    """Carries out requests of the archive panel, one at a time.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class ArchiveControl(QObject):
         self.checked.emit()
 
     def shut_down(self) -> None:
-        """Cancel what is under way."""
+        """Cancel running jobs."""
         if self._work is not None:
             self._work.cancel()
 
@@ -123,7 +123,7 @@ class ArchiveControl(QObject):
     def _do(
         self, function: Callable[[Report], T], on_succeeded: Callable[[T], object]
     ) -> None:
-        """Do one thing at a time to the archive as a whole, beside the window."""
+        """Run one archive job at a time in the background."""
         if self._work is not None:
             return
         self._work = job = Job(function, self)

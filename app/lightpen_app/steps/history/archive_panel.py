@@ -38,7 +38,7 @@ class SaveFormat(Enum):
 
 
 class ArchivePanel(Translated, QWidget):
-    """Three buttons, what the last check came to, and what the server has.
+    """Buttons of the archive, the last check, and the replication.
 
     Signals
     -------
@@ -102,25 +102,25 @@ class ArchivePanel(Translated, QWidget):
         self._refresh_buttons()
 
     def set_progress(self, fraction: float) -> None:
-        """Show how far it is, 0 to 1."""
+        """Show the progress, 0 to 1."""
         self._progress.setValue(round(100 * fraction))
 
     def checked(self) -> ArchiveCheckResult | None:
-        """Return what the last check found; None as long as there was none."""
+        """Return the result of the last check; None before the first."""
         return self._checked
 
     def set_checked(self, checked: ArchiveCheckResult | None) -> None:
-        """Show what a check came to; None as long as there was none."""
+        """Show the result of a check; None before the first."""
         self._checked = checked
         self._retranslate()
 
     def set_delivery(self, delivery: ReplicationState | None) -> None:
-        """Show how far the server has what was entered; None without a server."""
+        """Show the state of the replication; None without a server."""
         self._delivery = delivery
         self._show_delivery()
 
     def told(self) -> Sequence[StatusMessage]:
-        """Return what is said of the server and of the check."""
+        """Return the texts on server and check."""
         labels = (self._delivered, self._outcome, *self._findings)
         return [label.value() for label in labels if label.value().text]
 

@@ -1,4 +1,4 @@
-"""What a type-1 gauge study needs, and what it says of the tips that are shown."""
+"""A type-1 gauge study of the listed tips: input and result."""
 
 import numpy as np
 from PySide6.QtCore import Signal
@@ -56,7 +56,7 @@ class CapabilityRow(Translated, QWidget):
         self._retranslate()
 
     def tolerance(self) -> float | None:
-        """Return the width of the tolerance, mm; None where no study is wanted."""
+        """Return the tolerance, mm; None without a study."""
         return self._tolerance.value() or None
 
     def reference(self) -> FloatArray | None:
@@ -66,12 +66,12 @@ class CapabilityRow(Translated, QWidget):
         return np.array([field.value() for field in self._reference])
 
     def set_value(self, found: Capability | None, n_tips: int) -> None:
-        """Show what a study of so many tips has found, or that there is none."""
+        """Show the result of a study, or none."""
         self._shown = found, n_tips
         self._refresh()
 
     def words(self) -> str:
-        """Return what is said of the study."""
+        """Return the text on the study."""
         return self._told.value().text
 
     def _on_changed(self) -> None:

@@ -112,15 +112,15 @@ class HistoryContent(Translated, QWidget):
         return self._table
 
     def check_result(self) -> ArchiveCheckResult | None:
-        """Return what the last check of the archive found."""
+        """Return the result of the last archive check."""
         return self._archive.checked()
 
     def read_anew(self) -> None:
-        """Read what is looked for, as it is now."""
+        """Read the filtered entries again."""
         self._reader.open(self._filter.value())
 
     def shut_down(self) -> None:
-        """Cancel what is under way."""
+        """Cancel running jobs."""
         self._reader.shut_down()
         self._paper.shut_down()
         self._whole.shut_down()
@@ -169,7 +169,7 @@ class HistoryContent(Translated, QWidget):
         self._show_selection()
 
     def _follow(self, entry: StoredEntry) -> None:
-        """Show the trend of the pen and tip of an entry, within what is looked for."""
+        """Show the trend of an entry's pen and tip, within the filter."""
         event = entry.entry.event
         wanted = replace(
             self._filter.value(),

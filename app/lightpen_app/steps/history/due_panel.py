@@ -70,7 +70,7 @@ class DuePanel(Translated, QWidget):
         self._retranslate()
 
     def rule(self) -> DueRule:
-        """Return the rule as it is typed."""
+        """Return the rule in the fields."""
         return DueRule(round(self._days.value()), round(self._swings.value()))
 
     def set_rule(self, rule: DueRule, *, is_guarded: bool) -> None:

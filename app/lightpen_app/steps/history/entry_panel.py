@@ -91,7 +91,7 @@ class EntryPanel(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> Line | None:
-        """Return the line whose entry is shown."""
+        """Return the displayed line."""
         return self._line
 
     def set_value(self, line: Line | None) -> None:
@@ -112,7 +112,7 @@ class EntryPanel(Translated, QWidget):
         self._retranslate()
 
     def words(self) -> tuple[str, ...]:
-        """Return what is said of the entry."""
+        """Return the texts on the entry."""
         said = (self._changed.value().text, *(text.text() for text in self._texts))
         return tuple(filter(None, said))
 
@@ -234,7 +234,7 @@ class EntryPanel(Translated, QWidget):
 
 
 def _why_of(event: Event) -> str:
-    """Return verdict and reason, a note's text, or the settings of what is no swing."""
+    """Return verdict and reason, the text of a comment, or settings."""
     if event.kind is Kind.NOTE:
         return event.reason
     if event.kind is Kind.LIBRARY:

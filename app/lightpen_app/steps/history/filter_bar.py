@@ -1,4 +1,4 @@
-"""Which entries are shown: those of a pen, a tip, a station, a time."""
+"""Filter of the history: pen, tip, station, time."""
 
 from collections.abc import Sequence
 from datetime import date, datetime, time, timedelta
@@ -65,7 +65,7 @@ class FilterBar(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> EntryFilter:
-        """Return what is looked for; the last day is one of its own."""
+        """Return the filter; the last day is included."""
         end = self._end.value()
         named = (self._pen, self._tip, self._station)
         pen, tip, station = (choice.currentData() or "" for choice in named)
@@ -78,7 +78,7 @@ class FilterBar(Translated, QWidget):
         )
 
     def set_known(self, known: KnownNames) -> None:
-        """List the names that are known; what is chosen stays chosen."""
+        """Set the known names; the selection is kept."""
         if known == self._known:
             return
         self._known = known

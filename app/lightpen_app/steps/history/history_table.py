@@ -1,4 +1,4 @@
-"""The entries of the archive as a table, the newest first; what is seen is read."""
+"""The entries of the archive as a table, the newest first, read on demand."""
 
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -54,7 +54,7 @@ UNREAD = "\u2026"
 
 
 class HistoryModel(QAbstractTableModel):
-    """As many rows as there are entries, of which those are read that are seen.
+    """One row for each entry; visible rows are read.
 
     Signals
     -------
@@ -80,7 +80,7 @@ class HistoryModel(QAbstractTableModel):
         self.endResetModel()
 
     def put_block(self, first: int, found: Sequence[Line]) -> None:
-        """Show the lines of a block that was wanted."""
+        """Show the lines of a requested block."""
         self._asked.discard(first)
         self._blocks[first] = tuple(found)
         while len(self._blocks) > MOST_BLOCKS:
@@ -89,11 +89,11 @@ class HistoryModel(QAbstractTableModel):
         self.dataChanged.emit(self.index(first, 0), self.index(last, WORDS))
 
     def forget_block(self, first: int) -> None:
-        """Ask for a block again when it is to be shown the next time."""
+        """Request a block again when it is next shown."""
         self._asked.discard(first)
 
     def line(self, row: int) -> Line | None:
-        """Return a line that is to be shown; None as long as it is not read."""
+        """Return a line; None until it is read."""
         first = row - row % BLOCK
         if first in self._blocks:
             self._blocks.move_to_end(first)
@@ -159,7 +159,7 @@ class HistoryModel(QAbstractTableModel):
 
 
 class HistoryTable(Translated, RowTable):
-    """Shows the entries; the current one is told of once it is read.
+    """Shows the entries; the current one is reported once read.
 
     Signals
     -------
@@ -203,13 +203,13 @@ class HistoryTable(Translated, RowTable):
             self.selection_changed.emit()
 
     def put_block(self, first: int, found: Sequence[Line]) -> None:
-        """Show the lines of a block that was wanted."""
+        """Show the lines of a requested block."""
         self._model.put_block(first, found)
         if self._is_chosen(first, first + BLOCK - 1):
             self.selection_changed.emit()
 
     def forget_block(self, first: int) -> None:
-        """Ask for a block again when it is to be shown the next time."""
+        """Request a block again when it is next shown."""
         self._model.forget_block(first)
 
     def set_stations(self, stations: Sequence[str]) -> None:
@@ -218,7 +218,7 @@ class HistoryTable(Translated, RowTable):
         self._share_width()
 
     def n_lines(self) -> int:
-        """Return how many entries there are."""
+        """Return the number of entries."""
         return self._model.rowCount()
 
     def current(self) -> Line | None:
@@ -255,7 +255,7 @@ class HistoryTable(Translated, RowTable):
             self._share_width()
 
     def _share_width(self) -> None:
-        """Give each column the least it needs, and of what is left up to the most.
+        """Give each column its minimum, and share the rest up to the maximum.
 
         Where not even that fits, the letters are smaller, and no column tells the
         station where there is only one.

@@ -1,4 +1,4 @@
-"""The step History: all that ever became of a pen and its tips."""
+"""The step History: the complete history of pens and tips."""
 
 from typing import TYPE_CHECKING
 

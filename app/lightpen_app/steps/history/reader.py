@@ -46,7 +46,7 @@ class FirstEntries:
 
 
 class HistoryReader(QObject):
-    """Reads what is looked for; of what was looked for before, nothing is told.
+    """Reads entries by filter; results for an earlier filter are discarded.
 
     Signals
     -------
@@ -80,7 +80,7 @@ class HistoryReader(QObject):
         self._waiting: list[int] = []
 
     def open(self, wanted: EntryFilter) -> None:
-        """Read how many entries there are, and the newest."""
+        """Read the number of entries and the newest ones."""
         self._wanted = wanted
         self._waiting.clear()
         for what in ("block", "trend", "remarks"):
@@ -102,7 +102,7 @@ class HistoryReader(QObject):
         self._start("open", read, self.opened.emit)
 
     def read_block(self, first: int) -> None:
-        """Read the lines of a block, before those that were asked for before."""
+        """Read the lines of a block, before earlier requests."""
         if first in self._waiting:
             return
         self._waiting.append(first)
@@ -140,7 +140,7 @@ class HistoryReader(QObject):
         self._start("due", read, self.due_read.emit)
 
     def shut_down(self) -> None:
-        """Cancel what is under way."""
+        """Cancel running jobs."""
         for what in tuple(self._jobs):
             self._drop(what)
 

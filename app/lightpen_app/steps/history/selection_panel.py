@@ -1,4 +1,4 @@
-"""What the selected entries come to: two compared, and how well several repeat."""
+"""The selected entries: comparison of two, repeatability of several."""
 
 from collections.abc import Sequence
 
@@ -33,7 +33,7 @@ DECIMALS = 4  # of mm
 
 
 class SelectionPanel(Translated, QWidget):
-    """Shows two entries side by side, and the scatter of all that are selected.
+    """Compares two entries, and shows the scatter of all selected ones.
 
     With fewer than two selected, the scatter is that of the whole trend.
     """
@@ -84,17 +84,17 @@ class SelectionPanel(Translated, QWidget):
             self._retranslate()
 
     def set_value(self, selected: Sequence[StoredEntry], trend: Trend) -> None:
-        """Show other entries: those that are selected, and those of the trend."""
+        """Show the selected entries and those of the trend."""
         self._selected = tuple(filter(has_tip, selected))
         self._trend = trend
         self._retranslate()
 
     def comparison(self) -> Comparison | None:
-        """Return what is compared; None unless two tips are selected."""
+        """Return the comparison; None unless two tips are selected."""
         return compare(*self._selected) if len(self._selected) == PAIR else None
 
     def repeatability(self) -> Repeatability | None:
-        """Return how well the tips repeat; None if they are fewer than two."""
+        """Return the repeatability; None for fewer than two tips."""
         trend, study = self._trend, self._study
         entries = self._selected if len(self._selected) >= PAIR else trend.entries
         return repeatability_of(
@@ -103,7 +103,7 @@ class SelectionPanel(Translated, QWidget):
         )
 
     def words(self) -> tuple[str, ...]:
-        """Return what is said of the selection."""
+        """Return the texts on the selection."""
         said = (
             *(head.text() for head in self._heads),
             *(remark.value().text for remark in (self._change, self._verdict)),

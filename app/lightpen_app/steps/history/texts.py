@@ -1,4 +1,4 @@
-"""The words for what entries of the archive tell of."""
+"""Texts for entries of the archive."""
 
 from PySide6.QtCore import QCoreApplication
 
@@ -57,12 +57,12 @@ _KEPT = QT_TRANSLATE_NOOP("history", "saved")  # and in force for no pen
 
 
 def kind_text(kind: Kind) -> str:
-    """Return what an entry tells of."""
+    """Return the name of an entry's kind."""
     return _translated(_KINDS[kind])
 
 
 def what_text(line: Line) -> str:
-    """Return what an entry tells of, and what became of it."""
+    """Return the kind of an entry and its later state."""
     if line.entry is None:
         return _translated(_CHANGED)
     event = line.entry.entry.event
@@ -81,20 +81,20 @@ def what_text(line: Line) -> str:
 
 
 def usual_words() -> tuple[str, ...]:
-    """Return what is usually told of a calibration, by what its images are of."""
+    """Return the usual remarks on a calibration, by origin of its images."""
     of_tips = (kind_text(Kind.ACCEPTED), *map(origin_text, MARKED))
     states = tuple(map(_translated, _STATES.values()))
     return tuple(listed([word, state]) for word in of_tips for state in states)
 
 
 def rare_words() -> tuple[str, ...]:
-    """Return what is told of a swing that came to nothing, which may be long."""
+    """Return the remarks on a swing without a result."""
     kinds = kind_text(Kind.REFUSED), kind_text(Kind.ABANDONED)
     return tuple(listed([origin_text(o), kind]) for o in MARKED for kind in kinds)
 
 
 def item_text(event: Event) -> str:
-    """Return what a change of the tip library says of its item from then on."""
+    """Return the new values of a library item."""
     words = [
         _translated(template).format(event.settings[name])
         for name, template in _SAID.items()
@@ -106,7 +106,7 @@ def item_text(event: Event) -> str:
 
 
 def verdict_text(grade: str) -> str:
-    """Return the word of a verdict; that of a later version as it is."""
+    """Return the name of a verdict, unchanged if unknown."""
     try:
         return grade_text(Grade(grade)) if grade else ""
     except ValueError:
@@ -114,7 +114,7 @@ def verdict_text(grade: str) -> str:
 
 
 def line_tone(line: Line, is_verdict: bool) -> Tone:
-    """Return the colour of the words for what a line tells of, or of its verdict."""
+    """Return the tone of a line, by its kind or verdict."""
     if line.entry is None:
         return Tone.BAD
     event = line.entry.entry.event

@@ -1,4 +1,4 @@
-"""The LED table as a draft: what was opened, what was typed, and the way back."""
+"""The LED table as a draft: opened file, edits and undo."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -62,7 +62,7 @@ class DraftEdit(QUndoCommand):
 
 @dataclass(frozen=True)
 class LedState:
-    """What the table shows, beside what is in use.
+    """Content of the table and the file in use.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class LedState:
 
     @property
     def changes(self) -> Changes:
-        """By what the table differs from the file in use."""
+        """Differences between the table and the file in use."""
         if self.is_edited:
             return Changes.EDITED
         return Changes.NONE if self.invalid_file is None else Changes.FOREIGN
@@ -140,7 +140,7 @@ class LedDraft(QObject):
                 self.edit(before.draft)
 
     def use(self, file: PenFile, *, keeps_changes: bool = False) -> None:
-        """Put a file in use, and show it; with what was changed since, if wanted."""
+        """Use a file and show it, optionally with later edits."""
         preparation = self._selection.preparation
         self._selection.set_preparation(replace(preparation, pen_file=file))
         if not keeps_changes:

@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 
 class LedFileControl(QObject):
-    """Does what is asked for by the panel of the file; asks before changes are lost.
+    """Carries out requests of the file panel; asks before edits are lost.
 
     Signals
     -------
@@ -58,7 +58,7 @@ class LedFileControl(QObject):
         leds.changed.connect(self._on_draft_changed)
 
     def retranslate(self) -> None:
-        """Say anew what is wrong with the file, and why it cannot be saved."""
+        """Update the messages on the file."""
         self._panel.set_problem(self._problem())
         draft = self._leds.state.draft
         with_more = bool(draft.name or any(draft.tip))
@@ -86,7 +86,7 @@ class LedFileControl(QObject):
         self._tell(self._frame_error)
 
     def _tell(self, problem: Callable[[], str]) -> None:
-        """Say what is wrong with the file, in each language anew."""
+        """Show a message on the file in the selected language."""
         self._problem = problem
         self.retranslate()
 
@@ -104,7 +104,7 @@ class LedFileControl(QObject):
         self._unless_lost(self._use_samples)
 
     def _discard(self) -> None:
-        """Go back to what was opened; from what cannot be used, to the file in use."""
+        """Return to the opened file, or to the file in use if that is invalid."""
         if self._leds.state.is_edited:
             self._leds.edit(self._leds.state.opened)
         else:

@@ -23,7 +23,7 @@ from lightpen_app.work.job import Job
 
 
 class LedFilePanel(Translated, QWidget):
-    """A path with its buttons; below it what has to be said or asked about the file.
+    """Path and buttons, with messages and questions about the file.
 
     Signals
     -------
@@ -104,11 +104,11 @@ class LedFilePanel(Translated, QWidget):
         self._path.set_value(path)
 
     def problem(self) -> str:
-        """Return what is said about the file."""
+        """Return the message on the file."""
         return self._problem.value().text
 
     def set_problem(self, sentence: str) -> None:
-        """Say what is wrong, or nothing."""
+        """Set or clear the message."""
         self._path.set_faulty(bool(sentence))
         self._problem.set_value(StatusMessage(sentence, Sign.CROSS, Tone.BAD))
 
@@ -120,13 +120,13 @@ class LedFilePanel(Translated, QWidget):
             self._exchange.setText(self.tr("Swap {0} and {1}").format(*pair))
 
     def ask_units(self, name: str) -> None:
-        """Ask for the units of a file that does not say them; empty asks no more."""
+        """Ask for missing units; an empty text ends the question."""
         self._units.ask(name)
 
     def ask(
         self, words: Callable[[], tuple[str, str]], agreed: Callable[[], None]
     ) -> None:
-        """Ask before something is lost; ``agreed`` is called if it may be.
+        """Ask before a loss; ``agreed`` is called on consent.
 
         Parameters
         ----------
@@ -144,11 +144,11 @@ class LedFilePanel(Translated, QWidget):
             self._on_declined()
 
     def question(self) -> str:
-        """Return what is asked now, or nothing."""
+        """Return the present question, or an empty text."""
         return self._question.words()
 
     def set_savable(self, why_not: str, suffix: str) -> None:
-        """Tell whether there is something to save, and as what it is best saved."""
+        """Set whether there is something to save, and the suggested name."""
         self._suffix = suffix
         self._why_no_save = why_not
         self._refresh_save_words()
@@ -234,7 +234,7 @@ class LedFilePanel(Translated, QWidget):
 
 
 class _UnitsRow(Translated, QWidget):
-    """Asks for the units of a file that does not say them; hidden otherwise."""
+    """Asks for missing units of a file; hidden otherwise."""
 
     value_changed = Signal(str)
 

@@ -1,4 +1,4 @@
-"""The pen in space, and whether it stands in the pen frame."""
+"""The pen in space, and the check of its frame."""
 
 import math
 
@@ -74,7 +74,7 @@ class FramePanel(Translated, QGroupBox):
         self._view.set_value(picture)
 
     def value(self) -> FrameCheck | None:
-        """Return what is listed."""
+        """Return the listed checks."""
         return self._value
 
     def set_value(self, value: FrameCheck | None) -> None:

@@ -98,7 +98,7 @@ class LedTable(Translated, QTableView):
         self._retranslate()
 
     def value(self) -> PenDraft:
-        """Return what is shown."""
+        """Return the value."""
         return self._model.draft
 
     def set_value(self, value: PenDraft) -> None:
@@ -106,11 +106,11 @@ class LedTable(Translated, QTableView):
         self._model.set_draft(value)
 
     def set_misfits(self, misfits: Mapping[int, float]) -> None:
-        """Show how far LEDs, by number, lie from where the file puts them, px."""
+        """Show the errors of LEDs in the image, by number, px."""
         self._model.set_misfits(misfits)
 
     def set_marked(self, reasons: Mapping[int, str]) -> None:
-        """Mark LEDs, by number, with what is wrong with them."""
+        """Mark LEDs by number, with the reason."""
         self._model.set_marked(reasons)
 
     def show_normals(self, shown: bool) -> None:
@@ -119,7 +119,7 @@ class LedTable(Translated, QTableView):
             self.setColumnHidden(column, not shown)
 
     def chosen(self) -> int:
-        """Return the number of the LED whose row is current, 0 for none."""
+        """Return the number of the current LED, 0 for none."""
         index = self.currentIndex()
         return index.row() + 1 if index.isValid() else 0
 
@@ -162,7 +162,7 @@ class LedTable(Translated, QTableView):
 
 
 class _DraftModel(QAbstractTableModel):
-    """A draft, its flaws, and what the live match says of each LED."""
+    """A draft with its errors and the live match of each LED."""
 
     typed = Signal(object)
 

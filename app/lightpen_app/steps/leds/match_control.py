@@ -21,7 +21,7 @@ PERIOD_MS = 500
 
 
 class PenWatch(QObject):
-    """Compares a pen with what is seen, at most twice a second.
+    """Compares a pen with the detections, at most twice a second.
 
     Signals
     -------
@@ -148,7 +148,7 @@ class MatchControl(QObject):
             self._live.set_region(self._selection.preparation.region)
 
     def retranslate(self) -> None:
-        """Say what is missing to find the pen in the images."""
+        """Say what is missing for the detection of the pen."""
         preparation = self._selection.preparation
         if not self._live.is_open:
             why = self.tr("No camera is open. See the step Camera.")
@@ -199,5 +199,5 @@ class MatchControl(QObject):
 
 
 def _differ(swung: Pen, pen: Pen | None) -> bool:
-    """Return whether the LEDs of a table are not those that a swing began with."""
+    """Return whether the LEDs of a table differ from those of the swing."""
     return pen is None or not np.array_equal(swung.leds, pen.leds)

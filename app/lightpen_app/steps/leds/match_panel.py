@@ -59,7 +59,7 @@ class FixableMessage(Translated, QWidget):
         self._retranslate()
 
     def text(self) -> str:
-        """Return what is said."""
+        """Return the text."""
         return self._remark.value().text
 
     def set_value(self, remark: StatusMessage) -> None:
@@ -68,7 +68,7 @@ class FixableMessage(Translated, QWidget):
         self.setVisible(bool(remark.text))
 
     def set_mendable(self, finding: Finding | None) -> None:
-        """Offer to mend what was found, or nothing."""
+        """Offer a correction, or none."""
         self._finding = finding
         self._mend.setVisible(finding is not None)
         if finding is not None:
@@ -92,7 +92,7 @@ TALLEST = 0.9  # height of the image over its width; sensors are flatter
 
 
 class MatchPanel(Translated, QGroupBox):
-    """Shows images with numbered LEDs, how many fit, and which do not.
+    """Shows images with numbered LEDs and the match of each.
 
     Parameters
     ----------
@@ -137,11 +137,11 @@ class MatchPanel(Translated, QGroupBox):
         return self._view
 
     def state(self) -> State:
-        """Return what is said about the last images."""
+        """Return the state of the last images."""
         return self._banner.value()
 
     def remarks(self) -> tuple[str, ...]:
-        """Return what is said about the views so far."""
+        """Return the remarks on the views so far."""
         texts = (remark.text() for remark in self._messages)
         return tuple(filter(None, texts))
 
@@ -166,25 +166,25 @@ class MatchPanel(Translated, QGroupBox):
         self._refresh_state()
 
     def set_why_unknown(self, sentence: str) -> None:
-        """Say what is missing to find the pen in the images, or nothing."""
+        """Say what is missing for the detection of the pen."""
         if sentence != self._why_none:
             self._why_none = sentence
             self._refresh()
 
     def set_has_frame(self, has_frame: bool) -> None:
-        """Say whether the pen stands in its frame; if not, fitting is not enough."""
+        """Set whether the pen is in its frame; a match alone does not suffice."""
         if has_frame != self._has_frame:
             self._has_frame = has_frame
             self._refresh()
 
     def set_can_mend(self, can_mend: bool) -> None:
-        """Say whether the table is in the frame in which findings are told."""
+        """Set whether the table is in the frame of the findings."""
         if can_mend != self._can_mend:
             self._can_mend = can_mend
             self._refresh()
 
     def set_aside(self, is_aside: bool) -> None:
-        """Say whether the images are looked at with another pen, that of a swing."""
+        """Set whether another pen, that of a swing, is being detected."""
         if is_aside != self._is_aside:
             self._is_aside = is_aside
             self._refresh()
@@ -199,7 +199,7 @@ class MatchPanel(Translated, QGroupBox):
         self._refresh()
 
     def reasons(self) -> dict[int, str]:
-        """Return what is wrong with LEDs, by number."""
+        """Return the findings on LEDs, by number."""
         findings = () if self._match is None else self._match.findings
         return {led: self._words(each) for each in findings for led in each.leds}
 
@@ -235,7 +235,7 @@ class MatchPanel(Translated, QGroupBox):
         self._banner.set_value(self._state())
 
     def _toned(self, markers: Iterable[Marker]) -> Iterable[Marker]:
-        """Yield the rings, those of LEDs that do not fit in another tone."""
+        """Yield the rings; mismatched LEDs have another tone."""
         marked = {str(led) for led in self.reasons()}
         for marker in markers:
             if marker.label in marked:

@@ -1,4 +1,4 @@
-"""The LEDs of a pen in space, to be turned and looked at from all sides."""
+"""The LEDs of a pen in a rotatable 3-D view."""
 
 import math
 from dataclasses import dataclass, field
@@ -104,7 +104,7 @@ class PenView(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> PenPicture:
-        """Return what is shown."""
+        """Return the value."""
         return self._value
 
     def set_value(self, value: PenPicture) -> None:
@@ -129,7 +129,7 @@ class PenView(Translated, QWidget):
             self.update()
 
     def turned(self) -> tuple[float, float]:
-        """Return how far the pen is turned about its y axis and to the viewer, rad."""
+        """Return the rotation about the pen's y axis and towards the viewer, rad."""
         return self._yaw, self._pitch
 
     def place_of(self, led: int) -> QPointF:

@@ -1,4 +1,4 @@
-"""Buttons that lean and cover the simulated pen, where nobody can take it in hand."""
+"""Buttons that tilt and cover the simulated pen."""
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget

@@ -29,7 +29,7 @@ class Changes(Enum):
 
 
 class LedTablePanel(Translated, QGroupBox):
-    """Shows a draft and lets it be changed.
+    """Shows a draft and lets it be edited.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class LedTablePanel(Translated, QGroupBox):
         self._retranslate()
 
     def value(self) -> PenDraft:
-        """Return what is shown."""
+        """Return the value."""
         return self._value
 
     def set_value(self, value: PenDraft, changes: Changes) -> None:
@@ -123,7 +123,7 @@ class LedTablePanel(Translated, QGroupBox):
         self._flaw.set_value(StatusMessage(sentence, Sign.WARNING, Tone.BAD))
 
     def flaw(self) -> str:
-        """Return what is said about the cells."""
+        """Return the message on the cells."""
         return self._flaw.value().text
 
     def set_overriding_tip(self, point: str) -> None:
@@ -132,15 +132,15 @@ class LedTablePanel(Translated, QGroupBox):
         self._refresh()
 
     def set_misfits(self, misfits: Mapping[int, float]) -> None:
-        """Show how far LEDs, by number, are seen from their places, px."""
+        """Show the errors of LEDs in the image, by number, px."""
         self._table.set_misfits(misfits)
 
     def set_marked(self, reasons: Mapping[int, str]) -> None:
-        """Mark LEDs, by number, with what is wrong with them."""
+        """Mark LEDs by number, with the reason."""
         self._table.set_marked(reasons)
 
     def focus_cells(self) -> None:
-        """Take the focus of a button that vanishes once the table is mended."""
+        """Move the focus from a vanishing button to the cells."""
         self._table.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def set_chosen(self, led: int) -> None:
@@ -218,6 +218,6 @@ class LedTablePanel(Translated, QGroupBox):
 
 
 def _show(edit: QLineEdit, text: str) -> None:
-    """Show a text, but leave what the user types as it is typed."""
+    """Show a text unless the user is editing it."""
     if edit.text().strip() != text:
         edit.setText(text)

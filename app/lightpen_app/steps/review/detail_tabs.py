@@ -62,7 +62,7 @@ class DetailTabs(QTabWidget):
         self.currentChanged.connect(self.fill)
 
     def set_names(self, images: str, residuals: str, u: str, methods: str) -> None:
-        """Set what the tabs are called."""
+        """Set the titles of the tabs."""
         names = images, residuals, u, methods
         for tab, name in zip(self._tab_of.values(), names, strict=True):
             self.setTabText(self.indexOf(tab), name)
@@ -78,14 +78,14 @@ class DetailTabs(QTabWidget):
                 self._show_solution(panel.content())
 
     def pictures(self) -> "list[NamedPicture]":
-        """Return all plots as they are saved, those in tabs that were not seen too."""
+        """Return all plots for saving, including those of hidden tabs."""
         for panel in self._panels:
             self._show_solution(panel.content())
         cards = chain.from_iterable(panel.content().cards() for panel in self._panels)
         return [card.picture() for card in cards]
 
     def shut_down(self) -> None:
-        """Cancel what the panels do."""
+        """Cancel running jobs."""
         for panel in self._panels:
             content = panel.content_so_far()
             if content is not None:

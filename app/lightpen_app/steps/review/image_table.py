@@ -100,7 +100,7 @@ class ImageModel(QAbstractTableModel):
 
 
 class ImageTable(Translated, RowTable):
-    """Shows the images; the current one and the selected ones are kept over changes.
+    """Shows the images; current item and selection survive changes.
 
     Signals
     -------
@@ -133,7 +133,7 @@ class ImageTable(Translated, RowTable):
         return self._model.rows()
 
     def set_value(self, rows: Sequence[ImageRow]) -> None:
-        """Show images; those that were current or selected stay so."""
+        """Show images; current item and selection are kept."""
         current = self.number()
         selected = {row.number for row in self.selected()}
         chosen = self.selectionModel()

@@ -125,7 +125,7 @@ class ImagesPanel(Translated, QWidget):
         return (self._card,)
 
     def value(self) -> Solution | None:
-        """Return the solution whose images are shown."""
+        """Return the displayed solution."""
         return self._solution
 
     def set_value(self, solution: Solution | None) -> None:
@@ -237,7 +237,7 @@ class ImagesPanel(Translated, QWidget):
         return text.format(reason_text(row.reason))
 
     def _mark(self) -> None:
-        """Draw what was seen in the image that is shown, and tell of it."""
+        """Draw the detections of the displayed image and describe it."""
         solution, number = self._solution, self._table.number()
         self._misfits.set_number(number)
         if solution is None or number is None:
@@ -319,7 +319,7 @@ class ImagesPanel(Translated, QWidget):
         self._on_undecoded(self.tr("Image not available"))
 
     def _wanted(self) -> tuple[RecordSource, int, int] | None:
-        """Return whose image is chosen, its number and its camera."""
+        """Return number and camera of the selected image."""
         number = self._table.number()
         if self._solution is None or number is None:
             return None
@@ -335,7 +335,7 @@ class ImagesPanel(Translated, QWidget):
         self._view.set_arrows(NO_ARROWS)
 
     def _on_enlarge_toggled(self, enlarged: bool) -> None:
-        """Give the plot the place of all that is about it, or no longer."""
+        """Enlarge the plot to the whole panel, or restore it."""
         for widget in (
             *(self._table, self._count, self._take_out, self._put_back),
             *(self._undo, self._view, self._caption),

@@ -1,4 +1,4 @@
-"""U by Monte Carlo on request, beside U by the budget."""
+"""U by Monte Carlo on request, beside the budget."""
 
 import os
 
@@ -68,7 +68,7 @@ class MonteCarloRow(Translated, QWidget):
         self._retranslate()
 
     def set_value(self, solution: Solution) -> None:
-        """Be about another solution; what was computed of the one before is gone."""
+        """Show another solution and discard the earlier result."""
         if solution is self._solution:
             return
         self.stop()

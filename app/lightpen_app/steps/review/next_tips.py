@@ -26,7 +26,7 @@ LONGEST = 12  # characters of a tip on its button
 
 
 class NextTipsRow(Translated, QWidget):
-    """Shows other tips with how each stands; hidden while there is none.
+    """Shows other tips with their status; hidden without any.
 
     Signals
     -------
@@ -56,7 +56,7 @@ class NextTipsRow(Translated, QWidget):
         return self._value
 
     def set_statuses(self, statuses: StationStatus) -> None:
-        """Mark the tips as they stand."""
+        """Mark the tips by status."""
         self._statuses = statuses
         self._retranslate()
 
@@ -90,7 +90,7 @@ class NextTipsRow(Translated, QWidget):
             button.setToolTip(PARTED.join(filter(None, (told.format(tip), mark.text))))
 
     def _mark_of(self, each: NextTip) -> StatusMessage:
-        """Return what is the matter with a tip: overdue, or not calibrated."""
+        """Return why a tip needs attention: overdue, or not calibrated."""
         if each.last is not None and each.last.is_simulated:
             return StatusMessage()
         standing = self._statuses.of_tip(each.pen, each.tip)
@@ -100,7 +100,7 @@ class NextTipsRow(Translated, QWidget):
 
 
 class NextTipsControl(QObject):
-    """Looks for the other tips of a pen, and chooses the one that is wanted.
+    """Finds the other tips of a pen and selects the requested one.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ class NextTipsControl(QObject):
         self._show_statuses()
 
     def follow(self, result: Result | None) -> None:
-        """Show the other tips of the pen whose tip was accepted, if one was."""
+        """Show the other tips of the pen of an accepted tip."""
         self.shut_down()
         self._row.set_value(())
         if result is None:

@@ -88,19 +88,19 @@ class PlotCard(Translated, QFrame):
         return self._plot
 
     def set_place(self, place: SavePlace) -> None:
-        """Offer this place for what is saved."""
+        """Set the folder for saving."""
         self._place = place
 
     def picture(self) -> NamedPicture:
-        """Return the plot as it is saved beside others."""
+        """Return the plot for saving beside others."""
         return NamedPicture(f"{self._file_stem}.png", self._plot.png(self._mark()))
 
     def actions_offered(self) -> Sequence[QAction]:
-        """Return what the menu offers: enlarge, save as PNG, save as CSV."""
+        """Return the actions of the menu: enlarge, save as PNG, save as CSV."""
         return self._enlarge, self._save_png, self._save_csv
 
     def save(self, path: Path) -> None:
-        """Save as the suffix of the file says: numbers as CSV, else a picture."""
+        """Save by suffix: numbers as CSV, else a picture."""
         is_table = path.suffix.lower() == ".csv"
         data = self._plot.csv() if is_table else self._plot.png(self._mark())
         job = Job(lambda _: write_whole(path, data), self)

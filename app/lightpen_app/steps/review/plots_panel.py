@@ -70,7 +70,7 @@ class PlotsPanel(Translated, QWidget):
         return self._grid.cards()
 
     def shut_down(self) -> None:
-        """Let go of what is computed."""
+        """Cancel running jobs."""
 
     def _show(self, solution: Solution) -> None:
         raise NotImplementedError
@@ -231,7 +231,7 @@ class UncertaintyPanel(PlotsPanel):
 
 
 class MethodsPanel(PlotsPanel):
-    """The paper's iteration, and its result beside that of the joint fit."""
+    """Convergence of the paper's method, compared with the joint fit."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         # Widgets

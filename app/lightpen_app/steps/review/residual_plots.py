@@ -101,7 +101,7 @@ class MisfitPlot(Plot):
         self._chosen.setData(pos=np.array(points).reshape(-1, 2))
 
     def set_limit_words(self, at_rest: str, above: str) -> None:
-        """Change what the line says; ``above`` has fields for a count and for px."""
+        """Set the text of the line; ``above`` has fields for a count and for px."""
         self._limit_words = at_rest, above
         self._on_limit_moved()
 
@@ -164,7 +164,7 @@ class MisfitPlot(Plot):
         return QPoint(self._graphics.mapFromScene(scene))
 
     def _rest_limit(self, heights: FloatArray) -> None:
-        """Put the line above misfits (N,), from where it can be drawn to their half."""
+        """Place the line above residuals (N,), where it is visible."""
         if len(heights):
             rest = LIMIT_REST * float(heights.max())
             self._limit.setBounds((float(np.median(heights)), rest))
@@ -199,7 +199,7 @@ class MisfitPlot(Plot):
 
 
 class SquarePlot(Plot):
-    """A plot that shows a unit of x as long as one of y, and keeps a range in sight."""
+    """A plot with equal units of x and y that keeps a range visible."""
 
     def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
         super().__init__(axes, parent)
@@ -274,7 +274,7 @@ class ArrowPlot(SquarePlot):
         self._restyle()
 
     def scale(self) -> float:
-        """Return by how much the arrows are enlarged."""
+        """Return the magnification of the arrows."""
         return self._scale
 
     def set_data(
@@ -316,7 +316,7 @@ class ArrowPlot(SquarePlot):
 
 
 class Histogram(Plot):
-    """How often residuals occur, beside the normal curve of the same spread.
+    """Histogram of the residuals with the fitted normal curve.
 
     Parameters
     ----------

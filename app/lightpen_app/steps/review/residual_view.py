@@ -1,4 +1,4 @@
-"""A recorded image with what was seen in it, and its residuals as arrows."""
+"""A recorded image with its detections and residual arrows."""
 
 from dataclasses import dataclass
 

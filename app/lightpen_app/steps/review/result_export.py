@@ -25,7 +25,7 @@ DrawPlots: TypeAlias = "Callable[[], Sequence[NamedPicture]]"
 
 
 class ResultExport(QObject):
-    """Does what is asked for by the tools of a result.
+    """Carries out requests of the result tools.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class ResultExport(QObject):
     def _save(
         self, export: Export, laboratory: Laboratory | None, folder: Path
     ) -> None:
-        """Save the files of an export; those of an accepted result from its file."""
+        """Save an export; accepted results from their file."""
         status, stem, archive = self._run.status, self._place.stem(), self._run.archive
         solution, names, result = status.solution, status.names, status.result
         if solution is None:
@@ -140,7 +140,7 @@ class ResultExport(QObject):
         job.start()
 
     def _show_paper(self) -> None:
-        """Show the record on paper, of the result as it is on the disk."""
+        """Open the report of the stored result."""
         result, archive = self._run.status.result, self._run.archive
         if result is not None:
             self._paper.show(lambda: archive.file_of(result))

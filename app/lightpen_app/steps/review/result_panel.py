@@ -110,7 +110,7 @@ DIAL_HEIGHT = 22 * GRID  # px
 
 @dataclass(frozen=True, eq=False)
 class ReviewedResult:
-    """A solved swing beside what was in force before it.
+    """A solved swing with the result that was current before.
 
     Attributes
     ----------
@@ -255,7 +255,7 @@ class ResultPanel(Translated, QFrame):
         return Figures(AXES, tuple(names), tuple(cells))
 
     def _as_found_message(self, assessment: SwingAssessment) -> StatusMessage:
-        """Return how far the tip in force was found off, against its limit."""
+        """Return the deviation of the tip as found, with its limit."""
         change, last, limit = assessment.change, assessment.last, assessment.max_change
         if change is None or last is None:
             return StatusMessage()
@@ -307,5 +307,5 @@ def _texts(values: FloatArray, uncertainties: FloatArray) -> tuple[str, ...]:
 
 
 def _room(value: float) -> int:
-    """Return for how many decimals a column has room."""
+    """Return the number of decimals that fit a column."""
     return 3 if abs(value) < 100 else 1 if abs(value) < 1000 else 0

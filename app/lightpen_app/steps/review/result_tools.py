@@ -75,7 +75,7 @@ class ResultTools(Translated, QWidget):
         self._retranslate()
 
     def set_why_not(self, why_not: str) -> None:
-        """Disable all and say why not, or enable them."""
+        """Disable all with a reason, or enable them."""
         told = (
             self.tr("Open the folder of the swing"),
             self.tr("Copy x, y, z in mm, separated by tabs"),
@@ -85,7 +85,7 @@ class ResultTools(Translated, QWidget):
             button.set_why_not(why_not, words)
 
     def set_paper_why_not(self, why_not: str) -> None:
-        """Offer no record on paper and say why not, or offer it."""
+        """Disable the report with a reason, or enable it."""
         self._paper.setEnabled(not why_not)
         told = self.tr("Preview, save as PDF, or print")
         self._paper.setToolTip(why_not or told)

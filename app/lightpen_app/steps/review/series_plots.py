@@ -23,7 +23,7 @@ FARTHEST = 36.0  # degrees of tilt that are always shown
 
 
 class NamedPlot(Plot):
-    """A plot of one or more series; of more, the names stand beside the title."""
+    """A plot of one or more series; several are named beside the title."""
 
     def __init__(
         self, axes: Axes, series: Sequence[Curve], parent: QWidget | None = None

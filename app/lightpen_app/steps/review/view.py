@@ -28,7 +28,7 @@ ANY_WIDTH = 16777215  # QWIDGETSIZE_MAX
 
 
 class ReviewView(ResponsiveLayout, Translated, QWidget):
-    """Shows a solved swing, the result beside its details."""
+    """Shows a solved swing: result and details."""
 
     narrow_below = 112 * GRID  # px; then it has the result in a tab
     vast_from = QSize(240 * GRID, 140 * GRID)  # px; then the result is larger
@@ -82,7 +82,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self._retranslate()
 
     def set_state(self, state: ReviewPageState) -> None:
-        """Show a swing as it stands."""
+        """Show the state of a swing."""
         self._banner.set_value(state.banner)
         self._messages.set_value(state.remarks)
         images = self.tabs.images()
@@ -105,7 +105,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self.take_back.setVisible(state.is_accepted)
 
     def set_solving(self, is_solving: bool) -> None:
-        """Show how far the solution is, once it takes long."""
+        """Show the progress of a slow solution."""
         self._progress.setValue(0)
         if is_solving:
             self._patience.start()
@@ -114,7 +114,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
             self._solving.hide()
 
     def set_progress(self, fraction: float) -> None:
-        """Show how far the solution is, 0 to 1."""
+        """Show the progress of the solution, 0 to 1."""
         self._progress.setValue(round(100 * fraction))
 
     def end_questions(self) -> None:
@@ -158,7 +158,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
 
     @override
     def _use_room(self) -> None:
-        """Put the result beside the tabs, or make it the first of a narrow page."""
+        """Place the result beside the tabs, or as first tab of a narrow page."""
         side, direction = self._result_side, QBoxLayout.Direction
         self.result.set_large(self._room.is_vast)
         if self._room.is_narrow:

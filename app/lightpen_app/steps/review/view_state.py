@@ -1,4 +1,4 @@
-"""What the step Review says of a swing as it stands."""
+"""View state of the step Review."""
 
 from dataclasses import dataclass
 
@@ -32,7 +32,7 @@ OF_FILES = (
 
 @dataclass(frozen=True)
 class ReviewPageState:
-    """All that the page shows of a swing besides its solution.
+    """View state of the page without the solution.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class ReviewPageState:
 def review_page_state(
     status: SwingStatus, named: Names, main: MainAction
 ) -> ReviewPageState:
-    """Return what is shown.
+    """Return the view state of the page.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def differs(before: SwingStatus, now: SwingStatus) -> bool:
 
 
 def returns_to_swing(before: SwingStatus, now: SwingStatus) -> bool:
-    """Return whether the swing goes on with more images, or another one begins."""
+    """Return whether the swing continues with more images, or another begins."""
     if before.solution is None or now.is_reading:
         return False
     captures_more = now.is_capturing and (before.is_reading or not before.is_capturing)
@@ -120,7 +120,7 @@ def returns_to_swing(before: SwingStatus, now: SwingStatus) -> bool:
 def review_action(
     status: SwingStatus, *, is_new: bool, is_read: bool = True
 ) -> MainAction:
-    """Return what the main button does now.
+    """Return the present action of the main button.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def take_back_question() -> Question:
 
 
 def review_state(status: SwingStatus) -> State:
-    """Return the banner: what the tip is worth, or since when it is in force."""
+    """Return the banner: verdict, or since when the tip is current."""
     translate = QCoreApplication.translate
     if status.result is not None:
         return _accepted_state(status.result)

@@ -1,1 +1,1 @@
-"""The step Start: who calibrates what, and swings that were interrupted."""
+"""The step Start: item under calibration, and interrupted swings."""

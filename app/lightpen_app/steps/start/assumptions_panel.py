@@ -1,4 +1,4 @@
-"""What a station assumes where files say nothing, and the dialog that changes it."""
+"""Default uncertainties of a station, and their dialog."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -49,7 +49,7 @@ KINDS = (
 
 
 class AssumptionsDialog(Translated, QDialog):
-    """Standard uncertainties that stand in for what camera and LED file leave out.
+    """Default uncertainties for what camera and LED files do not state.
 
     Signals
     -------
@@ -134,7 +134,7 @@ class AssumptionsDialog(Translated, QDialog):
         self.value_changed.emit()
 
     def _show_which_temperature(self) -> None:
-        """Offer the uncertainty of what was measured, or how warm it may be."""
+        """Show the uncertainty of a measured temperature, or of the assumed one."""
         is_measured = self._value.temperature_c is not None
         self._fields["temperature"].setEnabled(is_measured)
         self._fields["warmth"].setEnabled(not is_measured)
@@ -172,7 +172,7 @@ class AssumptionsDialog(Translated, QDialog):
 
 
 class AssumptionsPanel(Translated, QGroupBox):
-    """Opens what is assumed of a station.
+    """Opens the default uncertainties of a station.
 
     Signals
     -------

@@ -1,4 +1,4 @@
-"""A barcode that a scanner types, told from what somebody types by its pace."""
+"""Barcode scanner input, told from typing by its speed."""
 
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QWindow
@@ -51,7 +51,7 @@ class BarcodeListener(QObject):
             window.installEventFilter(self)
 
     def is_amid(self, event: QKeyEvent) -> bool:
-        """Return whether a key follows those that are held back at their pace."""
+        """Return whether a key continues the held-back ones."""
         pressed = event.timestamp()
         return bool(self._held) and pressed - self._last_ms <= PACE_MS
 
@@ -74,7 +74,7 @@ class BarcodeListener(QObject):
         return True
 
     def _ends_with(self, event: QKeyEvent) -> bool:
-        """Tell the barcode that an Enter ends, or hand on what is none."""
+        """Report the barcode ended by Enter, or pass the keys on."""
         code = "".join(each.text() for each in self._held)
         if len(code) < SHORTEST:
             self._let_go()
@@ -85,7 +85,7 @@ class BarcodeListener(QObject):
         return True
 
     def _let_go(self) -> None:
-        """Hand on what is held back."""
+        """Pass the held-back keys on."""
         self._patience.stop()
         held, self._held = self._held, []
         self._hands_on = True

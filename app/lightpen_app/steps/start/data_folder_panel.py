@@ -1,4 +1,4 @@
-"""Where swings and results are kept, and who else uses that folder."""
+"""The data folder and its other users."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from lightpen_app.work.notifications import Notifications
 
 
 class DataFolderPanel(Translated, QGroupBox):
-    """Shows the data folder, opens it, and tells of other windows that use it.
+    """Shows and opens the data folder, and other windows that use it.
 
     Parameters
     ----------
@@ -63,12 +63,12 @@ class DataFolderPanel(Translated, QGroupBox):
         self._retranslate()
 
     def set_others(self, n_others: int) -> None:
-        """Tell how many other windows of the program use the folder."""
+        """Show the number of other windows that use the folder."""
         self._n_others = n_others
         self._retranslate()
 
     def set_fault(self, trouble: str) -> None:
-        """Tell why nothing can be kept in the folder; empty where it can."""
+        """Show why the folder cannot be written; an empty text ends it."""
         self._fault = trouble
         self._retranslate()
 

@@ -15,7 +15,7 @@ TYPING_PAUSE_MS = 400  # after which what was typed is taken over
 
 
 class EntryPresenter(QObject):
-    """Fills the fields from the selection, and takes over what is entered.
+    """Fills the fields from the selection and applies entries.
 
     Signals
     -------
@@ -58,7 +58,7 @@ class EntryPresenter(QObject):
         self._show(selection.preparation)
 
     def typed(self) -> Preparation:
-        """Return what is chosen, with the names as they are being typed."""
+        """Return the selection with the names being typed."""
         return replace(self._selection.preparation, names=self._names.value())
 
     def _on_edited(self) -> None:
@@ -66,7 +66,7 @@ class EntryPresenter(QObject):
         self.edited.emit()
 
     def _take_names(self) -> None:
-        """Take over all names but that of the station, which may be unfinished."""
+        """Apply all names but the station's, which may be incomplete."""
         self._typing.stop()
         now = self._selection.preparation
         names = replace(self._names.value(), station=now.names.station)
@@ -82,7 +82,7 @@ class EntryPresenter(QObject):
             self.tip_named.emit()
 
     def _on_item_chosen(self, kind: ItemKind, name: str) -> None:
-        """Take over a pen, tip or cone that was chosen; a tip with what is its own."""
+        """Apply a selected pen, tip or cone; a tip with its properties."""
         self._take_names()
         now = self._selection.preparation
         tip = self._library.tip(name)
@@ -127,7 +127,7 @@ class EntryPresenter(QObject):
         self._selection.set_preparation(replace(now, assumptions=assumed))
 
     def settle(self) -> None:
-        """Take over what is being typed."""
+        """Apply pending input."""
         self._names.settle()
         self._limits.settle()
         self._take_names()
@@ -139,7 +139,7 @@ class EntryPresenter(QObject):
         self._show(self._selection.preparation, before)
 
     def _show(self, now: Preparation, before: Preparation | None = None) -> None:
-        """Fill the fields of what is different; others may be being typed in."""
+        """Update the fields that differ; others may be in use."""
         if before is None or now.names != before.names:
             self._typing.stop()
             names = now.names

@@ -26,7 +26,7 @@ NO_REMARK = StatusMessage()
 
 @dataclass(frozen=True)
 class ItemChoice:
-    """An item to choose, and how it stands."""
+    """A selectable item with its status."""
 
     name: str
     remark: StatusMessage = NO_REMARK
@@ -61,7 +61,7 @@ class ItemButton(Translated, PushButton):
         return self._choices
 
     def set_choices(self, choices: Sequence[ItemChoice]) -> None:
-        """Let other items be chosen; a list that is open stays as it is."""
+        """Set the selectable items; an open list is kept."""
         self._choices = tuple(choices)
         if not self._menu.isVisible():
             self._fill()
@@ -128,7 +128,7 @@ class StationField(ChoiceField):
         self.activated.connect(self._on_finished)
 
     def value(self) -> str:
-        """Return the name as it is typed."""
+        """Return the name in the field."""
         return self.currentText().strip()
 
     def set_value(self, name: str) -> None:
@@ -163,7 +163,7 @@ class StationField(ChoiceField):
 
 
 class _NameEdit(QLineEdit):
-    """A line whose Enter key takes over what was typed, and else does nothing."""
+    """A line edit whose Enter key only applies the text."""
 
     entered = Signal()
 
@@ -234,12 +234,12 @@ class PointField(Translated, QWidget):
         self.blockSignals(blocked)
 
     def set_point_of_file(self, point: FloatArray | None) -> None:
-        """Show what the LED file has; None if it has no such point."""
+        """Show the point of the LED file; None without one."""
         self._of_file = point
         self._retranslate()
 
     def settle(self) -> None:
-        """Take over what is being typed."""
+        """Apply pending input."""
         for field in self._fields:
             field.interpretText()
 

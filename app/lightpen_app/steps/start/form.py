@@ -142,7 +142,7 @@ class NamesForm(Translated, QWidget):
         )
 
     def set_value(self, names: Names) -> None:
-        """Show other names; a field that shows its own already stays as it is."""
+        """Show other names; unchanged fields are not touched."""
         blocked = self.blockSignals(True)
         if names.station != self._station.value():
             self._station.set_value(names.station)
@@ -298,7 +298,7 @@ class LimitsForm(Translated, QGroupBox):
         self.blockSignals(blocked)
 
     def set_guarded(self, guarded: bool) -> None:
-        """Let nobody change them here, as it takes a supervisor."""
+        """Lock the fields, which need a supervisor."""
         for field in self._fields:
             field.setEnabled(not guarded)
 
@@ -351,7 +351,7 @@ class LimitsForm(Translated, QGroupBox):
 
 
 class _ListedEdit(QLineEdit):
-    """A name whose list an arrow key asks for."""
+    """A name with a list opened by an arrow key."""
 
     list_requested = Signal()
 

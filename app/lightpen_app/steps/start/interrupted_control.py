@@ -37,7 +37,7 @@ NOTICE = "start"  # cause of what is to be read
 
 
 class InterruptedControl(QObject):
-    """Looks for what has no end, and goes on with it, shows, closes or discards it.
+    """Finds interrupted work and resumes, shows, closes or discards it.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class InterruptedControl(QObject):
         self._searching.start()
 
     def shut_down(self) -> None:
-        """Stop all that is under way."""
+        """Cancel running jobs."""
         self._searching.stop()
         for job in (self._search, self._work):
             if job is not None:
@@ -226,7 +226,7 @@ class InterruptedControl(QObject):
             self._run.runner.go_on(swing)
 
     def _take_over(self, swing: Resumable) -> None:
-        """Choose what the swing was captured for, and the camera of its station."""
+        """Select the item of the swing and the camera of its station."""
         selection, header = self._selection, swing.record.header
         station = selection.preparation.names.station
         self._go_to_station(header.station)
@@ -237,7 +237,7 @@ class InterruptedControl(QObject):
         )
 
     def _go_to_station(self, name: str) -> None:
-        """Bring back what was chosen last at a station that is known."""
+        """Restore the last selection of a known station."""
         selection = self._selection
         is_other = name != selection.preparation.names.station
         if is_other and name in selection.stations():
@@ -275,7 +275,7 @@ class InterruptedControl(QObject):
     # Verifications
 
     def _on_continue_requested(self, found: InterruptedVerification) -> None:
-        """Choose what the verification was of, and go on with it."""
+        """Select the item of the verification and resume it."""
         under_way, selection = found.under_way, self._selection
         if under_way is None:
             return
@@ -330,7 +330,7 @@ class Interrupted:
 
 
 def _source_text(swing: Resumable) -> str:
-    """Return what the images of a swing came from, and where they are."""
+    """Return the source of a swing's images and their location."""
     choice = swing.source_choice
     if choice is None:
         return origin_text(recorded_origin(swing.record))

@@ -1,4 +1,4 @@
-"""A row for what was interrupted: gone on with, or discarded after a question."""
+"""A row for interrupted work: resume, or discard after a question."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -17,7 +17,7 @@ ROW_HEIGHT, SENTENCE_HEIGHT = 7 * GRID, 17 * GRID
 
 
 class RowKind(StrEnum):
-    """What can be done with what was interrupted."""
+    """Possible actions for interrupted work."""
 
     OFFERED = "offered"  # to go on with
     UNDER_WAY = "under way"  # in another program
@@ -26,7 +26,7 @@ class RowKind(StrEnum):
 
 @dataclass(frozen=True)
 class RowWords:
-    """What a row says.
+    """Texts of a row.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class RowWords:
 
 
 class InterruptedItem(Translated, QFrame):
-    """Something that was interrupted; its words are those of a subclass.
+    """Interrupted work; subclasses provide the texts.
 
     Signals
     -------
@@ -96,7 +96,7 @@ class InterruptedItem(Translated, QFrame):
         self._retranslate()
 
     def words(self) -> tuple[str, str]:
-        """Return what the row says."""
+        """Return the texts of the row."""
         return self._when.text(), unbroken(self._what.text())
 
     def height_for(self, width: int) -> int:

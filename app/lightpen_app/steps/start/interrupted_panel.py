@@ -1,4 +1,4 @@
-"""Swings and verifications without an end: offered to go on with, or to discard.
+"""Interrupted swings and verifications, to resume or discard.
 
 One that another program captures, or that is damaged, is told of and not offered.
 """
@@ -192,7 +192,7 @@ class InterruptedPanel(Translated, QGroupBox):
         self._hold_rows()
 
     def rows(self) -> tuple[InterruptedItem, ...]:
-        """Return the rows: what is offered, under way, and damaged."""
+        """Return the rows: interrupted, running, and damaged."""
         return tuple(self._rows)
 
     def set_waiting(self, why: str) -> None:

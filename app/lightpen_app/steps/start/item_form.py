@@ -1,4 +1,4 @@
-"""What the tip library says of one item, typed."""
+"""Form for an item of the tip library."""
 
 from collections.abc import Callable
 from datetime import date
@@ -137,7 +137,7 @@ class ItemForm(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> AnyItem:
-        """Return the item as it is typed; its picture is that of before."""
+        """Return the item in the form, with the earlier picture."""
         for field in (self._ball, self._change, self._days, self._swings, *self._axis):
             field.interpretText()
         self._nominal.settle()
@@ -167,7 +167,7 @@ class ItemForm(Translated, QWidget):
         )
 
     def tell_spin(self, text: str) -> None:
-        """Say how far a spin is."""
+        """Show the progress of a spin."""
         self._spin_told.setText(text)
         self._spin_told.setVisible(bool(text))
 
@@ -178,7 +178,7 @@ class ItemForm(Translated, QWidget):
             field.setValue(part)
 
     def stop_spin(self) -> None:
-        """End a spin that goes on."""
+        """Stop a spin in progress."""
         self._spin.setChecked(False)
 
     def picture(self) -> str:
@@ -217,7 +217,7 @@ class ItemForm(Translated, QWidget):
         return bool(self._id.text().strip())
 
     def has_day(self) -> bool:
-        """Return whether what is typed for a day is one, or nothing."""
+        """Return whether the field of a day is valid or empty."""
         return not self._due.text().strip() or self._due.value() is not None
 
     def _typed_axis(self) -> tuple[float, float, float] | None:
@@ -250,7 +250,7 @@ class ItemForm(Translated, QWidget):
         )
 
     def _show_picture(self) -> None:
-        """Show the picture that was given, else the one that is kept."""
+        """Show the new picture, or the stored one."""
         path, kept = self._picture.value(), None
         if isinstance(self._item, ListedTip):
             kept = kept_picture(self._folder, self._item)
@@ -311,7 +311,7 @@ class ItemForm(Translated, QWidget):
 
 
 def kept_picture(folder: Path, tip: ListedTip) -> ReadPicture | None:
-    """Return what reads the picture of a tip that is kept; None if there is none."""
+    """Return a reader of the stored picture of a tip; None without one."""
     if tip.picture is None:
         return None
     return partial(read_kept_picture, folder, tip.picture)
@@ -320,7 +320,7 @@ def kept_picture(folder: Path, tip: ListedTip) -> ReadPicture | None:
 def _alike(
     axis: tuple[float, float, float] | None, kept: tuple[float, float, float]
 ) -> bool:
-    """Return whether an axis is the kept one, to the digits that are shown."""
+    """Return whether an axis equals the stored one at the displayed precision."""
     return axis is not None and all(
         abs(one - two) < 1e-5 for one, two in zip(axis, kept, strict=True)
     )

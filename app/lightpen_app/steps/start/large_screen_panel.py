@@ -1,4 +1,4 @@
-"""What Start shows on a vast screen: how the tip developed, or how all of it goes."""
+"""Panel of Start on a very large screen: trend of the tip, or an introduction."""
 
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ LEAST_TREND = 2  # calibrations; of one there is nothing to see but its figures
 
 
 class LargeScreenPanel(QWidget):
-    """Shows the trend of a tip; of one that has none, what the program is for.
+    """Shows the trend of a tip, or an introduction without one.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class LargeScreenPanel(QWidget):
         job.start()
 
     def shut_down(self) -> None:
-        """Cancel what is under way."""
+        """Cancel running jobs."""
         if self._job is not None:
             self._job.cancel()
 

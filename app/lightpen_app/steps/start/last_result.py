@@ -1,4 +1,4 @@
-"""Looks up the result of the pen and tip that are named, and shows what it says."""
+"""Reads and shows the last result of the selected pen and tip."""
 
 from collections.abc import Callable
 
@@ -109,7 +109,7 @@ class LastResultPresenter(QObject):
             self.look_up()
 
     def show_status(self) -> None:
-        """Mark the tip that is named, as it stands now."""
+        """Mark the selected tip by its status."""
         now, library = self._selection.preparation, self._library
         status = library.statuses.of_tip(now.names.pen, now.names.tip)
         self._panel.set_status(None if now.origin is Origin.SIMULATED else status)
@@ -123,6 +123,6 @@ class LastResultPresenter(QObject):
 
 
 def _key(preparation: Preparation) -> tuple[str, str, bool]:
-    """Return what the result that is shown is looked for by."""
+    """Return the key of the displayed result."""
     names = preparation.names
     return names.pen, names.tip, preparation.origin is Origin.SIMULATED

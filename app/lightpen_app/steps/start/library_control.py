@@ -84,7 +84,7 @@ class LibraryControl(QObject):
         question.set_words(self._asking)
 
     def refresh(self) -> None:
-        """Show the library as it is now, for the pen that is chosen."""
+        """Show the library for the selected pen."""
         statuses, pen = self._watch.statuses, self._selection.preparation.names.pen
         for kind in ItemKind:
             self._names.set_choices(kind, self._choices(kind, pen))

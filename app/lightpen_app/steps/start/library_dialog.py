@@ -179,7 +179,7 @@ class LibraryDialog(Translated, QDialog):
         self._tabs.setCurrentIndex(KINDS.index(kind))
 
     def set_value(self, statuses: StationStatus, pen: str, *, is_guarded: bool) -> None:
-        """Show how all items stand; tips on a pen, if one is named.
+        """Show the status of all items; tips of a pen, if one is selected.
 
         Parameters
         ----------
@@ -190,13 +190,13 @@ class LibraryDialog(Translated, QDialog):
         self._fill()
 
     def add(self, name: str, kind: ItemKind | None = None) -> None:
-        """Ask for a new item, with an id that may be known already."""
+        """Open the form for a new item, optionally with its id."""
         self.set_kind(kind or self.kind())
         made = structs.replace(MADE[self.kind()](id="?"), id=name)
         self._start_editing(made, self.tr("New item"), is_new=True)
 
     def tell_kept(self, asked: RequestedChange) -> None:
-        """Show that what was asked for is done, if that is still waited for."""
+        """Show that the requested change is done, if still pending."""
         if asked is self._asked:
             self._stop_editing()
 
@@ -210,7 +210,7 @@ class LibraryDialog(Translated, QDialog):
         return True
 
     def rows(self) -> tuple[tuple[str, ...], ...]:
-        """Return what is written in the table."""
+        """Return the texts of the table."""
         model = self._model
         return tuple(
             tuple(model.item(row, column).text() for column in range(len(WIDTHS) + 1))

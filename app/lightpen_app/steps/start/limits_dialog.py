@@ -19,7 +19,7 @@ from lightpen_app.work.workbench import Workbench
 
 
 class LimitsDialog(Translated, QDialog):
-    """Shows limits; who signs as a supervisor lays others down.
+    """Shows limits; a supervisor may change them.
 
     Signals
     -------
@@ -150,7 +150,7 @@ class LimitsDialog(Translated, QDialog):
 
 
 class LimitsControl(QObject):
-    """Shows the limits of the station in a dialog, and saves what is signed there."""
+    """Shows the limits of the station and saves signed changes."""
 
     def __init__(self, workbench: Workbench, page: QWidget) -> None:
         super().__init__(page)

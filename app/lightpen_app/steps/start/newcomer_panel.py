@@ -1,4 +1,4 @@
-"""What somebody needs who has never seen the program: what it is, and a trial of it."""
+"""Panel for a first start: introduction and trial."""
 
 import sys
 
@@ -15,7 +15,7 @@ WIDTH = 112 * GRID  # px
 
 
 class Introduction(QDialog):
-    """Shows what is calibrated, how, and in which steps.
+    """Shows item, method and steps.
 
     Signals
     -------
@@ -57,7 +57,7 @@ DEMO = (sys.executable, ["-m", "lightpen_app", "--demo"])
 
 
 class NewcomerPanel(Translated, QGroupBox):
-    """Explains the program, plays its demo, and lets it be tried out.
+    """Introduces the program, plays the demo, and starts a trial.
 
     Signals
     -------
@@ -110,7 +110,7 @@ class NewcomerPanel(Translated, QGroupBox):
         introduction.open()
 
     def _on_play_clicked(self) -> None:
-        """Play the demo in a window of its own, which leaves this one as it is."""
+        """Play the demo in its own window."""
         QProcess.startDetached(*DEMO)
 
     def _retranslate(self) -> None:

@@ -1,4 +1,4 @@
-"""The step Start: who calibrates what, where, and what there is of it already."""
+"""The step Start: station, operator, item, and interrupted work."""
 
 from PySide6.QtCore import QEvent, QSize
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent

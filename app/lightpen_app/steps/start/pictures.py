@@ -24,7 +24,7 @@ translate = QCoreApplication.translate
 
 
 class Pictures(Translated, QWidget):
-    """Shows what is calibrated, how, and in which steps."""
+    """Shows item, method and steps."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -50,7 +50,7 @@ class Pictures(Translated, QWidget):
         self._retranslate()
 
     def set_vast(self) -> None:
-        """Put the steps beside larger pictures, in larger letters."""
+        """Set the large layout: steps beside larger pictures."""
         for picture in self._pictures:
             picture.setMaximumHeight(ANY_HEIGHT)
         for label in (*self._words, self._steps):
@@ -82,7 +82,7 @@ class Pictures(Translated, QWidget):
 
 
 def _steps() -> tuple[tuple[str, str], ...]:
-    """Return the name of each step, and what is done there."""
+    """Return name and purpose of each step."""
     return (
         (
             translate("Introduction", "Start"),

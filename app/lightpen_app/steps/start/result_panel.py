@@ -146,7 +146,7 @@ class LastResultPanel(Translated, QGroupBox):
             set_size(cell, figures)
 
     def value(self) -> LastResult:
-        """Return what is shown."""
+        """Return the value."""
         return self._value
 
     def set_value(self, value: LastResult) -> None:
@@ -156,7 +156,7 @@ class LastResultPanel(Translated, QGroupBox):
         self._retranslate()
 
     def set_rule(self, rule: DueRule) -> None:
-        """Go by another rule of how long a tip may be in force."""
+        """Set the calibration interval."""
         if rule != self._rule:
             self._rule = rule
             self._retranslate()
@@ -172,7 +172,7 @@ class LastResultPanel(Translated, QGroupBox):
         self._verify.set_why_not(why_not, told)
 
     def words(self) -> tuple[str, ...]:
-        """Return what is said, line by line."""
+        """Return the texts, line by line."""
         marks = [each.value().text for each in (self._grade, self._standing)]
         lines = [self._age.text(), *marks, self._when.text()]
         if self._value.result is not None:

@@ -16,7 +16,7 @@ STEP_MS = 1000  # from one sound to the next; none is longer
 
 
 class SoundTest(Translated, QWidget):
-    """Plays the sounds one after the other, or says why nothing can be heard.
+    """Plays the sounds one after the other, or reports why audio is unavailable.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class SoundTest(Translated, QWidget):
         self._retranslate()
 
     def words(self) -> str:
-        """Return what is said beside the button."""
+        """Return the text beside the button."""
         return self._words.value().text
 
     def stop(self) -> None:
@@ -70,7 +70,7 @@ class SoundTest(Translated, QWidget):
         self._play_next()
 
     def _tell_silence(self) -> None:
-        """Say why nothing can be heard, as long as that is so."""
+        """Report why audio is unavailable, as long as it is."""
         silence = self._silence()
         self._words.set_value(
             StatusMessage(silence, Sign.WARNING) if silence else StatusMessage()

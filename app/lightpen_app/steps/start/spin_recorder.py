@@ -48,7 +48,7 @@ class SpinRecorder(QObject):
             self._live.image_shown.disconnect(self._on_image_shown)
 
     def fit(self) -> SpinFit:
-        """Return the axis by what was seen.
+        """Return the axis from the spin.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The picture of a tip, as the library keeps it or as it is about to be kept."""
+"""The picture of a tip, stored or new."""
 
 from collections.abc import Callable
 
@@ -63,7 +63,7 @@ class TipPicture(Translated, QLabel):
 
 
 def _scaled(read: ReadPicture, place: QSize, density: float) -> QImage:
-    """Return a picture as large as it is shown."""
+    """Return a picture scaled for display."""
     buffer = QBuffer()
     buffer.setData(QByteArray(read()))
     buffer.open(QIODevice.OpenModeFlag.ReadOnly)

@@ -61,7 +61,7 @@ class LeaningDial(PostureDial):
         self._retranslate()
 
     def forget_wish(self) -> None:
-        """Begin from where the pen is seen, as after somebody else has led it."""
+        """Begin at the detected posture."""
         self._wish = None
 
     @override

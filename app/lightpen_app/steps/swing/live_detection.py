@@ -12,7 +12,7 @@ RATE_S = 2.0  # over which the images are counted
 
 
 class LiveDetectionView(QObject):
-    """Looks at the live images, beside the swing that is captured from them."""
+    """Shows the live detection beside its swing."""
 
     def __init__(self, run: SwingRun, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -34,7 +34,7 @@ class LiveDetectionView(QObject):
             self._arrivals.popleft()
 
     def words(self) -> str:
-        """Return what the last image shows, a few words; nothing without one."""
+        """Return the content of the last image in a few words; empty without one."""
         seen, setup = self._seen, self._run.status.setup
         if seen is None or setup is None:
             return ""
@@ -48,7 +48,7 @@ class LiveDetectionView(QObject):
         return text.format(n_leds, setup.pen.n_leds, round(self.rate()))
 
     def rate(self) -> float:
-        """Return how many images come, 1/s."""
+        """Return the frame rate, 1/s."""
         if len(self._arrivals) < 2:
             return 0.0
         (start, first), (end, last) = self._arrivals[0], self._arrivals[-1]

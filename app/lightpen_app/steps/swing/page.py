@@ -157,11 +157,11 @@ class SwingPage(Page):
         self._show()
 
     def _missing_input(self) -> str:
-        """Return what a swing needs and does not have, the first of it."""
+        """Return the first missing input of a swing."""
         return first_missing(self._selection.preparation.missing_inputs())
 
     def _ask_about_choices(self) -> None:
-        """Ask whether a swing goes on though something else was chosen meanwhile."""
+        """Ask whether to continue a swing although the selection has changed."""
         if self._is_entered and self._run.status.has_other_choices:
             self._runner.keep_choices()
             self._question.ask_about(other_choices_question, self._start_anew)
@@ -171,7 +171,7 @@ class SwingPage(Page):
             self._showing.start()
 
     def _show(self) -> None:
-        """Show what is the case now, here and in the operator view."""
+        """Update page and operator view."""
         before = self._shown
         self._shown = now = self._presenter.page_state(is_away=not self._is_entered)
         self._face.set_state(now)

@@ -40,7 +40,7 @@ SOUNDS: dict[SwingEventKind, Sound] = {
 
 
 class SideAction(Enum):
-    """What the button beside Start over does."""
+    """Action of the button beside Start over."""
 
     OPEN_CAMERA = auto()
     TRY_AGAIN = auto()
@@ -83,7 +83,7 @@ class SwingPageState:
 
 @dataclass(frozen=True, eq=False)
 class SwingProgress:
-    """What a swing lacks, measured once for each image that is kept.
+    """Missing images of a swing, computed once for each accepted image.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class SwingProgress:
 def advance_progress(
     before: SwingProgress | None, status: SwingStatus
 ) -> SwingProgress | None:
-    """Return what the swing lacks now; None where there is no swing."""
+    """Return what the swing lacks; None without a swing."""
     state, setup = status.state, status.setup
     if state is None or setup is None:
         return None
@@ -122,7 +122,7 @@ def advance_progress(
 
 
 class SwingPresenter(QObject):
-    """Computes what the page shows; counts the images beside the swing.
+    """Computes the page state; counts images beside the swing.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ class SwingPresenter(QObject):
         self.solved = 0.0
 
     def view_state(self, *, is_away: bool) -> SwingViewState | None:
-        """Return all that decides what is told of the swing; None without one."""
+        """Return the view state of the swing; None without one."""
         status = self._run.status
         state, setup = status.state, status.setup
         self._progress = progress = advance_progress(self._progress, status)
@@ -165,14 +165,14 @@ class SwingPresenter(QObject):
         )
 
     def fraction_kept(self) -> float:
-        """Return how many of the images of the swing are kept, 0 to 1."""
+        """Return the fraction of accepted images, 0 to 1."""
         state, progress = self._run.status.state, self._progress
         if state is None or progress is None:
             return 0.0
         return state.n_kept / max(state.n_kept + progress.short.n_more, 1)
 
     def page_state(self, *, is_away: bool) -> SwingPageState:
-        """Return what the page shows now."""
+        """Return the page state."""
         status, view = self._run.status, self.view_state(is_away=is_away)
         connection, words = self._live.worst_connection, self._words
         is_near = connection is Connection.STREAMING
@@ -201,7 +201,7 @@ class SwingPresenter(QObject):
 
 
 def main_action(status: SwingStatus) -> MainAction:
-    """Return what the main button does now."""
+    """Return the present action of the main button."""
     translate, state = QCoreApplication.translate, status.state
     if state is None or status.is_capturing:
         has_images = state is not None and state.n_kept > 0
@@ -229,7 +229,7 @@ def _why_no_review(status: SwingStatus, state: SwingState) -> str:
 
 
 def side_action(status: SwingStatus, connection: Connection) -> SideAction:
-    """Return what the button beside Start over does now."""
+    """Return the present action of the button beside Start over."""
     state = status.state
     if state is None or status.is_capturing:
         if connection is Connection.CLOSED:
@@ -245,7 +245,7 @@ def side_action(status: SwingStatus, connection: Connection) -> SideAction:
 
 
 def side_text(action: SideAction) -> str:
-    """Return what the button beside Start over is called."""
+    """Return the label of the button beside Start over."""
     translate = QCoreApplication.translate
     texts = {
         SideAction.OPEN_CAMERA: translate("SwingPage", "Open the camera"),
@@ -301,7 +301,7 @@ def finish_question(status: SwingStatus) -> Question:
 
 
 def other_choices_question() -> Question:
-    """Return whether a swing goes on though something else was chosen meanwhile."""
+    """Return the question whether to continue although the selection has changed."""
     translate = QCoreApplication.translate
     return Question(
         translate(

@@ -69,7 +69,7 @@ class SwingPlots(Translated, QWidget):
         return self._misfit, self._scatter, self._estimate, self._uncertainty
 
     def show_next(self, state: SwingState, max_uncertainty: float) -> None:
-        """Show how a swing went so far in the plot whose turn it is.
+        """Update one plot, in turn.
 
         One at a time, so that the window is never held up by all of them.
 
@@ -128,5 +128,5 @@ class SwingPlots(Translated, QWidget):
 
 
 def _numbers(kept: AcceptedImages) -> FloatArray:
-    """Return the numbers (N,) of kept images."""
+    """Return the numbers (N,) of accepted images."""
     return kept.numbers.astype(np.float64)

@@ -1,4 +1,4 @@
-"""How many images of a swing are told to be to go: the figure does not creep up."""
+"""Displayed number of remaining images, which does not increase slightly."""
 
 from dataclasses import dataclass
 from math import ceil
@@ -11,7 +11,7 @@ LEAST_RISE = 2  # by which a small figure has to be wrong before it is told
 
 @dataclass(frozen=True)
 class RemainingImages:
-    """How many images are to go, as it is told.
+    """Displayed number of remaining images.
 
     What is estimated anew with each image goes up and down. Told is the least of it,
     but for a rise that is more than chance, and after images were dropped.
@@ -32,11 +32,11 @@ class RemainingImages:
 
     @classmethod
     def first(cls, n_more: int, n_kept: int) -> Self:
-        """Return what is told first of a swing."""
+        """Return the first displayed number of a swing."""
         return cls(in_true_steps(n_more), n_kept)
 
     def after(self, n_more: int, n_kept: int) -> Self:
-        """Return what is told by the next estimate."""
+        """Return the displayed number after the next estimate."""
         now = self.first(n_more, n_kept)
         if n_kept < self.n_kept or now.n_images < self.n_images:
             return now
@@ -47,7 +47,7 @@ class RemainingImages:
 
 
 def in_true_steps(n_more: int) -> int:
-    """Return how many images are to go, rounded up to what an estimate is worth."""
+    """Return the number rounded up to the accuracy of the estimate."""
     step = _step(n_more)
     return ceil(n_more / step) * step
 

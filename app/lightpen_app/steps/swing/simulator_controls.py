@@ -67,13 +67,13 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         self._layout.setSpacing(GRID // 2 if self._room.is_narrow else GRID)
 
     def lean(self, posture: Posture) -> None:
-        """Hold the pen as the user wants, who leads it from now on."""
+        """Hold the pen as the user requests, instead of following the swing."""
         self._lead_by_hand()
         tilt, direction, turn = posture.tilt, posture.direction, posture.turn
         self._command(lambda operator: operator.lean(tilt, direction, turn))
 
     def follows(self) -> bool:
-        """Return whether the operator does what the swing asks for."""
+        """Return whether the operator follows the swing."""
         return self._follow.isChecked()
 
     @override

@@ -113,7 +113,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._retranslate()
 
     def value(self) -> OperatorValue:
-        """Return what is shown."""
+        """Return the value."""
         return self._value
 
     def set_value(
@@ -143,7 +143,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self.side.set_why_not(state.why_not_side)
 
     def set_image(self, shown: DisplayedImage) -> None:
-        """Show a live image, with rings about what is seen."""
+        """Show a live image with rings about the spots."""
         rings = (replace(ring, label="") for ring in live_markers(shown.seen))
         self._image.set_half(shown.half, shown.size, tuple(rings))
 
@@ -168,7 +168,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
 
     @override
     def _use_room(self) -> None:
-        """Put the plots beside the dial, or below it where there is little room."""
+        """Place the plots beside the dial, or below it in a small window."""
         is_small = self._is_small
         if is_small:
             self._side.addWidget(self._banner, 1, 0, 1, 3)
@@ -200,7 +200,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._count.set_largest(TextSize.HUGE if is_large else TextSize.DISPLAY)
 
     def _share_room(self) -> None:
-        """Divide the room beside the dial among numbers, pen, image and plots."""
+        """Divide the space beside the dial among numbers, pen, image and plots."""
         columns, rows = SIDE_SHARES, ROW_SHARES
         if self._is_small:
             columns, rows = (*columns[:2], 0), (1, 0)
@@ -214,7 +214,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
             self._side.setRowStretch(row, share)
 
     def _hold_first_row(self, height: int) -> None:
-        """Let the dial and what is beside it be seen whole above the plots."""
+        """Keep the dial and its neighbours fully visible above the plots."""
         self._body.setRowMinimumHeight(0, height if self._is_small else 0)
 
 

@@ -58,7 +58,7 @@ _LOOKS: dict[Phase, tuple[Sign, Tone]] = {
 
 @dataclass(frozen=True, eq=False)
 class SwingViewState:
-    """All that decides what is shown.
+    """Input of the displayed values.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class SwingWords(QObject):
     """Puts a moment of a swing into words, signs and numbers."""
 
     def operator_value(self, moment: SwingViewState) -> OperatorValue:
-        """Return what is shown, on the page and in the operator view."""
+        """Return the content of page and operator view."""
         told = self._told(moment)
         return OperatorValue(
             instruction=told.short,
@@ -140,7 +140,7 @@ class SwingWords(QObject):
         )
 
     def resting_value(self) -> OperatorValue:
-        """Return what is shown while other steps are, without a swing."""
+        """Return the content without a swing, while another step is shown."""
         told = Instruction(
             self.tr("No swing yet"),
             self.tr("The swing starts when the step Swing is opened at the computer."),
@@ -149,7 +149,7 @@ class SwingWords(QObject):
         return OperatorValue(told.short, told.hint, state)
 
     def waiting_value(self, refusal: Message | None, *, is_near: bool) -> OperatorValue:
-        """Return what is shown before there is a swing.
+        """Return the content before a swing.
 
         Parameters
         ----------
@@ -173,7 +173,7 @@ class SwingWords(QObject):
         )
 
     def note(self, moment: SwingViewState) -> str:
-        """Return what the count leaves out: time, limit, and what was of no use."""
+        """Return what the count excludes: time, limit, and unused images."""
         limit = moment.setup.limits.max_images
         text = self.tr("at most {0} images").format(limit)
         if moment.setup.is_recording:
@@ -196,7 +196,7 @@ class SwingWords(QObject):
         return self.tr("More images needed to complete the postures")
 
     def warning(self, moment: SwingViewState) -> StatusMessage:
-        """Return what no swing can mend, told as soon as it is known."""
+        """Return a warning that no swing can resolve."""
         why = out_of_reach(moment.setup.limits, moment.state, moment.short)
         is_asked = not moment.setup.is_recording
         if why is None or not is_asked or moment.state.phase is Phase.VERDICT:
@@ -342,7 +342,7 @@ class SwingWords(QObject):
         return self.tr("{0} of about {1} images").format(n_kept, n_in_all)
 
     def _read(self, moment: SwingViewState) -> str:
-        """Return how many images of a recording are read; nothing before the first."""
+        """Return the progress of reading a recording; empty before the first image."""
         progress = moment.state.progress
         if not progress.n_images:
             return ""
@@ -350,7 +350,7 @@ class SwingWords(QObject):
         return words.format(progress.n_read, progress.n_images)
 
     def _time_left(self, moment: SwingViewState) -> str:
-        """Return how long the swing goes on at the pace of the last images."""
+        """Return the remaining time at the present rate."""
         state, is_recording = moment.state, moment.setup.is_recording
         is_on = state.phase is Phase.CAPTURING and not is_recording
         if not is_on or not isfinite(state.kept.uncertainty):
@@ -365,7 +365,7 @@ class SwingWords(QObject):
         return self.tr("about {0} s left").format(max(10 * ceil(seconds / 10), 10))
 
     def _keys(self, moment: SwingViewState) -> str:
-        """Return what the keys of the operator view do now."""
+        """Return the keys of the operator view."""
         if moment.is_away:
             return ""
         if moment.verdict is not None:
@@ -378,7 +378,7 @@ class SwingWords(QObject):
 
 
 def images_period(times: FloatArray) -> float | None:
-    """Return the time from one kept image to the next, s; None of too few.
+    """Return the interval between accepted images, s; None for too few.
 
     Parameters
     ----------
@@ -408,7 +408,7 @@ def _to_go(moment: SwingViewState) -> RemainingImages:
 
 
 def _n_more(moment: SwingViewState) -> int:
-    """Return how many images are to go, no more than is told."""
+    """Return the remaining images, no more than displayed."""
     return min(moment.short.n_more, _to_go(moment).n_images)
 
 

@@ -1,1 +1,1 @@
-"""The step Verify: the tip in force proven by touching what is known."""
+"""The step Verify: verification of the current tip on reference artefacts."""

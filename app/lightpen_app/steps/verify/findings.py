@@ -34,7 +34,7 @@ PICTURE_SHARE, LARGE_PICTURE_SHARE, TABLES_SHARE = 3, 9, 13  # of the width
 
 @dataclass(frozen=True)
 class TaskPicture:
-    """A view of a task beside its figures.
+    """A picture of a task beside its figures.
 
     Attributes
     ----------
@@ -222,7 +222,7 @@ def dial_of(touched: list[Posture], posture: Posture | None) -> DialValue:
 
 
 def live_posture(setup: SessionSetup, state: SessionState) -> Posture | None:
-    """Return how the pen is held now, where it is seen."""
+    """Return the present posture, if detected."""
     touching = state.touching
     if not touching.held or touching.n_lost:
         return None

@@ -58,7 +58,7 @@ class ImagesRow(Translated, QWidget):
         self._retranslate()
 
     def set_progress(self, fraction: float | None) -> None:
-        """Show how much is read, 0 to 1, or that nothing is being read."""
+        """Show the progress of reading, 0 to 1, or none."""
         is_reading = fraction is not None
         for widget in (self._progress, self._cancel):
             widget.setVisible(is_reading)

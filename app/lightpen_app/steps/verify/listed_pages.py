@@ -1,4 +1,4 @@
-"""Pages, one of which is shown, and a list of them beside it or a field above it."""
+"""Pages with a list beside or a field above them."""
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
@@ -20,7 +20,7 @@ ROOM = 2 * GRID  # px, beside the longest title
 
 
 class ListedPages(ResponsiveLayout, QWidget):
-    """Shows the page whose title is chosen."""
+    """Shows the page of the selected title."""
 
     narrow_below = 116 * GRID  # px; then the titles are in a field above the page
 
@@ -78,7 +78,7 @@ class ListedPages(ResponsiveLayout, QWidget):
         self._list.setCurrentRow(self._stack.indexOf(page))
 
     def set_list_name(self, name: str) -> None:
-        """Say to a screen reader what is listed."""
+        """Set the accessible name of the list."""
         for each in (self._list, self._field):
             each.setAccessibleName(name)
 

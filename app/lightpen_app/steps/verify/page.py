@@ -189,7 +189,7 @@ class VerifyPage(ResponsiveLayout, Page):
 
     @override
     def _use_room(self) -> None:
-        """Put the live image beside the tasks, or among them."""
+        """Place the live image beside or among the tasks."""
         if self._room.is_narrow:
             self._image.setMinimumWidth(0)
             self._pages.add(self._image)
@@ -211,7 +211,7 @@ class VerifyPage(ResponsiveLayout, Page):
             self._showing.start()
 
     def _show(self) -> None:
-        """Show what is the case now, here and in the operator view."""
+        """Update page and operator view."""
         before, self._view = self._view, self._presenter.view()
         view, status = self._view, self._run.status
         self._progress.set_value(view)

@@ -98,7 +98,7 @@ class PenPanel(Translated, QWidget):
         self._retranslate()
 
     def shut_down(self) -> None:
-        """Let go of what is computed."""
+        """Cancel running jobs."""
         for job in (self._reading, self._improving, self._opening):
             if job is not None:
                 job.cancel()
@@ -317,7 +317,7 @@ class PenPanel(Translated, QWidget):
         return StatusMessage(text.format(*words), Sign.CHECK, Tone.GOOD)
 
     def _figures(self, found: PenOverTime, health: PenHealth) -> Figures:
-        """Return how far each LED moved and how much the pen grew, swing by swing."""
+        """Return the shift of each LED and the growth of the pen, by swing."""
         heads = *map(str, range(1, len(found.pen.leds) + 1)), self.tr("size")
         names, cells = [], []
         for swing, told in list(zip(found.swings, health.swings, strict=True))[

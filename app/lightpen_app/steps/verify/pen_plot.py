@@ -13,7 +13,7 @@ DOT = 6  # px
 
 
 class LedMovesPlot(Plot):
-    """A line for each LED; one that moved stands out."""
+    """A line for each LED; a displaced one stands out."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         self._lines: list[pg.PlotDataItem] = []
@@ -21,7 +21,7 @@ class LedMovesPlot(Plot):
         super().__init__(Axes(""), parent)
 
     def set_data(self, moves: FloatArray, moved: tuple[int, ...]) -> None:
-        """Show how far LEDs (N, L) were moved at each swing, mm, NaN where not seen.
+        """Show the shifts of LEDs (N, L) at each swing, mm, NaN where not seen.
 
         Parameters
         ----------

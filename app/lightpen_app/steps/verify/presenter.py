@@ -36,7 +36,7 @@ from lightpen_app.work.workbench import Workbench
 
 @dataclass(frozen=True)
 class Headline:
-    """What the page says of itself to the window.
+    """Status of the page for the window.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class VerifyView:
 
 
 class VerifyPresenter(QObject):
-    """Computes what is shown from the status of runner, camera and station."""
+    """Computes the view from the status of runner, camera and station."""
 
     def __init__(self, workbench: Workbench, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -88,7 +88,7 @@ class VerifyPresenter(QObject):
         self._verification, self._live = workbench.verification, workbench.live
 
     def view(self) -> VerifyView:
-        """Return what is shown now."""
+        """Return the view."""
         status = self._status
         is_reading = status.reading is ReadingState.IMAGES
         headline = self.headline()
@@ -110,7 +110,7 @@ class VerifyPresenter(QObject):
         )
 
     def headline(self) -> Headline:
-        """Return what the page says of itself."""
+        """Return the status of the page."""
         status, found = self._status, self._status.assessment
         is_doubted = self._tip_is_doubted()
         return Headline(
@@ -122,7 +122,7 @@ class VerifyPresenter(QObject):
         )
 
     def operator_value(self) -> OperatorValue:
-        """Return what is shown on the page and in the operator view."""
+        """Return the content of page and operator view."""
         status, said, banner = self._status, self._instruction(), self._banner()
         setup, state, task = status.setup, status.state, status.task
         if setup is None or state is None or task is None:
@@ -188,7 +188,7 @@ class VerifyPresenter(QObject):
         return MainAction(self.tr("Finish early"), why_not)
 
     def _title(self, task: AnyTask) -> str:
-        """Return the name of a task, and how far it is if it is to be done."""
+        """Return the name of a task, with its progress if selected."""
         status, name = self._status, worded(task.title)
         found = None if status.state is None else status.state.found.get(task.kind)
         if found is not None:
@@ -202,7 +202,7 @@ class VerifyPresenter(QObject):
         return self.tr("{0}: {1}").format(name, far)
 
     def _grade_text(self, grade: Grade) -> str:
-        """Return a grade; what is repeated is the verification and not a swing."""
+        """Return a grade; REPEAT refers to the verification, not to a swing."""
         return self.tr("REPEAT") if grade is Grade.REPEAT else grade_text(grade)
 
     # What the operator has to do

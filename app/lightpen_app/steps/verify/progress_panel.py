@@ -1,4 +1,4 @@
-"""What to do next, how far the verification is, and the buttons that lead it."""
+"""Instruction, progress and buttons of a verification."""
 
 from PySide6.QtWidgets import QProgressBar, QWidget
 from typing_extensions import override

@@ -1,4 +1,4 @@
-"""A ring that fills by angle as it is touched."""
+"""A ring that fills by angle as it is probed."""
 
 import math
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class RingValue:
 
     @property
     def start(self) -> float:
-        """Where what is covered begins, behind the largest gap, rad."""
+        """Start of the covered angle, after the largest gap, rad."""
         ordered = sorted(angle % (2 * math.pi) for angle in self.angles)
         if not ordered:
             return 0.0
@@ -48,7 +48,7 @@ class RingValue:
 
 
 class RingView(Translated, QWidget):
-    """Draws the touches on a ring, and how much of it they cover."""
+    """Draws probed points on a ring and the covered angle."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -58,7 +58,7 @@ class RingView(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> RingValue:
-        """Return what is shown."""
+        """Return the value."""
         return self._value
 
     def set_value(self, value: RingValue) -> None:

@@ -1,4 +1,4 @@
-"""Buttons for the simulated operator who touches, where the pen is simulated."""
+"""Buttons for the simulated operator who probes."""
 
 from PySide6.QtWidgets import QToolButton, QWidget
 from typing_extensions import override

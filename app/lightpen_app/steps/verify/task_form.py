@@ -114,7 +114,7 @@ class TaskForm(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> VerificationChoices:
-        """Return all choices, with those of this task."""
+        """Return all options, with those of this task."""
         is_chosen = self._is_chosen.isChecked()
         choices = self._value.with_task(self._task, is_chosen=is_chosen)
         values = {name: field.chosen() for name, field in self._fields.items()}

@@ -84,7 +84,7 @@ class TaskPanel(Translated, QWidget):
         self._form.set_value(choices)
 
     def set_status(self, status: VerificationStatus, reading: float | None) -> None:
-        """Show a verification, and how much of recorded images is read."""
+        """Show a verification, and the progress of reading images."""
         setup, state, task = status.setup, status.state, self._task
         self._finding.set_value(setup, state)
         found = None if state is None else state.found.get(task.kind)

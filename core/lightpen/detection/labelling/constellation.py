@@ -56,7 +56,7 @@ class Constellation:
 
 
 def certain_leds(pen: Pen) -> int:
-    """Return how many LEDs of a pen must be seen to be labelled among other spots."""
+    """Return the number of LEDs needed to label a pen among other spots."""
     return min(MIN_CERTAIN_LEDS, pen.n_leds)
 
 
@@ -99,7 +99,7 @@ def _constellation(
 
 
 class _Pattern(NamedTuple):
-    """The same, whatever discs the LEDs have and how many of them are enough.
+    """Pattern of a pen, independent of its discs and of the LEDs needed.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ def _heights(corners: FloatArray) -> FloatArray:
 def _self_motions(
     leds: FloatArray, normals: FloatArray, triples: IntArray, sides: FloatArray
 ) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Return the motions, other than none, that lay LEDs onto LEDs, and how many."""
+    """Return the motions, except identity, that map LEDs to LEDs."""
     known = {tuple(triple) for triple in triples.tolist()}
     bases = np.array([t for t in combinations(range(len(leds)), 3) if t in known])
     heights = _heights(leds[bases])

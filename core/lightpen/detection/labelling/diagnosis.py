@@ -74,7 +74,7 @@ _Fits = Callable[[Camera, Pen], bool]
 
 @dataclass(frozen=True, eq=False)
 class _Sample:
-    """A few images, and how many of their spots the pen explains."""
+    """A few images, with the number of spots that the pen explains."""
 
     spots: list[Spots]
     n_possible: int

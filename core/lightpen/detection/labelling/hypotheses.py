@@ -119,7 +119,7 @@ def lookalike_poses(
 def shifted_poses(
     sight: SpotArrays, pen: Constellation, R: FloatArray, t: FloatArray
 ) -> Candidates:
-    """Return poses beside a predicted one, shifted so that LEDs fall on spots.
+    """Return variants of a predicted pose, shifted so that LEDs meet spots.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def shifted_poses(
 def _spot_triples(
     sight: SpotArrays, pen: Constellation, effort: SearchEffort
 ) -> tuple[IntArray, IntArray]:
-    """Return images (G,) and triples (G, 3) of spots that may be triples of LEDs."""
+    """Return images (G,) and triples (G, 3) of spots that may be LEDs."""
     there = sight.rays * np.where(sight.usable, sight.ranges, 0.0)[..., None]
     gaps = np.linalg.norm(there[:, :, None] - there[:, None], axis=-1)
     near = sight.usable[:, :, None] & sight.usable[:, None]
@@ -172,7 +172,7 @@ def _spot_triples(
 
 @lru_cache(maxsize=MAX_SPOTS)
 def _triples_of(n: int) -> IntArray:
-    """Return the triples of n things, those of fewer things first.
+    """Return the triples of n items, those of low numbers first.
 
     So a triple draws the same lot whatever other images an image is labelled with.
     """

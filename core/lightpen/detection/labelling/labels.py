@@ -187,7 +187,7 @@ def label_spots(spots: Spots, camera: Camera, pen: Pen) -> Labels:
 def track_spots(
     spots: Spots, camera: Camera, pen: Pen, R: FloatArray, t: FloatArray
 ) -> Labels:
-    """Label the LEDs in an image whose pose is roughly known.
+    """Label the LEDs of an image with a predicted pose.
 
     Parameters
     ----------

@@ -174,7 +174,7 @@ def fit(
 
 
 def log_false_alarms(sight: SpotArrays, candidates: Candidates) -> FloatArray:
-    """Return log10 of how many labellings this good chance would offer, (C,).
+    """Return log10 of the expected number of false labellings, (C,).
 
     An a-contrario count in the manner of [1]_: the number of ways to give n of L LEDs
     to n of N spots, times the probability that n spots strewn over the area that these

@@ -1,1 +1,1 @@
-"""Bundle adjustment of all that the images depend on, with priors from files."""
+"""Bundle adjustment of all unknowns, with priors from files."""

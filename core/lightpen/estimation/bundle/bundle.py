@@ -320,7 +320,7 @@ def _jitter_beside(
 
 
 def _held_by_state(unknowns: Unknowns, values: FloatArray) -> FloatArray:
-    """Return the values without those that a state does not hold, which are 0 in it."""
+    """Return the values that the state contains."""
     at, held = unknowns.layout, values.copy()
     for kind in (at.tip, at.cone, *at.seat, at.drift):
         held[kind] = 0.0

@@ -1,4 +1,4 @@
-"""Estimation of all variance components, each beside the others."""
+"""Joint estimation of all variance components."""
 
 from collections.abc import Callable
 from functools import partial
@@ -22,7 +22,7 @@ ROUNDS = 3  # of finding each component beside the others
 def find_components(
     unknowns: Unknowns, information: FloatArray, right: FloatArray, before: Components
 ) -> Components:
-    """Find the components, each beside the others.
+    """Estimate the components jointly.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def _found_once(
 def _found_seat(
     unknowns: Unknowns, information: FloatArray, right: FloatArray, before: Components
 ) -> tuple[Component, tuple[Component, ...]]:
-    """Return the component of an oval seat, and those of its modes.
+    """Return the components of an oval seat and of its modes.
 
     An oval, equation (7), is a combination of modes, and either can explain the other.
     The likelier is fitted; the other is expected by its likelihood ratio to that.

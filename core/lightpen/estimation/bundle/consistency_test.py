@@ -199,13 +199,13 @@ class FileFit:
         return self._deviations(i, others) > LIMIT
 
     def _explains(self, released: tuple[int, ...]) -> bool:
-        """Tell whether these numbers are inconsistent, and no others beside them."""
+        """Return whether releasing exactly these numbers resolves the contradiction."""
         return not self._inconsistent(released) and all(
             self._is_inconsistent(i, released) for i in released
         )
 
     def _one_by_one(self) -> tuple[int, ...]:
-        """Return numbers to release, each the worst beside those before."""
+        """Return numbers to release, found one at a time, the worst first."""
         released: tuple[int, ...] = ()
         while inconsistent := self._inconsistent(released):
             released = (*released, max(inconsistent, key=lambda i: inconsistent[i]))

@@ -88,7 +88,7 @@ class Priors:
 
     @property
     def size_covariance(self) -> FloatArray:
-        """Of the scale as it is during the swing, (1, 1)."""
+        """Return the covariance of the scale during the swing, (1, 1)."""
         return self.scale.covariance + self.temperature.covariance
 
 

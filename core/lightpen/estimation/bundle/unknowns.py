@@ -271,12 +271,12 @@ class Unknowns:
 
 
 def led_basis(leds: FloatArray) -> FloatArray:
-    """Return all moves of LEDs but those of the pen as a whole, (3 L, 3 L - 6)."""
+    """Return a basis of LED moves without rigid moves and scale, (3 L, 3 L - 6)."""
     return np.asarray(np.linalg.qr(whole_moves(leds), mode="complete")[0][:, 6:])
 
 
 def whole_moves(leds: FloatArray) -> FloatArray:
-    """Return the moves of LEDs by those of the pen as a whole, (3 L, 6).
+    """Return the LED moves caused by rigid moves, (3 L, 6).
 
     Its shifts, mm, and its turns about the middle of the LEDs, rad.
     """

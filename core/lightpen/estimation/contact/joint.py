@@ -219,7 +219,7 @@ class Linearised:
 
 @dataclass(frozen=True, eq=False)
 class ContactModel:
-    """Images of the LEDs of a pen whose tip rests in the cone.
+    """Images of a pen whose tip rests in the cone.
 
     Attributes
     ----------

@@ -57,7 +57,7 @@ class PosedImages:
 
 
 def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedImages:
-    """Fit the pose of each image, and leave out those of another tip.
+    """Fit the pose of each image and exclude those of another tip.
 
     Raises
     ------

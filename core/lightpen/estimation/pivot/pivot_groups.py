@@ -113,7 +113,7 @@ class _Equations:
         return np.asarray(np.linalg.lstsq(A, b)[0])
 
     def residuals(self, solution: FloatArray) -> FloatArray:
-        """Return by how much each equation misses, (N, 3), mm."""
+        """Return the residual of each equation, (N, 3), mm."""
         return self.A @ solution - self.b
 
     def own_residuals(self, labels: IntArray, solutions: FloatArray) -> FloatArray:

@@ -105,7 +105,7 @@ def _transposed(rotations: FloatArray) -> FloatArray:
 
 
 def _with_scalar_moved(rotations: FloatArray, places: int) -> FloatArray:
-    """Return rotations whose quaternions had their scalar at the wrong end."""
+    """Return rotations from quaternions with the scalar at the other end."""
     from scipy.spatial.transform import Rotation  # takes 0.2 s
 
     quaternions = Rotation.from_matrix(rotations).as_quat()

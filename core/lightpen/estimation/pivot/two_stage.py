@@ -131,7 +131,7 @@ def _solved(normal: FloatArray, right: FloatArray) -> FloatArray:
 def propagated_covariance(
     rotations: FloatArray, covariances: FloatArray, tip_pen: FloatArray
 ) -> FloatArray:
-    """Return the covariance of the two-stage solution by those of the poses.
+    """Return the covariance of the two-stage solution from that of the poses.
 
     Its arguments are those of `lightpen.estimation.pivot.pivot.tip_covariances`.
 

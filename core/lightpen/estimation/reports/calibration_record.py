@@ -1,4 +1,4 @@
-"""The record of a calibration: what is written, read, reported and published as schema.
+"""The calibration record: one definition for files, reports and the schema.
 
 The program writes and reads these types and no others; `docs/schema.py` makes the
 published JSON schema of them. A number that could not be found is None; tip, cone,
@@ -253,7 +253,7 @@ class CoverageRecord(Struct, frozen=True):
 
 
 class LedRecord(Struct, frozen=True):
-    """The residuals of an LED, and how far it is from its place in the file."""
+    """Residuals of an LED, and its distance from the file position."""
 
     led: Place
     seen: Count
@@ -279,7 +279,7 @@ class CameraPlace(Struct, frozen=True, omit_defaults=True):
 
 
 class CameraRecord(Struct, frozen=True):
-    """What the images say of a camera of a rig."""
+    """Results of one camera of a rig."""
 
     name: str
     images: ImageCounts
@@ -291,7 +291,7 @@ class CameraRecord(Struct, frozen=True):
 
 
 class RigRecord(Struct, frozen=True):
-    """What the images say of the cameras of a rig."""
+    """Results of the cameras of a rig."""
 
     cameras: tuple[CameraRecord, ...]
 

@@ -187,7 +187,7 @@ def _uncertainty(calibration: Calibration) -> UncertaintyRecord:
 
 
 def _adjusted(calibration: Calibration) -> AdjustmentRecord:
-    """Return what the images made of the files."""
+    """Return the adjusted values of the files."""
     priors, reading = calibration.priors, calibration.priors.reading
     return AdjustmentRecord(
         intrinsics=adjusted_intrinsics(calibration, 0),
@@ -221,7 +221,7 @@ def _adjusted(calibration: Calibration) -> AdjustmentRecord:
 
 
 def _lamps(calibration: Calibration) -> tuple[LampRecord, ...]:
-    """Return what each camera's fixed lamps tell."""
+    """Return the fixed lamps of each camera."""
     names = calibration.bundle.state.rig.names or ("",)
     return tuple(
         LampRecord(
@@ -342,7 +342,7 @@ def _frames(calibration: Calibration) -> Iterator[FrameRecord]:
 def adjusted_intrinsics(
     calibration: Calibration, c: int
 ) -> dict[str, AdjustedParameter]:
-    """Return what the images made of the intrinsics of the c-th camera."""
+    """Return the adjusted intrinsics of the c-th camera."""
     camera = calibration.bundle.state.rig.cameras[c]
     place = calibration.bundle.layout.cameras[c]
     deviations = np.sqrt(np.diag(calibration.bundle.covariance)[place])
@@ -356,7 +356,7 @@ def adjusted_intrinsics(
 
 
 def _rig(calibration: Calibration) -> RigRecord:
-    """Return what the images of several cameras say of each."""
+    """Return the results of each camera of a rig."""
     names = calibration.bundle.state.rig.names
     return RigRecord(
         tuple(

@@ -15,7 +15,7 @@ from lightpen.swing_messages import not_simultaneous
 
 
 def lamp_warnings(calibration: Calibration) -> list[Message]:
-    """Return what is told of lamps that moved in the images."""
+    """Return warnings on fixed lamps that moved in the images."""
     rig, warnings = calibration.bundle.state.rig, []
     for c, images in enumerate(calibration.cameras):
         path = images.path
@@ -31,7 +31,7 @@ def lamp_warnings(calibration: Calibration) -> list[Message]:
 
 
 def warnings_of(calibration: Calibration) -> list[Message]:
-    """Return what the user should look into, one sentence or two each."""
+    """Return all warnings, one or two sentences each."""
     leds, sigma = calibration.leds, calibration.joint.sigma
     warnings = [
         *_rig_warnings(calibration),
@@ -59,7 +59,7 @@ def warnings_of(calibration: Calibration) -> list[Message]:
 
 
 def _seat_warnings(calibration: Calibration) -> list[Message]:
-    """Return what is told of a tip that did not rest where the model has it."""
+    """Return warnings on a seat that deviates from the model."""
     bundle, found = calibration.bundle, calibration.bundle.budget_components
     warnings = []
     jitter = found.jitter.covariance
@@ -86,7 +86,7 @@ def _seat_warnings(calibration: Calibration) -> list[Message]:
 
 
 def late_cameras(calibration: Calibration) -> list[Message]:
-    """Return what is told of cameras that took their images later than the first."""
+    """Return warnings on cameras with a time lag."""
     names = calibration.bundle.state.rig.names[1:]
     return [
         not_simultaneous(name, lag.value)
@@ -96,7 +96,7 @@ def late_cameras(calibration: Calibration) -> list[Message]:
 
 
 def _rig_warnings(calibration: Calibration) -> list[Message]:
-    """Return what the user of several cameras should look into."""
+    """Return the warnings for several cameras."""
     rig = calibration.bundle.state.rig
     warnings = late_cameras(calibration)
     if rig.n_cameras == 1:
@@ -132,5 +132,5 @@ def _rig_warnings(calibration: Calibration) -> list[Message]:
 
 
 def count_dropped(reasons: tuple[Reason, ...]) -> Counter[Reason]:
-    """Return how many images do not take part, by reason."""
+    """Return the number of excluded images by reason."""
     return Counter(why for why in reasons if why and why is not Reason.ABSENT)

@@ -198,7 +198,7 @@ def _direction(vector: FloatArray) -> str:
 
 
 def _rig_lines(calibration: Calibration) -> list[str]:
-    """Return lines of text on the images of each camera, and where it stands."""
+    """Return lines on the images and the position of each camera."""
     lines = []
     rig = calibration.bundle.state.rig
     moves = calibration.bundle.values[calibration.bundle.layout.extrinsics]

@@ -1,4 +1,4 @@
-"""The verdict on a calibration: good, to be looked at, or to be repeated, and why."""
+"""The verdict on a calibration: PASS, CHECK or REPEAT, with its reason."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -111,7 +111,7 @@ class Verdict:
 
     @property
     def can_be_accepted(self) -> bool:
-        """Whether its tip may be put in force."""
+        """Whether the tip may be accepted."""
         return self.grade is not Grade.REPEAT
 
     @property
@@ -186,7 +186,7 @@ class Change:
         return bool(beyond.any())
 
     def told(self, date: str) -> Message:
-        """Return it in words, beside an earlier tip of this date."""
+        """Return the verdict in words, with the date of the earlier tip."""
         lengths = np.abs(self.difference)
         axis = int(np.argmax(lengths / np.maximum(self.expanded_uncertainty, TINY)))
         return tip_changed(
@@ -196,7 +196,7 @@ class Change:
 
 
 def repeats(doubt: Message, reason: Message) -> bool:
-    """Return whether a doubt only says again what is the reason of the verdict."""
+    """Return whether a warning repeats the reason of the verdict."""
     if (doubt.code, reason.code) == ("warning.led-displaced", Code.LED_DISPLACED):
         return doubt.values["led"] == reason.values["led"]
     return doubt.code == reason.code
@@ -228,7 +228,7 @@ def change_doubt(change: Change, date: str, limit: float | None) -> Message | No
 def judge_change(
     verdict: Verdict, change: Change | None, date: str, limit: float | None = None
 ) -> Verdict:
-    """Judge a tip that would pass by how far it lies from the one before.
+    """Judge a passing tip by its change from the previous one.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def judge_unknown(verdict: Verdict, why: Message) -> Verdict:
 def distance_from_nominal(
     tip_pen: FloatArray, nominal_tip: FloatArray | None
 ) -> float | None:
-    """Return how far a tip lies from its place by design, mm, if that is too far."""
+    """Return the deviation of a tip from nominal, mm, if it is too large."""
     if nominal_tip is None:
         return None
     distance = float(np.linalg.norm(tip_pen - nominal_tip))

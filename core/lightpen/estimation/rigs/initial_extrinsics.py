@@ -40,7 +40,7 @@ class InitialExtrinsics:
     apart: BoolArray
 
     def deviations(self, file: Rig) -> FloatArray:
-        """Return these places less those of a file, as `Rig.covariance` has them."""
+        """Return the deviations from a file's extrinsics, as in `Rig.covariance`."""
         turns = self.rig.rotations[1:] @ np.swapaxes(file.rotations[1:], 1, 2)
         shifts = self.rig.translations[1:] - file.translations[1:]
         return np.concatenate([vector_from_rotation(turns), shifts], axis=1).ravel()

@@ -144,7 +144,7 @@ def _noise_exchanged(
     one: int,
     other: int,
 ) -> float:
-    """Return how many times the noise is larger with two camera files exchanged."""
+    """Return the noise ratio with the two camera files swapped."""
     total = {False: 0.0, True: 0.0}
     for images, file in ((one, other), (other, one)):
         part = parts[images]

@@ -71,7 +71,7 @@ class PenRotations:
         )
 
     def completed(self, other: "PenRotations", rotation: FloatArray) -> "PenRotations":
-        """Return them with those of a camera that is turned so where there are none."""
+        """Return extrinsics, completed by those of a camera rotated by 180 degrees."""
         new = other.known & ~self.known
         return PenRotations(
             np.where(new[:, None, None], rotation.T @ other.rotations, self.rotations),
@@ -115,7 +115,7 @@ class RelativeRotation:
 
 @dataclass(frozen=True)
 class TimeLag:
-    """By how much one camera is later than another.
+    """Time lag of a camera.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class TimeLag:
 
     @property
     def is_noticeable(self) -> bool:
-        """Whether it is there, and not small beside the noise of a pose."""
+        """Whether it is significant and relevant beside the noise of a pose."""
         return (
             abs(self.value) > SIGNIFICANT * self.sigma and abs(self.turn) > NOTICEABLE
         )
@@ -189,7 +189,7 @@ def require_same_moments(
 def measure_lag(
     one: PenRotations, other: PenRotations, found: RelativeRotation
 ) -> TimeLag | None:
-    """Measure by how much the other camera is later.
+    """Estimate the time lag of the other camera.
 
     Returns
     -------

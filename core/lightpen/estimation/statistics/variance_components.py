@@ -216,6 +216,6 @@ def find_jitter(
 
 
 def _not_negative(covariance: FloatArray) -> FloatArray:
-    """Return a covariance without what is negative in it."""
+    """Return a covariance with negative eigenvalues set to zero."""
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
     return np.asarray((vectors * np.maximum(values, NO_JITTER**2)) @ vectors.T)

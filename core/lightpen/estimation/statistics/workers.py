@@ -82,7 +82,7 @@ def cluster_workers(address: str) -> Iterator[Map]:
 def _gathered(
     futures: Sequence[Any], ended: Iterator[Any], report: Report
 ) -> list[Any]:
-    """Return the results of futures, in order, telling how many have ended."""
+    """Return the results of futures in order, with progress."""
     try:
         for n_done, _ in enumerate(ended, 1):
             report(n_done / len(futures))

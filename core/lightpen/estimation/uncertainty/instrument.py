@@ -78,7 +78,7 @@ class Instrument:
 
     @property
     def camera(self) -> Camera:
-        """The camera, of several the first, in whose frame points are measured."""
+        """The camera in whose frame points are measured, the first of a rig."""
         return self.rig.cameras[0]
 
     @property
@@ -142,7 +142,7 @@ def instrument_of_files(
 
 
 def with_rig(instrument: Instrument, rig: Rig) -> Instrument:
-    """Return the instrument with other cameras than those of its swing."""
+    """Return the instrument with another rig."""
     old, at = instrument.parameters, parameters_of(rig, instrument.pen)
     moved = np.zeros((at.number, old.number))
     for kind in ("tip", "diameter", "leds"):

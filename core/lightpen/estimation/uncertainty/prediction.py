@@ -254,7 +254,7 @@ def _linear_bundle(
 
 
 def _with_jitter(each: NormalEquations, jitter: FloatArray) -> NormalEquations:
-    """Return equations in which the seat may be another in each image.
+    """Return equations with a seat that varies between images.
 
     Parameters
     ----------

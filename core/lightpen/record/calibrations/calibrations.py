@@ -30,7 +30,7 @@ NOBODY = Names()
 
 @dataclass(frozen=True, eq=False)
 class CalibrationFile:
-    """A calibration as its file has it.
+    """A calibration read from a file.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class CalibrationFile:
 
     @property
     def camera_hashes(self) -> tuple[str, ...]:
-        """SHA-256 of the camera file, or of a rig file and those of its cameras."""
+        """SHA-256 of the camera file, or of a rig file with its camera files."""
         inputs = self.calibration.inputs
         if inputs.rig is None:
             return (inputs.camera.sha256,)
@@ -158,7 +158,7 @@ class ShownImages:
 
 
 def shown_images(record: CalibrationRecord) -> ShownImages:
-    """Return what the images of a record of one camera showed."""
+    """Return the detections in the images of a single-camera record."""
     frames = record.frames
     shape = len(frames), len(record.leds)
     seen, fit = np.full((*shape, 3), np.nan), np.zeros(shape, dtype=bool)

@@ -120,7 +120,7 @@ def _written(file: InputFile, place: Path) -> Path:
 def _observations(
     path: Path, record: CalibrationRecord, camera: Camera, pen: Pen
 ) -> Observations:
-    """Return what the images showed, those that took no part left out again."""
+    """Return the detections, with the same images excluded."""
     shown, frames = shown_images(record), record.frames
     pixels = np.where(shown.fit[..., None], shown.pixels, np.nan)
     numbers = np.arange(1, len(frames) + 1)

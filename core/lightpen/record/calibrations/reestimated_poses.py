@@ -115,7 +115,7 @@ def _pen(fitted: InstrumentRecord) -> Pen:
 
 
 def _first(rotations: FloatArray) -> int | None:
-    """Return with how many of the poses (N, 3, 3) the tip begins to be fixed."""
+    """Return the number of poses (N, 3, 3) from which the tip is determined."""
     for n_images in range(MIN_IMAGES, len(rotations) + 1):
         spread, _ = posture_spread(rotations[:n_images])
         if spread[0] >= MIN_SPREAD:

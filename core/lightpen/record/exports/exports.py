@@ -1,4 +1,4 @@
-"""The files of an exported calibration: what is in them, and how they are named.
+"""Files of an exported calibration: content and names.
 
 A name begins with pen, tip and date. No file is overwritten: a name in use gets a
 number.
@@ -23,7 +23,7 @@ from lightpen.record.swings.solving import Solution, record_inputs
 
 
 def export_stem(names: Names, moment: datetime, origin: Origin | None) -> str:
-    """Return what the names of the files of a tip begin with: pen, tip and date.
+    """Return the common beginning of the file names: pen, tip and date.
 
     The origin stands behind, unless it is a live camera.
     """

@@ -102,7 +102,7 @@ def _tip(file: CalibrationFile) -> str:
 
 
 def _images(file: CalibrationFile) -> str:
-    """Return a row for each image: whether it is used, and how well it fits."""
+    """Return a row for each image with its state and residual."""
     head = ["image", "file", "used", "reason", "rms_px"]
     head += [*(f"tip_{axis}_cam_mm" for axis in "uvw"), "camera", "origin", "grade"]
     rows: list[Sequence[object]] = [head]

@@ -62,7 +62,7 @@ class CameraTrial:
 
 
 class StoredTrial(Struct, frozen=True):
-    """What the file of an attempt says, but for what was found."""
+    """Content of the file of an attempt, without the result."""
 
     program: ProgramName
     created: ZonedTime
@@ -80,7 +80,7 @@ class StoredTrial(Struct, frozen=True):
 def keep_camera_trial(
     data: Path, trial: CameraTrial, names: Names, now: datetime
 ) -> Path:
-    """Keep what became of the calibration of a camera, and return its file.
+    """Write the file of a camera calibration and return it.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def keep_camera_trial(
 
 
 def read_camera_trial(content: bytes, file: Path) -> StoredTrial:
-    """Return what the file of an attempt says.
+    """Read the file of an attempt.
 
     Raises
     ------

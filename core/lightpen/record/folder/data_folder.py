@@ -1,4 +1,4 @@
-"""Whether anything can be kept in the folder that holds swings and results."""
+"""Whether the data folder can be written."""
 
 import os
 import time
@@ -60,7 +60,7 @@ class Presence:
         self._descriptor: int | None = None
 
     def count_others(self) -> int:
-        """Return how many other windows use the folder, and let them know of this one.
+        """Count the other windows that use the folder, and announce this one.
 
         Where the folder cannot be written, nobody knows of anybody.
         """

@@ -1,4 +1,4 @@
-"""What became of something that was tried."""
+"""Outcome of an attempt."""
 
 from enum import StrEnum
 

@@ -1,4 +1,4 @@
-"""What the files of verifications say of who verified what, and what it came to."""
+"""Reading the files of verifications."""
 
 from pathlib import Path
 
@@ -29,7 +29,7 @@ class _Verdict(StoredMessage, frozen=True, kw_only=True):
 
 
 class StoredProbingRun(Struct, frozen=True):
-    """Where the images of a run of live touches are kept, in the folder of touches."""
+    """Folder of the images of a probing run."""
 
     folder: str
     journal_sha256: str
@@ -69,7 +69,7 @@ class StoredVerification(Struct, frozen=True):
 
     @property
     def outcome(self) -> TrialOutcome:
-        """What became of it."""
+        """Outcome of the verification."""
         if self.ended is not None:
             return self.ended
         has_passed = self.verdict is None or self.verdict.grade == "pass"
@@ -85,7 +85,7 @@ class StoredVerification(Struct, frozen=True):
 
 
 def read_verification(content: bytes, file: Path) -> StoredVerification:
-    """Return what the file of a verification says.
+    """Read the file of a verification.
 
     Raises
     ------

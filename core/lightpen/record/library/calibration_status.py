@@ -1,4 +1,4 @@
-"""How the tips of a station stand: valid, overdue, not calibrated, or retired."""
+"""Calibration status of a station's tips: valid, overdue, not calibrated, retired."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from lightpen.record.library.tip_library import Item, ItemKind, Library
 
 
 class TipStatus(StrEnum):
-    """Whether something may be measured with."""
+    """Whether an item may be used for measuring."""
 
     VALID = "valid"
     OVERDUE = "overdue"
@@ -29,7 +29,7 @@ class CurrentResult:
 
 @dataclass(frozen=True)
 class StationStatus:
-    """How all tips, pens and cones of a station stand.
+    """Status of all tips, pens and cones of a station.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class StationStatus:
     now: datetime | None = None
 
     def of_tip(self, pen: str, tip: str) -> TipStatus | None:
-        """Return how a tip of a pen stands; None as long as that is not known."""
+        """Return the status of a tip of a pen; None while unknown."""
         if self.now is None or not (pen and tip):
             return None
         listed = self.library.tips.get(tip)
@@ -57,7 +57,7 @@ class StationStatus:
         return TipStatus.OVERDUE if is_over or found.is_due else TipStatus.VALID
 
     def of_item(self, kind: ItemKind, name: str) -> TipStatus | None:
-        """Return how a pen or cone, or the ball of a tip, stands by itself.
+        """Return the status of a pen, a cone or the ball of a tip.
 
         None of one that is not in the library.
         """
@@ -74,7 +74,7 @@ class StationStatus:
         return tuple(pen for pen, each in self.in_force if each == tip)
 
     def due(self, pen: str, tip: str) -> date | None:
-        """Return the last day on which a tip in force may be used, by its age."""
+        """Return the last day of validity of a current tip."""
         found = self.in_force.get((pen, tip))
         days = [] if found is None else [self._today(found.due)]
         listed = self.library.tips.get(tip)

@@ -1,4 +1,4 @@
-"""Changing the tip library: each change checked, signed where it must be, and kept."""
+"""Changes of the tip library: checked, signed if necessary, and stored."""
 
 import math
 from contextlib import suppress
@@ -169,7 +169,7 @@ def read_kept_picture(data: Path, picture: Picture) -> bytes:
 
 
 def keep_picture(data: Path, file: Path) -> Picture:
-    """Copy a picture into the data folder, by its hash, and return where it is.
+    """Copy a picture into the data folder, named by its hash; return its path.
 
     Raises
     ------
@@ -226,7 +226,7 @@ def _keep(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
 
 
 def _sensible(item: AnyItem) -> AnyItem:
-    """Return an item as it is kept; refuse what makes no sense."""
+    """Return an item as stored; reject implausible values."""
     name = item.id.strip()
     if not (name and name.isprintable() and len(name) <= LONGEST_ID):
         raise UsageError(

@@ -42,7 +42,7 @@ def add_numbered(folder: Path, data: bytes) -> Path:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, and those that it is in, unless they are there.
+    """Create a folder and its parents.
 
     Raises
     ------

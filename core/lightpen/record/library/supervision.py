@@ -61,7 +61,7 @@ class Supervision:
         return bool(self.password_hash)
 
     def limits_at(self, station: str, chosen: StationLimits) -> StationLimits:
-        """Return what holds at a station: what is laid down for it, or was chosen."""
+        """Return the limits of a station: set by a supervisor, or chosen."""
         return self.limits.get(station, chosen)
 
 
@@ -89,7 +89,7 @@ class LimitsChange(Struct, omit_defaults=True):
 
 
 def read_supervision(data: Path) -> Supervision:
-    """Return what is laid down in a data folder.
+    """Read the supervision of a data folder.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def read_supervision(data: Path) -> Supervision:
 
 
 def read_limits_change(content: bytes, file: Path) -> LimitsChange:
-    """Return what a file of limits says.
+    """Read a limits file.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def save_limits(
 
 
 def require_supervisor(supervision: Supervision, signature: Signature) -> None:
-    """Refuse who is no supervisor.
+    """Raise an error unless a supervisor signed.
 
     Raises
     ------

@@ -148,7 +148,7 @@ class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
         return None if point is None else np.array(point, dtype=np.float64)
 
     def rule(self, usual: DueRule) -> DueRule:
-        """Return how long it may be in force, by its own rule or the usual one."""
+        """Return the calibration interval, its own or the default."""
         return DueRule(
             self.max_days or usual.max_days, self.max_swings or usual.max_swings
         )
@@ -210,12 +210,12 @@ class Library:
         return exact or _alike(self.tips, code)
 
     def rule_of(self, tip: str, usual: DueRule) -> DueRule:
-        """Return how long a tip may be in force."""
+        """Return the calibration interval of a tip."""
         listed = self.tips.get(tip)
         return usual if listed is None else listed.rule(usual)
 
     def alike(self, kind: ItemKind, name: str) -> AnyItem | None:
-        """Return the item that a name cannot be told from: but for case, the same."""
+        """Return the item whose name differs in case only."""
         return _alike(self.items(kind), name)
 
 

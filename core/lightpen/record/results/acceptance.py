@@ -102,7 +102,7 @@ def accept(
 def conclude_accepted(
     archive: FolderArchive, found: InterruptedSwings
 ) -> InterruptedSwings:
-    """Conclude the interrupted swings whose tip was accepted; return the others.
+    """Conclude the interrupted swings with accepted tips; return the others.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def takes_supervisor(supervision: Supervision, assessment: SwingAssessment) -> b
 def _supervisor(
     supervision: Supervision, assessment: SwingAssessment, signature: Signature | None
 ) -> str:
-    """Return the supervisor who accepts a tip; empty where it takes none."""
+    """Return the supervisor who accepts a tip; empty if none is needed."""
     if not takes_supervisor(supervision, assessment):
         return ""
     if signature is None:
@@ -140,7 +140,7 @@ def _supervisor(
 
 
 def require_in_use(archive: FolderArchive, name: str) -> None:
-    """Refuse a tip that was retired: whoever retired it knows why.
+    """Reject a retired tip.
 
     A library that cannot be read is told of with the verdict.
 
@@ -157,7 +157,7 @@ def require_in_use(archive: FolderArchive, name: str) -> None:
 
 
 def _require_acceptable(verdict: Verdict, reason: str) -> None:
-    """Let a tip pass whose grade allows it to be accepted so."""
+    """Reject a tip whose grade does not allow this acceptance."""
     if verdict.grade is Grade.REPEAT:
         raise AcceptanceError("acceptance.repeat", why=verdict.reason)
     if verdict.grade is Grade.CHECK and not reason.strip():
@@ -201,7 +201,7 @@ def _stored_result(archive: FolderArchive, record: Record) -> Result | None:
 
 
 def _conclude(writer: RecordWriter, record: Record, result: Result) -> None:
-    """Write the verdict; where that fails, the archive tells it the next time."""
+    """Write the verdict; if that fails, it is taken from the archive next time."""
     if record.verdict != result.grade:
         with suppress(FileError):
             writer.conclude(result.grade)

@@ -1,4 +1,4 @@
-"""A solved swing beside what is in force: its verdict, and what to look into."""
+"""Assessment of a solved swing beside the current result."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -66,7 +66,7 @@ class SwingAssessment:
 def assess(
     archive: FolderArchive, record: Record, solution: Solution
 ) -> SwingAssessment:
-    """Judge a solved swing by itself, and beside what is in force."""
+    """Judge a solved swing by itself and beside the current result."""
     names, origin = recorded_names(record), recorded_origin(record)
     limits = recorded_limits(record)
     verdict = judge(solution.calibration, limits)
@@ -138,7 +138,7 @@ def _far_from_nominal(solution: Solution) -> list[Message]:
 
 
 def _bare_sides(solution: Solution, limits: SwingLimits) -> list[Message]:
-    """Name the postures that recorded images lack: nobody was asked to lean there."""
+    """Return the directions without images in recorded swings."""
     counts = dial_counts(solution.calibration.joint.rotations)[1:].sum(axis=0)
     bare = np.flatnonzero(counts == 0)
     if not (len(bare) and limits.min_per_field):

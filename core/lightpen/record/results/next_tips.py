@@ -30,7 +30,7 @@ class NextTip:
 
 
 def next_tips(archive: FolderArchive, present: Result) -> tuple[NextTip, ...]:
-    """Return the other tips of a pen: those in force, the oldest first, and others.
+    """Return the other tips of a pen: current ones, the oldest first, then others.
 
     Those of the library that were never calibrated with the pen follow, unless it is a
     simulated one. Retired tips are left out; results that cannot be read are passed

@@ -1,4 +1,4 @@
-"""The archive as a folder: one file a result, beside the records of the swings.
+"""The results as a folder: one file each, beside the records of swings.
 
 A file is written once and never changed. Its name is a number: the order of acceptance.
 Where its swing is recorded is written as a path from the data folder, so that the whole

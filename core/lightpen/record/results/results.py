@@ -54,7 +54,7 @@ END = b"\n}\n"
 
 
 class ResultHeading(Struct):
-    """What tells whether a result is the one that is looked for.
+    """The heading of a result, for look-ups.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class TipChange(Struct, frozen=True):
 
     @classmethod
     def of(cls, last: "Result", change: Change, limit: float | None = None) -> Self:
-        """Return what is kept of a change since the result in force."""
+        """Return the stored form of a change."""
         return cls(
             last.accepted,
             _vector(change.difference),
@@ -311,7 +311,7 @@ def has_head(start: bytes) -> bool:
 
 
 def parse_heading(start: bytes, file: Path) -> ResultHeading:
-    """Return whose result a file holds, by its start with the head, or the whole of it.
+    """Parse the heading of a result file from its beginning or its whole content.
 
     Raises
     ------
@@ -325,7 +325,7 @@ def parse_heading(start: bytes, file: Path) -> ResultHeading:
 
 
 def parse_withdrawal(data: bytes, file: Path) -> Withdrawal:
-    """Return what a file holds that takes a result back.
+    """Parse a revocation.
 
     Raises
     ------
@@ -388,7 +388,7 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
 
 
 def _head_of(data: bytes) -> bytes:
-    """Return what comes before the calibration, as JSON of its own."""
+    """Return the beginning of the file, before the calibration, as JSON."""
     head, found, _ = data.partition(CALIBRATION)
     return head + b"}" if found else data
 

@@ -1,4 +1,4 @@
-"""The header of a record: who, where, with what a swing was captured.
+"""The header of a record: station, operator, item and setup of a swing.
 
 It is written last when a record is made. Beside it stand copies, byte by byte, of the
 files it names. Header and copies each have their checksum.
@@ -72,7 +72,7 @@ class FileCopy(Struct, frozen=True, omit_defaults=True):
 
 
 class RigCopies(Struct, frozen=True):
-    """What a record keeps of a rig besides its first camera.
+    """Copies of the rig's files besides the first camera's.
 
     Attributes
     ----------
@@ -150,7 +150,7 @@ class Header(Struct, frozen=True, kw_only=True):
 
 
 def header_bytes(header: Header) -> bytes:
-    """Return a header as it is written, without the content of the files."""
+    """Return the bytes of a header, without the content of the files."""
     rig = header.rig
     if rig is not None:
         rig = replace(
@@ -170,7 +170,7 @@ def header_bytes(header: Header) -> bytes:
 
 
 def read_header(folder: Path) -> Header:
-    """Read the header of a record, and see that the copies are as it says.
+    """Read the header of a record and check its copies.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def read_header(folder: Path) -> Header:
 
 
 def header_copies(header: Header) -> Mapping[str, FileCopy]:
-    """Return the copies that a record keeps, by their files from its folder."""
+    """Return the copies in a record by their relative path."""
     by_stem = {CAMERA_STEM: header.camera_file, PEN_STEM: header.pen_file}
     if header.rig is not None:
         by_stem[RIG_STEM] = header.rig.rig_file
@@ -210,7 +210,7 @@ def copy_name(stem: str, file: FileCopy) -> str:
 
 
 def camera_stem(c: int) -> str:
-    """Return what the copy of the file of the c-th camera is called."""
+    """Return the stem of the copy of the c-th camera file."""
     return CAMERA_STEM if c == 0 else f"{CAMERA_STEM}-{c + 1}"
 
 
@@ -243,6 +243,6 @@ def limits_in(settings: Mapping[str, Plain]) -> SwingLimits:
 
 
 def number_in(settings: Mapping[str, Plain], key: str, usual: float) -> float:
-    """Return a number of a record's settings, or what is usual."""
+    """Return a number of a record's settings, or its default."""
     value = settings.get(key)
     return value if isinstance(value, int | float) else usual

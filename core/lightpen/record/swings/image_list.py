@@ -42,7 +42,7 @@ class ImageRow:
 
 
 def worst_first(solution: Solution) -> tuple[ImageRow, ...]:
-    """Return all images of a solved swing by misfit, those without the pen first.
+    """Return all images of a solved swing by residual; images without a pen first.
 
     An image keeps its place when it is taken out or put back, but for what that changes
     of the fit.
@@ -64,6 +64,6 @@ def worst_first(solution: Solution) -> tuple[ImageRow, ...]:
 
 
 def count_left_out(solution: Solution) -> Mapping[Reason, int]:
-    """Return how many images do not take part, by reason, the most frequent first."""
+    """Return the number of excluded images by reason, the most frequent first."""
     counts = Counter(reason for reason in solution.calibration.reasons if reason)
     return dict(counts.most_common())

@@ -1,4 +1,4 @@
-"""An interrupted swing: found, read back to go on with it, or set aside for good."""
+"""Interrupted swings: found, resumed or discarded."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,7 +90,7 @@ def find_unfinished(root: Path) -> InterruptedSwings:
 
 
 def discard_swing(folder: Path) -> None:
-    """Conclude an interrupted swing without a verdict; its images are kept.
+    """Conclude an interrupted swing without a verdict; the images are kept.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def discard_swing(folder: Path) -> None:
 
 
 def discard_damaged(folder: Path) -> None:
-    """Conclude a swing that cannot be read, without a verdict; its files are kept.
+    """Conclude an unreadable swing without a verdict; the files are kept.
 
     Nothing but the verdict is added, so that whoever restores the damaged file has the
     swing as it was.

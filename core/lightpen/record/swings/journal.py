@@ -78,7 +78,7 @@ class VerdictLine(Struct, tag_field="kind", tag="verdict"):
 
 
 class MoreLine(Struct, tag_field="kind", tag="more"):
-    """The swing goes on after a verdict, to so many images."""
+    """More images after a verdict, up to a number."""
 
     min_images: Count
     max_images: Number
@@ -88,13 +88,13 @@ Line: TypeAlias = ImageLine | OutLine | ExcludedLine | VerdictLine | MoreLine
 
 
 def line_bytes(line: Line) -> bytes:
-    """Return a line as it is written, with its end."""
+    """Return the bytes of a line, with its end."""
     text = json.dumps(to_builtins(line), allow_nan=False)
     return with_checksum(text.encode()) + b"\n"
 
 
 def journal_bytes(folder: Path) -> bytes:
-    """Return the journal of a record as it is on the disk.
+    """Return the journal of a record.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def read_lines(folder: Path) -> list[bytes]:
 
 
 def parse_lines(lines: list[bytes], folder: Path) -> list[Line]:
-    """Return what the lines of the journal in a folder say.
+    """Parse the lines of a journal.
 
     Raises
     ------
@@ -151,12 +151,12 @@ def damaged_line(folder: Path, number: int) -> FileError:
 
 
 def length_of(lines: list[bytes]) -> int:
-    """Return how many bytes lines have in the journal."""
+    """Return the length of lines in the journal, bytes."""
     return sum(len(line) + 1 for line in lines)
 
 
 def sound_length(folder: Path) -> int:
-    """Return how many bytes of the journal in a folder are whole lines."""
+    """Return the length of the complete lines of a journal, bytes."""
     length = length_of(read_lines(folder))
     return min(length, (folder / JOURNAL).stat().st_size)
 

@@ -108,7 +108,7 @@ class RecordedImage:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A swing as it is on disk.
+    """A swing on disk.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class Record:
 
     @property
     def stats(self) -> Stats:
-        """What became of the camera's images up to the last one that was kept."""
+        """Return the camera counters up to the last accepted image."""
         return self.images[-1].stats if self.images else Stats()
 
     @property
@@ -159,7 +159,7 @@ class Record:
 
 
 def open_record(folder: Path) -> Record:
-    """Open a record, also one whose writer was killed.
+    """Open a record, also after a crash of its writer.
 
     Raises
     ------
@@ -183,12 +183,12 @@ def open_record(folder: Path) -> Record:
 
 
 def _n_leds(lines: Sequence[Line]) -> int:
-    """Return how many LEDs the first image tells of."""
+    """Return the number of LEDs in the first image."""
     return next(len(line.pixels) for line in lines if isinstance(line, ImageLine))
 
 
 def _record(folder: Path, header: Header, lines: Sequence[Line], length: int) -> Record:
-    """Return what a record comes to, line by line."""
+    """Return the record of the journal's lines."""
     images: list[RecordedImage] = []
     taken_out: dict[int, str] = {}
     verdict, more = None, None
@@ -235,7 +235,7 @@ def is_record(folder: Path) -> bool:
 
 
 def missing_parts(folder: Path) -> tuple[str, ...]:
-    """Return what a folder lacks that looks like a record; nothing of any other."""
+    """Return the missing files of a folder that looks like a record."""
     parts = (HEADER, JOURNAL, IMAGES)
     missing = tuple(name for name in parts if not (folder / name).exists())
     return missing if len(missing) < len(parts) else ()
@@ -294,7 +294,7 @@ def _points(pixels: Sequence[tuple[float, float] | None]) -> FloatArray:
 
 
 def recorded_names(record: Record) -> Names:
-    """Return who calibrated what in a record."""
+    """Return station, operator, pen, tip and cone of a record."""
     header = record.header
     return Names(
         station=header.station,
@@ -307,7 +307,7 @@ def recorded_names(record: Record) -> Names:
 
 
 def recorded_origin(record: Record) -> Origin | None:
-    """Return what the images of a record are of; None if it does not say."""
+    """Return the origin of the images of a record; None if not stated."""
     said = record.header.settings.get("origin")
     return Origin(said) if said in set(Origin) else None
 
@@ -318,5 +318,5 @@ def is_of_recording(record: Record) -> bool:
 
 
 def recorded_limits(record: Record) -> SwingLimits:
-    """Return what a record's swing needed, and when it was to end."""
+    """Return the limits of a record's swing."""
     return limits_in(record.header.settings)

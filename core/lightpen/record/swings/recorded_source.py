@@ -1,4 +1,4 @@
-"""What a calibration is computed from, as a record keeps it."""
+"""The input of a calibration, from a record."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -68,7 +68,7 @@ class RecordSource:
 
 
 def source(record: Record) -> RecordSource:
-    """Return what the calibration of a record is computed from, now as ever.
+    """Return the input of the calibration of a record.
 
     Raises
     ------

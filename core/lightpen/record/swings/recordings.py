@@ -1,4 +1,4 @@
-"""Recorded images: what stands beside them, and whether they were simulated."""
+"""Recorded images: the files beside them, and whether they were simulated."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ PEN_FILES = ("leds.csv", "pen.json", "leds.json", "pen.csv")
 
 @dataclass(frozen=True)
 class FilesBeside:
-    """Files that stand beside recorded images, in all likelihood theirs.
+    """Files beside recorded images that probably belong to them.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ def files_beside(place: str) -> FilesBeside:
 
 
 def is_simulated_recording(place: str) -> bool:
-    """Return whether recorded images, or those of a recorded swing, were simulated."""
+    """Return whether recorded images or those of a recorded swing were simulated."""
     folder = Path(place)
     if is_simulated(folder):
         return True

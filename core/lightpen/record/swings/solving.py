@@ -1,4 +1,4 @@
-"""The tip of a recorded swing: the one computation that all who ask for it share.
+"""The tip of a recorded swing: the one computation for all callers.
 
 The wizard, its review and the command line compute the tip of a record here, always
 from the images on the disk, so that they agree to the last digit. What was seen in the
@@ -35,7 +35,7 @@ _logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The tip of a record, and what it was computed from.
+    """The tip of a record, with its input.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Solution:
     others: tuple[Observations, ...] = ()
 
     def seen_by(self, camera: int) -> Observations:
-        """Return what the images of a camera show, the first being 0."""
+        """Return the detections of a camera, from 0."""
         return (self.observations, *self.others)[camera]
 
     @property
@@ -121,7 +121,7 @@ def solve_record(
 
 
 def solve_again(solution: Solution, taken_out: Mapping[int, str]) -> Solution:
-    """Solve with other images taken out, from what was seen before.
+    """Solve with other images excluded, from the same detections.
 
     Parameters
     ----------

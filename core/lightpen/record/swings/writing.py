@@ -122,7 +122,7 @@ class RecordWriter:
 
     @classmethod
     def resume(cls, record: Record) -> Self:
-        """Go on with a record; what a crash left behind is written over.
+        """Resume a record; incomplete data after a crash is overwritten.
 
         Raises
         ------
@@ -175,7 +175,7 @@ class RecordWriter:
         others: Sequence[SecondaryView] = (),
         touch: int = 0,
     ) -> int:
-        """Record one image, or those of a moment.
+        """Record an image, or simultaneous images.
 
         Parameters
         ----------
@@ -256,7 +256,7 @@ class RecordWriter:
         self._write_line(ExcludedLine(reasons))
 
     def ask_for_more(self, min_images: int, max_images: int) -> None:
-        """Note that the swing goes on after a verdict, and to how many images."""
+        """Record that the swing continues up to a number of images."""
         self._write_line(MoreLine(min_images, max_images))
 
     def conclude(self, verdict: str) -> None:

@@ -42,7 +42,7 @@ FINEST = 1e-4  # mm, to which no LED file is known beforehand
 
 @dataclass(frozen=True, eq=False)
 class ImprovedPen:
-    """A pen whose LEDs several swings have put right.
+    """A pen with an LED file improved by several swings.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class ImprovedPen:
 def calibrate_again(
     calibration: CalibrationFile, camera: Camera, pen: Pen
 ) -> Calibration:
-    """Calibrate from the LED centres that a calibration keeps.
+    """Calibrate again from the LED centres of a calibration.
 
     Raises
     ------

@@ -139,7 +139,7 @@ def require_one_pen(calibrations: Sequence[CalibrationFile]) -> None:
 
 
 def _without_move(leds: FloatArray, changes: FloatArray) -> FloatArray:
-    """Return changes (L, 3) less the move and scale of all that fits most of them."""
+    """Return changes (L, 3) without the rigid motion and scale of most LEDs."""
     known = np.isfinite(changes).all(axis=1)
     arms = leds - leds.mean(axis=0)
     A = np.concatenate(

@@ -72,7 +72,7 @@ class PenOverTime:
 
 @dataclass(frozen=True, eq=False)
 class NewLedFile:
-    """A better LED file that was written, and what is in it."""
+    """An improved LED file and its content."""
 
     path: Path
     improved: ImprovedPen
@@ -130,7 +130,7 @@ def improve_led_file(
     now: datetime,
     report: Tell = lambda _: None,
 ) -> NewLedFile:
-    """Write a better LED file beside the data; see `led_file.improve_pen`.
+    """Write an improved LED file; see `led_file.improve_pen`.
 
     The old file stays, and no file is replaced.
 

@@ -59,7 +59,7 @@ def read_fixed_point(path: Path) -> RepeatedPoint:
 
 
 def fixed_point_in(record: str) -> RepeatedPoint | None:
-    """Return the fixed point that a record is of; None where it is of something else.
+    """Return the fixed point of a record; None for another task.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def read_scale(path: Path) -> Scale:
 
 
 def read_drift(path: Path) -> FloatArray:
-    """Read the standard uncertainty that a drift is for what was touched meanwhile."""
+    """Return the standard uncertainty by a drift for points probed meanwhile."""
     found = _read(path, _Drift, DRIFT)
     return np.array(found.standard_uncertainty_share_mm, dtype=np.float64)
 

@@ -1,4 +1,4 @@
-"""How a tip developed: its calibrations in their order, beside their limits."""
+"""Trend of a tip: its calibrations in order, with limits."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -155,7 +155,7 @@ def repeatability_of(
     reference: FloatArray | None = None,
     touched: RepeatedPoint | None = None,
 ) -> Repeatability | None:
-    """Return how well tips repeat; None if they are fewer than two, or of several.
+    """Return the repeatability; None for fewer than two calibrations or several tips.
 
     Parameters
     ----------

@@ -146,7 +146,7 @@ class LampDrift:
 
     @property
     def share(self) -> FloatArray:
-        """Standard uncertainty by it of what is touched meanwhile, (3,), mm.
+        """Standard uncertainty by the drift for points probed meanwhile, (3,), mm.
 
         The camera may have been anywhere between, see `verification.tasks.drift`;
         along the line of sight lamps show nothing.
@@ -211,7 +211,7 @@ def drift_of_lamps(
 def judged_with(
     found: VerificationAssessment, lamp_drift: LampDrift | None
 ) -> VerificationAssessment:
-    """Return what was found, or before it that the camera moved, which explains it."""
+    """Return the assessment, led by a camera motion that explains it."""
     if lamp_drift is None or lamp_drift.assessment.is_accepted:
         return found
     return worst((lamp_drift.assessment, found))

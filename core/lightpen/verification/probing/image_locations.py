@@ -30,7 +30,7 @@ from lightpen.record.swings.recordings import is_simulated_recording
 
 @dataclass(frozen=True, eq=False)
 class PenCameras:
-    """The cameras that look at the pen, one or those of a rig.
+    """The cameras that observe the pen, one or a rig.
 
     Attributes
     ----------

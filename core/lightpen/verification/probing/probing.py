@@ -41,7 +41,7 @@ FAR_ENOUGH = 2.0  # mm, that show the direction of approach
 
 
 class ProbingPhase(StrEnum):
-    """Where a touch stands."""
+    """Phase of a touch."""
 
     MOVING = "moving"  # or not seen
     HOLDING = "holding"
@@ -126,7 +126,7 @@ class ProbingState:
     places: tuple[TipObservation, ...] = ()
 
     def progress(self, rules: ProbingRules) -> float:
-        """Return how much of a touch is taken, 0 to 1."""
+        """Return the completed fraction of a touch, 0 to 1."""
         if self.phase is not ProbingPhase.HOLDING:
             return 0.0
         return len(self.held) / (rules.n_frames + rules.n_settling)
@@ -235,7 +235,7 @@ def _name(seen: TipObservation) -> str:
 
 
 def _agrees(held: tuple[TipObservation, ...], seen: TipObservation) -> bool:
-    """Return whether the pen is where it was held."""
+    """Return whether the pen is still in the same place."""
     turned = angles_between(seen.frame.rotation[None], held[0].frame.rotation[None])[
         0, 0
     ]
@@ -260,7 +260,7 @@ def _without_pose(state: ProbingState, rejected: RejectedFrame) -> ProbingTransi
 
 
 def _let_go(state: ProbingState) -> ProbingTransition:
-    """Return to a pen that moves; say so if a touch was broken off."""
+    """Return to a moving pen; report an incomplete touch."""
     events: tuple[ProbingEvent, ...] = ()
     if state.phase is ProbingPhase.HOLDING and len(state.held) >= HELD_ENOUGH:
         names = tuple(map(_name, state.held))

@@ -183,7 +183,7 @@ def touches_of(
     rules: ProbingRules,
     touches_known: Sequence[int] | None = None,
 ) -> ProbingRun:
-    """Return the touches in what the images of each camera show; see `touch_run`."""
+    """Return the touches in the observations of each camera; see `touch_run`."""
     images = _detections(seen, instrument)
     if not any(detection.has_pose for _, detection in images):
         raise _no_pen(name, seen[0])
@@ -211,7 +211,7 @@ def touches_of(
 
 
 def require_leds_fit(name: str, touches: Sequence[ProbedPoint]) -> None:
-    """Refuse touches whose images are not of the LEDs of the pen.
+    """Reject touches with images of another pen.
 
     Raises
     ------
@@ -241,7 +241,7 @@ def _held(
 def _held_as_recorded(
     images: Sequence[tuple[str, PenDetection]], touches: Sequence[int]
 ) -> tuple[StillFrames, ...]:
-    """Return the images of each touch; 0 of those that are of none."""
+    """Return the images of each touch; 0 for images of none."""
     by_touch: dict[int, list[tuple[str, PenDetection]]] = {}
     for image, touch in zip(images, touches, strict=True):
         if touch:

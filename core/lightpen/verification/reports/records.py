@@ -53,7 +53,7 @@ def verification_record(
 
 
 def repeatability_entries(found: Repeatability) -> dict[str, Any]:
-    """Return what was found of calibrations of one tip."""
+    """Return the entries of a repeatability study."""
     study = found.capability
     return {
         "mean_mm": found.scatter.mean,
@@ -87,7 +87,7 @@ def repeatability_entries(found: Repeatability) -> dict[str, Any]:
 
 
 def pen_health_entries(found: PenHealth) -> dict[str, Any]:
-    """Return what was found of a pen over its swings."""
+    """Return the entries of a pen's history."""
     return {
         "moved_leds": found.moved,
         "growth": found.growth,

@@ -34,7 +34,7 @@ def found_text(
     assessment: VerificationAssessment,
     rejected: Sequence[RejectedFrame],
 ) -> str:
-    """Return what a task found as text."""
+    """Return the result of a task as text."""
     lines = [line for table in tables for line in _table(table)]
     return "\n".join([*lines, *_left_out(rejected), "", *_verdict(assessment)])
 

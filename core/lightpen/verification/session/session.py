@@ -62,7 +62,7 @@ class SessionTransition:
 
 
 def setup_of(tip: CurrentTip, choices: VerificationChoices) -> SessionSetup:
-    """Return what is verified by a tip in force."""
+    """Return the setup of a session with a current tip."""
     return SessionSetup(
         tip.instrument, choices, tip.names.ball_diameter, tip.nominal_tip, tip.cone_cam
     )
@@ -71,7 +71,7 @@ def setup_of(tip: CurrentTip, choices: VerificationChoices) -> SessionSetup:
 def advance_session(
     setup: SessionSetup, state: SessionState, name: str, detection: PenDetection
 ) -> SessionTransition:
-    """Take one more image, and end the task at hand when its touches suffice."""
+    """Process one more image, and end the current task when its touches suffice."""
     task = state.task(setup)
     if task is None:
         return SessionTransition(state)
@@ -96,7 +96,7 @@ def advance_session(
 
 
 def end_task(setup: SessionSetup, state: SessionState) -> SessionTransition:
-    """End the task at hand with the touches that there are, or say why it cannot."""
+    """End the current task with its touches, or report why it cannot end."""
     task = state.task(setup)
     if task is None:
         return SessionTransition(state)
@@ -140,7 +140,7 @@ def run_again(
 def touch_again(
     setup: SessionSetup, state: SessionState, held: Sequence[StillFrames]
 ) -> SessionState:
-    """Return it with touches of the run at hand that were taken before.
+    """Return the session with earlier touches of the current run.
 
     One that would end the run has to be taken again: so it was not ended by it.
     """
@@ -159,7 +159,7 @@ def touch_again(
 
 
 def measure(setup: SessionSetup, task: AnyTask, runs: Runs) -> Found:
-    """Return what a task finds by its points.
+    """Return the result of a task from its points.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def measure(setup: SessionSetup, task: AnyTask, runs: Runs) -> Found:
 def measure_with_drift(
     setup: SessionSetup, done: PendingDriftCheck, drift: Drift | None = None
 ) -> Found:
-    """Return what the touches of a task find, by a camera that may have moved.
+    """Return the result of a task, with the motion of the camera.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def with_read(
 
 
 def with_found(state: SessionState, task: AnyTask, found: Found) -> SessionState:
-    """Return it with what a task has found; the next begins when the pen moves on."""
+    """Return the session with a task's result; the next begins when the pen moves."""
     pending = () if task is DRIFT else state.pending
     return replace(
         without_touches(state), found={**state.found, task.kind: found}, pending=pending
@@ -210,7 +210,7 @@ def with_found(state: SessionState, task: AnyTask, found: Found) -> SessionState
 
 
 def touched_anew(state: SessionState, task: AnyTask) -> SessionState:
-    """Return it with one task to be done again, and no points of the one at hand.
+    """Return the session with one task reset and no points of the current one.
 
     The drift reference is visited once more after it.
     """
@@ -285,7 +285,7 @@ def _screened(setup: SessionSetup, state: SessionState, task: AnyTask) -> Screen
 
 
 def _is_worth_telling(rules: ProbingRules, event: ProbingEvent) -> bool:
-    """Return whether an event is reported: a hand that comes to rest stops and goes."""
+    """Return whether an event is reported: small motions of a resting hand are not."""
     needed = rules.n_settling + WORTH_TELLING * rules.n_frames
     return event.what is ProbingEventKind.RECORDED or len(event.names) >= needed
 
@@ -333,7 +333,7 @@ def _with_visit(setup: SessionSetup, state: SessionState) -> SessionState:
 def _after_visit(
     setup: SessionSetup, state: SessionState, visits: Runs
 ) -> SessionState:
-    """Count in what was found since the visit before by how far the cone moved."""
+    """Include the motion of the cone since the last visit in the results."""
     if len(visits) < MIN_VISITS:
         return state
     around = measure_drift(visits[-MIN_VISITS:], setup.conditions)
@@ -341,7 +341,7 @@ def _after_visit(
 
 
 def _counting(setup: SessionSetup, state: SessionState, drift: Drift) -> SessionState:
-    """Count a drift in what was found since the visit before."""
+    """Include a drift in the results since the last visit."""
     for each in state.pending:
         found = measure_with_drift(setup, each, drift)
         state = with_found(state, each.task, found)

@@ -1,4 +1,4 @@
-"""A verification at one moment: what is verified, and what was probed and found."""
+"""State of a verification: setup, probed points and results."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -114,12 +114,12 @@ class SessionState:
     pending: tuple[PendingDriftCheck, ...] = ()
 
     def found_by(self, task: VerificationTask[OptionsT, FoundT]) -> FoundT | None:
-        """Return what a task has found; None until it is done."""
+        """Return the result of a task; None until it is complete."""
         found: FoundT | None = self.found.get(task.kind)  # type: ignore[assignment]
         return found
 
     def task(self, setup: SessionSetup) -> AnyTask | None:
-        """Return what is to be probed now; None when all is done.
+        """Return the task to probe; None when all are complete.
 
         The drift reference is visited before the first task and after each.
         """
@@ -135,11 +135,11 @@ class SessionState:
         return setup.is_drift_checked and DRIFT.kind not in self.found
 
     def runs_of(self, task: AnyTask) -> tuple[Points, ...]:
-        """Return the runs of the task at hand that are done."""
+        """Return the completed runs of the current task."""
         return self.visits if task is DRIFT else self.runs
 
     def progress(self, setup: SessionSetup, task: AnyTask) -> TaskProgress:
-        """Return how far a task is that may be at hand."""
+        """Return the progress of a task."""
         is_at_hand = self.task(setup) is task
         runs = self.runs_of(task) if is_at_hand or task is DRIFT else ()
         n_runs = task.n_runs(setup.choices.options_of(task))
@@ -153,7 +153,7 @@ class SessionState:
         )
 
     def _cones(self) -> tuple[FloatArray, ...]:
-        """Return the cones that were probed, of which a point may be one more."""
+        """Return the probed cones, of which a point may be a repetition."""
         found = self.found_by(FIXED_POINT)
         cones = [visit[0].point_cam for visit in self.visits[:1]]
         return tuple(cones if found is None else [*cones, found.calibrated.mean])
@@ -174,7 +174,7 @@ class SessionState:
 
 
 def n_done(state: SessionState) -> int:
-    """Return how many runs are done of the task at hand, and visits of the cone."""
+    """Return the completed runs of the current task and visits of the cone."""
     return len(state.runs) + len(state.visits)
 
 
@@ -191,7 +191,7 @@ def without_touches(state: SessionState) -> SessionState:
 
 
 def instruction(setup: SessionSetup, state: SessionState) -> Message:
-    """Return what the operator should do now."""
+    """Return the instruction for the operator."""
     task = state.task(setup)
     if task is None:
         return message("session.done")
@@ -204,7 +204,7 @@ def instruction(setup: SessionSetup, state: SessionState) -> Message:
 
 
 def fraction_done(setup: SessionSetup, state: SessionState) -> float:
-    """Return how much of the task at hand is done, 0 to 1."""
+    """Return the completed fraction of the current task, 0 to 1."""
     task = state.task(setup)
     if task is None:
         return 1.0

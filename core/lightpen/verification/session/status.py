@@ -31,7 +31,7 @@ class ReadingState(StrEnum):
 
 
 class SessionEventKind(StrEnum):
-    """What can happen, each with a sound and a sign of its own."""
+    """Kinds of events, each with its sound and sign."""
 
     RECORDED = "recorded"
     BROKEN_OFF = "broken off"
@@ -80,7 +80,7 @@ class VerificationStatus:
 
     @property
     def task(self) -> AnyTask | None:
-        """What is to be touched now; None when all is done, or nothing can be."""
+        """Task to probe; None when all are complete or none is possible."""
         if self.setup is None or self.state is None:
             return None
         return self.state.task(self.setup)
@@ -93,7 +93,7 @@ class VerificationStatus:
 
     @property
     def is_done(self) -> bool:
-        """Whether all that was chosen is found."""
+        """Whether all selected tasks are complete."""
         return self.state is not None and self.state.is_begun and self.task is None
 
     @property
@@ -112,13 +112,13 @@ class VerificationListener(Protocol):
         """Take the status after a change, and what happened."""
 
     def on_progress(self, fraction: float) -> None:
-        """Take how much of the images is read, 0 to 1."""
+        """Receive the fraction of images read, 0 to 1."""
 
     def on_fault(self, message: Message) -> None:
         """Take a sentence to be read: something could not be done."""
 
     def on_fault_cleared(self, message: Message) -> None:
-        """Take the sentence of a trouble whose cause is gone."""
+        """Receive the end of a fault."""
 
 
 _HAPPENED = {
@@ -138,7 +138,7 @@ def event_kinds(
 
 
 def ending(status: VerificationStatus) -> SessionEventKind:
-    """Return what it is that a task is done."""
+    """Return the event of a completed task."""
     if status.task is not None or status.assessment is None:
         return SessionEventKind.FINISHED
     is_refused = status.assessment.grade is Grade.REPEAT

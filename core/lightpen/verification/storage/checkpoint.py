@@ -168,7 +168,7 @@ class CheckpointFile:
         self._descriptor = descriptor
 
     def note(self, value: VerificationCheckpoint) -> None:
-        """Put it on the disk, if it is not what is there.
+        """Write it if it has changed.
 
         Raises
         ------
@@ -256,7 +256,7 @@ class UnlistedRecords:
 
 
 def written_since(folder: Path, under_way: VerificationCheckpoint) -> UnlistedRecords:
-    """Return what was written after the file of a verification.
+    """Return the files written after that of a verification.
 
     Raises
     ------
@@ -286,7 +286,7 @@ class _OfSession(Struct):
 
 
 def _is_concluded(found: InterruptedVerification) -> bool:
-    """Return whether it has ended and its file is only left over; that goes."""
+    """Return whether it is concluded; then its left-over file is deleted."""
     if found.under_way is None:
         return False
     since = written_since(found.path.parent.parent, found.under_way)

@@ -91,7 +91,7 @@ def conclusion_record(
 def accepting_supervisor(
     supervision: Supervision, found: VerificationAssessment, signature: Signature | None
 ) -> str:
-    """Return the supervisor who accepts the tip; empty where it takes none.
+    """Return the supervisor who accepts the tip; empty if none is needed.
 
     Raises
     ------

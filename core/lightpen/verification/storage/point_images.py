@@ -55,7 +55,7 @@ NOT_COUNTED = "not counted"
 
 @dataclass(frozen=True)
 class PointRecord:
-    """Where the images of a run are kept.
+    """Images of a run.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class PointImages:
 
     @property
     def runs(self) -> tuple[CountingRun, ...]:
-        """The runs that count, in the order of time, the one at hand included."""
+        """The accepted runs in order of time, the current one included."""
         return self._runs if self._open is None else (*self._runs, self._open)
 
     def records(self, task: AnyTask) -> tuple[PointRecord, ...]:
@@ -159,7 +159,7 @@ class PointImages:
             self._end(is_last=transition.finished is not None)
 
     def forget_but(self, kinds: Collection[str]) -> None:
-        """Close the run at hand as one that was given up; those of some tasks count."""
+        """Discard the current run, and the runs of all but some tasks."""
         with suppress(FileError):  # it stays as one that was interrupted
             self._close(DISCARDED)
         self._open = None
@@ -204,7 +204,7 @@ class PointImages:
                 del self._numbers[name]
 
     def _end(self, *, is_last: bool) -> None:
-        """Close the run at hand as one that is done."""
+        """Close the current run as complete."""
         run, folder = self._open, self._folder
         self._close(CONCLUDED)
         self._open = None
@@ -291,7 +291,7 @@ class LivePoints:
         return transition
 
     def _drifted(self, setup: SessionSetup, state: SessionState) -> SessionSetup:
-        """Return it with how far the camera has moved, where that is asked for next."""
+        """Return it with the motion of the camera, if required."""
         task = state.task(setup)
         if task is None:
             return setup
@@ -303,7 +303,7 @@ class LivePoints:
     def _name(
         self, frame: Frame, seen: PenDetection, setup: SessionSetup, state: SessionState
     ) -> str:
-        """Return the name of an image; one of a touch is kept under it."""
+        """Return the name of an image of a touch."""
         task = state.task(setup)
         if task is None or not seen.has_pose or seen.is_blurred:
             return str(frame.seq)

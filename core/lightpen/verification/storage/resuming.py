@@ -92,7 +92,7 @@ def resume_verification(
     under_way: VerificationCheckpoint,
     report: Report,
 ) -> ResumedVerification:
-    """Return an interrupted verification, with what it found and touched.
+    """Return an interrupted verification with its results and touches.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def resume_verification(
 def abandon_interrupted(
     data: Path, interrupted: InterruptedVerification, now: datetime
 ) -> None:
-    """Conclude an interrupted verification as abandoned; what is kept of it stays.
+    """Conclude an interrupted verification as abandoned; its files are kept.
 
     A damaged file is put aside.
 
@@ -197,7 +197,7 @@ def _require_same(tip: CurrentTip, under_way: VerificationCheckpoint) -> None:
 
 
 def _lamps_in(record: Record, setup: SessionSetup) -> LampObservations:
-    """Return what the images of a record show of lamps; nothing if they are gone."""
+    """Return the lamps in the images of a record; empty if they are missing."""
     with suppress(LightpenError):  # the touches are known without their images
         place = touch_place((str(record.folder),))
         return lamps_in(observe_place(place, setup.instrument))

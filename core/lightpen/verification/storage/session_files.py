@@ -41,7 +41,7 @@ _logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class PendingRecord:
-    """A record that waits to be written; those of its session are written before.
+    """A record to be written, after earlier ones of its session.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class SessionRecords:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """What is written of the session at hand."""
+        """The written files of the current session."""
         return tuple(self._files)
 
     @property
@@ -85,7 +85,7 @@ class SessionRecords:
 
     @property
     def waiting(self) -> tuple[str, ...]:
-        """The kinds of the tasks of the session at hand whose records wait."""
+        """The tasks of the current session whose records are not written yet."""
         return tuple(
             kept.task.kind
             for kept, files in self._waiting
@@ -97,11 +97,11 @@ class SessionRecords:
         self._files = list(files)
 
     def add(self, kept: PendingRecord) -> None:
-        """Have a record of the session at hand written by the next `write`."""
+        """Queue a record of the current session for the next `write`."""
         self._waiting.append((kept, self._files))
 
     def write(self) -> None:
-        """Write all that waits.
+        """Write all queued records.
 
         Raises
         ------
@@ -114,7 +114,7 @@ class SessionRecords:
             self._waiting.pop(0)
 
     def write_now(self, kept: PendingRecord) -> None:
-        """Write a record of the session at hand, or not at all.
+        """Write a record of the current session, or nothing.
 
         Raises
         ------
@@ -147,7 +147,7 @@ def concluding(
 
 
 class SessionKeeping:
-    """Keeps what is touched and found, each thing as soon as it is known.
+    """Stores touches and results as soon as they are known.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ class SessionKeeping:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """What is written of the session at hand."""
+        """The written files of the current session."""
         return self._records.files
 
     @property
@@ -200,18 +200,18 @@ class SessionKeeping:
     def add_task(
         self, task: AnyTask, tip: CurrentTip, lamp_drift: LampDrift | None
     ) -> None:
-        """Keep what a task found by live touches, when its drift is known."""
+        """Store the result of live touches once its drift is known."""
         records = self.images.records(task)
         images = TaskImages(tip.origin, lamp_drift=lamp_drift, records=records)
         self._unkept = (*self._unkept, CompletedTask(task, tip, images))
 
     def add_read(self, images: ReadImages, done: CompletedTask) -> None:
-        """Keep what a task found by recorded images, when its drift is known."""
+        """Store the result of recorded images once its drift is known."""
         self._read = (*self._read, images)
         self._unkept = (*self._unkept, done)
 
     def settle(self, status: VerificationStatus) -> None:
-        """Have written what was found, unless a later visit will add to its U."""
+        """Queue the results, except those whose U depends on a later visit."""
         state = status.state
         if state is None:
             return
@@ -224,7 +224,7 @@ class SessionKeeping:
                 self._add(each, found, status)
 
     def forget_but(self, state: SessionState) -> None:
-        """Forget the images of what is to be touched again."""
+        """Discard the images of touches to be repeated."""
         kinds = {*state.found, *([DRIFT.kind] if state.visits else [])}
         self.images.forget_but(kinds)
         self._unkept = tuple(each for each in self._unkept if each.task.kind in kinds)
@@ -248,7 +248,7 @@ class SessionKeeping:
         self._records.write_now(concluding(tip, conclusion, None))
 
     def give_up(self, status: VerificationStatus) -> None:
-        """Have concluded what was begun and is not done; another session begins."""
+        """Conclude an incomplete session, as another begins."""
         self.images.forget_but(())
         if status.state is not None:
             state = replace(status.state, pending=())

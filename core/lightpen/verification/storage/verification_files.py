@@ -68,7 +68,7 @@ def keep_verification(
 
 
 def verifications_folder(data: Path, *, is_simulated: bool) -> Path:
-    """Return the folder of a data folder that verifications are kept in."""
+    """Return the verifications folder of a data folder."""
     return (data / SIMULATED if is_simulated else data) / VERIFICATIONS
 
 

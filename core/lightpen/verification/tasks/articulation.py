@@ -222,7 +222,7 @@ def _assessment(error: float, limits: VerificationLimits) -> VerificationAssessm
 def _screen(
     options: ArticulationOptions, conditions: Conditions, progress: TaskProgress
 ) -> Screening:
-    """Drop a point in another posture than those of its run, or in an earlier one."""
+    """Reject a point in another posture than its run, or in an earlier one."""
     points, runs = progress.points, progress.runs
     last = points[-1].rotation[None]
     if len(points) > 1:

@@ -44,10 +44,10 @@ def accepted(reason: Message, next_step: Message = USE_TIP) -> VerificationAsses
 
 
 def check(reason: Message, next_step: Message) -> VerificationAssessment:
-    """Return that something is to be looked into."""
+    """Return an assessment CHECK."""
     return VerificationAssessment(Grade.CHECK, reason, next_step)
 
 
 def refused(reason: Message, next_step: Message) -> VerificationAssessment:
-    """Return that a limit is not kept."""
+    """Return an assessment for an exceeded limit."""
     return VerificationAssessment(Grade.REPEAT, reason, next_step)

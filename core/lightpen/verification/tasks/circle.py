@@ -270,7 +270,7 @@ def fit_circle(points_cam: FloatArray) -> CircleFit:
 
 
 def _off_circle(points: FloatArray, circle: FloatArray) -> FloatArray:
-    """Return how far points (N, 2) lie off a circle (x, y, radius), (N,)."""
+    """Return the distances of points (N, 2) from a circle (x, y, radius), (N,)."""
     return np.asarray(np.linalg.norm(points - circle[:2], axis=1) - circle[2])
 
 
@@ -290,7 +290,7 @@ def ring_so_far(points_cam: FloatArray) -> CircleFit | None:
 def residuals_of(
     fit: CircleFit, points_cam: FloatArray | Sequence[FloatArray]
 ) -> FloatArray:
-    """Return how far points are off a circle outwards and off its plane, (N, 2), mm."""
+    """Return radial and out-of-plane deviations of points, (N, 2), mm."""
     ways = np.reshape(points_cam, (-1, 3)) - fit.center_cam
     axial = ways @ fit.normal_cam
     spokes = ways - axial[:, None] * fit.normal_cam
@@ -447,7 +447,7 @@ def ring_fit(points: Sequence[ProbedPoint]) -> CircleFit | None:
 
 
 def covered(points: Sequence[ProbedPoint]) -> float:
-    """Return how much of a ring points cover, degrees; 0 at first."""
+    """Return the covered angle of a ring, degrees; 0 at first."""
     fit = ring_fit(points)
     return 0.0 if fit is None else fit.covered
 
@@ -540,7 +540,7 @@ def _tables(found: Circle, conditions: Conditions) -> tuple[ResultTable, ...]:
 def _figures_so_far(
     progress: TaskProgress, conditions: Conditions
 ) -> tuple[ResultTable, ...]:
-    """Return how far the last points are off the ring so far."""
+    """Return the residuals of the last points from the ring so far."""
     points, fit = progress.points, ring_fit(progress.points)
     title = message("circle.residuals")
     if fit is None:

@@ -129,7 +129,7 @@ class FixedPoint(Found):
 
     @property
     def probed(self) -> tuple[ProbedPoint, ...]:
-        """Points whose postures are of interest."""
+        """Probed points whose postures are shown."""
         return self.touches
 
 

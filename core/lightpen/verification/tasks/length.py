@@ -87,7 +87,7 @@ class LengthRun:
 
 @dataclass(frozen=True)
 class Scale:
-    """By how much the coordinates of the pen file are to be multiplied.
+    """Factor for the coordinates of the pen file.
 
     Attributes
     ----------
@@ -224,7 +224,7 @@ def _two_ends(name: str, touches: Sequence[ProbedPoint], certified: float) -> En
 
 
 def _on_faces(ends: Ends, ball_offset: float) -> Ends:
-    """Return both ends moved from the centres of the ball to what it touched."""
+    """Return both ends, moved from the ball centres to the probed surfaces."""
     one, other = (np.mean([t.point_cam for t in end], axis=0) for end in ends)
     outwards = (other - one) / np.linalg.norm(other - one)
     first, second = ends
@@ -237,7 +237,7 @@ def _on_faces(ends: Ends, ball_offset: float) -> Ends:
 def _scale(
     instrument: Instrument, rows: FloatArray, noise: FloatArray, errors: FloatArray
 ) -> Scale:
-    """Return the scale by what was known and the lengths together (least squares)."""
+    """Return the scale from prior and lengths (least squares)."""
     leds = instrument.pen.leds - instrument.pen.leds.mean(axis=0)
     of_scale = np.zeros(len(instrument.covariance))
     of_scale[instrument.parameters.leds] = (leds / np.sum(leds**2)).ravel()
@@ -292,7 +292,7 @@ def _assessment(
 def _screen(
     options: LengthOptions, conditions: Conditions, progress: TaskProgress
 ) -> Screening:
-    """Take the last point for a first end if the two are those of no such length."""
+    """Return the last point as a first end if the two do not form such a length."""
     points, certified = progress.points, options.length
     if len(points) != 2:
         return keep_all(len(points))

@@ -38,7 +38,7 @@ NO_DRIFT = np.zeros(3)  # mm
 
 @dataclass(frozen=True, eq=False)
 class ProbingFrame:
-    """The pen in one image, or in those of several cameras at one moment.
+    """The pen in one image, or in simultaneous images.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class ProbedPoint:
 
 @dataclass(frozen=True, eq=False)
 class MeanPoint:
-    """One point by several touches, as `ProbedPoint` has it."""
+    """A point averaged over several touches, see `ProbedPoint`."""
 
     point_cam: FloatArray
     noise: FloatArray

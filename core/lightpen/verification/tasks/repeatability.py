@@ -1,4 +1,4 @@
-"""One tip calibrated several times: the paper's Table 1, and what a scatter points to.
+"""Repeatability of one tip: the paper's Table 1, and causes of scatter.
 
 An error of the estimator, of the files or of the camera moves tip and fixed point
 alike: both are the same poses, read once in the pen and once in the camera. So a tip
@@ -155,7 +155,7 @@ def measure_repeatability(
     reference: FloatArray | None = None,
     touched: RepeatedPoint | None = None,
 ) -> Repeatability:
-    """Measure how well calibrations of one tip repeat.
+    """Return the repeatability of calibrations of one tip.
 
     Parameters
     ----------

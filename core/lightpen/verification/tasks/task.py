@@ -1,4 +1,4 @@
-"""What a verification task is: all that the command line, a session and the window use.
+"""Verification tasks: the definition for command line, session and window.
 
 A module of this package makes one `VerificationTask`; `lightpen.verification.tasks.
 registry` lists them. Nothing else switches on the kind of a task.
@@ -35,7 +35,7 @@ class Surface(StrEnum):
 
 
 def ball_offset(surface: Surface, ball_diameter: float | None) -> float:
-    """Return by how much a surface lies farther out than the tip's centre, mm.
+    """Return the offset of the surface from the tip centre, outwards, mm.
 
     That is to be added to the radius of a circle of tip centres, and to each end of a
     length.
@@ -45,7 +45,7 @@ def ball_offset(surface: Surface, ball_diameter: float | None) -> float:
 
 
 class TaskOptions(Struct, frozen=True, tag_field="task"):
-    """Base of what a station chooses for a task; the defaults are the usual values."""
+    """Base of the options of a task; the defaults are the usual values."""
 
 
 @dataclass(frozen=True)
@@ -152,13 +152,13 @@ class Conditions:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Base of what a task finds."""
+    """Base of the result of a task."""
 
     assessment: VerificationAssessment
 
     @property
     def probed(self) -> Points:
-        """Points whose postures are of interest."""
+        """Probed points whose postures are shown."""
         return ()
 
 
@@ -189,7 +189,7 @@ class ResultTable:
 
 @dataclass(frozen=True, eq=False)
 class TaskProgress:
-    """The task at hand.
+    """The current task.
 
     Attributes
     ----------
@@ -208,13 +208,13 @@ class TaskProgress:
 
     @property
     def run(self) -> int:
-        """Number of the run at hand, from 1."""
+        """Number of the current run, from 1."""
         return len(self.runs) + 1
 
 
 @dataclass(frozen=True)
 class Screening:
-    """Which points of the run at hand count, and why one does not."""
+    """Accepted points of the current run, and the reason for a rejection."""
 
     kept: Sequence[int]
     trouble: Message | None = None
@@ -355,13 +355,13 @@ class VerificationTask(Generic[OptionsT, FoundT]):
         return self.kind.replace(" ", "-")
 
     def done(self, options: OptionsT, progress: TaskProgress) -> float:
-        """Return how much of the run at hand is done, 0 to 1."""
+        """Return the completed fraction of the current run, 0 to 1."""
         if self.fraction is not None:
             return self.fraction(options, progress)
         return min(len(progress.points) / self.n_points(options), 1.0)
 
     def counted(self, options: OptionsT, progress: TaskProgress) -> Message:
-        """Return how much of the task at hand is probed of how much."""
+        """Return the progress of the current task: probed points and points in all."""
         count = (
             message(
                 "task.points",
@@ -390,7 +390,7 @@ class VerificationTask(Generic[OptionsT, FoundT]):
         return self.other_run if progress.runs and self.other_run else self.first
 
     def is_same_artefact(self, one: OptionsT, other: OptionsT) -> bool:
-        """Return whether what was found by some options stands by others."""
+        """Return whether a result remains valid with other options."""
         names = [each.name for each in self.fields if each.is_of_artefact]
         return all(getattr(one, name) == getattr(other, name) for name in names)
 
