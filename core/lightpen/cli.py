@@ -29,11 +29,15 @@ from lightpen.messages import Message, message
 
 # Each with what adds its options, which is imported only for what was given.
 COMMANDS = (
-    ("calibrate", "find the tip from a swing", "calibrate:add_calibrate"),
+    (
+        "calibrate",
+        "calibrate the tip from the images of a swing",
+        "calibrate:add_calibrate",
+    ),
     ("simulate", "write a simulated swing", "simulate:add_simulate"),
-    ("pivot", "find the tip from given poses", "pivot:add_pivot"),
-    ("pen", "put measured LEDs into the pen frame", "pen:add_pen"),
-    ("verify", "prove a tip by touching", "verify:add_verify"),
+    ("pivot", "calibrate the tip from given poses", "pivot:add_pivot"),
+    ("pen", "transform measured LED coordinates into the pen frame", "pen:add_pen"),
+    ("verify", "verify a tip on reference artefacts", "verify:add_verify"),
     (
         "repeatability",
         "compare calibrations of one tip",
@@ -41,28 +45,28 @@ COMMANDS = (
     ),
     (
         "recalculate",
-        "solve calibrations again, and check U by Monte Carlo",
+        "recompute calibrations and check U by Monte Carlo",
         "recalculate:add_recalculate",
     ),
     (
         "improve-pen",
-        "a better LED file by several swings",
+        "improve the LED file from several swings",
         "pen_health:add_improve_pen",
     ),
-    ("intrinsics", "calibrate a camera by a board", "intrinsics:add_intrinsics"),
+    ("intrinsics", "calibrate a camera with a board", "intrinsics:add_intrinsics"),
     (
         "extrinsics",
-        "find how two cameras stand, by a board",
+        "calibrate the extrinsics of two cameras with a board",
         "intrinsics:add_extrinsics",
     ),
-    ("board", "make a board to be printed", "board:add_board"),
+    ("board", "write a calibration board for printing", "board:add_board"),
     (
         "check-camera",
-        "whether camera and file agree, by a swing",
+        "check the camera file with a swing",
         "check_camera:add_check_camera",
     ),
-    ("export", "write a tip as other programs read it", "export:add_export"),
-    ("stream", "send pose and tip live to other programs", "stream:add_stream"),
+    ("export", "export a tip for other programs", "export:add_export"),
+    ("stream", "stream pose and tip to other programs", "stream:add_stream"),
 )
 OPENED = (".lightpen", ".json")  # suffixes of the files that the window opens
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
@@ -183,9 +187,9 @@ def _parser(
     parser = _Parser(
         prog="lightpen",
         description="Calibrate the probe tip of a light pen."
-        + (" Without a command, a window opens and leads through it." * has_window),
-        epilog="Exit status: 0 done, 1 the data cannot give a tip or the archive was "
-        "changed, 2 wrong usage or unreadable input.",
+        + (" Without a command, the wizard opens." * has_window),
+        epilog="Exit status: 0 done, 1 no result from these data or a modified "
+        "archive, 2 wrong usage or unreadable input.",
     )
     parser.set_defaults(verbose=False, log_level=None, log_folder=None)
     parser.add_argument("--version", action="version", version=__version__)
@@ -204,8 +208,8 @@ def _parser(
             resolve_name(f"lightpen.commands.{function}")(command)
     data_folder = usual_data_folder if desktop is None else desktop.data_folder
     for name, told, add in (
-        ("archive", "check, list, send and take up entries", add_archive),
-        ("tips", "the library of pens, tips and cones", add_tips),
+        ("archive", "check, list, export and import entries", add_archive),
+        ("tips", "manage the library of pens, tips and cones", add_tips),
     ):
         command = commands.add_parser(name, help=told)
         command.set_defaults(log_folder=usual_data_folder)

@@ -132,14 +132,14 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
         type=number_from(1e-6, 10.0, "uncertainty", "mm"),
         default=USUAL.flatness,
         metavar="MM",
-        help=f"standard uncertainty of how flat the board is ({USUAL.flatness:g})",
+        help=f"standard uncertainty of the flatness of the board, mm ({USUAL.flatness:g})",
     )
     parser.add_argument(
         "--squareness",
         type=number_from(1e-9, 0.1, "share", "of 1"),
         default=USUAL.squareness,
         metavar="SHARE",
-        help="of the ratio of its lengths along rows and columns "
+        help="standard uncertainty of its aspect ratio, relative "
         f"({USUAL.squareness:g})",
     )
     parser.add_argument(
@@ -147,7 +147,7 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
         type=number_from(1e-9, 0.1, "share", "of 1"),
         default=USUAL.scale,
         metavar="SHARE",
-        help=f"of all its lengths together ({USUAL.scale:g})",
+        help=f"standard uncertainty of its scale, relative ({USUAL.scale:g})",
     )
 
 

@@ -60,7 +60,7 @@ def add_stream(parser: argparse.ArgumentParser) -> None:
         "--source",
         choices=[source.key for source in SOURCES if source.camera is not None],
         default=RECORDED.key,
-        help=f"what takes the images ({RECORDED.key})",
+        help=f"image source ({RECORDED.key})",
     )
     parser.add_argument(
         "--producer", default="", metavar="FILE", help="GenTL producer of a camera"
@@ -77,22 +77,22 @@ def add_stream(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--address",
         default=LOOPBACK,
-        help="of this computer in the network that may listen; programs of this "
-        f"computer alone unless said ({LOOPBACK})",
+        help="local network address to listen on; by default only programs on "
+        f"this computer can connect ({LOOPBACK})",
     )
     parser.add_argument(
         "--port",
         type=whole_number,
         default=PORT,
         metavar="N",
-        help=f"0 for any that is free ({PORT})",
+        help=f"TCP port; 0 selects a free one ({PORT})",
     )
     parser.add_argument(
         "--rate",
         type=above_zero,
         default=USUAL_FRAME_RATE,
         metavar="HZ",
-        help=f"of recorded images ({USUAL_FRAME_RATE:g})",
+        help=f"frame rate of recorded images ({USUAL_FRAME_RATE:g})",
     )
     parser.add_argument(
         "--once",

@@ -70,19 +70,24 @@ def _add_entries(action: argparse.ArgumentParser) -> None:
     )
     of_all.add_argument("--note", metavar="TEXT")
     of_tips = action.add_argument_group(
-        "tips", f"'{NOTHING}' in place of a value forgets what was said"
+        "tips", f"'{NOTHING}' instead of a value clears the field"
     )
     for name, kind, unit, told in (
-        ("--ball-diameter", finite, "MM", "diameter of its ball"),
-        ("--max-change", finite, "MM", "that a calibration may find it moved"),
-        ("--max-days", whole_number, "N", "that it may be in force"),
-        ("--max-swings", whole_number, "N", "of its pen that it may be in force"),
-        ("--picture", Path, "FILE", "picture of it"),
+        ("--ball-diameter", finite, "MM", "ball diameter"),
+        ("--max-change", finite, "MM", "maximum change since the last calibration"),
+        ("--max-days", whole_number, "N", "calibration interval in days"),
+        (
+            "--max-swings",
+            whole_number,
+            "N",
+            "calibration interval in swings of the pen",
+        ),
+        ("--picture", Path, "FILE", "picture of the tip"),
     ):
         of_tips.add_argument(name, type=_or_nothing(kind), metavar=unit, help=told)
     for name, told in (
-        ("--nominal", "its centre by design, pen frame, mm"),
-        ("--axis", "axis of its stylus, from the ball into the pen, pen frame"),
+        ("--nominal", "nominal tip centre, pen frame, mm"),
+        ("--axis", "stylus axis from the ball into the pen, pen frame"),
     ):
         of_tips.add_argument(
             name, type=_or_nothing(finite), nargs="+", metavar="X Y Z", help=told
@@ -90,7 +95,7 @@ def _add_entries(action: argparse.ArgumentParser) -> None:
 
 
 def _add_author(action: argparse.ArgumentParser) -> None:
-    who = action.add_argument_group("who changes it, as the archive keeps it")
+    who = action.add_argument_group("author of the change, for the archive")
     who.add_argument("--station", default="", metavar="NAME")
     who.add_argument(
         "--operator",

@@ -594,7 +594,7 @@ CIRCLE = VerificationTask(
             message("circle.certified"),
             unknown=message("option.unknown"),
             argument="--radius",
-            help="certified",
+            help="certified radius",
         ),
         certificate_option("radius_uncertainty"),
         SurfaceOption(

@@ -387,7 +387,7 @@ LENGTH = VerificationTask(
             message("length.certified"),
             unknown=message("option.unknown"),
             argument="--length",
-            help="certified",
+            help="certified length",
         ),
         certificate_option("length_uncertainty"),
         SurfaceOption(

@@ -122,7 +122,7 @@ def certificate_option(name: str) -> NumberOption:
         unknown=message("option.unknown"),
         is_optional=True,
         argument="--certified-uncertainty",
-        help="U (k = 2) of what is certified",
+        help="U (k = 2) of the certified value",
     )
 
 
