@@ -105,9 +105,10 @@ def no_power_cut() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def other_data_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """No command writes into the log of whoever runs the tests."""
+    """No command writes into the log, or the keys, of whoever runs the tests."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_DATA_HOME", str(tmp_path_factory.mktemp("data-home")))
+        patch.setenv("LIGHTPEN_KEYS", str(tmp_path_factory.mktemp("keys")))
         yield
 
 

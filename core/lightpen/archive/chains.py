@@ -1,10 +1,9 @@
 """The chains in a database: appended to where they are at home, copied elsewhere."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import timedelta
 from typing import Any
-from uuid import uuid4
 
 from sqlalchemy import Column, Connection, Row, func, insert, select, update
 
@@ -12,6 +11,7 @@ from lightpen.archive.database import Database
 from lightpen.archive.entries import (
     EPOCH,
     NOTHING_BEFORE,
+    SHORT,
     ChainHead,
     Event,
     Kind,
@@ -22,15 +22,20 @@ from lightpen.archive.entries import (
     since_us,
     text_sha256,
 )
+from lightpen.archive.signatures import ChainKeys, entry_signature, key_in
 from lightpen.archive.tables import CHAINS, ENTRIES, RECORDS
-from lightpen.errors import ArchiveError
+from lightpen.errors import ArchiveError, FileError
 from lightpen.formats.own_json import DamagedError
 from lightpen.messages import Message, message
+from lightpen.record.signing.keys import chain_of, make_station_key
 
 SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
 _AT_HOME = select(CHAINS.c.chain).where(CHAINS.c.is_own)
 # Of an entry that is to be read.
-READ: tuple[Column[Any], ...] = (ENTRIES.c.number, ENTRIES.c.sha256, ENTRIES.c.text)
+READ: tuple[Column[Any], ...] = (
+    *(ENTRIES.c.number, ENTRIES.c.sha256, ENTRIES.c.text, ENTRIES.c.signature),
+)
+UNAPPROVED = "archive.key-unapproved"  # of a station without a supervisor
 BATCH = 200  # entries that are copied in one transaction
 
 
@@ -49,11 +54,22 @@ class CopyResult:
 
 
 def own_chain(database: Database) -> str:
-    """Return the chain that is at home in a database; it begins with the first call."""
+    """Return the chain that is at home in a database; it begins with the first call.
+
+    With it begins its station key.
+
+    Raises
+    ------
+    ArchiveError
+        The database cannot be used, or the key not be stored.
+    """
     with database.writing() as connection:
         chain = connection.execute(_AT_HOME).scalar_one_or_none()
         if chain is None:
-            chain = uuid4().hex
+            try:
+                chain = chain_of(make_station_key().public)
+            except FileError as error:
+                raise ArchiveError(error.message) from error
             _begin(connection, chain, is_own=True)
     return chain
 
@@ -86,7 +102,10 @@ def append(
     with database.writing() as connection:
         if _is_entered(connection, chain, event):
             return None
-        entry = chained(_head(connection, chain), event)
+        head = _head(connection, chain)
+        entry = chained(head, event)
+        signature = entry_signature(head, event, entry.sha256)
+        entry = replace(entry, signature=signature)
         if record is not None:
             _keep_records(connection, {text_sha256(record): record})
         _put(connection, chain, [entry])
@@ -101,10 +120,13 @@ def copy_entries(
 ) -> CopyResult:
     """Let the copy of a chain grow by entries, in their order; known ones are passed.
 
+    A chain that is at home in the database grows by `append` alone.
+
     Raises
     ------
     ArchiveError
-        They do not go on where the copy ends, or the copy says otherwise.
+        They do not go on where the copy ends, are not signed by the station of the
+        chain, are beyond the head of a chain at home, or the copy says otherwise.
     """
     with database.writing() as connection:
         if connection.dialect.name == "postgresql":
@@ -115,6 +137,9 @@ def copy_entries(
         known, new = _parted(entries, head.number)
         _require_same(connection, chain, known)
         _require_next(head, new)
+        if new:
+            _require_elsewhere(connection, new[0])
+            _require_signed(connection, chain, new)
         _keep_records(connection, _named(new, records))
         _put(connection, chain, new)
     return CopyResult(len(new), len(known))
@@ -246,6 +271,7 @@ def columns_of(entry: StoredEntry) -> dict[str, Any]:
         "record_sha256": event.record_sha256 or "",
         "text": entry.text,
         "at_us": since_us(event.at),
+        "signature": entry.signature,
     }
 
 
@@ -261,7 +287,7 @@ def sound_entry(row: Row[Any]) -> StoredEntry | None:
     if not isinstance(columns["text"], str):
         return None
     try:
-        entry = read_entry(columns["text"])
+        entry = read_entry(columns["text"], columns["signature"])
     except DamagedError:
         return None
     return entry if columns_of(entry) == columns else None
@@ -275,7 +301,10 @@ def searchable(text: str) -> str:
 def _head(connection: Connection, chain: str) -> ChainHead:
     """Return the last entry of a chain as the entries have it."""
     last = (
-        select(ENTRIES.c.number, ENTRIES.c.sha256, ENTRIES.c.since_us)
+        select(
+            *(ENTRIES.c.number, ENTRIES.c.sha256),
+            *(ENTRIES.c.since_us, ENTRIES.c.signature),
+        )
         .where(ENTRIES.c.chain == chain)
         .order_by(ENTRIES.c.number.desc())
         .limit(1)
@@ -284,7 +313,7 @@ def _head(connection: Connection, chain: str) -> ChainHead:
     if row is None:
         return ChainHead(chain)
     since = EPOCH + timedelta(microseconds=row.since_us)
-    return ChainHead(chain, row.number, row.sha256, since)
+    return ChainHead(chain, row.number, row.sha256, since, key_in(row.signature))
 
 
 def _is_entered(connection: Connection, chain: str, event: Event) -> bool:
@@ -363,6 +392,33 @@ def _require_next(head: ChainHead, new: list[StoredEntry]) -> None:
         number, sha256 = each.entry.number, each.sha256
 
 
+def _require_elsewhere(connection: Connection, new: StoredEntry) -> None:
+    """Refuse an entry of the chain at home that was not entered here."""
+    if connection.execute(_AT_HOME).scalar_one_or_none() == new.entry.chain:
+        raise ArchiveError("archive.own-chain-ahead", entry=_named_entry(new))
+
+
+def _require_signed(
+    connection: Connection, chain: str, new: Iterable[StoredEntry]
+) -> None:
+    limits = (
+        select(*READ)
+        .where(ENTRIES.c.chain == chain, ENTRIES.c.kind == Kind.LIMITS.value)
+        .order_by(ENTRIES.c.number)
+    )
+    try:
+        before = [
+            read_entry(row.text, row.signature) for row in connection.execute(limits)
+        ]
+    except DamagedError as error:
+        raise ArchiveError("archive.copy-damaged", chain=chain[:SHORT]) from error
+    keys = ChainKeys(chain, before)
+    for each in new:
+        finding = keys.finding(each)
+        if finding is not None and finding.code != UNAPPROVED:
+            raise ArchiveError(finding)
+
+
 def _named(
     entries: Sequence[StoredEntry], records: Mapping[str, str]
 ) -> dict[str, str]:
@@ -400,7 +456,7 @@ def read_row(database: Database, row: Row[Any]) -> StoredEntry:
         "archive.entry-damaged", number=row.number, archive=database.name
     )
     try:
-        entry = read_entry(row.text)
+        entry = read_entry(row.text, row.signature)
     except DamagedError as error:
         raise damaged from error
     if entry.sha256 != row.sha256:

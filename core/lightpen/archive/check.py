@@ -19,6 +19,7 @@ from lightpen.archive.entries import (
 )
 from lightpen.archive.files_check import FilesCheck
 from lightpen.archive.seal import is_sealed_otherwise, lost_heads, read_seal
+from lightpen.archive.signatures import ChainKeys
 from lightpen.archive.tables import CHAINS, ENTRIES, RECORDS
 from lightpen.errors import LightpenError
 from lightpen.messages import Message, message
@@ -151,7 +152,7 @@ def _walked(
 
     Entries that are added meanwhile are walked over, too.
     """
-    number, previous = 0, NOTHING_BEFORE
+    number, previous, keys = 0, NOTHING_BEFORE, ChainKeys(head.chain)
     while True:
         rows = _rows_after(database, head.chain, number)
         if not rows:
@@ -173,6 +174,9 @@ def _walked(
                 yield _unchained(head.chain, row.number)
             else:
                 sound.append(entry)
+                unsigned = keys.finding(entry)
+                if unsigned is not None:
+                    yield unsigned
             number, previous = row.number, row.sha256
         if files is not None:
             yield from files.findings(sound)

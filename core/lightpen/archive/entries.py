@@ -171,11 +171,14 @@ class StoredEntry:
     ----------
     text : str
         Canonical JSON: names sorted, no blanks, ASCII.
+    signature : str
+        See `lightpen.archive.signatures`; empty until it is entered.
     """
 
     entry: Entry
     text: str
     sha256: str
+    signature: str = ""
 
 
 @dataclass(frozen=True)
@@ -188,12 +191,15 @@ class ChainHead:
         Number of the last entry; 0 for an empty chain.
     since : datetime or None
         Time of the last entry.
+    key : str
+        Public key that signed it; empty for an empty chain.
     """
 
     chain: str
     number: int = 0
     sha256: str = NOTHING_BEFORE
     since: datetime | None = None
+    key: str = ""
 
 
 def chained(head: ChainHead, event: Event) -> StoredEntry:
@@ -212,8 +218,8 @@ def written(entry: Entry) -> StoredEntry:
     return StoredEntry(entry, text, text_sha256(text))
 
 
-def read_entry(text: str) -> StoredEntry:
-    """Return the entry that a text holds.
+def read_entry(text: str, signature: str = "") -> StoredEntry:
+    """Return the entry that a text holds, with the signature kept beside it.
 
     Raises
     ------
@@ -221,7 +227,7 @@ def read_entry(text: str) -> StoredEntry:
         It holds none, or was not written so.
     """
     data = text.encode("utf-8", "surrogateescape")
-    return StoredEntry(parse_own_json(data, Entry), text, text_sha256(text))
+    return StoredEntry(parse_own_json(data, Entry), text, text_sha256(text), signature)
 
 
 def since_us(moment: datetime) -> int:

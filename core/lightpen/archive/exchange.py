@@ -46,6 +46,7 @@ class _FirstLine(Struct):
 
 class _EntryLine(Struct):
     entry: str
+    signature: str = ""
     record: str | None = None
 
 
@@ -136,6 +137,7 @@ def _contents(database: Database) -> Iterator[dict[str, object]]:
             records = records_of(database, [entry])
             yield {
                 "entry": entry.text,
+                "signature": entry.signature,
                 "record": None if name is None else records.get(name),
             }
 
@@ -161,7 +163,7 @@ def _read(path: Path) -> Iterator[tuple[StoredEntry, str | None]]:
                         raise DamagedError("Lines are missing or changed.")
                     return
                 found = parse_own_json(line, _EntryLine)
-                yield read_entry(found.entry), found.record
+                yield read_entry(found.entry, found.signature), found.record
                 checksum.update(line)
                 n_read += 1
             raise DamagedError("Its end is missing.")

@@ -14,6 +14,7 @@ from lightpen.archive.queries import (
     IN_ORDER,
     EntryFilter,
     condition_of,
+    is_at_home,
     replaced,
     revoked,
 )
@@ -37,12 +38,15 @@ class Line:
     ----------
     entry : StoredEntry or None
         None if it was changed since it was entered.
+    is_foreign : bool
+        Whether it is a copy from another station.
     """
 
     chain: str
     number: int
     entry: StoredEntry | None
     state: TipState = TipState.NONE
+    is_foreign: bool = False
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,7 @@ def lines(
             ENTRIES,
             revoked(ENTRIES).label("is_taken_back"),
             replaced(ENTRIES).label("is_replaced"),
+            is_at_home(ENTRIES).label("is_at_home"),
         )
         .join(
             places,
@@ -133,4 +138,4 @@ def _line(row: Row[Any]) -> Line:
     if entry is not None and entry.entry.event.kind in IN_FORCE_BY:
         state = TipState.REPLACED if row.is_replaced else TipState.IN_FORCE
         state = TipState.TAKEN_BACK if row.is_taken_back else state
-    return Line(row.chain, row.number, entry, state)
+    return Line(row.chain, row.number, entry, state, not row.is_at_home)

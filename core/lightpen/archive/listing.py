@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from lightpen.archive.chains import chain_at_home
 from lightpen.archive.database import Database
 from lightpen.archive.entries import StoredEntry
 from lightpen.archive.queries import EntryFilter, newest
@@ -17,7 +18,7 @@ COLUMNS = (
     *("pen", "tip", "cone"),
     *(f"tip_{axis}_mm" for axis in AXES),
     *(f"expanded_uncertainty_{axis}_mm" for axis in AXES),
-    *("reason", "chain", "number", "sha256"),
+    *("reason", "chain", "number", "sha256", "is_foreign"),
 )
 BATCH = 1000  # entries that are read at one time
 
@@ -37,23 +38,37 @@ def save_entries(database: Database, wanted: EntryFilter, path: Path) -> int:
     """
     entries = tuple(_all(database, wanted))
     is_table = path.suffix.lower() == ".csv"
-    text = (entries_csv if is_table else entries_json)(entries)
+    home = chain_at_home(database)
+    text = (entries_csv if is_table else entries_json)(entries, home)
     write_whole(path, text.encode("utf-8", "backslashreplace"))
     return len(entries)
 
 
-def entries_csv(entries: Iterable[StoredEntry]) -> str:
-    """Return entries as a table, one a line."""
+def entries_csv(entries: Iterable[StoredEntry], home: str | None) -> str:
+    """Return entries as a table, one a line.
+
+    Parameters
+    ----------
+    home : str or None
+        Chain at home in the archive; entries of all others are foreign.
+    """
     lines = io.StringIO()
     writer = csv.writer(lines, lineterminator="\n")
     writer.writerow(COLUMNS)
-    writer.writerows(map(_row, entries))
+    writer.writerows(_row(each, home) for each in entries)
     return lines.getvalue()
 
 
-def entries_json(entries: Iterable[StoredEntry]) -> str:
-    """Return entries as stored, each with its hash."""
-    listed = [{"sha256": each.sha256, **json.loads(each.text)} for each in entries]
+def entries_json(entries: Iterable[StoredEntry], home: str | None) -> str:
+    """Return entries as they are kept, each with its hash, as `entries_csv`."""
+    listed = [
+        {
+            "sha256": each.sha256,
+            "is_foreign": each.entry.chain != home,
+            **json.loads(each.text),
+        }
+        for each in entries
+    ]
     return json.dumps(listed, indent=1) + "\n"
 
 
@@ -64,7 +79,7 @@ def _all(database: Database, wanted: EntryFilter) -> Iterator[StoredEntry]:
         last = batch[-1].entry
 
 
-def _row(entry: StoredEntry) -> list[object]:
+def _row(entry: StoredEntry, home: str | None) -> list[object]:
     event, nothing = entry.entry.event, ("", "", "")
     names = event.names
     return [
@@ -74,4 +89,5 @@ def _row(entry: StoredEntry) -> list[object]:
         *(event.tip_pen_mm or nothing),
         *(event.expanded_uncertainty_mm or nothing),
         *(event.reason, entry.entry.chain, entry.entry.number, entry.sha256),
+        entry.entry.chain != home,
     ]

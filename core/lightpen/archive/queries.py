@@ -17,7 +17,7 @@ from sqlalchemy import (
 from lightpen.archive.chains import READ, read_row, searchable
 from lightpen.archive.database import Database
 from lightpen.archive.entries import IN_FORCE_BY, Entry, Kind, StoredEntry, since_us
-from lightpen.archive.tables import ENTRIES
+from lightpen.archive.tables import CHAINS, ENTRIES
 
 IN_ORDER = (ENTRIES.c.since_us, ENTRIES.c.chain, ENTRIES.c.number)
 _KINDS_IN_FORCE = [kind.value for kind in IN_FORCE_BY]
@@ -136,6 +136,11 @@ def revoked(entries: FromClause) -> Exists:
     return exists().where(
         back.c.concerns == entries.c.sha256, back.c.kind == Kind.TAKEN_BACK.value
     )
+
+
+def is_at_home(entries: FromClause) -> Exists:
+    """Return the condition that an entry is of the chain at home in its database."""
+    return exists().where(CHAINS.c.chain == entries.c.chain, CHAINS.c.is_own)
 
 
 def replaced(entries: FromClause) -> Exists:

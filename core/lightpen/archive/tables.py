@@ -45,6 +45,7 @@ ENTRIES = Table(
     Column("record_sha256", String(64), nullable=False),
     Column("text", Text, nullable=False),
     Column("at_us", BigInteger, nullable=False),  # by its own clock
+    Column("signature", Text, nullable=False),  # as `lightpen.archive.signatures`
     Index("archive_of_tip", "pen", "tip", "is_simulated", "kind", "since_us"),
     Index("archive_in_order", "since_us", "chain", "number"),
     Index("archive_of_station", "station", "since_us", "chain", "number"),

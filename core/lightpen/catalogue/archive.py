@@ -37,5 +37,10 @@ MESSAGES = {
     "archive.another-result": "The result {file} is not the one that was entered in the archive: it was changed since. Restore it from a copy.",
     "file.seal": "seal",
     "archive.seal-damaged": "The seal {file} of the archive was changed or damaged.",
+    "archive.own-chain-ahead": "{entry} belongs to the chain of this station, but was not entered here. Nothing was imported. If this data folder was replaced by an older copy, fetch the missing entries from the server; if not, the file was forged.",
+    "archive.copy-damaged": "The copy of chain {chain} in this archive is damaged. Check the archive.",
+    "archive.signature-wrong": "The signature of entry {number} of chain {chain} is missing or wrong: the entry or its signature was changed.",
+    "archive.signature-foreign": "Entry {number} of chain {chain} is signed by a key that is not the station's: it was forged, or entered by a copy of the data folder on another computer.",
+    "archive.key-unapproved": "Entry {number} of chain {chain} introduces a station key that neither the key before nor a supervisor approved. Ask the station whether its data folder was moved to another computer.",
     "archive.closed": "The archive is closed: the program ends.",
 }

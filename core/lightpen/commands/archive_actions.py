@@ -7,7 +7,7 @@ from contextlib import closing, contextmanager
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
-from lightpen.archive.chains import own_chain
+from lightpen.archive.chains import chain_at_home, own_chain
 from lightpen.archive.check import check_file
 from lightpen.archive.database import Database, look_into, open_file, open_server
 from lightpen.archive.entries import SHORT, Kind
@@ -56,7 +56,8 @@ def _list(options: argparse.Namespace) -> None:
     )
     with _looked_into(_data(options)) as database:
         if options.csv:
-            told = entries_csv(newest(database, wanted, options.most))
+            home = chain_at_home(database)
+            told = entries_csv(newest(database, wanted, options.most), home)
         else:
             found = lines(database, wanted, 0, options.most)
             told = "\n".join(map(_line, found))
@@ -140,4 +141,6 @@ def _line(line: Line) -> str:
     words = [when, names.station, names.pen, names.tip, event.kind.value, event.grade]
     if tip is not None:
         words.append(" ".join(f"{value:.4f}" for value in tip))
+    if line.is_foreign:
+        words.append("(other station)")
     return "  ".join(filter(None, words))

@@ -156,10 +156,15 @@ def write_whole(path: Path, data: bytes) -> None:
         raise _unwritten(path, error) from error
 
 
-def create_whole(path: Path, data: bytes) -> None:
+def create_whole(path: Path, data: bytes, mode: int = 0o666) -> None:
     """Write a new file whole or not at all; never replace a file.
 
     When this returns, the file is on the disk with its name, whatever happens next.
+
+    Parameters
+    ----------
+    mode : int
+        Who may read and write it, as of `os.open`.
 
     Raises
     ------
@@ -170,7 +175,7 @@ def create_whole(path: Path, data: bytes) -> None:
     """
     sweep_parts(path.parent)
     try:
-        with part_of(path, data) as part:
+        with part_of(path, data, mode) as part:
             _name_anew(part, path)
         try:
             sync_folder(path.parent)

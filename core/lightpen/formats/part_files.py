@@ -10,6 +10,7 @@ import os
 import re
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import IO
 
@@ -21,15 +22,15 @@ _NAME = re.compile(r"\.[0-9a-f]{16}\.part")
 
 
 @contextlib.contextmanager
-def part_of(target: Path, data: bytes) -> Iterator[Path]:
-    """Write data to a temporary file in the folder of its target.
+def part_of(target: Path, data: bytes, mode: int = 0o666) -> Iterator[Path]:
+    """Write data to a temporary file beside its target, of a mode as of `os.open`.
 
     Raises
     ------
     OSError
         It cannot be written.
     """
-    part, stream = _own_part(target.parent)
+    part, stream = _own_part(target.parent, mode)
     try:
         with stream:
             stream.write(data)
@@ -74,11 +75,11 @@ def sweep_parts(folder: Path) -> None:
                 _sweep(path)
 
 
-def _own_part(folder: Path) -> tuple[Path, IO[bytes]]:
+def _own_part(folder: Path, mode: int) -> tuple[Path, IO[bytes]]:
     """Create a temporary file that no clean-up removes."""
     while True:
         part = folder / f".{os.urandom(8).hex()}.part"
-        stream = part.open("xb")
+        stream = open(part, "xb", opener=partial(os.open, mode=mode))  # noqa: SIM115
         try:
             # One who sweeps may have come between the making and the locking.
             if locked(stream.fileno(), patience_s=PATIENCE) and part.exists():

@@ -219,6 +219,8 @@ class EntryPanel(Translated, QWidget):
             return ""
         if line.entry.entry.event.kind not in IN_FORCE_BY:
             return self.tr("Only an accepted tip can be reinstated.")
+        if line.is_foreign:
+            return self.tr("This tip was accepted at another station.")
         if line.state is TipState.IN_FORCE:
             return self.tr("This tip is current.")
         return ""

@@ -34,6 +34,7 @@ _OUTCOMES: dict[TrialOutcome, str] = {
     TrialOutcome.REFUSED: QT_TRANSLATE_NOOP("history", "rejected"),
     TrialOutcome.ABANDONED: QT_TRANSLATE_NOOP("history", "abandoned"),
 }
+_FOREIGN = QT_TRANSLATE_NOOP("history", "other station")
 _STATES: dict[TipState, str] = {
     TipState.IN_FORCE: QT_TRANSLATE_NOOP("history", "current"),
     TipState.REPLACED: QT_TRANSLATE_NOOP("history", "replaced"),
@@ -77,6 +78,8 @@ def what_text(line: Line) -> str:
         words.append(_translated(_STATES[line.state]))
     if event.outcome is not None:
         words.append(_translated(_OUTCOMES[event.outcome]))
+    if line.is_foreign:
+        words.append(_translated(_FOREIGN))
     return listed(words)
 
 
@@ -121,7 +124,7 @@ def line_tone(line: Line, is_verdict: bool) -> Tone:
     if is_verdict:
         known = {grade.value: tone for grade, (_, tone) in GRADE_MARKS.items()}
         return known.get(event.grade, Tone.PLAIN)
-    if line.state is TipState.IN_FORCE:
+    if line.state is TipState.IN_FORCE and not line.is_foreign:
         return Tone.GOOD
     is_refused = event.kind is Kind.REFUSED or event.outcome is TrialOutcome.REFUSED
     return Tone.WARN if is_refused else Tone.PLAIN

@@ -1,0 +1,11 @@
+"""Changes of the station key: their names in an entry, and what approves them."""
+
+STATION_KEY = "station_key"
+OLD_KEY_SIGNATURE = "station_key_signature"
+SUPERVISOR_KEY = "supervisor_key"
+SUPERVISOR_SIGNATURE = "supervisor_signature"
+
+
+def key_change(chain: str, public: str) -> bytes:
+    """Return what approves another station key of a chain when signed."""
+    return f"lightpen station key\n{chain}\n{public}".encode()

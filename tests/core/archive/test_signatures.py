@@ -1,0 +1,108 @@
+"""Entries are signed by their station, and nobody else can continue its chain."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from sqlalchemy import update
+from tests.core.archive.conftest import Station, accepted
+
+from lightpen.archive.chains import copy_entries, entries_of, records_of
+from lightpen.archive.check import check_archive
+from lightpen.archive.entries import ChainHead, StoredEntry, chained
+from lightpen.archive.exchange import export_entries, import_entries
+from lightpen.archive.history import lines
+from lightpen.archive.queries import EntryFilter
+from lightpen.archive.tables import ENTRIES
+from lightpen.errors import ArchiveError
+from lightpen.record.signing.keys import key_folder, make_station_key
+
+
+def head_of(station: Station) -> ChainHead:
+    last = list(entries_of(station.database, station.chain))[-1]
+    entry = last.entry
+    return ChainHead(entry.chain, entry.number, last.sha256, entry.since)
+
+
+def forged(station: Station, n: int) -> tuple[StoredEntry, dict[str, str]]:
+    """Return an entry that continues a chain without its key, and its record."""
+    event, record = accepted(n)
+    entry = chained(head_of(station), event)
+    key = make_station_key()
+    signature = key.public + key.sign(b"lightpen entry\n" + entry.sha256.encode())
+    return replace(entry, signature=signature), {event.record_sha256 or "": record}
+
+
+def test_nobody_else_continues_the_chain_of_a_station(
+    make_station: Callable[[str], Station],
+) -> None:
+    here, there = make_station("Hall 2"), make_station("Hall 7")
+    there.enter(3)
+    known = list(entries_of(there.database, there.chain))
+    copy_entries(here.database, there.chain, known, records_of(there.database, known))
+
+    entry, records = forged(there, 3)
+    with pytest.raises(ArchiveError, match="signed by a key that is not the station's"):
+        copy_entries(here.database, there.chain, [entry], records)
+    unsigned = replace(entry, signature="")
+    with pytest.raises(ArchiveError, match="missing or wrong"):
+        copy_entries(here.database, there.chain, [unsigned], records)
+    assert check_archive(here.database).findings == ()
+
+
+def test_a_file_adds_nothing_to_the_chain_at_home(
+    tmp_path: Path, station: Station, make_station: Callable[[str], Station]
+) -> None:
+    station.enter(2)
+    older = make_station("copy")
+    first = list(entries_of(station.database, station.chain))[:1]
+    copy_entries(
+        older.database, station.chain, first, records_of(station.database, first)
+    )
+    export_entries(station.database, tmp_path / "all.jsonl")
+    known = import_entries(station.database, tmp_path / "all.jsonl")
+    assert (known.n_new, known.n_known) == (0, 2)
+
+    entry, records = forged(station, 2)
+    with pytest.raises(ArchiveError, match="was not entered here"):
+        copy_entries(station.database, station.chain, [entry], records)
+    assert len(list(entries_of(station.database, station.chain))) == 2
+
+
+def test_a_signature_that_was_changed_is_found(station: Station) -> None:
+    entry = station.enter(2)[0]
+    other = ("0" if entry.signature[-1] != "0" else "1").join(
+        [entry.signature[:-1], ""]
+    )
+    with station.database.writing() as connection:
+        connection.execute(
+            update(ENTRIES).where(ENTRIES.c.number == 1).values(signature=other)
+        )
+    (finding,) = check_archive(station.database).findings
+    assert finding.code == "archive.signature-wrong"
+
+
+def test_the_private_key_is_readable_by_its_account_alone(station: Station) -> None:
+    file = key_folder() / f"{station.chain}.key"
+    assert file.stat().st_mode & 0o077 == 0
+
+
+def test_nothing_is_entered_without_the_key_of_the_station(station: Station) -> None:
+    station.enter(1)
+    (key_folder() / f"{station.chain}.key").unlink()
+    with pytest.raises(ArchiveError, match="not in this user account"):
+        station.enter(1, 1)
+    assert len(list(entries_of(station.database, station.chain))) == 1
+
+
+def test_entries_of_other_stations_are_marked(
+    make_station: Callable[[str], Station], tmp_path: Path
+) -> None:
+    here, there = make_station("Hall 2"), make_station("Hall 7")
+    here.enter(1)
+    there.enter(1, 1)
+    export_entries(there.database, tmp_path / "there.jsonl")
+    import_entries(here.database, tmp_path / "there.jsonl")
+    found = lines(here.database, EntryFilter(), 0, 9)
+    assert [line.is_foreign for line in found] == [True, False]
