@@ -132,7 +132,7 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
         type=number_from(1e-6, 10.0, "uncertainty", "mm"),
         default=USUAL.flatness,
         metavar="MM",
-        help=f"standard uncertainty of the flatness of the board, mm ({USUAL.flatness:g})",
+        help=f"standard uncertainty of the board flatness ({USUAL.flatness:g})",
     )
     parser.add_argument(
         "--squareness",
