@@ -17,6 +17,7 @@ class Code(StrEnum):
     SWING_TO_SEAT = "swing.swing-to-seat"
     HOLD_STILL = "swing.hold-still"
     STARTS_IN = "swing.starts-in"
+    HOLD_UPRIGHT = "swing.hold-upright"
     LEAN_TO_YOUR_RIGHT = "swing.lean-to-your-right"
     FOLLOW_ARROW = "swing.follow-arrow"
     FEW_LEDS = "swing.few-leds"
@@ -58,6 +59,7 @@ SWING_TO_SEAT = message(  # no nominal tip: it is found by swinging
     Code.SWING_TO_SEAT
 )
 HOLD_STILL = message(Code.HOLD_STILL)
+HOLD_UPRIGHT = message(Code.HOLD_UPRIGHT)
 LEAN_TO_YOUR_RIGHT = message(Code.LEAN_TO_YOUR_RIGHT)
 FOLLOW_ARROW = message(Code.FOLLOW_ARROW)
 TOO_FAST = message(Code.TOO_FAST)

@@ -92,6 +92,7 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
 
     walker.until_says("PRACTICE SAVED")
     assert result_on_disk(walker).names.operator == "Ann"
+    assert walker.workbench.settings.station("Hall 2").heading == 0.0
     walker.until(walker.main_button().isEnabled)
     walker.press(Key.Key_PageDown)
     walker.until_says("Today")

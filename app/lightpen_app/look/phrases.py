@@ -47,6 +47,7 @@ _SHORTS: dict[Code, str] = {
     Code.SWING_TO_SEAT: QT_TRANSLATE_NOOP("phrases", "Seat and swing"),
     Code.HOLD_STILL: QT_TRANSLATE_NOOP("phrases", "Seated"),
     Code.STARTS_IN: QT_TRANSLATE_NOOP("phrases", "Starts in {seconds}"),
+    Code.HOLD_UPRIGHT: QT_TRANSLATE_NOOP("phrases", "Hold it upright"),
     Code.LEAN_TO_YOUR_RIGHT: QT_TRANSLATE_NOOP("phrases", "Tilt RIGHT"),
     Code.FOLLOW_ARROW: QT_TRANSLATE_NOOP("phrases", "Follow the arrow"),
     Code.FEW_LEDS: QT_TRANSLATE_NOOP("phrases", "Show the LEDs"),

@@ -50,6 +50,8 @@ class Station:
         Its centre by design, mm, pen frame; None for that of the LED file.
     second : StoredCamera or None
         None where one camera is used.
+    heading : float or None
+        The operator's right as the camera sees it, rad.
     """
 
     names: Names = field(default_factory=Names)
@@ -60,6 +62,7 @@ class Station:
     limits: SwingLimits = field(default_factory=SwingLimits)
     assumptions: Assumptions = USUAL
     verification: VerificationChoices = field(default_factory=VerificationChoices)
+    heading: float | None = None
 
 
 def preparation_of(name: str, station: Station, before: Preparation) -> Preparation:
@@ -81,6 +84,7 @@ def preparation_of(name: str, station: Station, before: Preparation) -> Preparat
         mask=_mask(camera),
         limits=station.limits,
         assumptions=station.assumptions,
+        heading=station.heading,
     )
 
 
@@ -113,6 +117,7 @@ def station_of(
         limits=preparation.limits,
         assumptions=preparation.assumptions,
         verification=choices,
+        heading=preparation.heading,
     )
 
 

@@ -1,5 +1,6 @@
 """What the pages share: made, connected, started and ended together."""
 
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 
@@ -100,6 +101,7 @@ class Workbench(QObject):
         self.camera = CameraSetup(self.selection, self.live, settings, around, self)
         samples = folder / SIMULATED
         self.files = ChosenFiles(self.selection, notices, samples, around, self)
+        self.run.changed.connect(self._keep_heading)
         self.run.result_changed.connect(self.library.refresh)
         self.run.result_changed.connect(self.streaming.read_tip)
         self.verification.files_changed.connect(self.archive_writer.enter_owed)
@@ -151,6 +153,15 @@ class Workbench(QObject):
         pool.waitForDone(round(1000 * max(0.0, deadline - monotonic())))
         is_saved = self.settings.await_saved(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended and is_saved
+
+    def _keep_heading(self) -> None:
+        """Remember for the next swings where the operator of this one stands."""
+        status, chosen = self.run.status, self.selection.preparation
+        if status.state is None or not status.is_capturing or status.is_recording:
+            return
+        if status.state.heading != chosen.heading:
+            now = replace(chosen, heading=status.state.heading)
+            self.selection.set_preparation(now)
 
     def _tell_runners(self) -> None:
         chosen, choices = self.selection.preparation, self.selection.choices

@@ -41,6 +41,8 @@ class GuidedOperator:
             self._wish = None  # a hand that was stopped must be led anew
 
     def _wanted(self, state: SwingState) -> Posture | None:
+        if state.heading is None and not state.was_upright:
+            return UPRIGHT
         if state.heading is None:
             return Posture(FIRST_LEAN.tilt, self._heading, FIRST_LEAN.turn)
         return state.target

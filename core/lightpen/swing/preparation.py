@@ -150,6 +150,9 @@ class Preparation:
         Whether LEDs were edited or opened that are not those of the file in use.
     second : SecondCamera or None
         None where one camera looks alone.
+    heading : float or None
+        The operator's right as the camera sees it, rad; None until a swing has learnt
+        it.
     """
 
     names: Names = field(default_factory=Names)
@@ -164,6 +167,7 @@ class Preparation:
     assumptions: Assumptions = USUAL
     has_unsaved_leds: bool = False
     second: SecondCamera | None = None
+    heading: float | None = None
 
     @property
     def camera(self) -> Camera | None:
@@ -201,7 +205,7 @@ class Preparation:
         """Return it with images of another source.
 
         The files of a simulated pen are not those of another source, nor is the stray
-        light.
+        light; and another camera sees the operator from elsewhere.
         """
         if source == self.source:
             return self
@@ -217,6 +221,7 @@ class Preparation:
             camera_file=camera_file,
             pen_file=pen_file,
             mask=np.zeros((0, 3)),
+            heading=None,
         )
 
     @property

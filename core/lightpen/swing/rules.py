@@ -24,7 +24,7 @@ from lightpen.model.posture import angles_between, posture_of
 from lightpen.swing.kept_images import AcceptedImages, keep, none_kept, without_slipped
 from lightpen.swing.rest import BATCH, in_place, offset, rests_in_place, steady_seat
 from lightpen.swing.seat import Seat
-from lightpen.swing.shortfall import guided, measure_shortfall, oriented
+from lightpen.swing.shortfall import guided, is_upright, measure_shortfall, oriented
 from lightpen.swing.state import (
     Pause,
     Phase,
@@ -39,6 +39,7 @@ from lightpen.swing.state import (
 from lightpen.swing_messages import (
     FOLLOW_ARROW,
     HOLD_STILL,
+    HOLD_UPRIGHT,
     LEAN_TO_YOUR_RIGHT,
     PAUSED,
     PEN_LIFTED,
@@ -140,6 +141,11 @@ def conclude(state: SwingState, verdict: Message, passed: bool) -> Transition:
     """Show the verdict on the solved swing."""
     event_kind = SwingEventKind.DONE if passed else SwingEventKind.FAILED
     return Transition(_enter(state, Phase.VERDICT, verdict), (SwingEvent(event_kind),))
+
+
+def forget_side(state: SwingState) -> SwingState:
+    """Return the swing that asks anew for the operator's right."""
+    return replace(state, heading=None, was_upright=False, target=None)
 
 
 def has_just_slipped(state: SwingState) -> bool:
@@ -402,6 +408,7 @@ def _enter(state: SwingState, phase: Phase, message: Message) -> SwingState:
         pause=Pause.NONE,
         strayed_since=None,
         stray_rotations=np.zeros((0, 3, 3)),
+        was_upright=False,
     )
 
 
@@ -429,6 +436,8 @@ def _elsewhere(state: SwingState) -> Message:
 
 
 def _asking(state: SwingState) -> Message:
+    if state.heading is None and not (state.was_upright or is_upright(state)):
+        return HOLD_UPRIGHT
     if state.heading is None:
         return LEAN_TO_YOUR_RIGHT
     return FOLLOW_ARROW

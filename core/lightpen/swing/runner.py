@@ -100,6 +100,10 @@ class SwingRunner:
         """Resume after a pause by the user."""
         self._queue.ask(self._workflow.resume)
 
+    def forget_side(self) -> None:
+        """Learn the operator's left and right anew."""
+        self._queue.ask(self._workflow.forget_side)
+
     def finish(self) -> None:
         """End the capture with the present images, and solve."""
         self._queue.ask(self._workflow.finish)

@@ -30,6 +30,7 @@ from lightpen.swing_messages import (
     uncertain,
 )
 
+UPRIGHT_HELD = 0.5  # s
 LEARNING_TILT = np.radians(12.0)  # tells to which side the operator leans
 REACHED = np.radians(5.0)  # of a target
 N_MORE = 40  # images at least, where more are asked for than a swing needs
@@ -188,14 +189,26 @@ def next_target(
 def oriented(
     setup: SwingSetup, state: SwingState, detection: PenDetection
 ) -> SwingState:
-    """Set the heading of the operator by the first lean, requested to the right."""
-    if state.heading is None:
-        posture = posture_of(setup.pen, detection.rotation)
-        if posture.tilt > LEARNING_TILT:
-            eighth = 2 * np.pi / N_DIRECTIONS
-            heading = float(round(posture.direction / eighth) % N_DIRECTIONS * eighth)
-            state = replace(state, heading=heading)
+    """Set the heading of the operator by a tilt to the right of an upright pen.
+
+    A pen that is tilted already says nothing: the tilt is requested once it is upright.
+    """
+    if state.heading is not None:
+        return state
+    if not state.was_upright:
+        return replace(state, was_upright=is_upright(state))
+    posture = posture_of(setup.pen, detection.rotation)
+    if posture.tilt > LEARNING_TILT:
+        eighth = 2 * np.pi / N_DIRECTIONS
+        heading = float(round(posture.direction / eighth) % N_DIRECTIONS * eighth)
+        state = replace(state, heading=heading)
     return state
+
+
+def is_upright(state: SwingState) -> bool:
+    """Return whether the pen was upright and still for a moment."""
+    since = state.still_since
+    return since is not None and state.time - since >= UPRIGHT_HELD
 
 
 def guided(setup: SwingSetup, state: SwingState, detection: PenDetection) -> SwingState:

@@ -226,6 +226,9 @@ class SwingState:
         New postures without a good image since the last that was kept.
     heading : float or None
         The operator's right as the camera sees it, rad; None until it is learnt.
+    was_upright : bool
+        Whether the pen was held upright since the capture began: a tilt after that
+        teaches the heading.
     target : Posture or None
         Next posture to guide to.
     target_since : float
@@ -251,6 +254,7 @@ class SwingState:
     stray_rotations: FloatArray
     flawed_rotations: FloatArray
     heading: float | None
+    was_upright: bool
     target: Posture | None
     target_since: float
     slipped_at: float | None
@@ -293,6 +297,7 @@ def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:
         stray_rotations=np.zeros((0, 3, 3)),
         flawed_rotations=np.zeros((0, 3, 3)),
         heading=None,
+        was_upright=False,
         target=None,
         target_since=time,
         slipped_at=None,

@@ -47,6 +47,7 @@ from lightpen.swing.rules import (
     advance_swing,
     conclude,
     finish,
+    forget_side,
     has_enough,
     pause,
     resume,
@@ -218,7 +219,7 @@ class SwingWorkflow:
         self._publish(
             SwingStatus(
                 setup=swing.setup,
-                state=swing.state,
+                state=replace(swing.state, heading=self._heading_for(swing)),
                 record_folder=record.folder,
                 names=names,
                 origin=recorded_origin(record),
@@ -227,6 +228,19 @@ class SwingWorkflow:
         self._hold_back()
         if not swing.setup.is_recording and has_enough(swing.setup, swing.state):
             self.finish()  # it was interrupted after its last image
+
+    def _heading_for(self, swing: Resumable) -> float | None:
+        """Return where the operator stands, as this swing or the station knows it."""
+        status, choices = self._status, self._presence.choices
+        if swing.setup.is_recording:
+            return None
+        if status.record_folder == swing.record.folder and status.state is not None:
+            return status.state.heading
+        return None if choices is None else choices.heading
+
+    def forget_side(self) -> None:
+        """Ask the operator again which side is the right one."""
+        self._change(lambda state: Transition(forget_side(state)))
 
     def take(
         self,

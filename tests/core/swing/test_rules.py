@@ -29,6 +29,7 @@ from lightpen.swing.rules import (
     advance_swing,
     conclude,
     finish,
+    forget_side,
     pause,
     resume,
     start_again,
@@ -47,6 +48,7 @@ from lightpen.swing.state import (
 )
 from lightpen.swing_messages import (
     FOLLOW_ARROW,
+    HOLD_UPRIGHT,
     LEAN_TO_YOUR_RIGHT,
     PEN_LOST,
     SEAT_TIP,
@@ -318,6 +320,33 @@ def test_the_first_lean_teaches_the_operators_side() -> None:
     assert station.state.heading == np.pi
     assert station.state.message == FOLLOW_ARROW
     assert station.state.target is not None
+
+
+def test_a_pen_that_is_tilted_at_the_start_does_not_teach_the_operators_side() -> None:
+    station = Station()
+    station.operator.seat()
+    station.operator.lean_towards(np.radians(20), np.pi, 0.0)
+    station.told = "right"
+    station.run(60.0, until=Phase.CAPTURING).run(2.0)
+    assert station.state.message == HOLD_UPRIGHT
+    assert station.state.heading is None
+
+    station.operator.lean_towards(0.0, 0.0, 0.0)
+    station.run(3.0)
+    assert station.state.message == LEAN_TO_YOUR_RIGHT
+    station.operator.lean_towards(np.radians(20), 0.0, 0.0)
+    station.run(2.0)
+    assert station.state.heading == 0.0
+
+
+def test_an_operator_who_stands_elsewhere_is_learnt_anew() -> None:
+    station = capturing_for(3.0)
+    assert station.state.heading == 0.0
+
+    state = forget_side(station.state)
+
+    assert (state.heading, state.target, state.was_upright) == (None, None, False)
+    assert state.kept is station.state.kept
 
 
 def test_a_pen_held_in_the_air_is_not_seated() -> None:

@@ -3,10 +3,12 @@
 import shutil
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 from benchmarks.small_records import entries_of
 
@@ -250,6 +252,21 @@ def test_more_images_can_be_captured_after_the_verdict(
     assert solved.n_recorded == N_IMAGES + 1
     assert set(solved.solution.taken_out) == {3}
     assert solved.tip == command(solved.record_folder)["tip_pen_mm"]
+
+
+def test_the_operators_side_is_that_of_the_station_and_kept_for_more_images(
+    station: "Station", interrupted: Path, rewrite_header: Callable[..., None]
+) -> None:
+    rewrite_header(interrupted, {"max_uncertainty_mm": 1.0})
+    station.runner.choose(replace(station.preparation, heading=np.pi))
+    station.go_on(interrupted)
+    assert station.state.heading == np.pi
+    station.solve()
+    station.runner.choose(replace(station.preparation, heading=0.0))
+    station.runner.capture_more()
+    station.wait_until(lambda: station.status.is_capturing)
+
+    assert station.state.heading == np.pi
 
 
 def test_more_images_than_needed_are_not_needed_because_they_were_asked_for(

@@ -225,11 +225,16 @@ def test_there_is_no_target_before_the_tip_rests() -> None:
     assert next_target(setup, start_swing(setup), upright) is None
 
 
-def test_the_operators_side_is_learnt_from_a_lean_and_kept() -> None:
+def test_the_operators_side_is_learnt_from_a_lean_of_an_upright_pen_and_kept() -> None:
     setup = SwingSetup(CAMERA, PEN)
     state = start_swing(setup)
     headings = []
-    for tilt, direction in ((5.0, 10.0), (20.0, 170.0), (20.0, 300.0)):
+    for tilt, direction, still_s in (
+        *((20.0, 300.0, None), (5.0, 10.0, 0.0), (20.0, 300.0, None)),
+        *((5.0, 10.0, 1.0), (20.0, 170.0, None), (20.0, 300.0, None)),
+    ):
+        still_since = None if still_s is None else state.time - still_s
+        state = replace(state, still_since=still_since)
         swing = swing_from_postures(Postures(*np.radians([[tilt], [direction], [0.0]])))
         pixels = simulate_centers(
             *(CAMERA, PEN, swing.rotations, swing.translations, 0.0),
@@ -240,4 +245,4 @@ def test_the_operators_side_is_learnt_from_a_lean_and_kept() -> None:
         )
         state = oriented(setup, state, detection)
         headings.append(state.heading)
-    assert headings == [None, np.pi, np.pi]
+    assert headings == [None, None, None, None, np.pi, np.pi]

@@ -30,6 +30,7 @@ from lightpen_app.work.workbench import Workbench
 
 SHOWING_MS = 50  # from a new state to what is shown; the states between make one
 PLOTTING_MS = 40  # from one plot to the next
+PAUSES = {SideAction.PAUSE, SideAction.RESUME}
 
 
 class SwingPage(Page):
@@ -73,6 +74,7 @@ class SwingPage(Page):
         self._live.other_changed.connect(self._on_connection_changed)
         self._face.side.clicked.connect(self._on_act_clicked)
         self._face.start_over.clicked.connect(self._on_start_over_clicked)
+        self._face.swapped.clicked.connect(self._on_swapped_clicked)
         self._face.dial.leaned.connect(self._hand.lean)
         self._hand.led_by_itself.connect(self._face.dial.forget_wish)
         self._showing.timeout.connect(self._show)
@@ -175,6 +177,9 @@ class SwingPage(Page):
         before = self._shown
         self._shown = now = self._presenter.page_state(is_away=not self._is_entered)
         self._face.set_state(now)
+        is_other = now.side is not before.side and {now.side, before.side} != PAUSES
+        if is_other and self._face.side.hasFocus():
+            self._face.dial.setFocus()  # Enter would do what the button did not say
         if not self._verification.status.is_here:
             self.operator_value_changed.emit(now.operator_value)
         self._face.dial.set_interactive(self._live.operator is not None)
@@ -241,6 +246,10 @@ class SwingPage(Page):
             self._question.ask_about(
                 lambda: start_over_question(self._run.status), self._start_anew
             )
+
+    def _on_swapped_clicked(self) -> None:
+        self._runner.forget_side()
+        self._face.dial.setFocus()  # the button is no longer there
 
     def _start_anew(self) -> None:
         if why_not := self._missing_input():

@@ -65,6 +65,8 @@ class SwingPageState:
         How the pen is drawn in space.
     why_not_side : str
         Why the button beside Start over cannot be pressed.
+    knows_side : bool
+        Whether the operator may say that left and right are swapped.
     """
 
     value: OperatorValue
@@ -79,6 +81,7 @@ class SwingPageState:
     main: MainAction
     side: SideAction
     why_not_side: str
+    knows_side: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,6 +200,7 @@ class SwingPresenter(QObject):
             main=main_action(status),
             side=side_action(status, connection),
             why_not_side=why_not_more(status),
+            knows_side=view is not None and view.knows_side,
         )
 
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSize
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 from typing_extensions import override
 
@@ -33,7 +33,7 @@ SIDE_SHARES = (9, 4, 6)  # of it: numbers, pen in space, live image
 ROW_SHARES = (1, 2)  # of the height: these, plots
 LARGE_SIDE_SHARES, LARGE_ROW_SHARES = (9, 5, 7), (2, 3)  # where there is plenty
 VAST_SIDE_SHARES, VAST_ROW_SHARES = (5, 0, 6), (1, 1)  # and where there is more
-PEN_PLACE = 3  # below the count, its bar and its note
+PEN_PLACE = 4  # below the count, its bar, its note and its button
 LEAST_IMAGE = 14 * GRID  # px of width
 PROGRESS_STEPS = 1000
 PLOTS_HEIGHT = 32 * GRID  # px, there
@@ -47,6 +47,8 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
     ----------
     side, start_over : PushButton
         The buttons at the upper right.
+    swapped : PushButton
+        For an operator who stands elsewhere than the arrow assumes.
     """
 
     narrow_below, low_below = 100 * GRID, 56 * GRID  # px; then its plots are below
@@ -60,6 +62,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
 
         # Widgets
         self.side, self.start_over = PushButton(), PushButton()
+        self.swapped = PushButton()
         self._instruction = FittedText(TextSize.HUGE)
         self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
         self._warning = SignLabel()
@@ -86,7 +89,8 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._body = grid_layout(self._content, spacing=(3 * GRID, GRID))
         self._body.addWidget(self.dial, 0, 0)
         self._side = grid_layout(self._body, at=(0, 1), spacing=2 * GRID)
-        numbers = (self._count, self._progress, self._note, 1)
+        left = Qt.AlignmentFlag.AlignLeft
+        numbers = (self._count, self._progress, self._note, (self.swapped, 0, left), 1)
         self._numbers = vertical_layout(self._side, *numbers, at=(0, 0))
         self._body.setRowStretch(0, 1)
         self._body.setColumnStretch(0, DIAL_SHARE)
@@ -141,6 +145,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._pen.set_value(state.stand)
         self.side.setText(side_text(state.side))
         self.side.set_why_not(state.why_not_side)
+        self.swapped.setVisible(state.knows_side)
 
     def set_image(self, shown: DisplayedImage) -> None:
         """Show a live image with rings about the spots."""
@@ -155,6 +160,8 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         """Set the texts anew."""
         self._image.set_message(self.tr("No image yet"))
         self._progress.setAccessibleName(self.tr("Progress"))
+        self.swapped.setText(self.tr("Left and right are swapped"))
+        self.swapped.setToolTip(self.tr("Learn again on which side you stand."))
         self.start_over.setText(self.tr("Start over"))
         self.start_over.setToolTip(
             self.tr(

@@ -117,6 +117,12 @@ class SwingViewState:
         return not streams and self.state.phase not in ENDED
 
     @property
+    def knows_side(self) -> bool:
+        """Whether the arrow goes by where the operator stands."""
+        is_capturing = self.state.phase is Phase.CAPTURING
+        return is_capturing and self.state.heading is not None
+
+    @property
     def is_unsolved(self) -> bool:
         """Whether the tip could be computed, but is not being."""
         return self.state.phase is Phase.SOLVING and self.solving is None
@@ -431,9 +437,10 @@ def _dial(moment: SwingViewState) -> DialValue:
         posture = None
     if state.heading is None and not moment.setup.is_recording:
         # Nobody knows yet how the operator sees the pen lean; right is his own right.
-        if posture is not None and not moment.is_simulated:
+        first = FIRST_LEAN if state.was_upright else UPRIGHT
+        if posture is not None and not moment.is_simulated and state.was_upright:
             posture = UPRIGHT
-        target = FIRST_LEAN if is_capturing else target
+        target = first if is_capturing else target
     return DialValue(
         counts=counts[1:],
         needed=wanted[1:],
