@@ -11,11 +11,14 @@ from datetime import datetime
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+
 from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
 from lightpen.errors import AcceptanceError, LightpenError
+from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import Message, message
 from lightpen.record.library.supervision import Signature
@@ -62,7 +65,7 @@ from lightpen.swing.state import (
 )
 from lightpen.swing.status import Activity, SwingListener, SwingStatus
 from lightpen.swing.swing_recorder import SwingRecorder
-from lightpen.swing_messages import no_tip
+from lightpen.swing_messages import leds_misfit, no_tip
 
 T = TypeVar("T")
 
@@ -490,11 +493,20 @@ class SwingWorkflow:
         solution = self._status.solution
         if solution is None:
             status = replace(self._status, activity=Activity.NONE)
-            self._conclude(status, no_tip(why), passed=False)
+            self._conclude(status, no_tip(self._by_evidence(why)), passed=False)
             return
         if set(self._tried) > set(solution.taken_out):
             why = message("swing.images-stay-in", why=why)
         self._keep_solution(solution, why)
+
+    def _by_evidence(self, why: Message) -> Message:
+        """Return why there is no tip; LEDs that misfit in each image come first."""
+        kept = None if self._status.state is None else self._status.state.kept
+        sigma = 0.0 if kept is None or not len(kept) else float(np.median(kept.sigmas))
+        if sigma <= USUAL_SIGMA:
+            return why
+        misfit = leds_misfit(sigma, USUAL_SIGMA)
+        return message("verdict.misfit-first", misfit=misfit, why=why)
 
     def _keep_solution(self, solution: Solution, why: Message) -> None:
         """Keep the solution and its images, and report why."""

@@ -9,7 +9,7 @@ from lightpen.cameras.worker_events import Connection
 from lightpen.detection.spots import Spots
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.pen_check.match import add_view, match_pen
+from lightpen.pen_check.match import PenMatch, add_view, match_pen
 from lightpen_app.steps.leds.draft import LedDraft
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.work.job import Job
@@ -37,6 +37,7 @@ class PenWatch(QObject):
         self._pen: Pen | None = None
         self._views: tuple[Spots, ...] = ()
         self._compared: tuple[Spots, ...] = ()
+        self._last: PenMatch | None = None
         self._job: Job | None = None  # whose outcome is awaited
         self._timer = QTimer(self)
         self._timer.setInterval(PERIOD_MS)
@@ -50,9 +51,14 @@ class PenWatch(QObject):
             self._views = ()
         if camera is self._camera and pen is self._pen:
             return
-        self._camera, self._pen = camera, pen
+        self._camera, self._pen, self._last = camera, pen, None
         self._forget()
         self._compare()
+
+    def last_match(self, camera: Camera | None, pen: Pen | None) -> PenMatch | None:
+        """Return how a pen fitted when it was compared last; None if never."""
+        is_same = camera is self._camera and pen is self._pen
+        return self._last if is_same else None
 
     def add(self, spots: Spots) -> None:
         """Take in what an image shows."""
@@ -93,8 +99,8 @@ class PenWatch(QObject):
         job.crashed.connect(self._on_crashed)
         job.start()
 
-    def _on_compared(self, match: object) -> None:
-        self._job = None
+    def _on_compared(self, match: PenMatch) -> None:
+        self._job, self._last = None, match
         self.value_changed.emit(match)
 
     def _on_crashed(self) -> None:
@@ -146,6 +152,12 @@ class MatchControl(QObject):
         self.watch.stop()
         if self._leds.state.is_pending and not self._run.status.is_capturing:
             self._live.set_region(self._selection.preparation.region)
+
+    def doubt(self) -> str:
+        """Return why the table may be of another pen than is seen, or nothing."""
+        camera, pen = self._selection.preparation.camera, self._leds.state.check.sought
+        match = self.watch.last_match(camera, pen)
+        return self._panel.doubt_of(match)
 
     def retranslate(self) -> None:
         """Say what is missing for the detection of the pen."""

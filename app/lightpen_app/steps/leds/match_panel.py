@@ -198,10 +198,20 @@ class MatchPanel(Translated, QGroupBox):
         self._match = value
         self._refresh()
 
+    def doubt_of(self, match: PenMatch | None) -> str:
+        """Return the most serious finding of a match, a sentence; empty without one."""
+        if match is None or not match.findings:
+            return ""
+        return self._words(match.findings[0], match)
+
     def reasons(self) -> dict[int, str]:
         """Return the findings on LEDs, by number."""
         findings = () if self._match is None else self._match.findings
-        return {led: self._words(each) for each in findings for led in each.leds}
+        return {
+            led: self._words(each, self._match)
+            for each in findings
+            for led in each.leds
+        }
 
     @override
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -275,7 +285,7 @@ class MatchPanel(Translated, QGroupBox):
             return []
         if match.findings:
             remarks = [
-                StatusMessage(self._words(each), Sign.WARNING, Tone.WARN)
+                StatusMessage(self._words(each, match), Sign.WARNING, Tone.WARN)
                 for each in match.findings[:N_FINDINGS]
             ]
         elif not match.fits:
@@ -304,7 +314,7 @@ class MatchPanel(Translated, QGroupBox):
             for each in self._match.findings[:N_FINDINGS]
         ]
 
-    def _words(self, finding: Finding) -> str:
+    def _words(self, finding: Finding, match: PenMatch | None) -> str:
         place = [
             f"{axis}\N{NO-BREAK SPACE}{number_text(each, 2)}"
             for axis, each in zip("xyz", finding.by, strict=True)
@@ -344,13 +354,13 @@ class MatchPanel(Translated, QGroupBox):
                 )
                 return words.format(*place)
             case MatchFinding.MISFIT:
-                assert self._match is not None
+                assert match is not None
                 words = self.tr(
                     "RMS residual {0} px; usual is {1} px or less. Check that the "
                     "LED file belongs to this pen and the intrinsics file to this "
                     "camera and lens."
                 )
-                return words.format(_pixels(self._match.sigma), USUAL_SIGMA)
+                return words.format(_pixels(match.sigma), USUAL_SIGMA)
 
 
 def _pixels(sigma: float) -> str:

@@ -109,6 +109,10 @@ class LedsPage(ResponsiveLayout, Page):
         return not self._selection.preparation.leds_missing_inputs()
 
     @override
+    def is_doubtful(self) -> bool:
+        return bool(self._matching.doubt())
+
+    @override
     def why_closed(self) -> str:
         now = self._selection.preparation
         return first_missing(now.start_missing_inputs() + now.camera_missing_inputs())
@@ -117,6 +121,13 @@ class LedsPage(ResponsiveLayout, Page):
     def main_action(self) -> MainAction:
         why_not = why_not_next(self._leds.state, self._selection.preparation)
         return MainAction(self.tr("Continue to the swing"), why_not)
+
+    @override
+    def run_main_action(self) -> None:
+        if self._matching.doubt():
+            self._file.ask(self._doubting, self.advance_requested.emit)
+        else:
+            super().run_main_action()
 
     @override
     def entered(self) -> None:
@@ -199,10 +210,17 @@ class LedsPage(ResponsiveLayout, Page):
         self._table.focus_cells()
         self._leds.edit(mended(self._leds.state.draft, finding))
 
+    def _doubting(self) -> tuple[str, str]:
+        """Return the question whether to swing with LEDs that do not fit."""
+        words = self.tr("{0} The swing will probably fail.")
+        text = words.format(self._matching.doubt()).strip()
+        return text, self.tr("Swing anyway")
+
     def _on_match_changed(self, match: PenMatch | None) -> None:
         self._match.set_value(match)
         rms = () if match is None else enumerate(match.rms.tolist(), 1)
         misfits = {led: each for led, each in rms if each == each}  # px, of LEDs seen
         self._table.set_misfits(misfits)
+        self.changed.emit()
         self._table.set_marked(self._match.reasons())
         self._refresh()

@@ -8,6 +8,7 @@ from PySide6.QtCore import QObject
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.worker_events import Connection
+from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.verdict import Grade, NextStep, Verdict
 from lightpen.messages import Message
 from lightpen.model.origin import Origin
@@ -16,7 +17,7 @@ from lightpen.simulator.follower import FIRST_LEAN
 from lightpen.swing.rules import COUNTDOWN, has_just_slipped
 from lightpen.swing.shortfall import Shortfall, out_of_reach, turn_range
 from lightpen.swing.state import Pause, Phase, SwingSetup, SwingState
-from lightpen.swing_messages import SHOW_PEN, Code
+from lightpen.swing_messages import SHOW_PEN, Code, leds_misfit
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import (
     Instruction,
@@ -43,6 +44,7 @@ FLAWS = (Code.FEW_LEDS, Code.TOO_FAST, Code.BAD_FIT)  # images that are not kept
 UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
 PACE_S, N_PACING = 15.0, 6  # the last seconds and images by which time left is told
 LONG_S = 90.0  # told in minutes
+FEW = 5  # images by which a misfit is told of
 
 _LOOKS: dict[Phase, tuple[Sign, Tone]] = {
     Phase.WAIT: (Sign.WAIT, Tone.QUIET),
@@ -203,7 +205,10 @@ class SwingWords(QObject):
 
     def warning(self, moment: SwingViewState) -> StatusMessage:
         """Return a warning that no swing can resolve."""
+        kept = moment.state.kept
         why = out_of_reach(moment.setup.limits, moment.state, moment.short)
+        if len(kept) >= FEW and kept.sigma > USUAL_SIGMA:
+            why = leds_misfit(kept.sigma, USUAL_SIGMA)
         is_asked = not moment.setup.is_recording
         if why is None or not is_asked or moment.state.phase is Phase.VERDICT:
             return StatusMessage()
@@ -241,6 +246,8 @@ class SwingWords(QObject):
             )
         if moment.verdict is not None:
             return self._next_step(moment, moment.verdict)
+        if state.phase is Phase.VERDICT:
+            return Instruction(told.short)  # the banner has the reason
         if moment.is_away and state.pause is Pause.BY_USER:
             hint = self.tr("Return to the step Swing at the computer to continue.")
             return Instruction(told.short, hint)

@@ -947,6 +947,26 @@ def test_another_pens_file_is_told(live: "Seen", tmp_path: Path) -> None:
     live.wait("LEDs of the LED file.")
 
 
+def test_a_file_that_misfits_leaves_the_step_amber_and_asks_before_the_swing(
+    live: "Seen", tmp_path: Path, qtbot: QtBot
+) -> None:
+    path = write_table(tmp_path / "other.csv", LEDS * [1.05, 1.0, 1.0])
+    open_file(live, path)
+    qtbot.waitUntil(live.page.is_doubtful)
+    asked: list[None] = []
+    live.page.advance_requested.connect(lambda: asked.append(None))
+
+    live.page.run_main_action()
+
+    assert live.child(QuestionBar).isVisible()
+    assert not asked
+    live.click("Cancel")
+    assert not asked
+    live.page.run_main_action()
+    live.click("Swing anyway")
+    assert len(asked) == 1
+
+
 def test_a_pen_that_is_away_is_not_found(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
