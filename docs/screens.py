@@ -1,11 +1,15 @@
-"""Draw every step of the wizard: ``python docs/screens.py``.
+"""Draw the steps of the wizard: ``python docs/screens.py [--all FOLDER]``.
 
 Writes docs/screens/<step>-<language>-<appearance>-<width>x<height>.png, the pictures
 of README.md. The tests draw them again and compare, so run this after a wanted change
-of the look, and look at each. What the wizard shows in them is simulated, with fixed
-seeds and without a running camera, so that they come out the same each time.
+of the look, and look at each. With ``--all`` every step is drawn in all languages,
+appearances and sizes; pictures already in the folder, say of the commit before,
+are compared and replaced, and those that differ are named. What the wizard shows is
+simulated, with fixed seeds and without a running camera, so that the pictures are the
+same each time.
 """
 
+import argparse
 import gc
 import os
 import sys
@@ -15,16 +19,19 @@ from collections.abc import Callable, Iterator
 from contextlib import chdir, contextmanager
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
+from functools import reduce
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NoReturn, TypeVar
+from typing import NoReturn, TypeAlias, TypeVar
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 sys.path.append(str(Path(__file__).parents[1]))
 
+import cv2
 import numpy as np
+import numpy.typing as npt
 from benchmarks.small_records import small_record
 from msgspec import structs
 from PySide6.QtCore import QDeadlineTimer, QEvent, QSize, QThreadPool, QTimer
@@ -94,6 +101,9 @@ N_HELD = 10  # images through which the pen is held still
 N_EARLIER = 24  # calibrations in the history
 REFRESH_MS = 200  # of the plots
 COMPARING_MS = 1500  # after which the LEDs of the file were compared with the images
+VISIBLE = 32  # of 255 levels; other versions of a font renderer shade edges by less
+SQUARE = 64  # px, in which pixels that differ are counted
+MAX_SHARE = 0.02  # of the pixels of a square: a short word of the smallest size
 PAUSE = 0.01  # s between two looks at what is waited for
 PATIENCE_MS = 120_000  # of all that is waited for, on a machine that does other things
 
@@ -112,11 +122,21 @@ class Look:
         return f"{step}-{self.language}-{self.appearance}-{size}.png"
 
 
-def looks_of(step: str) -> tuple[Look, ...]:
-    """Return how a step is drawn, in turn.
+def published_looks(step: str) -> tuple[Look, ...]:
+    """Return the looks of a step that are in the repository."""
+    if step != "swing":
+        return (Look("en", Appearance.LIGHT, SIZES[0]),)
+    return (
+        Look("en", Appearance.DARK, SIZES[0]),
+        Look("zh_CN", Appearance.LIGHT, SIZES[0]),
+    )
 
-    One appearance after the other, that in which the step before was drawn last first:
-    to change it takes long.
+
+def all_looks(step: str) -> tuple[Look, ...]:
+    """Return all looks of a step in the order of drawing.
+
+    One appearance after the other, the last one of the step before first: a change of
+    appearance takes long.
     """
     appearances = (Appearance.DARK, Appearance.LIGHT)
     return tuple(
@@ -127,9 +147,33 @@ def looks_of(step: str) -> tuple[Look, ...]:
     )
 
 
-def look_before(step: str) -> Look:
-    """Return the look in which a step is gone to, and from which it is drawn."""
-    return replace(looks_of(step)[-1], appearance=looks_of(step)[0].appearance)
+Looks: TypeAlias = Callable[[str], tuple[Look, ...]]
+
+
+def look_before(step: str, looks: Looks) -> Look:
+    """Return the look in which a step is opened, and from which it is drawn."""
+    return replace(all_looks(step)[-1], appearance=looks(step)[0].appearance)
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """How far two pictures differ.
+
+    Attributes
+    ----------
+    share : float
+        Largest share of visibly different pixels in a square.
+    picture : QImage
+        These pixels in white.
+    """
+
+    share: float
+    picture: QImage
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether the content differs, not only its antialiasing."""
+        return self.share > MAX_SHARE
 
 
 class StillCamera(SimulatedCamera):
@@ -340,20 +384,20 @@ class Stage:
         self._application.processEvents()
 
 
-def walk(stage: Stage) -> Iterator[str]:
+def walk(stage: Stage, looks: Looks) -> Iterator[str]:
     """Go through the steps, and yield each."""
     for step in STEPS:
-        stage.set_look(look_before(step))  # by which what comes first is laid out
+        stage.set_look(look_before(step, looks))  # the first layout depends on it
         if step == "review":
             stage.solve()
         stage.go_to(step)
         yield step
 
 
-def draw(stage: Stage, step: str) -> Iterator[tuple[str, QImage]]:
-    """Yield the name and the picture of the step that is shown in every look."""
-    stage.set_look(look_before(step))
-    for each in looks_of(step):
+def draw(stage: Stage, step: str, looks: Looks) -> Iterator[tuple[str, QImage]]:
+    """Yield name and picture of the present step in every look."""
+    stage.set_look(look_before(step, looks))
+    for each in looks(step):
         stage.set_look(each)
         yield each.file_name(step), stage.picture()
 
@@ -470,15 +514,45 @@ def anywhere() -> Iterator[None]:
         time.tzset()
 
 
+def levels(image: QImage) -> npt.NDArray[np.uint8]:
+    """Return (H, W, 3) levels of red, green and blue."""
+    rgb = image.convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(rgb.constBits(), np.uint8).reshape(rgb.height(), -1)
+    return rows[:, : 3 * rgb.width()].reshape(rgb.height(), -1, 3).copy()
+
+
+def compare(actual: QImage, expected: QImage) -> Difference:
+    """Compare two pictures."""
+    if actual.size() != expected.size():
+        return Difference(1.0, actual)
+    differences = cv2.absdiff(levels(actual), levels(expected))
+    apart = reduce(cv2.max, cv2.split(differences)) > VISIBLE
+    shown = np.where(apart, 255, 0).astype(np.uint8)
+    height, width = shown.shape
+    grey = QImage.Format.Format_Grayscale8
+    picture = QImage(shown.tobytes(), width, height, width, grey).copy()
+    square = (SQUARE, SQUARE)
+    shares = cv2.blur(apart.astype(np.float32), square, borderType=cv2.BORDER_CONSTANT)
+    return Difference(float(shares.max()), picture)
+
+
 def main() -> None:
-    """Draw all pictures."""
-    FOLDER.mkdir(exist_ok=True)
+    """Draw the pictures of the repository, or all of them."""
+    parser = argparse.ArgumentParser(description="Draw the steps of the wizard.")
+    parser.add_argument("--all", type=Path, metavar="FOLDER", help="draw all looks")
+    options = parser.parse_args()
+    folder = FOLDER if options.all is None else options.all.absolute()
+    looks = published_looks if options.all is None else all_looks
+    folder.mkdir(parents=True, exist_ok=True)
     application = make_application(sys.argv[:1])
     with anywhere():
         stage = Stage(application)
-        for step in walk(stage):
-            for name, picture in draw(stage, step):
-                picture.save(str(FOLDER / name))
+        for step in walk(stage, looks):
+            for name, picture in draw(stage, step, looks):
+                before = QImage(str(folder / name))
+                if not before.isNull() and compare(picture, before).is_seen:
+                    print(f"{name} has changed")
+                picture.save(str(folder / name))
         stage.close()
 
 

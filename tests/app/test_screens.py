@@ -7,14 +7,12 @@ screen is one of 1920 x 1080 at 200 %, which leaves 960 x 540, with a task bar.
 import importlib.util
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import reduce
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 import pytest
 from PySide6.QtCore import QPoint, QRect, QSize
 from PySide6.QtGui import QImage, QPainter
@@ -25,9 +23,6 @@ from lightpen_resources import languages
 
 ROOT = Path(__file__).parents[2]
 DIFFERENT = ROOT / "screens-different"
-VISIBLE = 32  # of 255 levels; other versions of a font renderer shade edges by less
-SQUARE = 64  # px, in which pixels that differ are counted
-MAX_SHARE = 0.02  # of the pixels of a square: a short word of the smallest size
 
 
 def load_screens() -> ModuleType:
@@ -43,7 +38,7 @@ SCREENS = load_screens()
 NAMES = [
     look.file_name(step)
     for step in SCREENS.STEPS
-    for look in sorted(SCREENS.looks_of(step), key=lambda look: look.appearance)
+    for look in SCREENS.published_looks(step)
 ]
 LEAST = QSize(940, 500)
 SIZES = (LEAST, QSize(960, 540), QSize(1280, 800))
@@ -57,52 +52,10 @@ KEYS = [
 Key = tuple[str, str, int]
 
 
-@dataclass(frozen=True, eq=False)
-class Difference:
-    """How far two pictures differ.
-
-    Attributes
-    ----------
-    share : float
-        Of the pixels of a square that differ visibly, where that is the most.
-    picture : QImage
-        These in white.
-    """
-
-    share: float
-    picture: QImage
-
-    @property
-    def is_seen(self) -> bool:
-        """Whether something else is shown, not only shaded otherwise."""
-        return self.share > MAX_SHARE
-
-
-def levels(image: QImage) -> npt.NDArray[np.uint8]:
-    """Return (H, W, 3) levels of red, green and blue."""
-    rgb = image.convertToFormat(QImage.Format.Format_RGB888)
-    rows = np.frombuffer(rgb.constBits(), np.uint8).reshape(rgb.height(), -1)
-    return rows[:, : 3 * rgb.width()].reshape(rgb.height(), -1, 3).copy()
-
-
-def compared(actual: QImage, expected: QImage) -> Difference:
-    if actual.size() != expected.size():
-        return Difference(1.0, actual)
-    differences = cv2.absdiff(levels(actual), levels(expected))
-    apart = reduce(cv2.max, cv2.split(differences)) > VISIBLE
-    shown = np.where(apart, 255, 0).astype(np.uint8)
-    height, width = shown.shape
-    grey = QImage.Format.Format_Grayscale8
-    picture = QImage(shown.tobytes(), width, height, width, grey).copy()
-    square = (SQUARE, SQUARE)
-    shares = cv2.blur(apart.astype(np.float32), square, borderType=cv2.BORDER_CONSTANT)
-    return Difference(float(shares.max()), picture)
-
-
 def moved(picture: QImage, word: QRect, by: QPoint) -> QImage:
     """Return the picture with a part of it moved."""
     part = picture.copy(word)
-    assert np.ptp(levels(part)) > VISIBLE
+    assert np.ptp(SCREENS.levels(part)) > SCREENS.VISIBLE
     drawn = picture.copy()
     painter = QPainter(drawn)
     painter.drawImage(word.topLeft() + by, part)
@@ -132,8 +85,8 @@ def seen(dressed: QApplication) -> Iterator[Seen]:
     dressed.setStyleSheet("")  # which the wizard gives it
     with SCREENS.anywhere():
         stage = SCREENS.Stage(dressed)
-        for step in SCREENS.walk(stage):
-            seen.pictures.update(SCREENS.draw(stage, step))
+        for step in SCREENS.walk(stage, SCREENS.published_looks):
+            seen.pictures.update(SCREENS.draw(stage, step, SCREENS.published_looks))
             seen.rooms.update(rooms_of(stage, step))
         yield seen
         stage.close()
@@ -145,7 +98,7 @@ def rooms_of(stage: Any, step: str) -> Iterator[tuple[Key, list[SizeClass]]]:
     In the appearance that it was drawn in last: to change it takes long.
     """
     window = stage.wizard.window
-    appearance = SCREENS.looks_of(step)[-1].appearance
+    appearance = SCREENS.published_looks(step)[-1].appearance
 
     def room() -> SizeClass:
         return room_of(window)
@@ -170,7 +123,7 @@ def pictures(seen: Seen) -> dict[str, QImage]:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_step_looks_as_it_did(pictures: dict[str, QImage], name: str) -> None:
     expected = QImage(str(SCREENS.FOLDER / name))
-    difference = compared(pictures[name], expected)
+    difference = SCREENS.compare(pictures[name], expected)
 
     if difference.is_seen:
         DIFFERENT.mkdir(exist_ok=True)
@@ -205,15 +158,15 @@ def test_a_word_that_moved_is_noticed(
 ) -> None:
     picture = pictures[NAMES[0]]
 
-    assert compared(moved(picture, word, by), picture).is_seen
-    assert compared(picture, picture).share == 0
+    assert SCREENS.compare(moved(picture, word, by), picture).is_seen
+    assert SCREENS.compare(picture, picture).share == 0
 
 
 def test_edges_that_are_shaded_otherwise_are_no_difference(
     pictures: dict[str, QImage],
 ) -> None:
     picture = pictures[NAMES[0]]
-    sharp = levels(picture).astype(np.float64)
+    sharp = SCREENS.levels(picture).astype(np.float64)
     shaded = sharp + 0.2 * (cv2.GaussianBlur(sharp, (3, 3), 0.8) - sharp)
     rgb = shaded.round().astype(np.uint8)
     height, width, _ = rgb.shape
@@ -221,7 +174,7 @@ def test_edges_that_are_shaded_otherwise_are_no_difference(
     other = QImage(rgb.tobytes(), width, height, 3 * width, format_).copy()
 
     assert other != picture
-    assert not compared(other, picture).is_seen
+    assert not SCREENS.compare(other, picture).is_seen
 
 
 @pytest.mark.parametrize("key", KEYS, ids=lambda key: "-".join(map(str, key)))
