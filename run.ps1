@@ -2,7 +2,7 @@
 # For Windows PowerShell 5.1 and later. ASCII only: 5.1 reads other text wrongly.
 
 $pythons = 'py -3.13', 'py -3.12', 'py -3.11', 'py -3.14', 'python', 'python3'
-$isUsable = 'import ensurepip, ssl, sys, venv; sys.exit(sys.version_info < (3, 11))'
+$isUsable = 'import ensurepip, ssl, sys, venv; sys.exit(sys.version_info < (3, 11) or sys.maxsize < 2**32)'
 
 foreach ($python in $pythons) {
     $words = $python -split ' '
@@ -18,7 +18,8 @@ foreach ($python in $pythons) {
     }
 }
 
-Write-Output 'No Python 3.11 or newer was found. Install one, for example with'
+Write-Output 'No 64-bit Python 3.11 or newer was found; a 32-bit one lacks the libraries.'
+Write-Output 'Install one, for example with'
 Write-Output '    winget install --exact --id Python.Python.3.13'
 Write-Output 'then open a new window and run this command again.'
 exit 1
