@@ -39,6 +39,11 @@ COMMANDS = (
     ("pen", "transform measured LED coordinates into the pen frame", "pen:add_pen"),
     ("verify", "verify a tip on reference artefacts", "verify:add_verify"),
     (
+        "discover",
+        "tip, pen and camera from one swing and one length",
+        "discover:add_discover",
+    ),
+    (
         "repeatability",
         "compare calibrations of one tip",
         "repeatability:add_repeatability",

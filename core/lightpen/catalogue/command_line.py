@@ -42,4 +42,9 @@ MESSAGES = {
     "stream.another-size": "The images have {width} x {height} px, and the intrinsics are for {its_width} x {its_height}. Give the camera file of these images.",
     "library.only-tips": "Only a tip has a ball, an axis, limits and a picture; {id} is none.",
     "library.no-point": "--{option} takes three numbers, X Y Z, or none.",
+    "cli.discover-length-words": "'{words}' is no length. Give two LEDs and millimetres, as in 'longest 180.02' or '1 4 180.02', and IMAGES before it.",
+    "cli.discover-output-twice": "{file} would replace an input file or another result. Give each result a name of its own.",
+    "cli.discover-suffix": "{file} does not end in {suffix}. Choose such a name.",
+    "cli.discover-images-or-centers": "Give either IMAGES or --centers FILE.csv.",
+    "cli.discover-no-size": "Centres alone do not tell the size of the images. Give it: --image-size 2448x2048.",
 }

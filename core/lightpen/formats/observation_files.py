@@ -1,6 +1,7 @@
 """Tables of LED centres and poses measured by other programs.
 
-LED centres have the columns ``frame,led,x_px,y_px``. Poses have the row-major rotation
+LED centres have the columns ``frame,led,x_px,y_px``; those of unknown LEDs have
+``frame,x_px,y_px``. Poses have the row-major rotation
 ``r11,r12,r13,r21,...,r33`` and the translation ``tx_mm,ty_mm,tz_mm`` of cam_from_pen,
 and optionally the covariance ``c11,c12,...,c66`` of the small rotation vector w and the
 translation t, in this order, rad and mm: the true rotation is ``exp([w]x) R``. A column
@@ -31,6 +32,7 @@ SINGULAR = 1e-14  # least over largest variance of a pose, in rad and mm
 SYMMETRY_TOLERANCE = 1e-6  # of a covariance, relative
 
 _CENTERS = (("frame",), ("led",), ("x_px", "x"), ("y_px", "y"))
+_UNLABELLED = (("frame",), ("x_px", "x"), ("y_px", "y"))
 _POSE = (
     *((f"r{i}{j}",) for i in "123" for j in "123"),
     *((f"t{axis}_mm", f"t{axis}") for axis in "xyz"),
@@ -54,6 +56,26 @@ class Centers:
 
     frames: IntArray
     pixels: FloatArray
+    path: Path
+
+
+@dataclass(frozen=True, eq=False)
+class UnlabelledCenters:
+    """Images of unknown LEDs in a series of frames.
+
+    Attributes
+    ----------
+    frames : (F,) array
+        Numbers of the frames, ascending: all from the first to the last, also those
+        without a centre.
+    centers : tuple of (S, 2) array
+        Those of each frame, in any order, px.
+    path : Path
+        The file they are from.
+    """
+
+    frames: IntArray
+    centers: tuple[FloatArray, ...]
     path: Path
 
 
@@ -100,17 +122,37 @@ def read_centers(path: Path, n_leds: int) -> Centers:
     pixels = table.numbers(columns[2:])
     _check_centers(table, led_of_row, pixels, n_leds)
     frames, place = np.unique(frame_of_row, return_inverse=True)
-    if len(frames) > MAX_FRAMES:
-        raise FileError(
-            "centers.too-many-frames",
-            name=table.name,
-            n_frames=len(frames),
-            most=MAX_FRAMES,
-        )
+    _check_number(table, len(frames))
     _check_no_pair_twice(table, frame_of_row, led_of_row, place * n_leds + led_of_row)
     grid = np.full((len(frames), n_leds, 2), np.nan)
     grid[place, led_of_row - 1] = pixels
     return Centers(frames, grid, path)
+
+
+def read_unlabelled_centers(path: Path) -> UnlabelledCenters:
+    """Read centres of unknown LEDs; see the module for the layout.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, or has cells that are not numbers.
+    """
+    table = read_table(path, message("file.centers"), OBSERVATION_FILE_LIMIT)
+    columns = table.columns(_UNLABELLED, message("table.of-centers"))
+    frame_of_row = table.whole_numbers(columns[0])
+    pixels = table.numbers(columns[1:])
+    _check_inside_any(table, pixels)
+    numbers, counts = np.unique(frame_of_row, return_counts=True)
+    frames = np.arange(numbers[0], numbers[-1] + 1)
+    if len(frames) > 2 * len(numbers):  # numbered in steps, or by a clock
+        frames = numbers
+    _check_number(table, len(frames))
+    order = np.argsort(frame_of_row, kind="stable")
+    parts = np.split(pixels[order], np.cumsum(counts)[:-1])
+    of_frame = dict(zip(numbers.tolist(), parts, strict=True))
+    nothing = np.zeros((0, 2))
+    centers = tuple(of_frame.get(frame, nothing) for frame in frames.tolist())
+    return UnlabelledCenters(frames, centers, path)
 
 
 def read_poses(path: Path) -> PoseTable:
@@ -155,11 +197,25 @@ def _check_centers(
         raise table.error(
             row, message("centers.unknown-led", led=leds[row], n_leds=n_leds)
         )
+    _check_inside_any(table, pixels)
+
+
+def _check_inside_any(table: Table, pixels: FloatArray) -> None:
     far = np.abs(pixels).max(axis=1) > LARGEST_PIXEL
     if np.any(far):
         row = int(np.argmax(far))
         raise table.error(
             row, message("centers.far", x=pixels[row, 0], y=pixels[row, 1])
+        )
+
+
+def _check_number(table: Table, n_frames: int) -> None:
+    if n_frames > MAX_FRAMES:
+        raise FileError(
+            "centers.too-many-frames",
+            name=table.name,
+            n_frames=n_frames,
+            most=MAX_FRAMES,
         )
 
 

@@ -217,6 +217,33 @@ def pen_frame_from_raw(raw_leds: FloatArray) -> tuple[FloatArray, FloatArray]:
     return _frame(raw_leds)
 
 
+def order_of_paper(leds: FloatArray, up: FloatArray) -> IntArray | None:
+    """Return the LEDs of the paper's layout in the order of their numbers.
+
+    Parameters
+    ----------
+    leds : (L, 3) array
+        LED centres in any right-handed frame and order, mm.
+    up : (3,) array
+        Direction from the tip to the LEDs, along which numbers grow.
+
+    Returns
+    -------
+    (10,) array of int or None
+        None for another layout.
+    """
+    slots = _layout(leds)
+    if slots is None:
+        return None
+    back, left, right = slots[_BACK], slots[_LEFT], slots[_RIGHT]
+    step = 1 if (leds[back[3]] - leds[back[0]]) @ up > 0 else -1
+    for first, second in ((left, right), (right, left)):
+        order = np.concatenate([back[::step], first[::step], second[::step]])
+        if _is_right_handed(leds[order]):
+            return order
+    return None
+
+
 def in_pen_frame(raw: Pen) -> Pen:
     """Return a pen of the paper's layout in the pen frame; see `pen_frame_from_raw`.
 

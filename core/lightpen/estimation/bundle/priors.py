@@ -102,7 +102,7 @@ def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
             else Prior(rig.covariance, assumed=False)
         )
     return Priors(
-        cameras=tuple(_intrinsics(camera, assumptions) for camera in rig.cameras),
+        cameras=tuple(prior_of_camera(camera, assumptions) for camera in rig.cameras),
         extrinsics=extrinsics,
         scale=(
             _one(assumptions.scale, assumed=True)
@@ -122,7 +122,8 @@ def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
     )
 
 
-def _intrinsics(camera: Camera, assumptions: Assumptions) -> Prior:
+def prior_of_camera(camera: Camera, assumptions: Assumptions) -> Prior:
+    """Return the prior of intrinsics that a file states, or an assumed one."""
     if camera.covariance is not None:
         return Prior(camera.covariance, assumed=False)
     variances = np.zeros(len(camera.intrinsics))

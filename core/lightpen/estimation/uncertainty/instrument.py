@@ -95,7 +95,7 @@ def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
     shrinkage_shift = unshrunk.values - bundle.values
     shrinkage_shift[:6] = adjustment.shrinkage_shift
     spread = spread + np.outer(shrinkage_shift, shrinkage_shift)
-    mixing = _mixing(bundle)
+    mixing = instrument_mixing(bundle)
     return Instrument(
         rig=state.rig,
         pen=state.pen,
@@ -177,7 +177,7 @@ def _with_budget_noise(bundle: Bundle, budget: Budget) -> FloatArray:
     return np.asarray(covariance + (by_tip - 1) * images)
 
 
-def _mixing(bundle: Bundle) -> FloatArray:
+def instrument_mixing(bundle: Bundle) -> FloatArray:
     """Return the parameters of an instrument by the unknowns of a bundle, (q, p)."""
     unknowns, state = bundle.unknowns, bundle.state
     at = parameters_of(state.rig, state.pen)

@@ -1,0 +1,24 @@
+"""Messages of discovery: code, then template with named values."""
+
+MESSAGES = {
+    "discover.no-start": "No focal length from 0.3 to 12 image widths explains the tracks. Check that the tip stayed in the cone, and tilt the pen in all directions, with roll.",
+    "discover.no-fit": "No pen, no camera and no fixed tip explain the tracks: they miss by {misfit:.1f} px. Check that the tip stayed in the cone, that the LEDs are fixed to one pen, and that camera and cone stand still.",
+    "discover.camera-changed": "The camera changed during the swing: its focal length was {first:.0f} px first and {second:.0f} px later. Lock zoom, focus and image stabilisation, and repeat the swing.",
+    "discover.many-left-out": "Only {n_used} of {n_images} images agree on one tip. Press the tip into the cone, clamp cone and camera, and repeat the swing.",
+    "discover.weak-swing": "The swing is too weak: U of the tip is {U:.2g} mm, the focal length is known to {focal:.2g} %, and the pen's tilt varies by {tilt:.0f} degrees. Tilt the pen by 30 degrees in all directions, and turn it about its axis.",
+    "discover.mirror-undecided": "The images do not decide between the pen and its mirror image. Tilt the pen further towards the camera and away from it, by 30 degrees or more, and come closer to the camera.",
+    "discover.not-followed": "The LEDs cannot be followed from image to image: in no {needed} of {n_images} images in a row the same 5 LEDs are seen. Give the images in the order in which they were taken, 10 or more a second, with the whole pen in view.",
+    "discover.too-few-images": "There are {n_images} images; at least {needed} are needed, and 300 are usual. Record a swing of 15 seconds or more, 10 images a second or more.",
+    "discover.too-few-leds": "{n_leds} LEDs are seen; at least {needed} are needed. Keep the whole pen in view, switch on all LEDs, and check exposure and focus.",
+    "discover.two-pens": "Beside one pen {n_others} other lights move with each other: there is a second pen, or a mirror. Remove or cover it, and repeat the swing.",
+    "discover.sketch-count": "{n_found} LEDs are found, and the sketch has {n_sketched}. Give a sketch with all LEDs of the pen, or none.",
+    "discover.other-sketch": "The LEDs found do not resemble the sketch, in whatever order. Check that it is of this pen, right-handed and in millimetres to 5 mm.",
+    "discover.no-such-led": "There is no LED {number}; {n_leds} LEDs are found, numbered from the tip upwards and from left to right. Give a length between two of these.",
+    "discover.same-led": "A length from LED {number} to itself is none. Give the numbers of two LEDs.",
+    "discover.lengths-contradict": "The lengths contradict each other: LEDs {first} and {second} are {stated:.3f} mm apart as measured, and {implied:.3f} mm by the other lengths. Check the numbers of the LEDs, and measure again.",
+    "discover.length-of-others": "The length of {length:g} mm is not that between LEDs {first} and {second}: by it the discs would be {found:.2f} mm wide, and {stated:g} mm is stated. It may be that between LEDs {other} and {another}. Check which LEDs were measured, and the diameter of the discs.",
+    "discover.no-length": "A pen file needs one known length. Measure the distance between two LEDs, and give it.",
+    "discover.relative": "No length is known: all lengths are in hundredths of the largest distance between two LEDs.",
+    "discover.length-limits": "The length limits U: known to {sigma:.3f} mm it would reduce U from {now:.0f} to {then:.0f} um.",
+    "discover.centers-outside": "Most centres are outside the image: they reach to ({x:.0f}, {y:.0f}) px, and the images have {width} x {height} px. Check the size of the images.",
+}

@@ -1,0 +1,206 @@
+"""``lightpen discover``: tip, pen and camera from one swing and one length."""
+
+import argparse
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from lightpen.commands.arguments import above_zero, finite
+from lightpen.commands.console import are_same, printing, progress, shown, write_record
+from lightpen.discovery.discover import Request, discover
+from lightpen.discovery.report import discovery_record, discovery_text
+from lightpen.discovery.scale import MeasuredLength
+from lightpen.discovery.sightings import (
+    Report,
+    Sightings,
+    find_spots,
+    sightings_of_centers,
+)
+from lightpen.errors import UsageError
+from lightpen.formats.camera_files import read_camera, write_camera
+from lightpen.formats.images import find_images
+from lightpen.formats.observation_files import read_unlabelled_centers
+from lightpen.formats.pen_files import read_unchecked_pen, write_pen
+from lightpen.model.camera import Camera
+from lightpen.model.pen import DISC_DIAMETER, Pen
+
+LONGEST = "longest"
+CALIPER = 0.02  # mm, standard uncertainty of a length unless given
+LEAST_SIDE, MOST_SIDE = 32, 65_536  # px, of an image
+SEARCHING = 0.6  # of the progress with images
+
+
+def add_discover(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen discover``."""
+    parser.set_defaults(run=_discover)
+    parser.add_argument(
+        "images",
+        nargs="*",
+        metavar="IMAGES",
+        help="image folder, file name pattern, video or record of a swing, in the "
+        "order of time, 10 images a second or more",
+    )
+    parser.add_argument(
+        "--centers",
+        type=Path,
+        metavar="FILE.csv",
+        help="spot centres (frame,x_px,y_px), which LED they are being unknown, "
+        "instead of IMAGES; with --image-size",
+    )
+    parser.add_argument(
+        "--image-size", type=_size, metavar="WxH", help="size of the images, 2448x2048"
+    )
+    parser.add_argument(
+        "--length",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar="LENGTH",
+        help="known length: 'longest MM' between the two LEDs farthest apart, or "
+        "'A B MM' between two LEDs by number (repeatable)",
+    )
+    parser.add_argument(
+        "--length-sigma",
+        type=above_zero,
+        default=CALIPER,
+        metavar="MM",
+        help=f"standard uncertainty of each length ({CALIPER})",
+    )
+    parser.add_argument(
+        "--led-diameter",
+        type=above_zero,
+        metavar="MM",
+        help=f"diameter of the LED discs ({DISC_DIAMETER:g})",
+    )
+    parser.add_argument(
+        "--camera", type=Path, metavar="FILE", help="camera file, if there is one"
+    )
+    rough = parser.add_mutually_exclusive_group()
+    rough.add_argument(
+        "--pen-sketch",
+        type=Path,
+        metavar="FILE",
+        help="LED file with rough coordinates, which gives numbers and frame",
+    )
+    rough.add_argument(
+        "--pen",
+        type=Path,
+        metavar="FILE",
+        help="LED file that is only roughly true; as --pen-sketch",
+    )
+    for name, what in (("pen", "pen file"), ("camera", "camera file")):
+        suffix = "json" if name == "pen" else "yaml"
+        parser.add_argument(
+            f"--out-{name}",
+            type=Path,
+            metavar=f"FILE.{suffix}",
+            help=f"write the {what}",
+        )
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="write the record as JSON"
+    )
+
+
+def _size(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,6})[xX](\d{1,6})", text)
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text} is no size such as 2448x2048.")
+    width, height = int(found[1]), int(found[2])
+    if not all(LEAST_SIDE <= side <= MOST_SIDE for side in (width, height)):
+        raise argparse.ArgumentTypeError(
+            f"{text} is no size from {LEAST_SIDE} to {MOST_SIDE} px."
+        )
+    return width, height
+
+
+@printing
+def _discover(options: argparse.Namespace) -> None:
+    lengths = tuple(_length(words, options.length_sigma) for words in options.length)
+    if not lengths and options.out_pen is not None:
+        raise UsageError("discover.no-length")
+    camera = None if options.camera is None else read_camera(options.camera)
+    sketch = _sketch(options.pen_sketch or options.pen)
+    _check_outputs(options)
+    with progress("Finding pen and camera") as report:
+        sightings = _sightings(options, camera, report)
+        if camera is not None and camera.image_size != sightings.size:
+            raise UsageError(
+                "cli.camera-of-other-size",
+                file=str(options.camera),
+                width=camera.width,
+                height=camera.height,
+                seen_width=sightings.size[0],
+                seen_height=sightings.size[1],
+            )
+        start = 0.0 if options.centers is not None else SEARCHING
+        found = discover(
+            sightings,
+            Request(lengths, _diameter(options, sketch), camera, sketch),
+            lambda done: report(start + (1 - start) * done),
+        )
+    if options.out_pen is not None:
+        write_pen(found.pen, options.out_pen)
+    if options.out_camera is not None:
+        write_camera(found.camera, options.out_camera)
+    if options.json is not None:
+        write_record(options.json, discovery_record(found))
+    print(shown(discovery_text(found)))
+
+
+def _length(words: Sequence[str], sigma: float) -> MeasuredLength:
+    try:
+        if len(words) == 2 and words[0].strip().casefold() == LONGEST:
+            return MeasuredLength(None, above_zero(words[1]), sigma)
+        if len(words) == 3:
+            first, second = (int(word) for word in words[:2])
+            return MeasuredLength((first, second), above_zero(words[2]), sigma)
+    except (ValueError, argparse.ArgumentTypeError):
+        pass
+    raise UsageError("cli.discover-length-words", words=" ".join(words))
+
+
+def _sketch(path: Path | None) -> Pen | None:
+    return None if path is None else read_unchecked_pen(path, "mm")
+
+
+def _diameter(options: argparse.Namespace, sketch: Pen | None) -> float:
+    if options.led_diameter is not None:
+        return float(finite(str(options.led_diameter)))
+    return DISC_DIAMETER if sketch is None else sketch.diameter
+
+
+def _check_outputs(options: argparse.Namespace) -> None:
+    """Refuse outputs that replace an input or each other, or of another suffix."""
+    inputs = [options.centers, options.camera, options.pen, options.pen_sketch]
+    inputs = [path for path in inputs if path is not None]
+    seen: list[Path] = []
+    for path in (options.out_pen, options.out_camera, options.json):
+        if path is None:
+            continue
+        if any(are_same(path, other) for other in (*inputs, *seen)):
+            raise UsageError("cli.discover-output-twice", file=str(path))
+        seen.append(path)
+    for path, suffixes in (
+        (options.out_pen, (".json",)),
+        (options.out_camera, (".yaml", ".yml")),
+    ):
+        if path is not None and path.suffix.lower() not in suffixes:
+            raise UsageError(
+                "cli.discover-suffix", file=str(path), suffix=" or ".join(suffixes)
+            )
+
+
+def _sightings(
+    options: argparse.Namespace, camera: Camera | None, report: Report
+) -> Sightings:
+    if bool(options.images) == (options.centers is not None):
+        raise UsageError("cli.discover-images-or-centers")
+    if options.centers is None:
+        source = find_images(*options.images)
+        return find_spots(source, lambda done: report(SEARCHING * done))
+    size = options.image_size or (None if camera is None else camera.image_size)
+    if size is None:
+        raise UsageError("cli.discover-no-size")
+    given = read_unlabelled_centers(options.centers)
+    names = tuple(f"frame {frame}" for frame in given.frames)
+    return sightings_of_centers(names, given.centers, size)

@@ -1,0 +1,297 @@
+"""Which mirror image, which focal length: all are tried on a part of the swing.
+
+Under weak perspective a shape and its mirror image along the line of sight have the
+same tracks. Perspective tells them apart: the wrong one fits hundreds of times worse.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.discovery.factorisation import WeakShape, factorise, filled_tracks
+from lightpen.discovery.starts import (
+    CameraPrior,
+    KnownLength,
+    Start,
+    adjust_start,
+    any_camera,
+    focal_length_of,
+    free_focal_length,
+    held,
+    ideal_camera,
+    state_of,
+)
+from lightpen.discovery.tracks import Pieces
+from lightpen.errors import CalibrationError
+from lightpen.estimation.bundle.priors import prior_of_camera
+from lightpen.model.assumptions import USUAL
+from lightpen.model.camera import Camera
+from lightpen.model.rigid import fit_rigid
+
+FOCAL_LENGTHS = (1.0, 1.7, 2.8, 0.7, 4.5)  # image widths, tried where none fits
+SHORTEST, LONGEST = 0.3, 12.0  # image widths, of a focal length that may be
+MIN_PIECES = 5  # of a part of the swing to begin with
+MIN_IMAGES = 25
+PRESENT = 0.7  # share of a part's images in which a piece is seen
+N_BOUNDS = 25  # images between which parts are sought
+N_USED = 80  # images of a part that are adjusted
+UNIT = 100.0  # mm: the largest distance of two LEDs, until a length is known
+POINT = 1e-3  # mm: radius of a disc before the size is known
+ROUGH, FINER = 2.0, 0.5  # px: noise that residuals are measured by at first
+PROMISING = 30.0  # times the least misfit, within which all of the camera is adjusted
+FITTING = 0.7  # px: a start that fits
+ALIKE = 0.02  # of the pen's size, within which two shapes are one
+APART = 0.2  # of the misfit of all, that a part of them has by itself
+DECIDED = 2.0  # times the misfit of the best that the mirrored one must have
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A start that was tried.
+
+    Attributes
+    ----------
+    mirrored : bool
+        Whether near and far are exchanged against the first shape.
+    started_at, focal_length : float
+        Before and after the adjustment, px.
+    misfit : float
+        Robust noise of one coordinate about it, px.
+    is_best : bool
+        Whether it ended at the shape that fits best, wherever it began.
+    """
+
+    mirrored: bool
+    started_at: float
+    focal_length: float
+    misfit: float
+    is_best: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Seed:
+    """A part of the swing that is solved.
+
+    Attributes
+    ----------
+    images, pieces : (M,) and (L,) array of int
+    start : Start
+        LED j is that of ``pieces[j]``.
+    hypotheses : tuple of Hypothesis
+    """
+
+    images: IntArray
+    pieces: IntArray
+    start: Start
+    hypotheses: tuple[Hypothesis, ...]
+
+
+def solve_seed(
+    pieces: Pieces, size: tuple[int, int], known: Camera | None = None
+) -> Seed:
+    """Solve the part of a swing that shows most pieces for longest.
+
+    Parameters
+    ----------
+    size : tuple of int
+        Width and height of the images, px.
+    known : Camera, optional
+        With its covariance, where there is a camera file.
+
+    Raises
+    ------
+    CalibrationError
+        No part is long enough, or the mirror stays undecided.
+    """
+    images, chosen = _best_part(pieces)
+    seed = _solved(pieces, images, chosen, size, known)
+    if seed.start.sigma > FITTING:
+        _require_one_pen(pieces, seed, size, known)
+        _require_one_camera(pieces, seed, size, known)
+        raise CalibrationError("discover.no-fit", misfit=seed.start.sigma)
+    others = [h.misfit for h in seed.hypotheses if not h.is_best]
+    if min(others, default=np.inf) < DECIDED * seed.start.sigma:
+        raise CalibrationError("discover.mirror-undecided")
+    return seed
+
+
+def _solved(
+    pieces: Pieces,
+    images: IntArray,
+    chosen: IntArray,
+    size: tuple[int, int],
+    known: Camera | None,
+) -> Seed:
+    """Return the best of all hypotheses for a part of a swing."""
+    pixels = pieces.pixels[np.ix_(images, chosen)]
+    shape = factorise(pixels)
+    used = np.unique(np.linspace(0, len(images) - 1, N_USED).astype(int))
+    shape = shape._replace(
+        rotations=shape.rotations[used],
+        scales=shape.scales[used],
+        centroids=shape.centroids[used],
+    )
+    trial = _Trial(pixels[used], size, known)
+    both = ((False, shape), (True, shape.mirrored))
+    # The mirrored shape has the same focal length, but for its sign.
+    focal = abs(focal_length_of(shape)) if known is None else known.fx
+    tried: list[tuple[Hypothesis, Start]] = []
+    for mirrored, each in both:
+        tried += trial.starts(each, [focal], mirrored=mirrored)
+    if known is None and not any(h.misfit < FITTING for h, _ in tried):
+        focal_lengths = [size[0] * width for width in FOCAL_LENGTHS]
+        for mirrored, each in both:
+            tried += trial.starts(each, focal_lengths, mirrored=mirrored)
+    if not tried:
+        raise CalibrationError("discover.no-start")
+    _, start = min(tried, key=lambda pair: pair[0].misfit)
+    hypotheses = tuple(
+        replace(each, is_best=_are_alike(other, start)) for each, other in tried
+    )
+    return Seed(images[used], chosen, start, hypotheses)
+
+
+def _are_alike(one: Start, other: Start) -> bool:
+    """Tell whether two starts have the same pen, not its mirror image."""
+    leds, others = one.state.pen.leds, other.state.pen.leds
+    R, t = fit_rigid(leds, others)
+    return bool(np.abs(leds @ R.T + t - others).max() < ALIKE * UNIT)
+
+
+def _require_one_pen(
+    pieces: Pieces, seed: Seed, size: tuple[int, int], known: Camera | None
+) -> None:
+    """Refuse tracks of which a part fits by itself, as those of one of two pens.
+
+    The tracks of two bodies span subspaces of their own [1]_.
+
+    References
+    ----------
+    .. [1] J. P. Costeira, T. Kanade, "A multibody factorization method for
+       independently moving objects", Int. J. Computer Vision 29 (1998) 159-179.
+    """
+    if len(seed.pieces) < 2 * MIN_PIECES - 2:
+        return
+    images = np.arange(seed.images[0], seed.images[-1] + 1)
+    tracks = filled_tracks(pieces.pixels[np.ix_(images, seed.pieces)])
+    flat = np.concatenate([tracks[..., 0], tracks[..., 1]])
+    basis = np.linalg.svd(flat, full_matrices=False)[2][:8]
+    alike = np.abs(basis.T @ basis)
+    np.fill_diagonal(alike, 0.0)
+    root = 1 / np.sqrt(alike.sum(axis=1))
+    parting = np.linalg.eigh(alike * np.outer(root, root))[1][:, -2] * root
+    for side in (parting >= np.median(parting), parting > 0):
+        larger = seed.pieces[side if 2 * side.sum() >= len(side) else ~side]
+        if not MIN_PIECES <= len(larger) <= len(seed.pieces) - 2:
+            continue
+        part = _solved(pieces, images, larger, size, known)
+        if part.start.sigma < APART * seed.start.sigma:
+            n_others = len(seed.pieces) - len(larger)
+            raise CalibrationError("discover.two-pens", n_others=n_others)
+
+
+def _require_one_camera(
+    pieces: Pieces, seed: Seed, size: tuple[int, int], known: Camera | None
+) -> None:
+    """Refuse a swing whose parts fit by themselves, with focal lengths of their own."""
+    n_images = seed.images[-1] + 1
+    images = np.arange(seed.images[0], n_images)
+    shown = (pieces.spots[np.ix_(images, seed.pieces)] >= 0).sum(axis=1)
+    images = images[shown >= min(4, len(seed.pieces))]
+    if len(images) < 2 * MIN_IMAGES:
+        return
+    parts = [
+        _solved(pieces, half, seed.pieces, size, known)
+        for half in np.array_split(images, 2)
+    ]
+    if all(part.start.sigma < APART * seed.start.sigma for part in parts):
+        first, second = (part.start.state.rig.cameras[0].fx for part in parts)
+        raise CalibrationError("discover.camera-changed", first=first, second=second)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """What all hypotheses are tried on."""
+
+    pixels: FloatArray
+    size: tuple[int, int]
+    known: Camera | None
+
+    def starts(
+        self, shape: WeakShape, focal_lengths: Sequence[float], *, mirrored: bool
+    ) -> list[tuple[Hypothesis, Start]]:
+        """Return what the adjustments of a shape come to."""
+        width = self.size[0]
+        first, second, unit = _longest(shape)
+        length = (KnownLength(first, second, UNIT, 1e-4 * UNIT),)
+        found: list[tuple[float, Start]] = []
+        for focal in focal_lengths:
+            if not SHORTEST * width < focal < LONGEST * width:
+                continue
+            camera = (
+                ideal_camera(*self.size, focal) if self.known is None else self.known
+            )
+            start = state_of(shape, camera, POINT, unit)
+            rough = adjust_start(start, self.pixels, held(camera), 12, length, ROUGH)
+            if self.known is None:
+                prior = free_focal_length(camera)
+                rough = adjust_start(rough.state, self.pixels, prior, 20, length, FINER)
+            found.append((focal, rough))
+        least = min((start.sigma for _, start in found), default=0.0)
+        return [
+            self._finished(focal, start, length, least, mirrored=mirrored)
+            for focal, start in found
+        ]
+
+    def _finished(
+        self,
+        focal: float,
+        start: Start,
+        length: tuple[KnownLength, ...],
+        least: float,
+        *,
+        mirrored: bool,
+    ) -> tuple[Hypothesis, Start]:
+        if start.sigma <= PROMISING * max(least, FITTING / PROMISING):
+            prior = camera_prior(start.state.rig.cameras[0], self.known)
+            start = adjust_start(start.state, self.pixels, prior, 40, length)
+        after = start.state.rig.cameras[0].fx
+        return Hypothesis(mirrored, float(focal), after, start.sigma), start
+
+
+def camera_prior(camera: Camera, known: Camera | None) -> CameraPrior:
+    """Return what is known of a camera: its file, or what all cameras are like."""
+    if known is None:
+        return any_camera(camera)
+    return CameraPrior.of(known, prior_of_camera(known, USUAL).covariance)
+
+
+def _longest(shape: WeakShape) -> tuple[int, int, float]:
+    """Return the two points farthest apart, and mm a unit by `UNIT`."""
+    points = shape.points
+    apart = np.linalg.norm(points[:, None] - points, axis=2)
+    first, second = np.unravel_index(np.argmax(apart), apart.shape)
+    return int(first), int(second), UNIT / float(apart.max())
+
+
+def _best_part(pieces: Pieces) -> tuple[IntArray, IntArray]:
+    """Return the images and the pieces of a part with many pieces for long."""
+    seen = pieces.spots >= 0
+    seen = np.concatenate([np.zeros((1, seen.shape[1]), int), np.cumsum(seen, axis=0)])
+    n = len(seen) - 1
+    bounds = np.unique(np.linspace(0, n, N_BOUNDS).astype(int))
+    best, score = (0, 0), 0.0
+    for a in bounds:
+        for b in bounds[bounds >= a + MIN_IMAGES]:
+            n_pieces = int((seen[b] - seen[a] >= PRESENT * (b - a)).sum())
+            if n_pieces >= MIN_PIECES and (n_pieces - 3) * (b - a) > score:
+                best, score = (int(a), int(b)), float((n_pieces - 3) * (b - a))
+    a, b = best
+    if score == 0:
+        raise CalibrationError("discover.not-followed", n_images=n, needed=MIN_IMAGES)
+    chosen = np.flatnonzero(seen[b] - seen[a] >= PRESENT * (b - a))
+    images = np.arange(a, b)
+    enough = (pieces.spots[a:b, chosen] >= 0).sum(axis=1) >= min(4, len(chosen))
+    return images[enough], chosen

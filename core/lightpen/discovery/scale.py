@@ -1,0 +1,126 @@
+"""The pen's scale by known lengths, and priors that leave all else to the images."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.discovery.starts import KnownLength, gradient_of
+from lightpen.errors import CalibrationError
+from lightpen.model.information import inverse
+from lightpen.model.pen import Pen
+
+WIDE = 0.02  # of the pen's size: prior of an LED coordinate
+EXACT_SCALE = 1e-6  # relative: what is left to `led_covariance`
+CONTRADICTING = 4.0  # standard deviations
+
+
+@dataclass(frozen=True)
+class MeasuredLength:
+    """A length that was measured on the pen.
+
+    Attributes
+    ----------
+    leds : tuple of int or None
+        Numbers of the two LEDs, from 1; None: the two farthest apart.
+    length, sigma : float
+        With its standard uncertainty, mm.
+    """
+
+    leds: tuple[int, int] | None
+    length: float
+    sigma: float
+
+
+def known_lengths(
+    measured: Sequence[MeasuredLength], leds: FloatArray
+) -> tuple[KnownLength, ...]:
+    """Return measured lengths by the indices of numbered LEDs (L, 3).
+
+    Raises
+    ------
+    CalibrationError
+        An LED is none of the pen's, or one LED is given twice.
+    """
+    return tuple(_known(each, leds) for each in measured)
+
+
+def _known(each: MeasuredLength, leds: FloatArray) -> KnownLength:
+    if each.leds is None:
+        apart = np.linalg.norm(leds[:, None] - leds, axis=2)
+        one, other = np.unravel_index(np.argmax(apart), apart.shape)
+        return KnownLength(int(one), int(other), each.length, each.sigma)
+    first, second = each.leds
+    for number in each.leds:
+        if not 1 <= number <= len(leds):
+            raise CalibrationError(
+                "discover.no-such-led", number=number, n_leds=len(leds)
+            )
+    if first == second:
+        raise CalibrationError("discover.same-led", number=first)
+    return KnownLength(first - 1, second - 1, each.length, each.sigma)
+
+
+def scale_by(lengths: Sequence[KnownLength], leds: FloatArray) -> float:
+    """Return the factor that brings LEDs (L, 3) to the lengths, least squares.
+
+    Raises
+    ------
+    CalibrationError
+        The lengths contradict each other; the text tells which.
+    """
+    found = np.array([_distance(leds, each) for each in lengths])
+    stated = np.array([each.length for each in lengths])
+    sigmas = np.array([each.sigma for each in lengths])
+    weights = found / sigmas
+    factor = float((weights @ (stated / sigmas)) / (weights @ weights))
+    off = factor * found - stated
+    # What the shape itself is uncertain by is far less.
+    limit = CONTRADICTING * np.hypot(sigmas, 2e-4 * stated)
+    worst = int(np.argmax(np.abs(off) / limit))
+    if abs(off[worst]) > limit[worst]:
+        rest = np.arange(len(lengths)) != worst
+        others = float((found[rest] @ stated[rest]) / (found[rest] @ found[rest]))
+        each = lengths[worst]
+        raise CalibrationError(
+            "discover.lengths-contradict",
+            first=each.first + 1,
+            second=each.second + 1,
+            stated=each.length,
+            implied=others * found[worst],
+        )
+    return factor
+
+
+def nearest_pair(leds: FloatArray, length: float) -> tuple[int, int, float]:
+    """Return the numbers of the two LEDs whose distance is nearest to a length, mm."""
+    one, other = np.triu_indices(len(leds), k=1)
+    apart = np.linalg.norm(leds[one] - leds[other], axis=1)
+    k = int(np.argmin(np.abs(apart - length)))
+    return int(one[k]) + 1, int(other[k]) + 1, float(apart[k])
+
+
+def with_lengths_known(pen: Pen, lengths: Sequence[KnownLength]) -> Pen:
+    """Return a pen of which nothing is known but lengths, for the adjustment.
+
+    Its LEDs have a wide covariance; along the change of a length it is that of the
+    length. The lengths are those during the swing, so the pen does not expand.
+    """
+    size = float(np.ptp(pen.leds, axis=0).max())
+    information = np.eye(pen.leds.size) / (WIDE * size) ** 2
+    for each in lengths:
+        row = gradient_of(pen.leds, each)
+        information += np.outer(row, row) / each.sigma**2
+    return replace(
+        pen,
+        led_covariance=inverse(information),
+        scale_sigma=EXACT_SCALE,
+        expansion=0.0,
+        expansion_sigma=None,
+        temperature_c=None,
+    )
+
+
+def _distance(leds: FloatArray, known: KnownLength) -> float:
+    return float(np.linalg.norm(leds[known.second] - leds[known.first]))

@@ -1,0 +1,133 @@
+"""What the images of a swing show, before anything is known of pen and camera."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.detection.reasons import MISHAPS
+from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
+from lightpen.errors import FileError
+from lightpen.formats.decoding import bits_of
+from lightpen.formats.images import ImageSource, look_at_all
+
+SEARCH_MEMORY_A_PIXEL = 5  # bytes, as of `lightpen.detection.observations`
+UNFIT = SpotFlaw.MERGED | SpotFlaw.CUT | SpotFlaw.BLURRED
+
+Report = Callable[[float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Sightings:
+    """Unlabelled spots of N images in time order.
+
+    Attributes
+    ----------
+    names : tuple of str
+        File or frame, one an image.
+    centers : tuple of (S, 2) array
+        Centres of the spots of each image, px; centroids where there are shapes.
+    size : tuple of int
+        Width and height of the images, px.
+    shapes : tuple of (S, 2, 2) array or None
+        Covariance of the area of each spot, px^2; None where only centres are given.
+    areas : tuple of (S,) array or None
+        px^2; NaN of saturated ones.
+    edge_widths : (N,) array
+        Mean width of the rims of each image, px; NaN where only centres are given.
+    """
+
+    names: tuple[str, ...]
+    centers: tuple[FloatArray, ...]
+    size: tuple[int, int]
+    shapes: tuple[FloatArray, ...] | None = None
+    areas: tuple[FloatArray, ...] | None = None
+    edge_widths: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+def sightings_of_centers(
+    frames: tuple[str, ...], centers: tuple[FloatArray, ...], size: tuple[int, int]
+) -> Sightings:
+    """Return the sightings of centres that were found elsewhere.
+
+    Raises
+    ------
+    FileError
+        Most centres are outside an image of this size.
+    """
+    every = np.concatenate([np.zeros((0, 2)), *centers])
+    outside = np.any((every < -0.5) | (every > size), axis=1)
+    if 2 * outside.sum() > len(every):
+        x, y = every.max(axis=0)
+        raise FileError(
+            "discover.centers-outside", x=x, y=y, width=size[0], height=size[1]
+        )
+    return Sightings(frames, centers, size)
+
+
+def find_spots(
+    source: ImageSource, report: Report = lambda fraction: None
+) -> Sightings:
+    """Find the spots in images that are whole and sharp.
+
+    Raises
+    ------
+    FileError
+        No image can be read, or they differ in size.
+    """
+    found: list[tuple[Spots, tuple[int, int] | None]] = []
+    trouble: FileError | None = None
+
+    def search(load: Callable[[], Image]) -> tuple[Spots, tuple[int, int] | FileError]:
+        try:
+            image = load()
+        except FileError as error:
+            return Spots.none(), error
+        size = (image.shape[1], image.shape[0])
+        try:
+            return detect_spots(image, full_scale=2 ** bits_of(image) - 1), size
+        except MISHAPS:
+            return Spots.none(), size
+
+    n_images = len(source.names)
+    for spots, seen in look_at_all(source, search, SEARCH_MEMORY_A_PIXEL):
+        if isinstance(seen, FileError):
+            trouble = seen
+        found.append((spots, None if isinstance(seen, FileError) else seen))
+        report(len(found) / n_images)
+    sizes = [size for _, size in found if size is not None]
+    if not sizes:
+        assert trouble is not None
+        raise FileError("images.none-readable", n_images=n_images, why=trouble.message)
+    size = max(set(sizes), key=sizes.count)
+    return _sightings(
+        source.names, [s if own == size else Spots.none() for s, own in found], size
+    )
+
+
+def _sightings(
+    names: tuple[str, ...], every: list[Spots], size: tuple[int, int]
+) -> Sightings:
+    good = [np.flatnonzero((spots.flaws & UNFIT) == 0) for spots in every]
+    pairs = list(zip(every, good, strict=True))
+    widths = [
+        float(spots.edge_widths[chosen].mean()) if len(chosen) else np.nan
+        for spots, chosen in pairs
+    ]
+    return Sightings(
+        names=names,
+        centers=tuple(spots.centers[chosen] for spots, chosen in pairs),
+        size=size,
+        shapes=tuple(spots.shapes[chosen] for spots, chosen in pairs),
+        areas=tuple(_areas(spots)[chosen] for spots, chosen in pairs),
+        edge_widths=np.array(widths),
+    )
+
+
+def _areas(spots: Spots) -> FloatArray:
+    is_saturated = (spots.flaws & SpotFlaw.SATURATED) != 0
+    return np.where(is_saturated, np.nan, spots.areas)
