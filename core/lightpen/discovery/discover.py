@@ -18,7 +18,7 @@ from lightpen.detection.pose import MIN_POSE_LEDS
 from lightpen.detection.reasons import Reason
 from lightpen.discovery.hypotheses import Hypothesis, camera_prior, solve_seed
 from lightpen.discovery.labelling import Labelled, label, pixels_of
-from lightpen.discovery.normals import covariance_by_normal
+from lightpen.discovery.normals import covariance_by_normal, towards_camera
 from lightpen.discovery.numbering import framed, number_by_place, number_by_sketch
 from lightpen.discovery.scale import (
     EXACT_SCALE,
@@ -265,7 +265,9 @@ def _scaled_start(
         for each in known_lengths(measured, leds)
     )
     state = scaled_to(state, scale_by(lengths, leds))
+    normals = np.tile(towards_camera(state), (len(leds), 1))
     pen, known = _with_discs(state.pen, request), request.camera
+    pen = replace(pen, normals=normals)
     state = replace(state, pen=pen)
     some = np.unique(np.linspace(0, len(found.images) - 1, N_ADJUSTED).astype(int))
     part = replace(state, rotations=state.rotations[some])

@@ -24,7 +24,8 @@ from lightpen.model.information import inverse
 from lightpen.model.rigid import rotation_from_vector
 
 TURN = 1e-3  # rad, of a difference
-PRIOR = 0.5  # rad: standard deviation about the normal found
+TINY = 1e-12
+FACING = 0.3  # rad: standard deviation of the normal about the mean line of sight
 
 
 def covariance_by_normal(bundle: Bundle) -> FloatArray:
@@ -55,7 +56,7 @@ def covariance_by_normal(bundle: Bundle) -> FloatArray:
     known = bundle.prior_information + bundle.measured_information
     without = inverse(information[np.ix_(old, old)] + known)
     information[np.ix_(old, old)] += known
-    information[[p0, p0 + 1], [p0, p0 + 1]] += PRIOR**-2
+    information[[p0, p0 + 1], [p0, p0 + 1]] += FACING**-2
     more = inverse(information)[np.ix_(old, old)] - without
     by = instrument_mixing(bundle)
     return np.asarray(by @ more @ by.T)
@@ -84,5 +85,29 @@ def turned_normals(normals: FloatArray, turn: FloatArray) -> FloatArray:
     turn : (2,) array
         rad.
     """
-    across = np.linalg.svd(normals.mean(axis=0)[None])[2][1:]
+    across = _across(normals)
     return np.asarray(normals @ rotation_from_vector((turn @ across)[None])[0].T)
+
+
+def towards_camera(state: BundleState) -> FloatArray:
+    """Return the mean direction from the tip to the camera in the pen's frame, (3,).
+
+    A pen is held with its discs to the camera, so their normal is near.
+    """
+    towards = -np.einsum("nji,j->ni", state.rotations, state.cone_rig).mean(axis=0)
+    return np.asarray(towards / np.linalg.norm(towards))
+
+
+def off_sight(state: BundleState) -> FloatArray:
+    """Return the turn of the normal that would bring it to the camera, (2,), rad."""
+    normals = state.pen.normals
+    axis = np.cross(normals.mean(axis=0), towards_camera(state))
+    sine = float(np.linalg.norm(axis))
+    cosine = float(normals.mean(axis=0) @ towards_camera(state))
+    turn = axis * np.arctan2(sine, cosine) / max(sine, TINY)
+    return np.asarray(_across(normals) @ turn)
+
+
+def _across(normals: FloatArray) -> FloatArray:
+    """Return two axes, (2, 3), at right angles to the mean of normals."""
+    return np.asarray(np.linalg.svd(normals.mean(axis=0)[None])[2][1:])

@@ -6,6 +6,7 @@ from itertools import permutations
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
+from lightpen.discovery.normals import towards_camera
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.model.pen import Pen, order_of_paper, pen_frame_from_raw
@@ -27,7 +28,7 @@ def number_by_place(state: BundleState) -> IntArray:
         With the tip in the frame of its pen.
     """
     leds = state.pen.leds - state.tip_pen
-    towards = _towards_camera(state)
+    towards = towards_camera(state)
     up = _normalised(leds.mean(axis=0) - (leds.mean(axis=0) @ towards) * towards)
     right = np.cross(up, towards)
     paper = order_of_paper(leds, up)
@@ -109,12 +110,6 @@ def framed(
         t = -R @ leds[0]
     moved = replace(pen, leds=leds @ R.T + t, normals=pen.normals @ R.T)
     return moved, R, t
-
-
-def _towards_camera(state: BundleState) -> FloatArray:
-    """Return the mean direction from the pen to the camera in the pen's frame, (3,)."""
-    towards = -np.einsum("nji,j->ni", state.rotations, state.cone_rig)
-    return _normalised(towards.mean(axis=0))
 
 
 def _normalised(vector: FloatArray) -> FloatArray:

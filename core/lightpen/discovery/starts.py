@@ -14,7 +14,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.pose import CAUCHY_WIDTH, NOISE_FLOOR, robust_sigma
 from lightpen.discovery.factorisation import WeakShape
-from lightpen.discovery.normals import turned_normals, with_normal
+from lightpen.discovery.normals import FACING, off_sight, turned_normals, with_normal
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     BundleState,
@@ -34,7 +34,6 @@ UNKNOWN = 3.0  # relative, of a focal length
 ASPECT, CENTER, RADIAL, TANGENTIAL = 1e-3, 0.03, (0.5, 1.0, 1.0), 1e-3
 MAX_TURN = 0.3  # rad, of one step
 SETTLED = 1e-7  # relative gain of a step
-NORMAL = 1.0  # rad: standard deviation of the step of the normal
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e8
 WORST = 1e12  # misfit of a state that is none
 
@@ -261,6 +260,7 @@ def _cost(
     loss = CAUCHY_WIDTH**2 * float(np.log1p(squares / width).sum())
     off = state.rig.cameras[0].intrinsics - prior.intrinsics
     loss += float(off @ prior.information @ off)
+    loss += float(np.sum(off_sight(state) ** 2)) / FACING**2
     loss += sum(((_length(state, k) - k.length) / k.sigma) ** 2 for k in lengths)
     return loss if np.isfinite(loss) else WORST
 
@@ -299,7 +299,8 @@ def _with_priors(
     off = state.rig.cameras[0].intrinsics - prior.intrinsics
     N[at, at] += prior.information
     at_normal = at.stop + np.arange(2)
-    N[at_normal, at_normal] += NORMAL**-2  # keeps a normal that nothing tells in place
+    N[at_normal, at_normal] += FACING**-2
+    b[at_normal] += off_sight(state) / FACING**2
     b[at] -= prior.information @ off
     at_leds = len(b) - 3 * state.pen.n_leds
     for known in lengths:

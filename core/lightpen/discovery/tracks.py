@@ -133,7 +133,7 @@ def find_lamps(pieces: Pieces) -> FloatArray:
     """Return the places of lamps that stay while most spots move, (K, 2), px."""
     pixels = pieces.pixels
     moving = _range(pixels)
-    lamps = []
+    lamps: list[FloatArray] = []
     for p in np.flatnonzero(pieces.lengths >= LASTING):
         own = pieces.spots[:, p] >= 0
         if moving[p] > STILL:

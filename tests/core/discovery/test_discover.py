@@ -99,7 +99,9 @@ def test_a_known_camera_makes_the_tip_more_certain(found: Discovery) -> None:
 
     known = discover(STATION.sightings, replace(STATION.request, camera=camera))
 
-    assert (known.expanded_uncertainty <= found.expanded_uncertainty).all()
+    # The weak axis gains; the noise is estimated anew, to a part in a hundred.
+    assert known.expanded_uncertainty[1] < 0.9 * found.expanded_uncertainty[1]
+    assert (known.expanded_uncertainty < 1.02 * found.expanded_uncertainty).all()
     errors = errors_of(known, STATION)
     assert (np.abs(errors.tip) < 1.75 * known.expanded_uncertainty).all()
 
