@@ -16,6 +16,7 @@ References
    298-372, section 6.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -61,6 +62,23 @@ class _System(NamedTuple):
     own_right: FloatArray
 
 
+class LinearSight(NamedTuple):
+    """Points of one camera and their derivatives, 0 where not seen.
+
+    Attributes
+    ----------
+    residuals : (V, N, 2) array
+        px.
+    shared, own, by_board : (V, N, 2, p), (V, N, 2, 6) and (V, N, 2, 3) array
+        By all but the poses, by the pose of the view, and by the points on the board.
+    """
+
+    residuals: FloatArray
+    shared: FloatArray
+    own: FloatArray
+    by_board: FloatArray
+
+
 def adjust_board(
     views: Views,
     start: BoardState,
@@ -83,7 +101,7 @@ def adjust_board(
     """
     prior = _prior(start, tolerances, stated)
     origin, state = start, start
-    sigma = max(_rms(_residuals(views, state)), FINEST)
+    sigma = max(_rms(board_residuals(views, state)), FINEST)
     for _ in range(NOISE_ROUNDS):
         state, system = _settled(views, state, origin, prior, sigma)
         information, scores = _eliminated(system)
@@ -149,22 +167,22 @@ def view_information(
     pixels[~inside | (points[..., 2] <= 0)] = np.nan
     names = ("",) * len(pixels)
     views = Views(board, names, pixels, (image_size,))
-    return _eliminated(_system(views, state, _residuals(views, state)))[0]
+    return _eliminated(_system(views, state, board_residuals(views, state)))[0]
 
 
 def _settled(
     views: Views, start: BoardState, origin: BoardState, prior: FloatArray, sigma: float
 ) -> tuple[BoardState, _System]:
     state, damping = start, FIRST_DAMPING
-    residuals = _residuals(views, state)
+    residuals = board_residuals(views, state)
     if np.isinf(residuals).any():
         raise CalibrationError("intrinsics.no-start", board=views.board.name)
     system = _system(views, state, residuals)
     cost = _cost_of(system.residuals, state, origin, prior, sigma)
     for _ in range(MAX_STEPS):
         step, poses_step = _step(system, state, origin, prior, sigma, damping)
-        moved = _moved(state, step, poses_step)
-        there = _residuals(views, moved)
+        moved = moved_state(state, step, poses_step)
+        there = board_residuals(views, moved)
         reached = _cost_of(there, moved, origin, prior, sigma)
         if not reached <= cost:
             damping *= 10
@@ -246,7 +264,10 @@ def _away(state: BoardState, origin: BoardState) -> FloatArray:
     return np.concatenate([*intrinsics, places, state.shape - origin.shape])
 
 
-def _moved(state: BoardState, step: FloatArray, poses_step: FloatArray) -> BoardState:
+def moved_state(
+    state: BoardState, step: FloatArray, poses_step: FloatArray
+) -> BoardState:
+    """Return a state after a step of all but the poses, and of the poses, (V, 6)."""
     places = places_at(state.cameras)
     cameras = tuple(
         camera.with_intrinsics(camera.intrinsics + step[at])
@@ -263,6 +284,7 @@ def _moved(state: BoardState, step: FloatArray, poses_step: FloatArray) -> Board
             state.poses.translations + poses_step[:, 3:],
         ),
         state.shape + step[places.stop :],
+        state.offsets,
     )
 
 
@@ -271,7 +293,8 @@ def _points_cam(board: Board, state: BoardState) -> tuple[FloatArray, FloatArray
 
     (V, N, 3) and (V, C, N, 3).
     """
-    turned = board_points(board, state.shape) @ np.swapaxes(state.poses.rotations, 1, 2)
+    true = board_points(board, state.shape) + state.offsets
+    turned = true @ np.swapaxes(state.poses.rotations, 1, 2)
     in_rig = turned + state.poses.translations[:, None]
     in_cameras = np.einsum("cij,vnj->vcni", state.rotations, in_rig)
     return turned, in_cameras + state.translations[None, :, None]
@@ -291,7 +314,7 @@ def _normals(state: BoardState) -> FloatArray:
     return np.asarray(np.einsum("cij,vj->vci", state.rotations, normals))
 
 
-def _residuals(views: Views, state: BoardState) -> FloatArray:
+def board_residuals(views: Views, state: BoardState) -> FloatArray:
     _, points = _points_cam(views.board, state)
     normals = _normals(state)
     residuals = np.empty_like(views.pixels)
@@ -306,12 +329,8 @@ def _residuals(views: Views, state: BoardState) -> FloatArray:
 
 
 def _system(views: Views, state: BoardState, residuals: FloatArray) -> _System:
-    turned, points = _points_cam(views.board, state)
-    deformations = deformations_of(views.board)
-    seen = views.seen
-    n_views, _, n_points, _ = views.pixels.shape
-    cameras_at, places = intrinsics_at(state.cameras), places_at(state.cameras)
-    n_shared = places.stop + N_SHAPE
+    n_views = views.n_views
+    n_shared = places_at(state.cameras).stop + N_SHAPE
     total = _System(
         residuals,
         np.zeros((n_views, n_shared, n_shared)),
@@ -320,6 +339,35 @@ def _system(views: Views, state: BoardState, residuals: FloatArray) -> _System:
         np.zeros((n_views, N_POSE, N_POSE)),
         np.zeros((n_views, N_POSE)),
     )
+    for sight in linearise(views, state, residuals):
+        shared = sight.shared.reshape(n_views, -1, n_shared)
+        own = sight.own.reshape(n_views, -1, N_POSE)
+        left = sight.residuals.reshape(n_views, -1, 1)
+        across = np.swapaxes(shared, 1, 2)
+        total.shared[:] += across @ shared
+        total.right[:] += (across @ left)[..., 0]
+        total.cross[:] += across @ own
+        total.own[:] += np.swapaxes(own, 1, 2) @ own
+        total.own_right[:] += (np.swapaxes(own, 1, 2) @ left)[..., 0]
+    return total
+
+
+def linearise(
+    views: Views, state: BoardState, residuals: FloatArray
+) -> Iterator[LinearSight]:
+    """Yield the derivatives of the points of each camera.
+
+    Parameters
+    ----------
+    residuals : (V, C, N, 2) array
+        px.
+    """
+    turned, points = _points_cam(views.board, state)
+    deformations = deformations_of(views.board)
+    seen = views.seen
+    n_views, _, n_points, _ = views.pixels.shape
+    cameras_at, places = intrinsics_at(state.cameras), places_at(state.cameras)
+    n_shared = places.stop + N_SHAPE
     for c, camera in enumerate(state.cameras):
         X, R = points[:, c], state.rotations[c]
         by_point = camera.project_with_jacobian(X).jacobian
@@ -335,18 +383,9 @@ def _system(views: Views, state: BoardState, residuals: FloatArray) -> _System:
         shared[..., places.stop :] = by_board @ deformations
         own = np.concatenate([-by_rig @ skew(turned), by_rig], axis=-1)
         missing = ~seen[:, c]
-        shared[missing], own[missing] = 0.0, 0.0
+        shared[missing], own[missing], by_board[missing] = 0.0, 0.0, 0.0
         left = np.where(missing[..., None], 0.0, residuals[:, c])
-        shared = shared.reshape(n_views, -1, n_shared)
-        own = own.reshape(n_views, -1, N_POSE)
-        left = left.reshape(n_views, -1, 1)
-        across = np.swapaxes(shared, 1, 2)
-        total.shared[:] += across @ shared
-        total.right[:] += (across @ left)[..., 0]
-        total.cross[:] += across @ own
-        total.own[:] += np.swapaxes(own, 1, 2) @ own
-        total.own_right[:] += (np.swapaxes(own, 1, 2) @ left)[..., 0]
-    return total
+        yield LinearSight(left, shared, own, by_board)
 
 
 def _prior(

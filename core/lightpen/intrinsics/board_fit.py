@@ -1,6 +1,6 @@
 """State of a board adjustment, and its fit."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
@@ -27,6 +27,8 @@ class BoardState:
         Poses of rig_from_board.
     shape : (5,) array
         Stretch, shear, and three bends, mm.
+    offsets : (3,) or (N, 3) array
+        Of the single points from where shape has them, mm.
     """
 
     cameras: tuple[Camera, ...]
@@ -34,6 +36,7 @@ class BoardState:
     translations: FloatArray
     poses: BoardPoses
     shape: FloatArray
+    offsets: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +54,7 @@ class BoardFit:
     prior : (p, p) array
         Information of the priors.
     covariance : (p, p) array
-        Of the unknowns but the poses, noise being independent.
+        Of the unknowns but the poses; of `adjust_board` by independent noise alone.
     """
 
     board: Board
@@ -66,7 +69,7 @@ class BoardFit:
     @property
     def board_points(self) -> FloatArray:
         """Points of the board as it was found to be, (N, 3), mm."""
-        return board_points(self.board, self.state.shape)
+        return board_points(self.board, self.state.shape) + self.state.offsets
 
     @property
     def rms(self) -> float:
@@ -90,26 +93,6 @@ class BoardFit:
         """Return the information that was assumed of a camera's intrinsics."""
         at = self.of_intrinsics(camera)
         return self.prior[at, at]
-
-    @property
-    def correlation(self) -> float:
-        """How many times the variance of independent noise the views vary by.
-
-        The scores of views scatter as the information of independent noise says, if it
-        is that; where they scatter more, residuals hang together within a view [1]_.
-
-        References
-        ----------
-        .. [1] K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized
-           linear models", Biometrika 73 (1986) 13-22.
-        """
-        S, weight = self.covariance, self.sigma**-2
-        information, scores = weight * self.information, weight * self.scores
-        found = np.einsum("vi,ij,vj->", scores, S, scores)
-        leverages = S @ information
-        expected = np.einsum("vii->", leverages)
-        expected -= np.einsum("vij,vji->", leverages, leverages)
-        return float(found / expected)
 
     @property
     def of_places(self) -> slice:

@@ -1,9 +1,9 @@
 """The intrinsics of a camera from views of a board, with their covariance.
 
-Residuals alone certify nothing: what a model with more coefficients gains is asked of
-views that it was not fitted to, halves of the views are compared by what their
-difference may be, and where residuals hang together within a view the covariance is
-enlarged by as much.
+Residuals alone certify nothing: what another lens model gains is asked of views that it
+was not fitted to, parts of the views are compared by what their difference may be, and
+the covariance contains what board, lens and single views do beside the model. A set of
+views that no single camera can have taken is refused, by what it is instead.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,15 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit
+from lightpen.intrinsics.alternatives import explain, find_change, message_on_change
+from lightpen.intrinsics.board_findings import (
+    board_contradictions,
+    messages_on_board,
+    messages_on_size,
+    released_tolerances,
+    require_plausible_bend,
+)
+from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.distortion import (
     FEW,
     Choice,
@@ -23,16 +31,17 @@ from lightpen.intrinsics.distortion import (
     folds,
     rms_together,
 )
+from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
 from lightpen.intrinsics.start import start_board_poses, start_camera
 from lightpen.intrinsics.uncertainty_map import error_fields
+from lightpen.intrinsics.variance_components import MixedFit, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
-from lightpen.messages import Message, message
+from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.quantiles import normal_quantile
 
 MIN_VIEWS = 5
 ENOUGH_VIEWS = 15
-SIGMAS = 2.0  # of the correlation by chance
 OFF_POINT = 6.0  # robust standard deviations
 OFF_VIEW = 4.0  # times the median rms of the views
 FINEST = 1e-3  # px; exact points are off by rounding alone
@@ -40,9 +49,9 @@ MOST_OFF = 0.2  # of the points
 WORST_RMS = 0.004  # of the image's longer side: no flat board of these squares
 LARGEST_FOCAL_SIGMA = 0.02  # relative
 LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
-CONTRADICTED = 3.0  # standard deviations
-STRETCHED = 1e-3  # relative: less is no printer's doing
-LET_GO, LET_GO_MM = 0.1, 5.0  # of a board that is not what it was said to be
+CLUSTERED = 2.0  # times the variance that views of one camera scatter by
+UNEVEN_LENS = 10.0  # times the noise: a residual field that is no lens'
+UNEVEN_VIEWS = 2.0  # times the noise: a smooth error of views that is no blur
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +87,10 @@ class CameraCalibration:
         Excluded points in the accepted views.
     held_out : (V,) array
         Distance of the points of each view by the others, px rms.
-    correlation : float
-        Factor applied to the variances of independent noise.
+    effects : MixedFit
+        The final fit, with what board, lens and single views do beside the model.
+    duplicates : tuple of str
+        Views in which the board is where it was in another.
     halves : ViewHalves or None
         None where there are too few views.
     remarks : tuple of Message
@@ -88,14 +99,19 @@ class CameraCalibration:
 
     camera: Camera
     views: Views
-    adjustment: BoardFit
+    effects: MixedFit
+    duplicates: tuple[str, ...]
     left_out: tuple[str, ...]
     n_points_left_out: int
     choice: Choice
     held_out: FloatArray
-    correlation: float
     halves: ViewHalves | None
     remarks: tuple[Message, ...]
+
+    @property
+    def adjustment(self) -> BoardFit:
+        """The final fit."""
+        return self.effects.adjustment
 
     @property
     def held_out_rms(self) -> float:
@@ -126,41 +142,102 @@ def calibrate_camera(
     start = start_camera(views, FEW)
     placed = np.isfinite(start_board_poses(start, views).translations[:, 0])
     views, unplaced = _parted(views, placed)
+    views, duplicates = without_duplicates(views)
+    if duplicates and views.n_views < MIN_VIEWS:
+        raise CalibrationError(
+            "intrinsics.few-distinct", n_views=views.n_views, least=MIN_VIEWS
+        )
     require_views(views)
     first = fit_camera(views, tolerances, start)
+    try:
+        found = _calibrated(views, tolerances, first, report)
+    except CalibrationError as error:
+        raise explain(views, tolerances, first, None) or error from error
+    change = find_change(found.effects, found.views.names)
+    if change is not None or found.is_suspicious:
+        released = found.adjustment if found.denied.any() else None
+        offsets = found.adjustment.state.offsets
+        better = explain(views, tolerances, first, change, released, offsets)
+        if better is not None:
+            raise better
+    require_plausible_bend(found.adjustment)
+    remarks = [
+        *messages_on_board(found.adjustment, tolerances, found.denied),
+        *messages_on_size(views.board),
+    ]
+    if duplicates:
+        remarks.append(message_on_duplicates(views.n_views, duplicates))
+    if change is not None:
+        remarks.append(message_on_change(change))
+    if found.choice.remark is not None:
+        remarks.append(found.choice.remark)
+    at = found.adjustment.of_intrinsics(0)
+    camera = replace(
+        found.adjustment.state.cameras[0],
+        covariance=found.adjustment.covariance[at, at],
+        calibrated_on=calibrated_on,
+        lens_field=found.effects.fields[0],
+    )
+    return CameraCalibration(
+        camera=camera,
+        views=found.views,
+        effects=found.effects,
+        duplicates=duplicates,
+        left_out=unplaced + found.left_out,
+        n_points_left_out=_n_points_left_out(views, found.views),
+        choice=found.choice,
+        held_out=found.held_out,
+        halves=_halves(found.effects),
+        remarks=tuple(remarks),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """One camera that fits the views best."""
+
+    views: Views
+    left_out: tuple[str, ...]
+    denied: BoolArray
+    choice: Choice
+    held_out: FloatArray
+    effects: MixedFit
+
+    @property
+    def adjustment(self) -> BoardFit:
+        return self.effects.adjustment
+
+    @property
+    def is_suspicious(self) -> bool:
+        """Whether something else than one camera may be before the board."""
+        components = self.effects.components
+        return bool(
+            self.denied.any()
+            or self.left_out
+            or self.choice.pull is not None
+            or self.effects.clustering > CLUSTERED
+            or components.view > UNEVEN_VIEWS * components.noise
+            or components.lenses[0] > UNEVEN_LENS * components.noise
+        )
+
+
+def _calibrated(
+    views: Views,
+    tolerances: BoardTolerances,
+    first: BoardFit,
+    report: Callable[[float], None],
+) -> _Found:
     kept, left_out = _without_outliers(views, first)
     fitted = fit_camera(kept, tolerances, first.state.cameras[0])
-    denied = _denied(fitted, tolerances)
-    stated = tolerances
+    denied = board_contradictions(fitted, tolerances)
     if denied.any():  # then the views tell how it is, and not what was said of it
-        tolerances = BoardTolerances(LET_GO_MM, LET_GO, stated.scale)
+        tolerances = released_tolerances(tolerances)
         fitted = fit_camera(kept, tolerances, fitted.state.cameras[0])
     report(0.2)
     choice, fitted, held_out = choose_distortion(kept, tolerances, fitted, report)
-    remarks = _messages_on_board(fitted, denied, stated)
-    if choice.remark is not None:
-        remarks = (*remarks, choice.remark)
     _require_determined(fitted)
-    correlation = _significant(fitted)
-    at = fitted.of_intrinsics(0)
-    camera = replace(
-        fitted.state.cameras[0],
-        covariance=correlation * fitted.covariance[at, at],
-        calibrated_on=calibrated_on,
-    )
-    _require_no_fold(camera)
-    return CameraCalibration(
-        camera=camera,
-        views=kept,
-        adjustment=fitted,
-        left_out=unplaced + left_out,
-        n_points_left_out=_n_points_left_out(views, kept),
-        choice=choice,
-        held_out=held_out,
-        correlation=correlation,
-        halves=_halves(kept, tolerances, camera, choice),
-        remarks=remarks,
-    )
+    _require_no_fold(fitted.state.cameras[0])
+    return _Found(kept, left_out, denied, choice, held_out, fit_effects(kept, fitted))
 
 
 def require_views(views: Views) -> None:
@@ -220,41 +297,6 @@ def _n_points_left_out(views: Views, kept: Views) -> int:
     return int(views.seen[taking_part].sum()) - int(kept.seen.sum())
 
 
-def _denied(fitted: BoardFit, tolerances: BoardTolerances) -> BoolArray:
-    """Tell which errors of the board contradict its tolerances, (5,)."""
-    sigmas = np.sqrt(np.diag(fitted.covariance)[fitted.of_shape])
-    priors = np.repeat([tolerances.squareness, tolerances.flatness], [2, 3])
-    learned = np.sqrt(np.maximum(priors**2 - sigmas**2, 1e-30))
-    return np.asarray(np.abs(fitted.state.shape) > CONTRADICTED * learned)
-
-
-def _messages_on_board(
-    fitted: BoardFit, denied: BoolArray, tolerances: BoardTolerances
-) -> tuple[Message, ...]:
-    """Return messages on a board that contradicts its tolerances."""
-    values = fitted.state.shape
-    remarks = []
-    stretch, shear = values[:2].tolist()
-    if denied[:2].any() and max(abs(stretch), abs(shear)) > STRETCHED:
-        remarks.append(
-            message(
-                "intrinsics.board-stretched",
-                board=fitted.board.name,
-                stretch=stretch,
-                shear=float(np.degrees(shear)),
-            )
-        )
-    if denied[2:].any():
-        remarks.append(
-            message(
-                "intrinsics.board-bent",
-                bend=float(np.abs(values[2:]).max()),
-                stated=tolerances.flatness,
-            )
-        )
-    return tuple(remarks)
-
-
 def _require_no_fold(camera: Camera) -> None:
     if folds(camera):
         raise CalibrationError("intrinsics.folds")
@@ -273,34 +315,20 @@ def _require_determined(fitted: BoardFit) -> None:
         )
 
 
-def _significant(fitted: BoardFit) -> float:
-    """Return the factor by correlation of the residuals, 1 if not significant."""
-    n_unknowns = fitted.scores.shape[1] - N_SHAPE
-    chance = 1 + SIGMAS * float(np.sqrt(2 / n_unknowns))
-    found = fitted.correlation
-    return found if found > chance else 1.0
-
-
-def _halves(
-    views: Views, tolerances: BoardTolerances, near: Camera, choice: Choice
-) -> ViewHalves | None:
-    if views.n_views < 2 * MIN_VIEWS:
+def _halves(effects: MixedFit) -> ViewHalves | None:
+    """Return what every second view makes of the camera against the others."""
+    n_views = len(effects.scores.scores)
+    if n_views < 2 * MIN_VIEWS:
         return None
-    is_even = np.arange(views.n_views) % 2 == 0
-    try:
-        one, other = (
-            fit_camera(views.chosen(which), tolerances, near, choice.pull)
-            for which in (is_even, ~is_even)
-        )
-        first, second = one.state.cameras[0], other.state.cameras[0]
-        change = first.intrinsics - second.intrinsics
-        moves = error_fields(second) @ change
-    except CalibrationError:  # half of the views are too alike, or fold the image
-        return None
-    at = one.of_intrinsics(0)
-    variances = np.diag(one.covariance[at, at]) + np.diag(other.covariance[at, at])
+    at = effects.adjustment.of_intrinsics(0)
+    share = np.where(np.arange(n_views) % 2 == 0, 1.0, 0.0)
+    score, information = effects.scores.change(share)
+    covariance = np.linalg.pinv(information[at, at], rcond=1e-14, hermitian=True)
+    covariance *= max(effects.scores.clustering, 1.0)
+    change = covariance @ score[at] / max(effects.scores.clustering, 1.0)
+    moves = error_fields(effects.adjustment.state.cameras[0]) @ change
     return ViewHalves(
         change[:4],
-        2 * np.sqrt(variances[:4]),
+        2 * np.sqrt(np.diag(covariance)[:4]),
         float(np.sqrt(np.mean(np.square(moves).sum(axis=-1)))),
     )

@@ -26,6 +26,7 @@ FOLDING = {FEW: [4], MANY: [5, 6, 7]}  # which of them fold: k3, and the denomin
 PULLS = (0.1, 0.03, 0.01, 0.003, 0.001, 1e-4, 1e-10)  # the weakest first
 N_FOLDS = 5
 WORTH = 0.01  # by which 8 coefficients must lessen the held-out error
+EVEN = np.zeros(3)  # mm: all points lie where the board has them
 SIGMAS = 2.0  # of the mean gain of a view
 
 
@@ -104,11 +105,21 @@ def choose_distortion(
 
 
 def fit_camera(
-    views: Views, tolerances: BoardTolerances, near: Camera, pull: float | None = None
+    views: Views,
+    tolerances: BoardTolerances,
+    near: Camera,
+    pull: float | None = None,
+    offsets: FloatArray = EVEN,
 ) -> BoardFit:
-    """Return the fit of all, from a camera on; see `Choice` for the pull."""
+    """Return the fit of all, from a camera on; see `Choice` for the pull.
+
+    Parameters
+    ----------
+    offsets : (3,) or (N, 3) array
+        Of the points of the board, mm.
+    """
     known = None
-    poses = _rough_poses(near, views)
+    poses = rough_poses(near, views)
     if pull is not None:
         distortion = near.distortion.copy()
         folding = FOLDING[len(distortion)]
@@ -118,7 +129,7 @@ def fit_camera(
         at = 4 + np.array(folding)
         known[at, at] = pull**-2
     state = BoardState(
-        (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE)
+        (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE), offsets
     )
     return adjust_board(views, state, tolerances, (known,))
 
@@ -185,14 +196,14 @@ def _held_out(views: Views, tolerances: BoardTolerances, found: _Drawn) -> Float
     for fold in range(int(fold_of.max()) + 1):
         others, own = views.chosen(fold_of != fold), views.chosen(fold_of == fold)
         fitted = fit_camera(others, tolerances, found.camera, found.pull).state
-        poses = _rough_poses(found.camera, own)
+        poses = rough_poses(found.camera, own)
         residuals = fit_board_poses(own, replace(fitted, poses=poses))
         squares = np.square(residuals).sum(axis=-1)
         errors[fold_of == fold] = np.sqrt(np.nanmean(squares, axis=(1, 2)))
     return errors
 
 
-def _rough_poses(near: Camera, views: Views) -> BoardPoses:
+def rough_poses(near: Camera, views: Views) -> BoardPoses:
     """Return the poses of the views, also by a camera that folds them."""
     try:
         return start_board_poses(near, views)

@@ -13,8 +13,14 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import adjust_board, stated_information
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
+from lightpen.intrinsics.board_findings import (
+    board_contradictions,
+    messages_on_board,
+    released_tolerances,
+)
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
+from lightpen.intrinsics.variance_components import MixedFit, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
@@ -28,8 +34,8 @@ ALIKE_SHIFT = 0.15  # of its distance
 PEN_SPEED = 100.0  # mm/s
 APART = 3.0  # times the noise of each camera alone
 SIGMAS = 4.0
+OF_BOARD = ("intrinsics.board-stretched", "intrinsics.board-bent")  # of both together
 LEAST_LAG = 0.02  # of the time between two views
-SIGNIFICANT = 1.8  # times the variance of independent noise
 
 
 @dataclass(frozen=True)
@@ -102,13 +108,17 @@ class PairCalibration:
 
     rig: Rig
     views: Views
-    adjustment: BoardFit
+    effects: MixedFit
     alone: tuple[CameraCalibration, ...]
     n_pairs: int
     left_out: tuple[str, ...]
-    correlation: float
     lag: PairLag | None
     remarks: tuple[Message, ...]
+
+    @property
+    def adjustment(self) -> BoardFit:
+        """The final fit."""
+        return self.effects.adjustment
 
     @property
     def baseline(self) -> float:
@@ -175,39 +185,43 @@ def calibrate_pair(
         np.zeros(N_SHAPE),
     )
     fitted = adjust_board(views, state, tolerances, stated)
-    correlation = fitted.correlation
-    correlation = correlation if correlation > SIGNIFICANT else 1.0
-    rig = _rig(fitted, names, tolerances, correlation)
+    denied = board_contradictions(fitted, tolerances)
+    if denied.any():
+        released = released_tolerances(tolerances)
+        fitted = adjust_board(views, fitted.state, released, stated)
+    effects = fit_effects(views, fitted)
+    fitted = effects.adjustment
+    rig = _rig(effects, names, tolerances)
     both = np.all(views.found, axis=1)
     lag = _lag(views, fitted, both, interval_ms)
     return PairCalibration(
         rig=rig,
         views=views,
-        adjustment=fitted,
         alone=alone,
         n_pairs=int(both.sum()),
         left_out=tuple(name for name in names_of_all if name not in views.names),
-        correlation=correlation,
+        effects=effects,
         lag=lag,
-        remarks=_messages(fitted, alone, both, lag, names),
+        remarks=(
+            *messages_on_board(fitted, tolerances, denied),
+            *_messages(fitted, alone, both, lag, names),
+        ),
     )
 
 
 def _rig(
-    fitted: BoardFit,
-    names: tuple[str, str],
-    tolerances: BoardTolerances,
-    correlation: float,
+    effects: MixedFit, names: tuple[str, str], tolerances: BoardTolerances
 ) -> Rig:
+    fitted = effects.adjustment
     state, at = fitted.state, fitted.of_places
-    covariance = correlation * fitted.covariance[at, at]
+    covariance = fitted.covariance[at, at].copy()
     shift = state.translations[1]
     covariance[3:, 3:] += tolerances.scale**2 * np.outer(shift, shift)
     cameras = []
-    for c, camera in enumerate(state.cameras):
+    for c, (camera, field) in enumerate(zip(state.cameras, effects.fields, strict=True)):
         own = fitted.of_intrinsics(c)
         cameras.append(
-            replace(camera, covariance=correlation * fitted.covariance[own, own])
+            replace(camera, covariance=fitted.covariance[own, own], lens_field=field)
         )
     return Rig(tuple(cameras), state.rotations, state.translations, covariance, names)
 
@@ -338,6 +352,7 @@ def _messages(
         of_camera(name, remark)
         for name, each in zip(names, alone, strict=False)
         for remark in each.remarks
+        if remark.code not in OF_BOARD
     ]
     if lag is not None and lag.is_significant:
         return (*remarks, lag.told(names[1]))

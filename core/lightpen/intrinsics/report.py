@@ -14,6 +14,7 @@ from lightpen.intrinsics.next_view import choose_next_view
 from lightpen.intrinsics.observing import ObservedBoard
 from lightpen.intrinsics.pair import PairCalibration
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
+from lightpen.intrinsics.variance_components import MixedFit
 from lightpen.intrinsics.views import BoardTolerances
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import vector_from_rotation
@@ -113,11 +114,7 @@ def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> 
         *_halves_lines(calibration),
         *_board_lines(fitted),
     ]
-    if calibration.correlation > 1:
-        lines.append(
-            f"{'Correlation':<{TITLE}}U is {calibration.correlation**0.5:.1f} times "
-            "that of independent noise"
-        )
+    lines += _effects_lines(calibration.effects)
     lines += ["", _region_lines(fitted, camera), "", *_worst_lines(calibration)]
     if calibration.remarks:
         lines += ["", *map(str, calibration.remarks)]
@@ -158,7 +155,7 @@ def intrinsics_record(
             "held_out_rms_px_8": calibration.choice.held_out_more,
             "reason": calibration.choice.message,
         },
-        "correlation_factor": calibration.correlation,
+        "effects": _effects_record(calibration.effects),
         "projection_uncertainty": {
             "middle_px": uncertain.center,
             "rms_px": uncertain.typical,
@@ -198,6 +195,7 @@ def intrinsics_record(
             for v, name in enumerate(views.names)
         ],
         "views_left_out": calibration.left_out,
+        "duplicates": calibration.duplicates,
         "points_left_out": calibration.n_points_left_out,
         "images_without_board": unseen,
         "remarks": calibration.remarks,
@@ -228,11 +226,7 @@ def pair_text(calibration: PairCalibration, observed: ObservedBoard) -> str:
         lines.append(
             f"  left out   {', '.join(calibration.left_out)}: the cameras do not agree"
         )
-    if calibration.correlation > 1:
-        lines.append(
-            f"{'Correlation':<{TITLE}}U is {calibration.correlation**0.5:.1f} times "
-            "that of independent noise"
-        )
+    lines += _effects_lines(calibration.effects)
     for name, camera in zip(rig.names, rig.cameras, strict=True):
         assert camera.covariance is not None
         of = COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))
@@ -269,7 +263,7 @@ def pair_record(
         ),
         "rms_px": fitted.rms,
         "noise_px": fitted.sigma,
-        "correlation_factor": calibration.correlation,
+        "effects": _effects_record(calibration.effects),
         "views_of_both": calibration.n_pairs,
         "board_found": _board_record(fitted),
         "lag": (
@@ -350,6 +344,38 @@ def _worst_lines(calibration: CameraCalibration) -> list[str]:
             for v in calibration.worst_first[:N_WORST]
         ),
     ]
+
+
+def _effects_lines(effects: MixedFit) -> list[str]:
+    found = effects.components
+    lines = [
+        f"{'Effects':<{TITLE}}noise {found.noise:.4f} px, smooth error of a view "
+        f"{found.view:.4f} px, points of the board {found.in_plane:.4f} mm in the plane "
+        f"and {found.out_of_plane:.4f} mm out of it"
+    ]
+    lines += [
+        f"{'Lens field':<{TITLE}}amplitude {field.amplitude:.4f} px, correlation length "
+        f"{field.length:.0f} px"
+        for field in effects.fields
+        if field is not None
+    ]
+    return lines
+
+
+def _effects_record(effects: MixedFit) -> dict[str, Any]:
+    found = effects.components
+    return {
+        "noise_px": found.noise,
+        "view_px": found.view,
+        "board_in_plane_mm": found.in_plane,
+        "board_out_of_plane_mm": found.out_of_plane,
+        "lens_fields": [
+            field and {"amplitude_px": field.amplitude, "length_px": field.length}
+            for field in effects.fields
+        ],
+        "lens_field_log_likelihood_gain": 0.5 * effects.field_gain,
+        "clustering_by_view": effects.clustering,
+    }
 
 
 def _camera_record(camera: Camera) -> dict[str, Any]:

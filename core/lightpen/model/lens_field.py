@@ -74,7 +74,7 @@ class LensField:
 
     def basis(self, pixels: FloatArray) -> FloatArray:
         """Return the weights of the nodes' values at pixels (..., 2), (..., M)."""
-        return correlation(pixels, self.nodes, self.length) @ self._known
+        return correlation(pixels, self.nodes, self.length) @ self.node_information
 
     def at(self, pixels: FloatArray) -> FloatArray:
         """Return the mean of the field at pixels, both (..., 2), px; NaN gives NaN."""
@@ -90,7 +90,11 @@ class LensField:
         )
 
     @cached_property
-    def _known(self) -> FloatArray:
+    def node_information(self) -> FloatArray:
+        """Information of a component at the nodes before any measurement, (M, M).
+
+        For an amplitude of 1 px.
+        """
         nodes = correlation(self.nodes, self.nodes, self.length)
         return np.asarray(np.linalg.inv(nodes + ROUNDING * np.eye(len(nodes))))
 

@@ -100,13 +100,3 @@ def test_a_board_taken_for_flat_leads_the_camera_astray(
     ]
 
     assert errors[0].max() > 100 * errors[1].max()
-
-
-def test_views_that_hang_together_are_noticed(make_views: MakeViews) -> None:
-    views = make_views(n_views=20)
-    rng = np.random.default_rng(3)
-    ramps = views.board.points[:, :2] / 50  # what a blur to one side of a view does
-    slopes = rng.normal(0, 0.06, (20, 1, 1, 2))
-    pulled = replace(views, pixels=views.pixels + slopes * ramps[:, ::-1] ** 2)
-
-    assert fitted(views).correlation < 2 < fitted(pulled).correlation

@@ -131,6 +131,7 @@ def test_views_that_are_alike_are_refused(make_views: MakeViews) -> None:
     views = make_views(n_views=8)
     rng = np.random.default_rng(2)
     one = np.repeat(views.pixels[:1], 8, axis=0)
+    one = one + rng.uniform(-4, 4, (8, 1, 1, 2))
     alike = replace(views, pixels=one + rng.normal(0, 0.03, one.shape))
 
     with pytest.raises(CalibrationError, match="too alike"):

@@ -1,0 +1,420 @@
+"""What a board and a lens do beside the model: a mixed model with variance components.
+
+The residuals of a fitted board are linear in four kinds of random effects: each point
+of the board is off in its plane and out of it; each lens has a smooth residual field
+over the image, the same in all views; each view has a smooth error of its own (blur,
+shadows, a board that gives way), of second and third order over the board; the rest is
+independent noise. Their variances follow from restricted maximum likelihood [1]_, by
+the fixed point of [2]_. The cameras are estimated together with the effects, so what
+the views cannot tell from an effect is in their covariance. Amplitude and length of the
+fields are hardly known by one set of views: the estimate is the mean over a grid of
+both, weighed by the likelihood.
+
+References
+----------
+.. [1] H. D. Patterson, R. Thompson, "Recovery of inter-block information when block
+   sizes are unequal", Biometrika 58 (1971) 545-554.
+.. [2] D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4 (1992) 415-447,
+   equation 27.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.intrinsics.adjustment import board_residuals, moved_state
+from lightpen.intrinsics.board_fit import N_POSE, BoardFit
+from lightpen.intrinsics.effects import Design, design_of
+from lightpen.intrinsics.views import Views
+from lightpen.model.lens_field import LensField
+
+LENGTHS = (0.15, 0.3, 0.6)  # of the image's longer side
+SPREADS = (0.35, 0.6, 1.0, 1.7, 3.0)  # of the most likely amplitude
+LEAST = 1e-3  # of the noise: a component of no effect
+LEAST_SPREAD = 0.1  # of the noise: an amplitude that may yet be
+MAX_ROUNDS = 20
+CONVERGED = 0.1  # of twice the logarithm of the likelihood
+FIRST = 0.2  # of the noise: a component to begin with
+KNOWN = 1e-2  # least number of effects that a variance is estimated from
+SIGNIFICANT = 6.0  # twice the gain of log-likelihood by a field, of two parameters
+
+
+@dataclass(frozen=True)
+class VarianceComponents:
+    """Standard deviations of the random effects.
+
+    Attributes
+    ----------
+    noise : float
+        Of one coordinate, px.
+    in_plane, out_of_plane : float
+        Of the points of the board, mm.
+    view : float
+        Of the smooth error of a view, px.
+    lenses : tuple of float
+        Amplitude of the residual field of each camera, px.
+    """
+
+    noise: float
+    in_plane: float
+    out_of_plane: float
+    view: float
+    lenses: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ViewScores:
+    """Scores of the views about all but poses and effects.
+
+    Attributes
+    ----------
+    scores : (V, s) array
+    information : (V, q, s) array
+        Of each view, its columns of these.
+    covariance : (q, q) array
+        Of these and of the effects of board and lens, by all views.
+    """
+
+    scores: FloatArray
+    information: FloatArray
+    covariance: FloatArray
+
+    def change(self, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return score and information of a change that views have a share in.
+
+        Parameters
+        ----------
+        weights : (V,) array
+            The share.
+
+        Returns
+        -------
+        (s,) and (s, s) array
+        """
+        score = weights @ self.scores
+        first = np.einsum("v,vqs->qs", weights, self.information)
+        own = np.einsum("v,vqs->qs", weights**2, self.information)
+        n = len(score)
+        known = own[:n] - first.T @ self.covariance @ first
+        return score, 0.5 * (known + known.T)
+
+    @property
+    def clustering(self) -> float:
+        """Scatter of the scores, over what the components make of it."""
+        n = self.scores.shape[1]
+        S = self.covariance[:n, :n]
+        found = np.einsum("vi,ij,vj->", self.scores, S, self.scores)
+        own = self.information[:, :n]
+        leverage = np.einsum(
+            "vqi,qr,vrj->ij",
+            self.information,
+            self.covariance,
+            self.information,
+            optimize=True,
+        )
+        return float(found / np.sum(S * (own.sum(axis=0) - leverage)))
+
+
+@dataclass(frozen=True, eq=False)
+class MixedFit:
+    """A fitted board with its random effects.
+
+    Attributes
+    ----------
+    adjustment : BoardFit
+        At the estimate, with the covariance by all effects; its residuals are without
+        the fields.
+    repeatability : (p, p) array
+        Share of the covariance by noise and by errors of single views, which another
+        set of views draws anew.
+    fields : tuple of LensField or None
+        Of each camera; None where the likelihood does not support one.
+    field_gain : float
+        Twice the gain of log-likelihood by the fields.
+    clustering : float
+        Variance of the views' scores over what the components make of it [1]_; the
+        covariance is multiplied by it where it is above 1.
+    scores : ViewScores
+        Of each view, for tests of groups of views.
+
+    References
+    ----------
+    .. [1] K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized
+       linear models", Biometrika 73 (1986) 13-22.
+    """
+
+    adjustment: BoardFit
+    components: VarianceComponents
+    repeatability: FloatArray
+    fields: tuple[LensField | None, ...]
+    field_gain: float
+    clustering: float
+    scores: ViewScores
+
+
+class _Reduced(NamedTuple):
+    """Normal equations without the views' own unknowns, and without priors."""
+
+    normal: FloatArray
+    right: FloatArray
+    squares: float
+    logarithm: float  # of the determinant of what was eliminated
+    solved: FloatArray
+    inverse_own: FloatArray
+
+
+class _Solution(NamedTuple):
+    """Effects by given components."""
+
+    components: VarianceComponents
+    deviance: float
+    x: FloatArray
+    covariance: FloatArray
+
+
+def fit_effects(views: Views, fitted: BoardFit) -> MixedFit:
+    """Return a board's fit with the effects of board, lens and single views.
+
+    Parameters
+    ----------
+    fitted : BoardFit
+        By noise alone.
+    """
+    longer = max(max(size) for size in views.image_sizes)
+    n_cameras = len(fitted.state.cameras)
+    noise = max(fitted.sigma, 1e-6)
+    mm = _mm_a_px(fitted)
+    usual = VarianceComponents(
+        noise,
+        FIRST * noise * mm,
+        FIRST * noise * mm,
+        FIRST * noise,
+        (FIRST * noise,) * n_cameras,
+    )
+    found: list[tuple[Design, _Solution]] = []
+    for share in LENGTHS:
+        design = design_of(views, fitted, share * longer)
+        usual, reduced = _most_likely(design, usual, mm)
+        for spread in SPREADS:
+            amplitudes = tuple(
+                spread * max(each, LEAST_SPREAD * usual.noise) for each in usual.lenses
+            )
+            solution = _solve(design, reduced, replace(usual, lenses=amplitudes))
+            found.append((design, solution))
+    nothing = replace(usual, lenses=(LEAST * usual.noise,) * n_cameras)
+    without = _solve(design, reduced, nothing)
+    return _averaged(views, fitted, found, without.deviance)
+
+
+def _mm_a_px(fitted: BoardFit) -> float:
+    """Return what a pixel is on the board, mm."""
+    camera, poses = fitted.state.cameras[0], fitted.state.poses
+    return float(np.nanmedian(poses.translations[:, 2])) / camera.fx
+
+
+def _most_likely(
+    design: Design, components: VarianceComponents, mm: float
+) -> tuple[VarianceComponents, _Reduced]:
+    before = np.inf
+    for _ in range(MAX_ROUNDS):
+        reduced = _reduced(design, components)
+        solution = _solve(design, reduced, components)
+        if before - solution.deviance < CONVERGED:
+            break
+        before = solution.deviance
+        components = _no_less(_following(design, reduced, solution), mm)
+    return solution.components, reduced
+
+
+def _no_less(components: VarianceComponents, mm: float) -> VarianceComponents:
+    least = LEAST * components.noise
+    return VarianceComponents(
+        components.noise,
+        max(components.in_plane, least * mm),
+        max(components.out_of_plane, least * mm),
+        max(components.view, least),
+        tuple(max(each, least) for each in components.lenses),
+    )
+
+
+def _reduced(design: Design, components: VarianceComponents) -> _Reduced:
+    weight = components.noise**-2
+    own_normal = _own_normal(design, components)
+    inverse_own = np.linalg.inv(own_normal)
+    cross, own_right = weight * design.cross, weight * design.own_right
+    solved = cross @ inverse_own
+    normal = weight * design.normal
+    normal -= np.tensordot(solved, cross, axes=([0, 2], [0, 2]))
+    right = weight * design.right.sum(axis=0)
+    right -= np.tensordot(solved, own_right, axes=([0, 2], [0, 1]))
+    eliminated = np.einsum("vo,voq,vq->", own_right, inverse_own, own_right)
+    n_smooth = own_normal.shape[-1] - N_POSE
+    logarithm = np.linalg.slogdet(own_normal)[1].sum()
+    logarithm += design.n_views * n_smooth * np.log(components.view**2)
+    logarithm += design.n * np.log(components.noise**2)
+    return _Reduced(
+        normal,
+        right,
+        float(weight * design.squares - eliminated),
+        float(logarithm),
+        solved,
+        inverse_own,
+    )
+
+
+def _solve(
+    design: Design, reduced: _Reduced, components: VarianceComponents
+) -> _Solution:
+    normal = reduced.normal + design.prior(components)
+    right = reduced.right - design.prior_pull
+    covariance = np.linalg.inv(0.5 * (normal + normal.T))
+    x = covariance @ right
+    deviance = (
+        reduced.logarithm
+        + np.linalg.slogdet(normal)[1]
+        - design.prior_logarithm(components)
+        + reduced.squares
+        - right @ x
+    )
+    return _Solution(components, float(deviance), x, covariance)
+
+
+def _own(design: Design, reduced: _Reduced, solution: _Solution) -> FloatArray:
+    """Return pose and smooth error of each view, (V, o)."""
+    weight = solution.components.noise**-2
+    own = np.einsum("vij,vj->vi", reduced.inverse_own, weight * design.own_right)
+    return np.asarray(own - np.einsum("vpo,p->vo", reduced.solved, solution.x))
+
+
+def _following(
+    design: Design, reduced: _Reduced, solution: _Solution
+) -> VarianceComponents:
+    """Return the next components of the fixed point."""
+    x, covariance, components = solution.x, solution.covariance, solution.components
+    own = _own(design, reduced, solution)
+    smooth = own[:, N_POSE:]
+    by_others = covariance @ reduced.solved[..., N_POSE:]
+    spread = np.sum(reduced.solved[..., N_POSE:] * by_others)
+    spread += np.diagonal(reduced.inverse_own, axis1=1, axis2=2)[:, N_POSE:].sum()
+    smooth_known = smooth.size - spread * components.view**-2
+    known, sizes = design.effects(x, covariance, components)
+    shared = slice(0, design.n_shared)
+    n_known = known.sum() + smooth_known + N_POSE * design.n_views
+    n_known += design.n_shared - np.sum(design.shared_prior * covariance[shared, shared])
+    squares = (
+        design.squares
+        - 2 * (x @ design.right.sum(axis=0) + np.sum(own * design.own_right))
+        + x @ design.normal @ x
+        + 2 * np.sum(own * np.einsum("vpo,p->vo", design.cross, x))
+        + np.einsum("vo,voq,vq->", own, design.own_own, own)
+    )
+    deviations = np.sqrt(sizes / np.maximum(known, KNOWN))
+    return VarianceComponents(
+        float(np.sqrt(max(squares, 1e-30) / max(design.n - n_known, 1.0))),
+        float(deviations[0]),
+        float(deviations[1]),
+        float(np.sqrt(np.sum(smooth**2) / max(smooth_known, KNOWN))),
+        tuple(map(float, deviations[2:])),
+    )
+
+
+def _averaged(
+    views: Views,
+    fitted: BoardFit,
+    found: list[tuple[Design, _Solution]],
+    without: float,
+) -> MixedFit:
+    """Return the mean of solutions, weighed by their likelihood."""
+    n = len(fitted.prior)
+    n_kept = n + 3 * views.board.n_points
+    deviances = np.array([each.deviance for _, each in found])
+    weights = np.exp(-0.5 * (deviances - deviances.min()))
+    weights /= weights.sum()
+    x = np.sum([w * s.x[:n_kept] for w, (_, s) in zip(weights, found, strict=True)], 0)
+    covariance, repeated = np.zeros((n, n)), np.zeros((n, n))
+    for w, (design, each) in zip(weights, found, strict=True):
+        off = each.x[:n] - x[:n]
+        C = each.covariance[:n]
+        covariance += w * (C[:, :n] + np.outer(off, off))
+        repeated += w * (C[:, :n] - C @ design.prior(each.components) @ C.T)
+    design, likeliest = found[int(np.argmin(deviances))]
+    gain = without - float(deviances.min())
+    reduced = _reduced(design, likeliest.components)
+    scores = _scores(design, reduced, likeliest, n)
+    clustering = scores.clustering
+    factor = max(clustering, 1.0)
+    poses = _own(design, reduced, likeliest)[:, :N_POSE]
+    off = x[:n_kept] - likeliest.x[:n_kept]
+    poses = poses - np.einsum("vpo,p->vo", reduced.solved[:, :n_kept, :N_POSE], off)
+    state = moved_state(fitted.state, x[:n], poses)
+    state = replace(state, offsets=fitted.state.offsets + x[n:].reshape(-1, 3))
+    fields = tuple(
+        _field(design, likeliest, c) if gain > SIGNIFICANT else None
+        for c in range(len(state.cameras))
+    )
+    adjustment = replace(
+        fitted,
+        state=state,
+        residuals=board_residuals(without_fields(views, fields), state),
+        sigma=likeliest.components.noise,
+        covariance=factor * covariance,
+    )
+    return MixedFit(
+        adjustment,
+        likeliest.components,
+        factor * repeated,
+        fields,
+        gain,
+        clustering,
+        scores,
+    )
+
+
+def without_fields(views: Views, fields: tuple[LensField | None, ...]) -> Views:
+    """Return the views as lenses without residual fields have them."""
+    pixels = views.pixels.copy()
+    for c, field in enumerate(fields):
+        if field is not None:
+            pixels[:, c] -= field.at(pixels[:, c])
+    return replace(views, pixels=pixels)
+
+
+def _scores(
+    design: Design, reduced: _Reduced, solution: _Solution, n: int
+) -> ViewScores:
+    """Return the scores of the views about the first n unknowns."""
+    weight = solution.components.noise**-2
+    information = weight * design.columns
+    information -= reduced.solved @ np.swapaxes(weight * design.cross[:, :n], 1, 2)
+    scores = weight * design.right[:, :n]
+    scores -= np.einsum("vpo,vo->vp", reduced.solved[:, :n], weight * design.own_right)
+    scores -= np.einsum("vqp,q->vp", information, solution.x)
+    return ViewScores(scores, information, solution.covariance)
+
+
+def _own_normal(design: Design, components: VarianceComponents) -> FloatArray:
+    """Return the normal equations of pose and smooth error of each view."""
+    n_own = design.own_own.shape[-1]
+    prior = np.full(n_own, components.view**-2)
+    prior[:N_POSE] = 0.0
+    normal = components.noise**-2 * design.own_own + np.diag(prior)
+    return np.asarray(normal + 1e-12 * np.eye(n_own))
+
+
+def _field(
+    design: Design, solution: _Solution, camera: int
+) -> LensField:
+    """Return the residual field of a lens, the intrinsics being as they were found."""
+    at, n = design.of_field(camera), design.n_shared
+    C = solution.covariance
+    known = C[at, at] - C[at, :n] @ np.linalg.solve(C[:n, :n], C[:n, at])
+    values = solution.x[at].reshape(-1, 2)
+    field = design.fields[camera]
+    return replace(
+        field,
+        amplitude=solution.components.lenses[camera],
+        values=values,
+        covariance=0.5 * (known[0::2, 0::2] + known[1::2, 1::2]),
+    )

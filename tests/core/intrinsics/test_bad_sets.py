@@ -1,0 +1,152 @@
+"""Tests of sets of views that no single camera took, or that say little."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
+from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.model.camera import Camera
+
+MakeViews = Callable[..., Views]
+NOISE = 0.03  # px
+OTHER = Camera(
+    *(640, 480, 870.0, 869.0, 310.0, 251.0),
+    distortion=np.array([-0.15, 0.1, -5e-4, 3e-4, 0.0]),
+)
+
+
+def calibrated(views: Views) -> CameraCalibration:
+    return calibrate_camera(views, BoardTolerances())
+
+
+def expanded(found: CameraCalibration) -> FloatArray:
+    assert found.camera.covariance is not None
+    return 2 * np.sqrt(np.diag(found.camera.covariance))
+
+
+def merged(one: Views, other: Views, is_other: FloatArray) -> Views:
+    """Return the views of one, and some in the place of them of the other."""
+    which = is_other.astype(bool)[:, None, None, None]
+    return replace(one, pixels=np.where(which, other.pixels, one.pixels))
+
+
+def zoomed(camera: Camera, by: float) -> Camera:
+    return replace(camera, fx=by * camera.fx, fy=by * camera.fy)
+
+
+@pytest.fixture(scope="module")
+def ten(make_views: MakeViews) -> CameraCalibration:
+    return calibrated(make_views(n_views=10))
+
+
+def test_views_copied_six_times_count_once(
+    make_views: MakeViews, ten: CameraCalibration
+) -> None:
+    views = make_views(n_views=10)
+    names = tuple(f"{copy}-{name}" for copy in range(6) for name in views.names)
+    copied = replace(views, pixels=np.tile(views.pixels, (6, 1, 1, 1)), names=names)
+    found = calibrated(copied)
+
+    np.testing.assert_allclose(expanded(found), expanded(ten))
+    assert len(found.duplicates) == 50
+    assert "50 views show the board where" in str(found.remarks[0])
+
+
+def test_images_of_a_board_at_rest_count_once(
+    make_views: MakeViews, ten: CameraCalibration
+) -> None:
+    views = make_views(n_views=10)
+    pixels = np.repeat(views.pixels, 6, axis=0)
+    pixels[np.arange(60) % 6 > 0] += np.random.default_rng(1).normal(
+        0, NOISE, (50, *pixels.shape[1:])
+    )
+    names = tuple(f"{frame}.png" for frame in range(60))
+    found = calibrated(replace(views, pixels=pixels, names=names))
+
+    np.testing.assert_allclose(expanded(found), expanded(ten))
+    assert found.views.n_views == 10
+
+
+def test_one_pose_alone_is_refused_as_such(make_views: MakeViews) -> None:
+    views = make_views(n_views=8)
+    rest = np.repeat(views.pixels[:1], 8, axis=0)
+
+    with pytest.raises(CalibrationError, match="Different poses of the board: 1"):
+        calibrated(replace(views, pixels=rest))
+
+
+def test_zoom_in_the_middle_of_a_set_is_refused_with_the_first_view_after_it(
+    make_views: MakeViews, camera: Camera
+) -> None:
+    before = make_views(n_views=28)
+    after = make_views(n_views=28, of=zoomed(camera, 1.01))
+
+    with pytest.raises(CalibrationError, match=r"changed at view_15\.png"):
+        calibrated(merged(before, after, np.arange(28) >= 14))
+
+
+def test_a_small_change_is_a_finding(make_views: MakeViews, camera: Camera) -> None:
+    before = make_views(n_views=24)
+    after = make_views(n_views=24, of=zoomed(camera, 1.004))
+    found = calibrated(merged(before, after, np.arange(24) >= 12))
+
+    assert {each.code for each in found.remarks} & {
+        "intrinsics.step",
+        "intrinsics.drift",
+    }
+
+
+def test_an_unchanged_camera_is_not_said_to_have_changed(
+    make_views: MakeViews,
+) -> None:
+    for seed in range(3):
+        assert not calibrated(make_views(seed=seed)).remarks
+
+
+def test_two_cameras_in_one_set_are_named_as_such(make_views: MakeViews) -> None:
+    odd = np.arange(20) % 3 == 1
+    mixed = merged(make_views(n_views=20), make_views(n_views=20, of=OTHER), odd)
+
+    with pytest.raises(CalibrationError, match="two cameras") as caught:
+        calibrated(mixed)
+    assert caught.value.message.values["n_named"] == odd.sum()
+
+
+def test_rotated_images_are_named(make_views: MakeViews) -> None:
+    views = make_views(n_views=14)
+    pixels = views.pixels.copy()
+    pixels[[2, 5, 9]] = np.array([639, 479]) - pixels[[2, 5, 9]]
+
+    with pytest.raises(CalibrationError, match="rotated by 180") as caught:
+        calibrated(replace(views, pixels=pixels))
+    names = caught.value.message.values["names"]
+    assert names == "view_03.png, view_06.png, view_10.png"
+
+
+def test_sheared_images_are_not_taken_for_a_sheared_board(
+    make_views: MakeViews,
+) -> None:
+    views = make_views(n_views=20)
+    pixels = views.pixels.copy()
+    pixels[..., 0] += 0.003 * (pixels[..., 1] - 240)
+
+    with pytest.raises(CalibrationError, match="not perpendicular") as caught:
+        calibrated(replace(views, pixels=pixels))
+    slope = np.radians(caught.value.message.values["degrees"])
+    assert slope == pytest.approx(0.003, abs=BoardTolerances().squareness)
+
+
+def test_a_board_in_another_unit_is_questioned(make_views: MakeViews) -> None:
+    found = calibrated(make_views("chessboard:9x6:2423"))
+
+    assert "makes a board of 19.4 m" in str(found.remarks[-1])
+
+
+def test_a_board_bent_as_none_is_refused(make_views: MakeViews) -> None:
+    with pytest.raises(CalibrationError, match="bent by"):
+        calibrated(make_views(shape=np.array([0, 0, 12.0, 0, 8.0])))
