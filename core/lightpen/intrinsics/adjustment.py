@@ -315,6 +315,7 @@ def _normals(state: BoardState) -> FloatArray:
 
 
 def board_residuals(views: Views, state: BoardState) -> FloatArray:
+    """Return observed minus modelled points, (V, C, N, 2), px; NaN where not seen."""
     _, points = _points_cam(views.board, state)
     normals = _normals(state)
     residuals = np.empty_like(views.pixels)

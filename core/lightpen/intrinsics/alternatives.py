@@ -31,7 +31,8 @@ from lightpen.model.quantiles import chi_square_quantile
 FEWEST = 3  # views of a group
 MAX_ROUNDS = 8
 LESSENED = 0.97  # of the rms without it, or an alternative is no explanation
-CHANCE = 1e-4  # of a change, by chance
+CHANCE = 1e-3  # of a change, by chance
+LEAST_KNOWN = 1e-10  # least eigenvalue of an information matrix scaled to ones
 USELESS = 0.001  # of the image's longer side, by which a change moves the image
 SHEARED = 0.01  # of the slope of the columns, first step
 MOST_SINGLE = 40  # views that are turned one by one
@@ -75,27 +76,43 @@ def find_change(mixed: MixedFit, names: tuple[str, ...]) -> Change | None:
     camera = mixed.adjustment.state.cameras[0]
     at = mixed.adjustment.of_intrinsics(0)
     n = at.stop - at.start
-    least = chi_square_quantile(n, CHANCE / len(trials))
-    least *= max(mixed.scores.clustering, 1.0)
-    best: Change | None = None
+    zoom = np.zeros((n, 1))
+    zoom[:2, 0] = camera.fx, camera.fy
+    ways = (zoom, np.eye(n)[:, :4], np.eye(n))
+    clustering = max(mixed.scores.clustering, 1.0)
+    best, most = None, 1.0
     for first, share in trials:
-        score, information = mixed.scores.change(share - share.mean() * (first == 0))
-        known = information[at, at]
-        values, vectors = np.linalg.eigh(known)
-        if values[0] <= 1e-12 * values[-1]:  # one part alone does not tell
-            scale = 1 / np.sqrt(np.maximum(np.diag(known), 1e-300))
-            values, vectors = np.linalg.eigh(known * np.outer(scale, scale))
-            vectors = scale[:, None] * vectors
-            if values[0] <= 1e-10:
-                continue
-        difference = (vectors / values) @ (vectors.T @ score[at])
-        significance = float(score[at] @ difference)
-        if significance > least:
-            least = significance
-            moves = error_fields(camera) @ difference
-            in_image = float(np.sqrt(np.mean(np.square(moves).sum(axis=-1))))
-            best = Change(names[first] if first else "", difference, in_image)
+        score, information = mixed.scores.change(share)
+        for way in ways:
+            difference, squares = _fitted_change(score[at], information[at, at], way)
+            chance = CHANCE / (len(trials) * len(ways))
+            least = clustering * chi_square_quantile(way.shape[1], chance)
+            if squares > most * least:
+                most = squares / least
+                moves = error_fields(camera) @ difference
+                in_image = float(np.sqrt(np.mean(np.square(moves).sum(axis=-1))))
+                best = Change(names[first] if first else "", difference, in_image)
     return best
+
+
+def _fitted_change(
+    score: FloatArray, information: FloatArray, way: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return the change that fits best of some kind, and its size by its covariance.
+
+    Parameters
+    ----------
+    way : (n, k) array
+        Its directions.
+    """
+    known = way.T @ information @ way
+    scale = 1 / np.sqrt(np.maximum(np.diag(known), 1e-300))
+    values, vectors = np.linalg.eigh(known * np.outer(scale, scale))
+    if values[0] <= LEAST_KNOWN:  # one part alone does not tell
+        return np.zeros(len(score)), 0.0
+    vectors = scale[:, None] * vectors
+    found = (vectors / values) @ (vectors.T @ (way.T @ score))
+    return way @ found, float(score @ way @ found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +144,9 @@ def explain(
     offsets : (N, 3) array, optional
         Of the points of the board as one camera has them, mm.
     """
-    board = _BoardKnown(tolerances, fitted.state.offsets if offsets is None else offsets)
+    board = _BoardKnown(
+        tolerances, fitted.state.offsets if offsets is None else offsets
+    )
     near = fitted.state.cameras[0]
     n = 2 * int(views.seen.sum())
     nothing = _rms(_residuals_by(views, board, near))
@@ -191,7 +210,11 @@ def _change_error(
         "intrinsics.changed",
         name=views.names[first],
         before=cameras[0].fx,
+        cx_before=cameras[0].cx,
+        cy_before=cameras[0].cy,
         after=cameras[1].fx,
+        cx_after=cameras[1].cx,
+        cy_after=cameras[1].cy,
         n_before=int(np.sum(~which)),
         n_after=int(np.sum(which)),
     )
@@ -243,9 +266,7 @@ def _fitted(views: Views, board: _BoardKnown, near: Camera) -> BoardFit | None:
         return None
 
 
-def _residuals_by(
-    views: Views, board: _BoardKnown, near: Camera
-) -> FloatArray | None:
+def _residuals_by(views: Views, board: _BoardKnown, near: Camera) -> FloatArray | None:
     found = _fitted(views, board, near)
     return None if found is None else found.residuals
 

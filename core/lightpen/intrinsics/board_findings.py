@@ -1,4 +1,4 @@
-"""What a calibration says of its board: stretched, sheared, bent, or of no usual size."""
+"""Findings on the board of a calibration: stretched, sheared, bent, or implausible."""
 
 import numpy as np
 
@@ -86,9 +86,5 @@ def messages_on_size(board: Board) -> tuple[Message, ...]:
     if least <= longer <= most:
         return ()
     return (
-        message(
-            "intrinsics.size-implausible",
-            pitch=board.pitch,
-            side=longer / 1000,
-        ),
+        message("intrinsics.size-implausible", pitch=board.pitch, side=longer / 1000),
     )

@@ -122,21 +122,23 @@ class Design:
         """
         points = x[self.of_points].reshape(-1, 3)
         spread = np.diag(covariance)[self.of_points].reshape(-1, 3)
-        known = [
+        known: list[float] = [
             2 * self.n_points - spread[:, :2].sum() / components.in_plane**2,
             self.n_points - spread[:, 2].sum() / components.out_of_plane**2,
         ]
-        squares = [np.sum(points[:, :2] ** 2), np.sum(points[:, 2] ** 2)]
+        squares = [float(np.sum(points[:, :2] ** 2)), float(np.sum(points[:, 2] ** 2))]
         for c, amplitude in enumerate(components.lenses):
             own = self.of_field(c)
             information = self._node_information(c)
             unknown = np.sum(information * covariance[own, own]) / amplitude**2
-            known.append(own.stop - own.start - unknown)
-            squares.append(x[own] @ information @ x[own])
+            known.append(float(own.stop - own.start - unknown))
+            squares.append(float(x[own] @ information @ x[own]))
         return np.array(known), np.array(squares)
 
     def _node_information(self, camera: int) -> FloatArray:
-        return np.kron(self.fields[camera].node_information, np.eye(2))
+        return np.asarray(
+            np.kron(self.fields[camera].node_information, np.eye(2)), dtype=np.float64
+        )
 
 
 def design_of(views: Views, fitted: BoardFit, length: float) -> Design:

@@ -12,12 +12,12 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import adjust_board, stated_information
-from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.board_findings import (
     board_contradictions,
     messages_on_board,
     released_tolerances,
 )
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.variance_components import MixedFit, fit_effects
@@ -209,16 +209,16 @@ def calibrate_pair(
     )
 
 
-def _rig(
-    effects: MixedFit, names: tuple[str, str], tolerances: BoardTolerances
-) -> Rig:
+def _rig(effects: MixedFit, names: tuple[str, str], tolerances: BoardTolerances) -> Rig:
     fitted = effects.adjustment
     state, at = fitted.state, fitted.of_places
     covariance = fitted.covariance[at, at].copy()
     shift = state.translations[1]
     covariance[3:, 3:] += tolerances.scale**2 * np.outer(shift, shift)
     cameras = []
-    for c, (camera, field) in enumerate(zip(state.cameras, effects.fields, strict=True)):
+    for c, (camera, field) in enumerate(
+        zip(state.cameras, effects.fields, strict=True)
+    ):
         own = fitted.of_intrinsics(c)
         cameras.append(
             replace(camera, covariance=fitted.covariance[own, own], lens_field=field)

@@ -350,12 +350,12 @@ def _effects_lines(effects: MixedFit) -> list[str]:
     found = effects.components
     lines = [
         f"{'Effects':<{TITLE}}noise {found.noise:.4f} px, smooth error of a view "
-        f"{found.view:.4f} px, points of the board {found.in_plane:.4f} mm in the plane "
-        f"and {found.out_of_plane:.4f} mm out of it"
+        f"{found.view:.4f} px, points of the board {found.in_plane:.4f} mm in plane "
+        f"and {found.out_of_plane:.4f} mm out of plane"
     ]
     lines += [
-        f"{'Lens field':<{TITLE}}amplitude {field.amplitude:.4f} px, correlation length "
-        f"{field.length:.0f} px"
+        f"{'Lens field':<{TITLE}}amplitude {field.amplitude:.4f} px, correlation "
+        f"length {field.length:.0f} px"
         for field in effects.fields
         if field is not None
     ]

@@ -242,7 +242,7 @@ def _no_less(components: VarianceComponents, mm: float) -> VarianceComponents:
 def _reduced(design: Design, components: VarianceComponents) -> _Reduced:
     weight = components.noise**-2
     own_normal = _own_normal(design, components)
-    inverse_own = np.linalg.inv(own_normal)
+    inverse_own: FloatArray = np.asarray(np.linalg.inv(own_normal), dtype=np.float64)
     cross, own_right = weight * design.cross, weight * design.own_right
     solved = cross @ inverse_own
     normal = weight * design.normal
@@ -269,7 +269,9 @@ def _solve(
 ) -> _Solution:
     normal = reduced.normal + design.prior(components)
     right = reduced.right - design.prior_pull
-    covariance = np.linalg.inv(0.5 * (normal + normal.T))
+    covariance: FloatArray = np.asarray(
+        np.linalg.inv(0.5 * (normal + normal.T)), dtype=np.float64
+    )
     x = covariance @ right
     deviance = (
         reduced.logarithm
@@ -302,7 +304,9 @@ def _following(
     known, sizes = design.effects(x, covariance, components)
     shared = slice(0, design.n_shared)
     n_known = known.sum() + smooth_known + N_POSE * design.n_views
-    n_known += design.n_shared - np.sum(design.shared_prior * covariance[shared, shared])
+    n_known += design.n_shared - np.sum(
+        design.shared_prior * covariance[shared, shared]
+    )
     squares = (
         design.squares
         - 2 * (x @ design.right.sum(axis=0) + np.sum(own * design.own_right))
@@ -403,9 +407,7 @@ def _own_normal(design: Design, components: VarianceComponents) -> FloatArray:
     return np.asarray(normal + 1e-12 * np.eye(n_own))
 
 
-def _field(
-    design: Design, solution: _Solution, camera: int
-) -> LensField:
+def _field(design: Design, solution: _Solution, camera: int) -> LensField:
     """Return the residual field of a lens, the intrinsics being as they were found."""
     at, n = design.of_field(camera), design.n_shared
     C = solution.covariance

@@ -1,4 +1,4 @@
-"""A calibrated camera: pinhole with Brown-Conrady distortion.
+"""A calibrated camera: pinhole with distortion by Brown-Conrady or Kannala-Brandt.
 
 A projection is three maps, each with its Jacobian: the perspective division
 ``(u, v, w) -> (u, v) / w``, the distortion of normalised points, and the affine map
@@ -10,6 +10,8 @@ to pixels. The distortion is OpenCV's model with 5 or 8 coefficients
     x' = x g + 2 p1 x y + p2 (r2 + 2 x^2)
     y' = y g + p1 (r2 + 2 y^2) + 2 p2 x y
 
+or that of Kannala and Brandt with 4 coefficients, see `lightpen.model.fisheye`.
+
 References
 ----------
 .. [1] D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37
@@ -20,18 +22,27 @@ References
 
 from dataclasses import dataclass, field, replace
 from datetime import date
+from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.errors import CalibrationError
+from lightpen.model import fisheye
 from lightpen.model.lens_field import LensField
 
 UNDISTORT_STEPS = 20
 # Of a step of Newton's method, in normalised units: what is left is about its square,
 # less than 1e-8 px at any sensible focal length.
 UNDISTORT_TOLERANCE = 1e-7
+
+
+class LensModel(StrEnum):
+    """Models of the distortion of a lens."""
+
+    BROWN = "brown"
+    KANNALA_BRANDT = "kannala-brandt"
 
 
 class PointMap(NamedTuple):
@@ -60,8 +71,8 @@ class Camera:
         Focal length, px.
     cx, cy : float
         Principal point, px; (0, 0) is the centre of the top-left pixel.
-    distortion : (5,) or (8,) array
-        ``k1 k2 p1 p2 k3 [k4 k5 k6]``.
+    distortion : (5,), (8,) or (4,) array
+        ``k1 k2 p1 p2 k3 [k4 k5 k6]``, or ``k1 k2 k3 k4`` of Kannala and Brandt.
     covariance : (4 + n, 4 + n) array or None
         Covariance of ``fx fy cx cy`` and the n distortion coefficients, as the
         calibration of the camera states it.
@@ -74,6 +85,8 @@ class Camera:
     lens_field : LensField or None
         Residual field beyond the distortion model, from the camera calibration. Not
         part of the projection: `without_lens_field` removes it from observed pixels.
+    lens : LensModel
+        Model of the distortion.
     """
 
     width: int
@@ -88,6 +101,15 @@ class Camera:
     serial: str = ""
     temperature_c: float | None = None
     lens_field: LensField | None = None
+    lens: LensModel = LensModel.BROWN
+
+    @property
+    def distortion_names(self) -> tuple[str, ...]:
+        """Names of the distortion coefficients."""
+        if self.lens is LensModel.KANNALA_BRANDT:
+            return ("k1", "k2", "k3", "k4")
+        names = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+        return names[: len(self.distortion)]
 
     @property
     def image_size(self) -> tuple[int, int]:
@@ -158,7 +180,7 @@ class Camera:
     def pixels(self, normalised: FloatArray) -> FloatArray:
         """Return the pixels of undistorted normalised points, both (..., 2)."""
         r2 = np.einsum("...i,...i->...", normalised, normalised)
-        factor = _radial_gain(self.distortion, r2) + normalised @ self._slopes
+        factor = self._gain(r2) + normalised @ self._slopes
         return self._distorted_pixels(normalised, r2, factor)
 
     def pixels_with_jacobian(self, normalised: FloatArray) -> PointMap:
@@ -179,9 +201,9 @@ class Camera:
         """
         slopes = self._slopes
         r2 = np.einsum("...i,...i->...", normalised, normalised)
-        gain = _radial_gain(self.distortion, r2)
+        gain = self._gain(r2)
         factor = gain + normalised @ slopes
-        slope = 2 * _radial_slope(self.distortion, r2, gain)
+        slope = 2 * self._gain_slope(r2, gain)
         of_factor = normalised * slope[..., None] + slopes
         J = normalised[..., :, None] * of_factor[..., None, :]
         J += slopes[:, None] * normalised[..., None, :]
@@ -193,13 +215,32 @@ class Camera:
     @property
     def _slopes(self) -> FloatArray:
         """Change of the tangential factor by the normalised point, (2,)."""
-        return np.asarray(2 * self.distortion[3:1:-1])
+        return 2 * self._tangential
+
+    @property
+    def _tangential(self) -> FloatArray:
+        """Tangential coefficients ``p2 p1``, (2,)."""
+        if self.lens is LensModel.KANNALA_BRANDT:
+            return np.zeros(2)
+        return self.distortion[3:1:-1]
+
+    def _gain(self, r2: FloatArray) -> FloatArray:
+        """Return distorted over undistorted distance from the axis."""
+        if self.lens is LensModel.KANNALA_BRANDT:
+            return fisheye.gain(self.distortion, r2)
+        return _radial_gain(self.distortion, r2)
+
+    def _gain_slope(self, r2: FloatArray, gain: FloatArray) -> FloatArray:
+        """Return d gain / d r2."""
+        if self.lens is LensModel.KANNALA_BRANDT:
+            return fisheye.gain_slope(self.distortion, r2, gain)
+        return _radial_slope(self.distortion, r2, gain)
 
     def _distorted_pixels(
         self, normalised: FloatArray, r2: FloatArray, factor: FloatArray
     ) -> FloatArray:
         distorted = normalised * factor[..., None]
-        distorted += r2[..., None] * self.distortion[3:1:-1]
+        distorted += r2[..., None] * self._tangential
         distorted *= np.array([self.fx, self.fy])
         distorted += np.array([self.cx, self.cy])
         return distorted
@@ -219,7 +260,16 @@ class Camera:
         """
         x, y = normalised[..., 0], normalised[..., 1]
         r2 = x * x + y * y
-        gain = _radial_gain(self.distortion, r2)
+        gain = self._gain(r2)
+        if self.lens is LensModel.KANNALA_BRANDT:
+            J = np.zeros((*normalised.shape, 4 + len(self.distortion)))
+            J[..., 0, 0], J[..., 1, 1] = x * gain, y * gain
+            J[..., 0, 2] = J[..., 1, 3] = 1
+            focal_points = normalised * np.array([self.fx, self.fy])
+            J[..., 4:] = (
+                focal_points[..., None] * fisheye.gain_jacobian(r2)[..., None, :]
+            )
+            return J
         k4, k5, k6 = _rational(self.distortion)
         denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
         J = np.zeros((*normalised.shape, 4 + len(self.distortion)))
@@ -254,6 +304,11 @@ class Camera:
         ------
         CalibrationError
             The distortion cannot be undone there: the coefficients fold the image.
+
+        Notes
+        -----
+        Directions of a fisheye that are more than 88 degrees off the axis are returned
+        at 88 degrees, see `sees`.
         """
         return self.unproject_with_jacobian(pixels).points
 
@@ -279,6 +334,8 @@ class Camera:
         """
         focal = np.array([self.fx, self.fy])
         normalised = (pixels - np.array([self.cx, self.cy])) / focal
+        if self.lens is LensModel.KANNALA_BRANDT:
+            return self._unproject_fisheye(normalised)
         missing = np.isnan(pixels)
         with np.errstate(all="ignore"):  # what diverges is refused below
             for _ in range(UNDISTORT_STEPS):
@@ -291,6 +348,33 @@ class Camera:
                         break
                     return PointMap(normalised, inverse)
         raise CalibrationError("camera.distortion-folds")
+
+    def _unproject_fisheye(self, distorted: FloatArray) -> PointMap:
+        """Return the same of distorted normalised points of a fisheye."""
+        distances = np.linalg.norm(distorted, axis=-1)
+        found = fisheye.angles(self.distortion, distances)
+        if np.any(np.isnan(found) & ~np.isnan(distances)):
+            raise CalibrationError("camera.distortion-folds")
+        scale = np.where(
+            distances > 1e-12,
+            np.tan(found) / np.where(distances > 1e-12, distances, 1),
+            1,
+        )
+        normalised = distorted * scale[..., None]
+        return PointMap(
+            normalised, _inverse_2x2(self.pixels_with_jacobian(normalised).jacobian)
+        )
+
+    def sees(self, pixels: FloatArray) -> BoolArray:
+        """Tell which pixels (..., 2) are images of directions before the camera.
+
+        The corners of a fisheye's image may not be.
+        """
+        if self.lens is not LensModel.KANNALA_BRANDT:
+            return np.ones(pixels.shape[:-1], dtype=np.bool_)
+        focal = np.array([self.fx, self.fy])
+        distorted = (pixels - np.array([self.cx, self.cy])) / focal
+        return fisheye.is_within(self.distortion, np.linalg.norm(distorted, axis=-1))
 
 
 def _rational(distortion: FloatArray) -> FloatArray:

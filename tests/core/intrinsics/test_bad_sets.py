@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.views import BoardTolerances, Views
@@ -29,9 +29,9 @@ def expanded(found: CameraCalibration) -> FloatArray:
     return 2 * np.sqrt(np.diag(found.camera.covariance))
 
 
-def merged(one: Views, other: Views, is_other: FloatArray) -> Views:
+def merged(one: Views, other: Views, is_other: BoolArray) -> Views:
     """Return the views of one, and some in the place of them of the other."""
-    which = is_other.astype(bool)[:, None, None, None]
+    which = is_other[:, None, None, None]
     return replace(one, pixels=np.where(which, other.pixels, one.pixels))
 
 
@@ -92,7 +92,7 @@ def test_zoom_in_the_middle_of_a_set_is_refused_with_the_first_view_after_it(
 
 def test_a_small_change_is_a_finding(make_views: MakeViews, camera: Camera) -> None:
     before = make_views(n_views=24)
-    after = make_views(n_views=24, of=zoomed(camera, 1.004))
+    after = make_views(n_views=24, of=replace(camera, cx=camera.cx + 3.0))
     found = calibrated(merged(before, after, np.arange(24) >= 12))
 
     assert {each.code for each in found.remarks} & {
@@ -101,9 +101,7 @@ def test_a_small_change_is_a_finding(make_views: MakeViews, camera: Camera) -> N
     }
 
 
-def test_an_unchanged_camera_is_not_said_to_have_changed(
-    make_views: MakeViews,
-) -> None:
+def test_an_unchanged_camera_is_not_said_to_have_changed(make_views: MakeViews) -> None:
     for seed in range(3):
         assert not calibrated(make_views(seed=seed)).remarks
 
@@ -137,8 +135,9 @@ def test_sheared_images_are_not_taken_for_a_sheared_board(
 
     with pytest.raises(CalibrationError, match="not perpendicular") as caught:
         calibrated(replace(views, pixels=pixels))
-    slope = np.radians(caught.value.message.values["degrees"])
-    assert slope == pytest.approx(0.003, abs=BoardTolerances().squareness)
+    degrees = caught.value.message.values["degrees"]
+    assert isinstance(degrees, float)
+    assert np.radians(degrees) == pytest.approx(0.003, abs=BoardTolerances().squareness)
 
 
 def test_a_board_in_another_unit_is_questioned(make_views: MakeViews) -> None:

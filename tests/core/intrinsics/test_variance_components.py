@@ -134,9 +134,7 @@ def test_a_change_of_the_camera_is_in_the_scores_of_the_views_after_it(
     before = make_views(n_views=20)
     after = make_views(n_views=20, of=replace(camera, cx=camera.cx + 3.0))
     which = (np.arange(20) >= 10)[:, None, None, None]
-    found = fitted(
-        replace(before, pixels=np.where(which, after.pixels, before.pixels))
-    )
+    found = fitted(replace(before, pixels=np.where(which, after.pixels, before.pixels)))
     score, information = found.scores.change(which[:, 0, 0, 0].astype(float))
     at = found.adjustment.of_intrinsics(0)
     covariance = np.linalg.inv(information[at, at])
