@@ -40,7 +40,7 @@ SHOWN = 6  # names
 
 
 @dataclass(frozen=True)
-class Change:
+class CameraChange:
     """A camera that changed while its views were taken.
 
     Attributes
@@ -58,7 +58,7 @@ class Change:
     in_image: float
 
 
-def find_change(mixed: MixedFit, names: tuple[str, ...]) -> Change | None:
+def find_change(mixed: MixedFit, names: tuple[str, ...]) -> CameraChange | None:
     """Return the most significant change of the camera in time, if one is.
 
     Parameters
@@ -91,7 +91,7 @@ def find_change(mixed: MixedFit, names: tuple[str, ...]) -> Change | None:
                 most = squares / least
                 moves = error_fields(camera) @ difference
                 in_image = float(np.sqrt(np.mean(np.square(moves).sum(axis=-1))))
-                best = Change(names[first] if first else "", difference, in_image)
+                best = CameraChange(names[first] if first else "", difference, in_image)
     return best
 
 
@@ -127,7 +127,7 @@ def explain(
     views: Views,
     tolerances: BoardTolerances,
     fitted: BoardFit,
-    change: Change | None,
+    change: CameraChange | None,
     released: BoardFit | None = None,
     offsets: FloatArray | None = None,
 ) -> CalibrationError | None:
@@ -137,7 +137,7 @@ def explain(
     ----------
     fitted : BoardFit
         Of some or all of the views by one camera.
-    change : Change or None
+    change : CameraChange or None
         The most significant change in time.
     released : BoardFit, optional
         With another board than it is said to be; that explains the views, too.
@@ -220,7 +220,7 @@ def _change_error(
     )
 
 
-def message_on_change(change: Change) -> Message:
+def message_on_change(change: CameraChange) -> Message:
     """Return the message on a change that does not make the set useless."""
     if not change.name:
         return message(

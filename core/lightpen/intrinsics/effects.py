@@ -7,7 +7,6 @@ view has its pose and the coefficients of a smooth error of its own.
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Protocol
 
 import numpy as np
 
@@ -19,20 +18,27 @@ from lightpen.intrinsics.views import Views
 from lightpen.model.lens_field import LensField
 
 
-class Components(Protocol):
-    """Standard deviations of the effects."""
+@dataclass(frozen=True)
+class VarianceComponents:
+    """Standard deviations of the random effects.
 
-    @property
-    def in_plane(self) -> float:
-        """Of the points of the board, mm."""
+    Attributes
+    ----------
+    noise : float
+        Of one coordinate, px.
+    in_plane, out_of_plane : float
+        Of the points of the board, mm.
+    view : float
+        Of the smooth error of a view, px.
+    lenses : tuple of float
+        Amplitude of the residual field of each camera, px.
+    """
 
-    @property
-    def out_of_plane(self) -> float:
-        """The same, mm."""
-
-    @property
-    def lenses(self) -> tuple[float, ...]:
-        """Amplitudes of the residual fields, px."""
+    noise: float
+    in_plane: float
+    out_of_plane: float
+    view: float
+    lenses: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +98,7 @@ class Design:
         begin = self.of_points.stop + sum(sizes[:camera])
         return slice(begin, begin + sizes[camera])
 
-    def prior(self, components: Components) -> FloatArray:
+    def prior(self, components: VarianceComponents) -> FloatArray:
         """Return the information of all priors, (p, p)."""
         prior = np.zeros_like(self.normal)
         prior[: self.n_shared, : self.n_shared] = self.shared_prior
@@ -104,7 +110,7 @@ class Design:
             prior[own, own] = self._node_information(c) / amplitude**2
         return prior
 
-    def prior_logarithm(self, components: Components) -> float:
+    def prior_logarithm(self, components: VarianceComponents) -> float:
         """Return the logarithm of the priors' determinant, but for a constant."""
         logarithm = -2 * self.n_points * np.log(components.in_plane**2)
         logarithm -= self.n_points * np.log(components.out_of_plane**2)
@@ -114,7 +120,7 @@ class Design:
         return float(logarithm)
 
     def effects(
-        self, x: FloatArray, covariance: FloatArray, components: Components
+        self, x: FloatArray, covariance: FloatArray, components: VarianceComponents
     ) -> tuple[FloatArray, FloatArray]:
         """Return how many effects are known, and their sum of squares.
 

@@ -26,7 +26,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.intrinsics.adjustment import board_residuals, moved_state
 from lightpen.intrinsics.board_fit import N_POSE, BoardFit
-from lightpen.intrinsics.effects import Design, design_of
+from lightpen.intrinsics.effects import Design, VarianceComponents, design_of
 from lightpen.intrinsics.views import Views
 from lightpen.model.lens_field import LensField
 
@@ -39,29 +39,6 @@ CONVERGED = 0.1  # of twice the logarithm of the likelihood
 FIRST = 0.2  # of the noise: a component to begin with
 KNOWN = 1e-2  # least number of effects that a variance is estimated from
 SIGNIFICANT = 6.0  # twice the gain of log-likelihood by a field, of two parameters
-
-
-@dataclass(frozen=True)
-class VarianceComponents:
-    """Standard deviations of the random effects.
-
-    Attributes
-    ----------
-    noise : float
-        Of one coordinate, px.
-    in_plane, out_of_plane : float
-        Of the points of the board, mm.
-    view : float
-        Of the smooth error of a view, px.
-    lenses : tuple of float
-        Amplitude of the residual field of each camera, px.
-    """
-
-    noise: float
-    in_plane: float
-    out_of_plane: float
-    view: float
-    lenses: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
