@@ -57,9 +57,9 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
     ) -> None:
         super().__init__(SwingStatus(), notifications, parent)
         self._folder = folder
-        self._archive = FolderArchive(folder)
-        self.follower: GuidedOperator | None = None
         self.logbook = LazyLogbook(folder, os.environ.get(SERVER, ""))
+        self._archive = FolderArchive(folder, self.logbook.confirm)
+        self.follower: GuidedOperator | None = None
         self.runner = SwingRunner(
             *(self.records_folder, self.archive, self, now), self.logbook
         )

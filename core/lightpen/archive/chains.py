@@ -14,6 +14,7 @@ from lightpen.archive.entries import (
     SHORT,
     ChainHead,
     Event,
+    FileHash,
     Kind,
     StoredEntry,
     chained,
@@ -28,6 +29,7 @@ from lightpen.errors import ArchiveError, FileError
 from lightpen.formats.own_json import DamagedError
 from lightpen.messages import Message, message
 from lightpen.record.signing.keys import chain_of, make_station_key
+from lightpen.record.signing.station import station_name
 
 SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
 _AT_HOME = select(CHAINS.c.chain).where(CHAINS.c.is_own)
@@ -67,7 +69,7 @@ def own_chain(database: Database) -> str:
         chain = connection.execute(_AT_HOME).scalar_one_or_none()
         if chain is None:
             try:
-                chain = chain_of(make_station_key().public)
+                chain = _new_chain(database)
             except FileError as error:
                 raise ArchiveError(error.message) from error
             _begin(connection, chain, is_own=True)
@@ -204,6 +206,19 @@ def entry_of_result(database: Database, chain: str, place: str) -> StoredEntry |
     return None if row is None else read_row(database, row)
 
 
+def limits_entered(database: Database, chain: str) -> tuple[FileHash, ...]:
+    """Return the files of limits that a chain has entries of, the oldest first."""
+    wanted = (
+        select(*READ)
+        .where(ENTRIES.c.chain == chain, ENTRIES.c.kind == Kind.LIMITS.value)
+        .order_by(ENTRIES.c.number)
+    )
+    with database.reading() as connection:
+        rows = connection.execute(wanted).all()
+    files = (read_row(database, row).entry.event.result for row in rows)
+    return tuple(file for file in files if file is not None)
+
+
 class ArchivedFiles:
     """The paths of the result files and swings in a chain.
 
@@ -331,6 +346,13 @@ def _is_entered(connection: Connection, chain: str, event: Event) -> bool:
 def _is_known(connection: Connection, chain: str) -> bool:
     wanted = select(CHAINS.c.chain).where(CHAINS.c.chain == chain)
     return connection.execute(wanted).one_or_none() is not None
+
+
+def _new_chain(database: Database) -> str:
+    """Return the name of the station key with which a chain begins."""
+    if database.file is None:
+        return chain_of(make_station_key().public)
+    return station_name(database.file.parent)
 
 
 def _begin(connection: Connection, chain: str, *, is_own: bool) -> None:

@@ -32,7 +32,6 @@ from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import (
     Record,
     open_record,
-    recorded_limits,
     recorded_names,
     recorded_origin,
 )
@@ -74,6 +73,8 @@ def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
         at=found.at,
         names=Names(operator=found.operator, pen=found.pen, tip=found.tip),
         program=this_program(),
+        reason=found.reason,
+        settings={"supervisor": found.supervisor} if found.supervisor else {},
         result=place,
     )
     revoked = file.with_name(f"{found.takes_back}.json")
@@ -156,7 +157,7 @@ def account_of_refused(
             calibration.budget.expanded_uncertainty[:3].tolist()
         ),
     )
-    inputs, limits = record_inputs(solution.source), recorded_limits(record)
+    inputs, limits = record_inputs(solution.source), assessment.limits
     return _with_record(event, calibration_record(calibration, inputs, "joint", limits))
 
 

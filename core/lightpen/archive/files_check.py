@@ -71,7 +71,7 @@ class FilesCheck:
         self.n_files += len(new)
         if new:
             with ThreadPoolExecutor() as executor:
-                found = executor.map(partial(_finding, data, entry.number), new)
+                found = executor.map(partial(file_finding, data, entry.number), new)
                 yield from filter(None, found)
 
     def _unreadable(self, data: Path, swing: str) -> Iterator[Message]:
@@ -110,7 +110,7 @@ def _images(data: Path, journal: FileHash) -> Iterator[FileHash]:
                 yield FileHash(f"{folder}/{image_name(line.number, c)}", digest)
 
 
-def _finding(data: Path, number: int, file: FileHash) -> Message | None:
+def file_finding(data: Path, number: int, file: FileHash) -> Message | None:
     """Return what differs between a file and its entry."""
     path = data / file.place
     try:

@@ -25,6 +25,7 @@ from lightpen.archive.chains import (
     append,
     entry_of_result,
     heads,
+    limits_entered,
     own_chain,
     records_of,
 )
@@ -38,7 +39,12 @@ from lightpen.archive.event_extraction import (
     account_of_result,
     account_of_unreadable,
 )
-from lightpen.archive.reinstating import restored_result, with_change
+from lightpen.archive.reinstating import (
+    due_doubts,
+    require_restorable,
+    restored_result,
+    with_change,
+)
 from lightpen.archive.replication import Replicator
 from lightpen.archive.seal import close_sealed
 from lightpen.archive.station_events import (
@@ -46,10 +52,19 @@ from lightpen.archive.station_events import (
     is_station_file,
     station_files,
 )
-from lightpen.errors import ArchiveError, FileError
-from lightpen.formats.files import FOLDER, unreadable
+from lightpen.errors import AcceptanceError, ArchiveError, FileError
+from lightpen.formats.files import FOLDER, printable, unreadable
+from lightpen.formats.stored_messages import StoredMessage
 from lightpen.local_time import local_now
 from lightpen.messages import Message
+from lightpen.model.limits import StationLimits
+from lightpen.record.library.guard_files import LIMITS_FOLDER
+from lightpen.record.library.numbered_files import number_of, numbered_files
+from lightpen.record.library.supervision import (
+    Signature,
+    Supervision,
+    approval_of_change,
+)
 from lightpen.record.library.tip_library import LIBRARY, library_files
 from lightpen.record.results.acceptance import require_in_use
 from lightpen.record.results.assessment import SwingAssessment
@@ -103,7 +118,7 @@ class Logbook:
 
     def __init__(self, data: Path, server: str = "") -> None:
         self._data = data
-        self._results = FolderArchive(data)
+        self._results = FolderArchive(data, self.confirm)
         self._lock = Lock()
         self.database: Database = open_file(data / ARCHIVE)
         try:
@@ -184,36 +199,73 @@ class Logbook:
         with self._lock:
             self._enter(ExtractedEvent(event))
 
-    def restore(self, entry: StoredEntry, by: Names, reason: str) -> Result:
+    def restore(
+        self,
+        entry: StoredEntry,
+        by: Names,
+        reason: str,
+        signature: Signature | None = None,
+    ) -> Result:
         """Put the tip of an entry in force again, and enter that.
 
         Parameters
         ----------
         by : Names
             Operator who reinstates it, and station.
+        signature : Signature, optional
+            Of a supervisor, where there is a password.
 
         Raises
         ------
         ArchiveError
-            The entry put no tip in force, or it cannot be entered; it stays owed then.
+            The entry put no tip in force, is not of this station, its files are not as
+            they were entered, or it cannot be entered; it stays owed then.
         AcceptanceError
-            The tip is retired.
+            The tip is retired, there is no reason, or there is a password and no
+            supervisor signs.
         FileError
             It cannot be put in force; what was in force stays so.
         """
         require_in_use(self._results, entry.entry.event.names.tip)
-        event, record = entry.entry.event, entry.entry.event.record_sha256 or ""
-        now = local_now()
+        event, now = entry.entry.event, local_now()
         with self._lock:
-            text = records_of(self.database, [entry]).get(record)
+            require_restorable(self.database, self.chain, entry, self._data)
+            text = records_of(self.database, [entry]).get(event.record_sha256 or "")
             result = restored_result(entry, text, self._data, by, reason, now)
+            supervision = self._results.supervision()
+            key = approval_of_change(supervision, signature, reason)
             last = self._results.in_force(
                 event.names.pen, event.names.tip, is_simulated=event.is_simulated
             )
-            result = with_change(result, last)
-            self._results.store(result)
+            doubts = due_doubts(
+                *(self.database, entry, self._results.library(), now),
+                supervision.limits_at(by.station, StationLimits()).due,
+            )
+            result = replace(
+                with_change(result, last),
+                doubts=tuple(map(StoredMessage.of, doubts)),
+                supervisor=signature.name.strip() if key and signature else "",
+            )
+            self._results.store(result, key)
         self.enter_owed()
         return result
+
+    def confirm(self, supervision: Supervision) -> None:
+        """Confirm that the limits of the data folder are those that were entered.
+
+        Raises
+        ------
+        AcceptanceError
+            They are not.
+        ArchiveError
+            The archive cannot be read.
+        """
+        if supervision.chain not in ("", self.chain):
+            raise AcceptanceError("limits.other-archive")
+        for file in limits_entered(self.database, self.chain):
+            number = number_of(Path(file.place))
+            if supervision.hashes[number - 1 : number] != (file.sha256,):
+                raise AcceptanceError("limits.not-entered", file=printable(file.place))
 
     def delivery(self) -> ReplicationState | None:
         """Return the progress of the replication; None without a server.
@@ -246,8 +298,9 @@ class Logbook:
 
     def _owed(self) -> Iterator[Path]:
         """Yield the files, and then the swings, that have no entry."""
+        limits = reversed(numbered_files(self._data / LIMITS_FOLDER))
         own = (*library_files(self._data), *station_files(self._data))
-        for file in (*self._results.all_files(), *own):
+        for file in dict.fromkeys((*limits, *self._results.all_files(), *own)):
             if not self._is_entered(file):
                 yield file
         for folder in _set_aside(self._data / RECORDS):

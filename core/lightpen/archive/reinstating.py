@@ -1,16 +1,78 @@
 """Reinstating an older tip: a new result from an earlier calibration."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
+from lightpen.archive.chains import batch_of
+from lightpen.archive.database import Database
 from lightpen.archive.entries import IN_FORCE_BY, StoredEntry
-from lightpen.errors import ArchiveError
+from lightpen.archive.files_check import file_finding
+from lightpen.archive.queries import calibrating
+from lightpen.errors import AcceptanceError, ArchiveError
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen.estimation.reports.verdict import Grade, change_since
 from lightpen.formats.own_json import parse_own_json
+from lightpen.local_time import local_time
+from lightpen.messages import Message, message
+from lightpen.model.limits import DueRule
+from lightpen.record.library.tip_library import Library
+from lightpen.record.results.assessment import overdue_items
 from lightpen.record.results.results import Result, TipChange
 from lightpen.record.swings.names import Names
+
+
+def require_restorable(
+    database: Database, chain: str, entry: StoredEntry, data: Path
+) -> None:
+    """Refuse an entry that is not of a chain, or whose result is not as it was.
+
+    Parameters
+    ----------
+    chain : str
+        That is at home in the data folder.
+    data : Path
+        Data folder.
+
+    Raises
+    ------
+    ArchiveError
+        It is refused.
+    """
+    number = entry.entry.number
+    there = batch_of(database, chain, number - 1)[:1]
+    if [each.sha256 for each in there] != [entry.sha256]:
+        raise ArchiveError("archive.of-other-station", number=number)
+    result = entry.entry.event.result
+    if result is None:
+        return
+    finding = file_finding(data, number, result)
+    if finding is not None:
+        raise ArchiveError(finding)
+
+
+def due_doubts(
+    database: Database,
+    entry: StoredEntry,
+    library: Library,
+    now: datetime,
+    rule: DueRule,
+) -> Iterator[Message]:
+    """Yield what is overdue of the tip of an entry.
+
+    Parameters
+    ----------
+    rule : DueRule
+        Of the station, for tips that have none of their own.
+    """
+    names = entry.entry.event.names
+    yield from overdue_items(library, names, local_time(now).date())
+    due = library.rule_of(names.tip, rule).due(
+        calibrating(database, entry).entry.event.at
+    )
+    if now > due:
+        yield message("doubt.calibration-overdue", due=f"{local_time(due):%Y-%m-%d}")
 
 
 def restored_result(
@@ -38,6 +100,8 @@ def restored_result(
         The entry put no tip in force, or the archive does not tell all of it.
     """
     event = entry.entry.event
+    if not reason.strip():
+        raise AcceptanceError("reinstating.no-reason")
     if event.kind not in IN_FORCE_BY:
         raise ArchiveError("archive.not-restorable", number=entry.entry.number)
     try:

@@ -18,8 +18,15 @@ from lightpen.record.folder.verifications import (
     StoredVerification,
     read_verification,
 )
+from lightpen.record.library.guard_files import LIMITS_FOLDER, read_limits_change
+from lightpen.record.library.key_changes import (
+    OLD_KEY_SIGNATURE,
+    STATION_KEY,
+    SUPERVISOR_KEY,
+    SUPERVISOR_SIGNATURE,
+)
 from lightpen.record.library.numbered_files import numbered_files
-from lightpen.record.library.supervision import LIMITS_FOLDER, read_limits_change
+from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.record.swings.assumed import Plain
 from lightpen.record.swings.journal import JOURNAL
@@ -69,10 +76,20 @@ def account_of_station(results: FolderArchive, file: Path) -> ExtractedEvent:
 
 
 def _of_limits(file: Path, content: bytes, place: FileHash) -> Event:
+    """Return a change of limits, once all of them are known to be signed."""
+    read_supervision(file.parents[1])
     change = read_limits_change(content, file)
-    settings: dict[str, Plain] = {"changes_password": bool(change.password)}
+    settings: dict[str, Plain] = {"changes_password": change.password is not None}
     if change.limits is not None:
         settings |= change.limits
+    if change.password is not None:
+        settings[SUPERVISOR_KEY] = change.password.key
+    if change.station_key:
+        settings |= {
+            STATION_KEY: change.station_key,
+            OLD_KEY_SIGNATURE: change.station_key_signature,
+            SUPERVISOR_SIGNATURE: change.key_approval,
+        }
     return Event(
         kind=Kind.LIMITS,
         at=change.at,

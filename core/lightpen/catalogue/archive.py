@@ -32,6 +32,8 @@ MESSAGES = {
     "archive.vouched-changed": "The file {file} of entry {number} was modified after it was entered.",
     "archive.vouched-missing": "The file {file} of entry {number} is missing.",
     "archive.swing-missing": "The swing {folder} of entry {number} is missing.",
+    "archive.of-other-station": "Entry {number} is not of this station. Only a tip that was accepted here can be reinstated.",
+    "reinstating.no-reason": "Enter the reason for reinstating this tip.",
     "archive.not-restorable": "Entry {number} is not an accepted tip. Choose the entry of an accepted tip.",
     "archive.too-little-kept": "Entry {number} has no complete calibration record and cannot be reinstated. Calibrate the tip again.",
     "archive.another-result": "The result {file} is not the one that was entered in the archive: it was changed since. Restore it from a copy.",

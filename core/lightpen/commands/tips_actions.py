@@ -96,7 +96,8 @@ def _change(options: argparse.Namespace) -> None:
     data = _data(options)
     there = known_item(read_library(data), ItemKind(options.kind), options.id)
     item = _with_entries(there, options)
-    _tell(options, item, change_item(data, item, _author(options), local_now()))
+    library = change_item(data, item, _author(options), local_now(), there)
+    _tell(options, item, library)
 
 
 @printing
@@ -116,15 +117,15 @@ def _spin(options: argparse.Namespace) -> None:
     assert isinstance(tip, ListedTip)
     found = _spun(options)
     x, y, z = found.axis_pen.tolist()
-    tip = structs.replace(tip, stylus_axis=(x, y, z), axis_origin=AxisOrigin.SPIN)
-    library = change_item(data, tip, _author(options), local_now())
+    spun = structs.replace(tip, stylus_axis=(x, y, z), axis_origin=AxisOrigin.SPIN)
+    library = change_item(data, spun, _author(options), local_now(), tip)
     if not options.json:
         print(
             f"Axis {x:.5f} {y:.5f} {z:.5f}, U (k = 2) "
             f"{_degrees(found.expanded_uncertainty)}, turned by "
             f"{_degrees(found.turn)}, tilted by {_degrees(found.wobble)} rms."
         )
-    _tell(options, tip, library)
+    _tell(options, spun, library)
 
 
 ACTIONS: dict[str, Command] = {

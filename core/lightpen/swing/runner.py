@@ -142,9 +142,25 @@ class SwingRunner:
         """
         self._queue.ask(lambda: self._workflow.accept(reason, signature))
 
-    def revoke(self, result: Result, operator: str) -> None:
-        """Revoke a result in favour of the one before."""
-        self._queue.ask(lambda: self._workflow.revoke(result, operator))
+    def revoke(
+        self,
+        result: Result,
+        operator: str,
+        reason: str = "",
+        signature: Signature | None = None,
+    ) -> None:
+        """Revoke a result in favour of the one before.
+
+        Parameters
+        ----------
+        reason : str
+            In the words of the operator.
+        signature : Signature, optional
+            Signature of a supervisor, if one is required.
+        """
+        self._queue.ask(
+            lambda: self._workflow.revoke(result, operator, reason, signature)
+        )
 
     def set_aside(self) -> None:
         """Discard the swing, for a repetition; its images are kept."""

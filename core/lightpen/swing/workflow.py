@@ -547,12 +547,20 @@ class SwingWorkflow:
         finally:
             self._publish(status)
 
-    def revoke(self, result: Result, operator: str) -> None:
+    def revoke(
+        self,
+        result: Result,
+        operator: str,
+        reason: str = "",
+        signature: Signature | None = None,
+    ) -> None:
         """Revoke a result in favour of the one before, or report why not."""
-        self._faults.trying(lambda: self._withdraw(result, operator))
+        self._faults.trying(lambda: self._withdraw(result, operator, reason, signature))
 
-    def _withdraw(self, result: Result, operator: str) -> None:
-        self._archive.revoke(result, operator, self._now())
+    def _withdraw(
+        self, result: Result, operator: str, reason: str, signature: Signature | None
+    ) -> None:
+        self._archive.revoke(result, operator, self._now(), reason, signature)
         status, own = self._status, self._status.result
         if own is not None and own.record == result.record:
             status = replace(status, result=None)

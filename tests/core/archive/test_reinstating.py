@@ -3,11 +3,13 @@
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
 import pytest
 from msgspec import structs
+from tests.core.archive.conftest import Station
 from tests.core.archive.test_logbook import NAMES, checked, result
 
 from lightpen.archive.chains import append, entries_of
@@ -16,11 +18,17 @@ from lightpen.archive.entries import Event, Kind, StoredEntry, text_sha256
 from lightpen.archive.history import lines, messages_on
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.queries import EntryFilter, last_accepted
-from lightpen.errors import AcceptanceError, ArchiveError
+from lightpen.errors import AcceptanceError, ArchiveError, FileError
+from lightpen.local_time import local_now
 from lightpen.model.limits import DueRule
+from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.library_changes import Author, add_item, retire_item
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.supervision_changes import set_password
 from lightpen.record.library.tip_library import ItemKind, ListedTip
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen.record.results.results import result_bytes
+from lightpen.record.signing.station import memory_file
 from lightpen.record.swings.names import Names
 
 BEA = Names("Hall 7", "Bea")
@@ -156,3 +164,112 @@ def test_a_note_is_an_entry_on_another(data: Path, logbook: Logbook) -> None:
     assert event.reason == "Dropped on the floor. 掉在地上了"
     assert (event.names.pen, event.names.tip) == ("LP-04", "T-10")
     assert checked(data).findings == ()
+
+
+EVE = Signature("Eve", "correct horse")
+
+
+def test_where_there_is_a_password_a_supervisor_reinstates_a_tip(
+    data: Path, logbook: Logbook
+) -> None:
+    set_password(data, EVE, EVE.password, local_now())
+    first, _ = entries(logbook)
+    wrong = Signature("Eve", "wrong horse")
+    for signature in (None, wrong):
+        with pytest.raises(AcceptanceError):
+            logbook.restore(first, BEA, "The new one is bent.", signature)
+    assert len(FolderArchive(data).all_files()) == 2
+
+    restored = logbook.restore(first, BEA, "The new one is bent.", EVE)
+    assert restored.supervisor == "Eve"
+    found = FolderArchive(data).in_force("LP-04", "T-10")
+    assert found is not None
+    assert found.supervisor == "Eve"
+    assert any(each.code == "doubt.calibration-overdue" for each in found.doubts)
+    assert checked(data).findings == ()
+
+
+def test_where_there_is_a_password_a_supervisor_takes_a_tip_back(
+    data: Path, logbook: Logbook
+) -> None:
+    set_password(data, EVE, EVE.password, local_now())
+    archive, now = FolderArchive(data), local_now()
+    last = archive.in_force("LP-04", "T-10")
+    assert last is not None
+    for reason, signature in (
+        ("Bent.", None),
+        ("", EVE),
+        ("Bent.", replace(EVE, password="no")),
+    ):
+        with pytest.raises(AcceptanceError):
+            archive.revoke(last, "Bea", now, reason, signature)
+    assert len(archive.all_files()) == 2
+
+    archive.revoke(last, "Bea", now, "Bent.", EVE)
+    logbook.enter_owed()
+    found = archive.in_force("LP-04", "T-10")
+    assert found is not None
+    assert found.tip_pen[0] == 0.0
+    event = entries(logbook)[-1].entry.event
+    assert (event.reason, event.settings["supervisor"]) == ("Bent.", "Eve")
+
+
+def test_a_tip_is_reinstated_with_a_reason_only(data: Path, logbook: Logbook) -> None:
+    with pytest.raises(AcceptanceError, match="Enter the reason"):
+        logbook.restore(entries(logbook)[0], BEA, " ")
+
+
+def test_a_tip_of_another_station_is_not_reinstated(
+    data: Path, logbook: Logbook, make_station: Callable[[str], Station]
+) -> None:
+    (foreign,) = make_station("Hall 9").enter(1)
+    with pytest.raises(ArchiveError, match="not of this station"):
+        logbook.restore(foreign, BEA, "It was better.")
+
+
+def test_a_tip_whose_file_was_changed_is_not_reinstated(
+    data: Path, logbook: Logbook
+) -> None:
+    first = entries(logbook)[0]
+    assert first.entry.event.result is not None
+    file = data / first.entry.event.result.place
+    file.write_bytes(file.read_bytes() + b" ")
+    with pytest.raises(ArchiveError, match="was modified"):
+        logbook.restore(first, BEA, "It was better.")
+
+
+def test_limits_that_are_not_those_of_the_archive_stop_every_acceptance(
+    data: Path, logbook: Logbook
+) -> None:
+    set_password(data, EVE, EVE.password, local_now())
+    logbook.enter_owed()
+    shutil.rmtree(data / LIMITS_FOLDER)
+    memory_file(data).unlink()
+    archive = FolderArchive(data, logbook.confirm)
+    with pytest.raises(AcceptanceError, match="not those entered in its archive"):
+        archive.supervision()
+    with pytest.raises(AcceptanceError, match="not those entered in its archive"):
+        logbook.restore(entries(logbook)[0], BEA, "It was better.")
+
+
+def test_a_result_that_was_written_by_hand_is_neither_in_force_nor_entered(
+    data: Path, logbook: Logbook
+) -> None:
+    archive = FolderArchive(data)
+    set_password(data, EVE, EVE.password, local_now())
+    logbook.enter_owed()
+    n_entries = len(entries(logbook))
+    chef = replace(result(data, 2), supervisor="Chef")
+    (archive.folder / "000003.json").write_bytes(result_bytes(chef, "records/swing"))
+    with pytest.raises(FileError, match="not signed"):
+        archive.in_force("LP-04", "T-10")
+    (why,) = logbook.enter_owed()
+    assert why.code == "signing.unsigned-file"
+    assert len(entries(logbook)) == n_entries
+
+    (archive.folder / "000003.json").unlink()
+    archive.store(replace(result(data, 2), supervisor=""))
+    signed = (archive.folder / "000003.json").read_bytes()
+    (archive.folder / "000004.json").write_bytes(signed)  # once more, at the end
+    with pytest.raises(FileError, match="not signed"):
+        archive.in_force("LP-04", "T-10")

@@ -24,7 +24,8 @@ from lightpen.record.folder.camera_calibrations import CameraTrial, keep_camera_
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
 from lightpen.record.library.numbered_files import add_numbered
-from lightpen.record.library.supervision import Signature, save_limits
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.supervision_changes import save_limits
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
 from lightpen.verification.reports.records import verification_record
@@ -151,7 +152,11 @@ def test_a_change_of_limits_and_of_the_password_is_entered_with_who_and_when(
 
     password, limits = events(logbook)
     assert {password.kind, limits.kind} == {Kind.LIMITS}
-    assert password.settings == {"changes_password": True}
+    assert password.settings["changes_password"] is True
+    assert set(password.settings) == {
+        *("changes_password", "station_key", "station_key_signature"),
+        *("supervisor_key", "supervisor_signature"),
+    }
     assert (limits.names.operator, limits.names.station) == ("Eve", "Hall 2")
     assert limits.at == NOON
     assert limits.settings["max_radius_mm"] == StationLimits().verification.radius

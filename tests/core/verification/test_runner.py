@@ -27,7 +27,8 @@ from lightpen.formats.files import sha256
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
 from lightpen.record.folder.verifications import TOUCHES, VERIFICATIONS
-from lightpen.record.library.supervision import Signature, set_password
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.supervision_changes import set_password
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.reading import DISCARDED, Record, RecordedImage, open_record

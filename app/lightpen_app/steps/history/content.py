@@ -13,6 +13,7 @@ from lightpen.archive.entries import StoredEntry
 from lightpen.archive.history import Line
 from lightpen.archive.queries import EntryFilter
 from lightpen.model.limits import DueRule
+from lightpen.record.library.supervision import Signature
 from lightpen.record.results.results import Result
 from lightpen.verification.history.trend import Trend
 from lightpen_app.look.layouts import vertical_layout
@@ -196,6 +197,7 @@ class HistoryContent(Translated, QWidget):
     def _show_rule(self) -> None:
         is_guarded = self._chosen.supervision.is_guarded
         self._due.set_rule(self._chosen.limits.due, is_guarded=is_guarded)
+        self._entry.set_guarded(is_guarded)
 
     def _on_workbench_changed(self) -> None:
         before = self._due.rule()
@@ -216,10 +218,13 @@ class HistoryContent(Translated, QWidget):
             lambda _: self.read_anew(),
         )
 
-    def _restore(self, entry: StoredEntry, reason: str) -> None:
+    def _restore(
+        self, entry: StoredEntry, reason: str, signature: Signature | None
+    ) -> None:
         logbook, names = self._logbook, self._chosen.preparation.names
         self._enter(
-            lambda _: logbook.opened().restore(entry, names, reason), self._on_restored
+            lambda _: logbook.opened().restore(entry, names, reason, signature),
+            self._on_restored,
         )
 
     def _enter(

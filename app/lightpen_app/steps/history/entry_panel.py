@@ -13,6 +13,7 @@ from lightpen.archive.entries import (
     StoredEntry,
 )
 from lightpen.archive.history import Line, TipState
+from lightpen.record.library.supervision import Signature
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
@@ -39,14 +40,14 @@ class EntryPanel(Translated, QWidget):
     -------
     note_given(Written, str)
         A note on an entry.
-    restore_requested(Written, str)
+    restore_requested(Written, str, Signature or None)
         The tip of an entry shall be in force again, for a reason.
     paper_requested(Written)
         The record on paper of an entry's tip shall be shown.
     """
 
     note_given = Signal(object, str)
-    restore_requested = Signal(object, str)
+    restore_requested = Signal(object, str, object)
     paper_requested = Signal(object)
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -54,7 +55,7 @@ class EntryPanel(Translated, QWidget):
         self._line: Line | None = None
         self._asked: StoredEntry | None = None
         self._home = ""
-        self._restores = False
+        self._restores = self._is_guarded = False
         self._messages: tuple[StoredEntry, ...] = ()
 
         # Widgets
@@ -106,6 +107,10 @@ class EntryPanel(Translated, QWidget):
         """Take over which chain is at home here: the files of its results are here."""
         self._home = chain
 
+    def set_guarded(self, is_guarded: bool) -> None:
+        """Ask for a supervisor before a tip is reinstated, or for none."""
+        self._is_guarded = is_guarded
+
     def set_messages(self, remarks: Sequence[StoredEntry]) -> None:
         """Show what concerns the entry."""
         self._messages = tuple(remarks)
@@ -122,7 +127,7 @@ class EntryPanel(Translated, QWidget):
             return
         self._asked, self._restores = line.entry, restores
         self._word_question()
-        self._reason.ask()
+        self._reason.ask(of_supervisor=restores and self._is_guarded)
 
     def _word_question(self) -> None:
         if self._restores:
@@ -147,9 +152,11 @@ class EntryPanel(Translated, QWidget):
         if self._line is not None and self._line.entry is not None:
             self.paper_requested.emit(self._line.entry)
 
-    def _on_given(self, text: str) -> None:
-        given = self.restore_requested if self._restores else self.note_given
-        given.emit(self._asked, text)
+    def _on_given(self, text: str, signature: Signature | None) -> None:
+        if self._restores:
+            self.restore_requested.emit(self._asked, text, signature)
+        else:
+            self.note_given.emit(self._asked, text)
 
     def _retranslate(self) -> None:
         line, entry = self._line, None if self._line is None else self._line.entry

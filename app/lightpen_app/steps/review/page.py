@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from typing_extensions import override
 
 from lightpen.estimation.reports.verdict import Grade, NextStep
+from lightpen.record.library.supervision import Signature
 from lightpen.record.results.acceptance import takes_supervisor
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.swing.status import SwingStatus
@@ -79,6 +80,7 @@ class ReviewPage(Page):
         view.take_back.clicked.connect(self._ask_to_take_back)
         view.accept.clicked.connect(self._ask_reason)
         view.reason.given.connect(self._runner.accept)
+        view.withdrawal.given.connect(self._withdraw)
         view.tabs.images_made.connect(self._on_images_made)
         view.tabs.saved.connect(notices.show_status)
         view.tabs.failed.connect(partial(notices.tell, self.key))
@@ -226,17 +228,21 @@ class ReviewPage(Page):
         assessment = self._run.status.assessment
         supervision = self._selection.supervision
         if assessment is not None:
-            of_supervisor = takes_supervisor(supervision, assessment)
+            station = self._run.status.names.station
+            of_supervisor = takes_supervisor(supervision, assessment, station)
             self._view.reason.ask(of_supervisor=of_supervisor)
 
     def _ask_to_take_back(self) -> None:
-        self._view.question.ask_about(take_back_question, self._withdraw)
+        if self._selection.supervision.is_guarded:
+            self._view.withdrawal.ask(of_supervisor=True)
+        else:
+            self._view.question.ask_about(take_back_question, self._withdraw)
 
-    def _withdraw(self) -> None:
+    def _withdraw(self, reason: str = "", signature: Signature | None = None) -> None:
         result = self._run.status.result
         if result is not None:
             operator = self._selection.preparation.names.operator
-            self._runner.revoke(result, operator)
+            self._runner.revoke(result, operator, reason, signature)
 
     def _on_run_troubled(self) -> None:
         if self._run.status.result is None:

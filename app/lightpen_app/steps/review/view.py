@@ -19,6 +19,7 @@ from lightpen_app.widgets.reason_bar import ReasonBar, usual_reasons
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.withdrawal_bar import WithdrawalBar
 from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.swing_run import SwingRun
 
@@ -42,6 +43,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self._banner = StateBanner(TextSize.TITLE)
         self._banner.setMinimumHeight(self._banner.sizeHint().height())
         self.question, self.reason = QuestionBar(), ReasonBar()
+        self.withdrawal = WithdrawalBar()
         self._progress = QProgressBar()
         self.cancel = PushButton()
         self._solving = QWidget()
@@ -69,6 +71,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         fill(buttons, (self.accept, 1), (self.verify, 1), (self.take_back, 1))
         fill(below, self.next_tips, 0)
         layout = vertical_layout(self, self._banner, self.question, self.reason)
+        fill(layout, self.withdrawal)
         fill(layout, self._solving, self._messages)
         self._columns = horizontal_layout(layout, stretch=1, spacing=2 * GRID)
         self._use_room()  # before the tabs: the order of the Tab key
@@ -77,6 +80,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         # Connections
         self._patience.timeout.connect(self._solving.show)
         self.reason.declined.connect(self.tabs.setFocus)
+        self.withdrawal.declined.connect(self.tabs.setFocus)
         self.question.declined.connect(self.tabs.setFocus)
 
         self._retranslate()
@@ -121,6 +125,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         """Ask nothing any more."""
         self.question.hide()
         self.reason.hide()
+        self.withdrawal.hide()
 
     @override
     def _retranslate(self) -> None:

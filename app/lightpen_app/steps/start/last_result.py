@@ -5,6 +5,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject, Signal
 
 from lightpen.model.origin import Origin
+from lightpen.record.library.supervision import Signature
 from lightpen.record.results.results import Result
 from lightpen.swing.preparation import Preparation
 from lightpen_app.look.phrases import first_missing
@@ -111,15 +112,18 @@ class LastResultPresenter(QObject):
     def show_status(self) -> None:
         """Mark the selected tip by its status."""
         now, library = self._selection.preparation, self._library
+        self._panel.set_guarded(self._selection.supervision.is_guarded)
         status = library.statuses.of_tip(now.names.pen, now.names.tip)
         self._panel.set_status(None if now.origin is Origin.SIMULATED else status)
         due = self._selection.limits.due
         self._panel.set_rule(library.library.rule_of(now.names.tip, due))
         self._panel.set_why_unverified(first_missing(now.missing_inputs()))
 
-    def _on_take_back_requested(self, result: Result) -> None:
+    def _on_take_back_requested(
+        self, result: Result, reason: str, signature: Signature | None
+    ) -> None:
         operator = self._selection.preparation.names.operator
-        self._run.runner.revoke(result, operator)
+        self._run.runner.revoke(result, operator, reason, signature)
 
 
 def _key(preparation: Preparation) -> tuple[str, str, bool]:

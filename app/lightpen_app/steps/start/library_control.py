@@ -1,7 +1,6 @@
 """What the step Start does with the tip library: lists, dialog and barcodes."""
 
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 
 from msgspec import structs
@@ -195,5 +194,6 @@ def _changed(
     item: AnyItem = asked.item
     if asked.picture and isinstance(item, ListedTip):
         item = structs.replace(item, picture=keep_picture(folder, Path(asked.picture)))
-    make = partial(add_item if asked.is_new else change_item, folder)
-    return make(item, by, now)
+    if asked.is_new:
+        return add_item(folder, item, by, now)
+    return change_item(folder, item, by, now, asked.before)

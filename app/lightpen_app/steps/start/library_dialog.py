@@ -54,6 +54,8 @@ class RequestedChange:
         Whether the item is to be added.
     signature : Signature or None
         Signature of a supervisor, if one is required.
+    before : item or None
+        The item as it was shown; None for a new one.
     """
 
     item: AnyItem
@@ -61,6 +63,7 @@ class RequestedChange:
     is_new: bool
     reason: str
     signature: Signature | None
+    before: AnyItem | None = None
 
 
 class LibraryDialog(Translated, QDialog):
@@ -89,6 +92,7 @@ class LibraryDialog(Translated, QDialog):
         self._pen = ""
         self._is_guarded = False
         self._item: AnyItem | None = None  # that is being added or changed
+        self._before: AnyItem | None = None  # as it was shown
         self._is_new = False
         self._asked: RequestedChange | None = (
             None  # of which it is not known if it is kept
@@ -265,7 +269,7 @@ class LibraryDialog(Translated, QDialog):
         return row
 
     def _start_editing(self, item: AnyItem, what: str, *, is_new: bool) -> None:
-        self._item, self._is_new = item, is_new
+        self._item, self._before, self._is_new = item, None if is_new else item, is_new
         self._what.setText(what)
         self._form.set_value(item, is_new=is_new)
         self._form.show()
@@ -306,7 +310,7 @@ class LibraryDialog(Translated, QDialog):
         if item is None:
             return
         back = item.is_retired
-        self._item = structs.replace(item, is_retired=not back)
+        self._item, self._before = structs.replace(item, is_retired=not back), item
         self._is_new = False
         words = self.tr("Reactivate {0}") if back else self.tr("Retire {0}")
         self._what.setText(words.format(item.id))
@@ -332,7 +336,9 @@ class LibraryDialog(Translated, QDialog):
         self._fault.set_value(StatusMessage())
         picture = self._form.picture() if is_typed else ""
         reason = self._reason.text().strip()
-        self._asked = RequestedChange(item, picture, self._is_new, reason, signature)
+        self._asked = RequestedChange(
+            *(item, picture, self._is_new, reason, signature, self._before)
+        )
         self._refresh()
         self.change_asked.emit(self._asked)
 

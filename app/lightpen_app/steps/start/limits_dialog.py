@@ -5,7 +5,8 @@ from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLineEdit, QWidget
 from typing_extensions import override
 
 from lightpen.model.limits import LIMITS, StationLimits
-from lightpen.record.library.supervision import Signature, Supervision, save_limits
+from lightpen.record.library.supervision import Signature, Supervision, read_supervision
+from lightpen.record.library.supervision_changes import save_limits
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
@@ -159,6 +160,7 @@ class LimitsControl(QObject):
         self._folder, self._clock = workbench.folder, workbench.around.now
         self._dialog = LimitsDialog(page)
         self._saving: Job | None = None
+        self._shown = StationLimits()
 
         # Connections
         self._dialog.signed.connect(self._on_signed)
@@ -169,6 +171,7 @@ class LimitsControl(QObject):
         due = self._selection.limits.due
         limits = StationLimits(now.limits, choices.limits, due)
         is_guarded = self._selection.supervision.is_guarded
+        self._shown = limits
         self._dialog.set_value(limits, is_guarded=is_guarded)
         self._dialog.open()
 
@@ -180,18 +183,28 @@ class LimitsControl(QObject):
     def _on_signed(
         self, limits: StationLimits, signature: Signature, new_password: str
     ) -> None:
-        folder, now = self._folder, self._clock
+        folder, now, before = self._folder, self._clock, self._shown
         station = self._selection.preparation.names.station
         self._saving = job = Job(
             lambda _: save_limits(
-                *(folder, station, limits, signature, new_password, now())
+                *(folder, station, limits, signature, new_password, now(), before)
             ),
             self,
         )
 
         # Connections
         job.succeeded.connect(self._on_saved)
-        job.failed.connect(self._dialog.tell)
+        job.failed.connect(self._on_failed)
+        job.start()
+
+    def _on_failed(self, why: str) -> None:
+        """Report it, and read the limits again: another window may have set them."""
+        folder = self._folder
+        self._dialog.tell(why)
+        job = Job(lambda _: read_supervision(folder), self)
+
+        # Connections
+        job.succeeded.connect(self._selection.set_supervision)
         job.start()
 
     def _on_saved(self, supervision: Supervision) -> None:

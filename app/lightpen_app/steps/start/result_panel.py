@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QGroupBox, QLabel, QWidget
 from lightpen.local_time import local_time
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import TipStatus
+from lightpen.record.library.supervision import Signature
 from lightpen.record.results.results import Result
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import (
@@ -30,6 +31,7 @@ from lightpen_app.widgets.responsive_layout import SizeClass
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.status_mark import status_message
 from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.withdrawal_bar import WithdrawalBar
 
 DAYS_IN_MONTH, DAYS_IN_YEAR = 30, 365
 SIZES = (  # of age, words and figures, where there is little room, plenty, and more
@@ -71,13 +73,13 @@ class LastResultPanel(Translated, QGroupBox):
 
     Signals
     -------
-    take_back_requested(Result)
+    take_back_requested(Result, str, Signature or None)
         The result that is shown shall not be in force any more.
     verification_requested()
         The tip that is shown shall be verified.
     """
 
-    take_back_requested = Signal(object)
+    take_back_requested = Signal(object, str, object)
     verification_requested = Signal()
 
     def __init__(
@@ -107,6 +109,8 @@ class LastResultPanel(Translated, QGroupBox):
         self._take_back = PushButton()
         self._question = QuestionBar()
         self._question.set_words(self._taking_back)
+        self._withdrawal = WithdrawalBar()
+        self._is_guarded = False
 
         # Layout
         layout = vertical_layout(self, spacing=GRID // 2)
@@ -126,11 +130,13 @@ class LastResultPanel(Translated, QGroupBox):
             table.addWidget(self._uncertainty[row - 1], row, 2)
         table.setColumnStretch(3, 1)
         horizontal_layout(layout, self._verify, self._take_back, 1)
-        fill(layout, self._question)
+        fill(layout, self._question, self._withdrawal)
 
         # Connections
         self._verify.clicked.connect(self.verification_requested)
-        self._take_back.clicked.connect(self._question.ask)
+        self._take_back.clicked.connect(self._ask_to_take_back)
+        self._withdrawal.given.connect(self._on_signed)
+        self._withdrawal.declined.connect(self._take_back.setFocus)
         self._question.agreed.connect(self._on_agreed)
         self._question.declined.connect(self._take_back.setFocus)
 
@@ -272,8 +278,21 @@ class LastResultPanel(Translated, QGroupBox):
             text = text.format(shortened(result.supervisor), result.reason)
         return StatusMessage(text, Sign.WARNING, Tone.WARN)
 
+    def set_guarded(self, is_guarded: bool) -> None:
+        """Ask for a supervisor before an acceptance is revoked, or for none."""
+        self._is_guarded = is_guarded
+
+    def _ask_to_take_back(self) -> None:
+        if self._is_guarded:
+            self._withdrawal.ask(of_supervisor=True)
+        else:
+            self._question.ask()
+
     def _on_agreed(self) -> None:
-        self.take_back_requested.emit(self._value.result)
+        self.take_back_requested.emit(self._value.result, "", None)
+
+    def _on_signed(self, reason: str, signature: Signature) -> None:
+        self.take_back_requested.emit(self._value.result, reason, signature)
 
     def _warning_of(self, result: Result, now: datetime) -> StatusMessage:
         if result.accepted > now:

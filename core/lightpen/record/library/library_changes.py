@@ -15,11 +15,16 @@ from lightpen.errors import FileError, NameTakenError, UsageError
 from lightpen.formats import upgrades
 from lightpen.formats.files import MEGABYTE, create_whole, printable, read_bytes
 from lightpen.formats.image_headers import read_image_header
-from lightpen.formats.json_records import record_bytes
+from lightpen.formats.json_records import json_bytes
+from lightpen.formats.own_json import with_checksum
 from lightpen.formats.upgrades import newest_format
 from lightpen.messages import Message, message
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
-from lightpen.record.library.numbered_files import add_numbered, make_folder
+from lightpen.record.library.numbered_files import (
+    make_folder,
+    newest_number,
+    numbered_file,
+)
 from lightpen.record.library.supervision import (
     Signature,
     read_supervision,
@@ -42,8 +47,10 @@ from lightpen.record.library.tip_library import (
     Picture,
     read_library,
 )
+from lightpen.record.signing.signed_text import place_in
 
 LARGEST_PLACE = 10_000.0  # mm
+SEPARATORS = set("/\\")  # of folders
 LARGEST_PICTURE = 8 * MEGABYTE
 PICTURE = message("file.picture")
 
@@ -79,29 +86,52 @@ def add_item(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
         It cannot be kept; the library stays as it was.
     """
     item = _sensible(item)
-    there = read_library(data).alike(item.kind, item.id)
-    if there is not None:
-        raise UsageError(_in_use(there))
-    return _keep(data, item, by, now)
+    while True:
+        number = newest_number(data / LIBRARY) + 1
+        there = read_library(data).alike(item.kind, item.id)
+        if there is not None:
+            raise UsageError(_in_use(there))
+        with suppress(NameTakenError):  # another program changed the library meanwhile
+            return _keep(data, number, item, by, now)
 
 
-def change_item(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
+def change_item(
+    data: Path, item: AnyItem, by: Author, now: datetime, before: AnyItem | None = None
+) -> Library:
     """Put another version of an item in its place, and return the library.
 
     One that is as it was is not kept once more.
 
+    Parameters
+    ----------
+    before : item, optional
+        As it was shown while it was edited.
+
     Raises
     ------
     UsageError
-        It is not in the library, or an entry makes no sense.
+        It is not in the library, an entry makes no sense, or it was changed since it
+        was shown.
     AcceptanceError, FileError
         As of `add_item`.
     """
-    item, library = _sensible(item), read_library(data)
-    there = library.item(item.kind, item.id)
-    if there is None:
-        raise UsageError(no_such_item(item.kind, item.id))
-    return library if there == item else _keep(data, item, by, now)
+    item = _sensible(item)
+    while True:
+        number = newest_number(data / LIBRARY) + 1
+        library = read_library(data)
+        there = library.item(item.kind, item.id)
+        if there is None:
+            raise UsageError(no_such_item(item.kind, item.id))
+        if there == item:
+            return library
+        if before is not None and there != before:
+            raise UsageError(
+                "library.changed-meanwhile",
+                kind=KIND_WORDS[item.kind],
+                id=printable(item.id),
+            )
+        with suppress(NameTakenError):  # another program changed the library meanwhile
+            return _keep(data, number, item, by, now)
 
 
 def retire_item(
@@ -123,7 +153,8 @@ def retire_item(
         As of `add_item`.
     """
     item = known_item(read_library(data), kind, name)
-    return change_item(data, structs.replace(item, is_retired=is_retired), by, now)
+    retired = structs.replace(item, is_retired=is_retired)
+    return change_item(data, retired, by, now, before=item)
 
 
 def known_item(library: Library, kind: ItemKind, name: str) -> AnyItem:
@@ -205,12 +236,13 @@ def no_such_item(kind: ItemKind, name: str) -> Message:
     return message("library.no-such-item", kind=KIND_WORDS[kind], id=printable(name))
 
 
-def _keep(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
-    supervisor = ""
+def _keep(data: Path, number: int, item: AnyItem, by: Author, now: datetime) -> Library:
+    """Keep a change as the file of a number; `NameTakenError` if there is another."""
+    supervisor, signers = "", None
     supervision = read_supervision(data)
     if supervision.is_guarded:
         signature = by.signature or Signature("", "")
-        require_supervisor(supervision, signature)
+        signers = supervision.signers(require_supervisor(supervision, signature))
         supervisor = signature.name.strip()
     change = LibraryChange(
         format=newest_format(upgrades.LIBRARY),
@@ -221,14 +253,20 @@ def _keep(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
         supervisor=supervisor,
         reason=by.reason.strip(),
     )
-    add_numbered(data / LIBRARY, record_bytes(change))
+    file = numbered_file(data / LIBRARY, number)
+    make_folder(file.parent)
+    text = json_bytes(change)
+    if signers is not None:
+        text = signers.signed(text, place_in(data, file))
+    create_whole(file, with_checksum(text) + b"\n")
     return read_library(data)
 
 
 def _sensible(item: AnyItem) -> AnyItem:
     """Return an item as stored; reject implausible values."""
     name = item.id.strip()
-    if not (name and name.isprintable() and len(name) <= LONGEST_ID):
+    is_id = name and name.isprintable() and not set(name) & SEPARATORS
+    if not (is_id and len(name) <= LONGEST_ID):
         raise UsageError(
             "library.bad-id", id=printable(name[: 2 * LONGEST_ID]), most=LONGEST_ID
         )

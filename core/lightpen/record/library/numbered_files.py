@@ -5,6 +5,7 @@ set back can turn round. Of two programs that take the same number one gets it, 
 other the next.
 """
 
+from collections.abc import Callable
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
@@ -20,11 +21,16 @@ from lightpen.formats.files import (
 from lightpen.formats.system_reasons import strerror
 
 
-def add_numbered(folder: Path, data: bytes) -> Path:
+def add_numbered(folder: Path, data: bytes | Callable[[Path], bytes]) -> Path:
     """Add a file, the newest of all, and return it.
 
     When this returns, it is kept whatever happens next; when it raises, or is killed,
     it is kept whole or not at all.
+
+    Parameters
+    ----------
+    data : bytes or callable
+        Content; or a function that returns it for the file.
 
     Raises
     ------
@@ -32,13 +38,29 @@ def add_numbered(folder: Path, data: bytes) -> Path:
         It cannot be written.
     """
     make_folder(folder)
-    newest = numbered_files(folder)[:1]
-    for free in count(1 + (_number(newest[0]) if newest else 0)):
-        file = folder / f"{free:06d}.json"
+    for free in count(1 + newest_number(folder)):
+        file = numbered_file(folder, free)
         with suppress(NameTakenError):  # by another program, just now
-            create_whole(file, data)
+            create_whole(file, data if isinstance(data, bytes) else data(file))
             break
     return file
+
+
+def numbered_file(folder: Path, number: int) -> Path:
+    """Return the file of a number."""
+    return folder / f"{number:06d}.json"
+
+
+def newest_number(folder: Path) -> int:
+    """Return the number of the newest file; 0 where there is none.
+
+    Raises
+    ------
+    FileError
+        The folder cannot be read.
+    """
+    newest = numbered_files(folder)[:1]
+    return number_of(newest[0]) if newest else 0
 
 
 def make_folder(folder: Path) -> None:
@@ -72,10 +94,10 @@ def numbered_files(folder: Path) -> list[Path]:
         paths = list(folder.iterdir()) if folder.is_dir() else []
     except OSError as error:
         raise unreadable(folder, FOLDER, error) from error
-    files = [path for path in paths if path.suffix == ".json" and _number(path)]
-    return sorted(files, key=lambda file: (_number(file), file.name), reverse=True)
+    files = [path for path in paths if path.suffix == ".json" and number_of(path)]
+    return sorted(files, key=lambda file: (number_of(file), file.name), reverse=True)
 
 
-def _number(file: Path) -> int:
+def number_of(file: Path) -> int:
     """Return the place of a file in the order; 0 for a foreign file."""
     return int(file.stem) if file.stem.isdecimal() else 0

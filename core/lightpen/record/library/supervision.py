@@ -1,35 +1,34 @@
-"""Who may change the limits of a station, and every change that was made.
+"""Who may change the limits of a station, and go beyond them.
 
-Each change is a file of its own in the data folder, numbered in their order and never
-changed: the newest password counts, and of each station the newest limits. A password
-is kept as Argon2 makes it [1]_: what is on the disk tells nobody what it is.
-
-References
-----------
-.. [1] RFC 9106, "Argon2 Memory-Hard Function for Password Hashing and Proof-of-Work
-   Applications", 2021.
+The password and the limits in force follow from the signed changes in the data folder,
+see `lightpen.record.library.guard_files`. All of them must be there, unchanged and
+signed; else nothing is accepted.
 """
 
+import re
+import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from datetime import datetime
+from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
 
-from msgspec import Struct, structs
-
 from lightpen.errors import AcceptanceError, FileError
-from lightpen.formats import upgrades
 from lightpen.formats.files import MEGABYTE, printable, read_bytes
-from lightpen.formats.json_records import record_bytes
-from lightpen.formats.own_json import DamagedError, ZonedTime, require_usual
-from lightpen.formats.upgrades import LaterFormatError, newest_format, parse_upgraded
-from lightpen.messages import message
-from lightpen.model.limits import LIMITS, StationLimits
-from lightpen.record.library.numbered_files import add_numbered, numbered_files
-
-LIMITS_FOLDER = "limits"
-WHAT = message("file.limits")
-LEAST_PASSWORD = 8  # characters
+from lightpen.model.limits import StationLimits
+from lightpen.record.library.guard_files import (
+    LIMITS_FOLDER,
+    NOTHING_BEFORE,
+    WHAT,
+    LimitsChange,
+    PasswordVerifier,
+    read_limits_change,
+)
+from lightpen.record.library.key_changes import key_change
+from lightpen.record.library.numbered_files import number_of, numbered_files
+from lightpen.record.library.password_delay import note_attempt, require_patience
+from lightpen.record.signing.keys import SigningKey, chain_of, is_signed, station_key
+from lightpen.record.signing.signed_text import Signers, place_in, signatures_of
+from lightpen.record.signing.station import memory_file, remembered
 
 
 @dataclass(frozen=True)
@@ -42,189 +41,244 @@ class Signature:
 
 @dataclass(frozen=True)
 class Supervision:
-    """What the supervisors of a data folder have laid down.
+    """What the supervisors of a data folder have set.
 
     Attributes
     ----------
-    password_hash : str
-        Empty where there is no password: then anybody may change limits.
+    password : PasswordVerifier or None
+        None where there is no password: then anybody may change limits.
     limits : mapping of str to StationLimits
-        Limits by station name.
+        By the name of the station, as it was written last.
+    chain : str
+        Name of the first station key, and of the archive's chain; empty where there
+        are no files.
+    station_keys, supervisor_keys : tuple of str
+        Public keys that were ever in use, the present one last.
+    unsigned : mapping of str to int
+        As of `LimitsChange`.
+    hashes : tuple of str
+        Of the files, the oldest first.
     """
 
-    password_hash: str = ""
+    password: PasswordVerifier | None = None
     limits: Mapping[str, StationLimits] = field(default_factory=dict)
+    chain: str = ""
+    station_keys: tuple[str, ...] = ()
+    supervisor_keys: tuple[str, ...] = ()
+    unsigned: Mapping[str, int] = field(default_factory=dict)
+    hashes: tuple[str, ...] = ()
 
     @property
     def is_guarded(self) -> bool:
         """Whether it takes a supervisor to change limits and to go beyond them."""
-        return bool(self.password_hash)
+        return self.password is not None
 
     def limits_at(self, station: str, chosen: StationLimits) -> StationLimits:
-        """Return the limits of a station: set by a supervisor, or chosen."""
-        return self.limits.get(station, chosen)
+        """Return the limits in force at a station: those set for it, or the chosen."""
+        found = self._limits_of(station)
+        return chosen if found is None else found
+
+    def is_unknown(self, station: str) -> bool:
+        """Return whether a guarded folder has no limits for a station."""
+        return self.is_guarded and self._limits_of(station) is None
+
+    def _limits_of(self, station: str) -> StationLimits | None:
+        folded = folded_name(station)
+        same = (
+            each for name, each in self.limits.items() if folded_name(name) == folded
+        )
+        return next(same, None)
+
+    def signers(self, supervisor: SigningKey | None = None) -> Signers:
+        """Return the keys by which a new file is signed.
+
+        Raises
+        ------
+        FileError
+            The station key is not in this user account, or cannot be read.
+        """
+        key = station_key(chain_of(self.station_keys[-1]))
+        if key is None:
+            raise FileError("signing.key-missing", chain=self.chain[:8])
+        return Signers(key, supervisor)
+
+    def require_signed(
+        self, data: Path, file: Path, text: bytes, *, has_supervisor: bool
+    ) -> None:
+        """Refuse a file of a guarded folder that is not signed as it must be.
+
+        Files that were there before the first password need no signatures.
+
+        Parameters
+        ----------
+        text : bytes
+            Of the JSON object with the signatures.
+        has_supervisor : bool
+            Whether it names a supervisor.
+
+        Raises
+        ------
+        FileError
+            It is not.
+        """
+        folder = place_in(data, file.parent)
+        if not self.is_guarded or number_of(file) <= self.unsigned.get(folder, 0):
+            return
+        found = signatures_of(text, place_in(data, file))
+        is_signed_so = any(map(found.is_by_station, self.station_keys)) and (
+            not has_supervisor or any(map(found.is_by_supervisor, self.supervisor_keys))
+        )
+        if not is_signed_so:
+            raise FileError("signing.unsigned-file", file=printable(str(file)))
 
 
-class LimitsChange(Struct, omit_defaults=True):
-    """What was laid down at one time: a password, or the limits of a station.
-
-    Attributes
-    ----------
-    password : str
-        Argon2 hash; empty if unchanged.
-    limits : mapping of str to float or None
-        Limits by `Limit.key`; None if only the password was changed.
-    """
-
-    format: int
-    at: ZonedTime
-    supervisor: str
-    station: str = ""
-    password: str = ""
-    limits: dict[str, float] | None = None
-
-    def __post_init__(self) -> None:
-        require_usual(self.at)
-        StationLimits().with_values(self.limits or {})
+def folded_name(station: str) -> str:
+    """Return a station name without case, width and additional spaces."""
+    normal = unicodedata.normalize("NFKC", station)
+    return re.sub(r"\s+", " ", normal).strip().casefold()
 
 
 def read_supervision(data: Path) -> Supervision:
-    """Read the supervision of a data folder.
+    """Return what is set in a data folder.
 
     Raises
     ------
     FileError
-        It cannot be read, or was changed: an older limit must not count again in
-        silence.
+        A file cannot be read, is missing, changed or not signed: other limits or
+        another password must not count in silence.
     """
-    password, limits = "", dict[str, StationLimits]()
-    for file in reversed(numbered_files(data / LIMITS_FOLDER)):
-        change = read_limits_change(read_bytes(file, WHAT, MEGABYTE), file)
-        password = change.password or password
-        if change.limits is not None:
-            limits[change.station] = StationLimits().with_values(change.limits)
-    return Supervision(password, limits)
+    folder = data / LIMITS_FOLDER
+    guard = Supervision()
+    for number, file in enumerate(reversed(numbered_files(folder)), start=1):
+        if number_of(file) != number:
+            raise FileError("limits.missing", folder=printable(str(folder)))
+        content = read_bytes(file, WHAT, MEGABYTE)
+        guard = _followed(guard, data, file, content)
+    before = remembered(data)
+    if before is not None:
+        there = guard.hashes[before.n_changes - 1 : before.n_changes]
+        if there != (before.sha256,):
+            raise FileError(
+                "limits.rolled-back",
+                folder=printable(str(folder)),
+                memory=printable(str(memory_file(data))),
+            )
+    return guard
 
 
-def read_limits_change(content: bytes, file: Path) -> LimitsChange:
-    """Read a limits file.
-
-    Raises
-    ------
-    FileError
-        It was changed since.
-    """
-    try:
-        return parse_upgraded(content, LimitsChange, upgrades.LIMITS)
-    except LaterFormatError as error:
-        raise FileError("limits.later-version", file=printable(str(file))) from error
-    except DamagedError as error:
-        raise FileError("limits.damaged", file=printable(str(file))) from error
-
-
-def set_password(data: Path, signature: Signature, new: str, now: datetime) -> None:
-    """Lay down a supervisor's password; where there is one, by that one only.
+def require_supervisor(
+    supervision: Supervision, signature: Signature | None
+) -> SigningKey:
+    """Return the key of a supervisor; refuse who is none.
 
     Raises
     ------
     AcceptanceError
-        The present password is another one, the name is missing, or the new one is too
-        short.
-    FileError
-        It cannot be kept.
+        There is no password yet, it is another one, the name is missing, or too many
+        wrong passwords were entered just now.
     """
-    from argon2 import PasswordHasher  # 20 ms that a start of the program need not take
-
-    supervision = read_supervision(data)
-    if supervision.is_guarded:
-        require_supervisor(supervision, signature)
-    else:
-        _require_name(signature)
-    if len(new) < LEAST_PASSWORD:
-        raise AcceptanceError(
-            "supervisor.short-password", length=len(new), needed=LEAST_PASSWORD
-        )
-    change = _change(now, signature)
-    _add(data, structs.replace(change, password=PasswordHasher().hash(new)))
-
-
-def set_limits(
-    data: Path, station: str, limits: StationLimits, signature: Signature, now: datetime
-) -> None:
-    """Lay down the limits of a station.
-
-    Raises
-    ------
-    AcceptanceError
-        It is not signed by a supervisor.
-    FileError
-        It cannot be kept.
-    """
-    require_supervisor(read_supervision(data), signature)
-    entry = {limit.key: limits.value(limit) for limit in LIMITS}
-    change = _change(now, signature)
-    _add(data, structs.replace(change, station=station, limits=entry))
-
-
-def save_limits(
-    data: Path,
-    station: str,
-    limits: StationLimits,
-    signature: Signature,
-    new_password: str,
-    now: datetime,
-) -> Supervision:
-    """Lay down limits, and a password where there is none or a new one is given.
-
-    Returns
-    -------
-    Supervision
-        What is laid down now.
-
-    Raises
-    ------
-    AcceptanceError
-        It is not signed by a supervisor, or the password is too short.
-    FileError
-        It cannot be kept.
-    """
-    if not read_supervision(data).is_guarded:
-        set_password(data, signature, signature.password, now)
-    if new_password:
-        set_password(data, signature, new_password, now)
-        signature = replace(signature, password=new_password)
-    set_limits(data, station, limits, signature, now)
-    return read_supervision(data)
-
-
-def require_supervisor(supervision: Supervision, signature: Signature) -> None:
-    """Raise an error unless a supervisor signed.
-
-    Raises
-    ------
-    AcceptanceError
-        There is no password yet, it is another one, or the name is missing.
-    """
-    from argon2 import PasswordHasher  # as above
-    from argon2.exceptions import InvalidHashError, VerifyMismatchError
-
-    _require_name(signature)
-    if not supervision.is_guarded:
+    if signature is None:
+        raise AcceptanceError("supervisor.needed")
+    require_name(signature)
+    if supervision.password is None:
         raise AcceptanceError("supervisor.no-password")
-    try:
-        PasswordHasher().verify(supervision.password_hash, signature.password)
-    except (VerifyMismatchError, InvalidHashError) as error:
-        raise AcceptanceError("supervisor.wrong-password") from error
+    require_patience(supervision.password.key)
+    key = supervision.password.key_from(signature.password)
+    note_attempt(supervision.password.key, succeeded=key is not None)
+    if key is None:
+        raise AcceptanceError("supervisor.wrong-password")
+    return key
 
 
-def _require_name(signature: Signature) -> None:
+def approval_of_change(
+    supervision: Supervision, signature: Signature | None, reason: str
+) -> SigningKey | None:
+    """Return the key of the supervisor who approves another tip to be in force.
+
+    None where there is no password.
+
+    Raises
+    ------
+    AcceptanceError
+        There is one, and no supervisor signs or no reason is given.
+    """
+    if not supervision.is_guarded:
+        return None
+    if signature is None or not reason.strip():
+        raise AcceptanceError("supervisor.needed")
+    return require_supervisor(supervision, signature)
+
+
+def require_name(signature: Signature) -> None:
+    """Refuse a signature without a name.
+
+    Raises
+    ------
+    AcceptanceError
+        It has none.
+    """
     if not signature.name.strip():
         raise AcceptanceError("supervisor.no-name")
 
 
-def _change(now: datetime, signature: Signature) -> LimitsChange:
-    return LimitsChange(newest_format(upgrades.LIMITS), now, signature.name)
+def _followed(
+    guard: Supervision, data: Path, file: Path, content: bytes
+) -> Supervision:
+    """Return what is set after one more change."""
+    change = read_limits_change(content, file)
+    found = signatures_of(content, place_in(data, file))
+    station_keys, supervisor_keys = guard.station_keys, guard.supervisor_keys
+    password = change.password or guard.password
+    is_sound = change.previous == (guard.hashes[-1:] or (NOTHING_BEFORE,))[0]
+    if change.station_key:
+        is_sound &= _is_introduced(guard, change)
+        station_keys = *station_keys, change.station_key
+    is_sound &= bool(station_keys) and found.is_by_station(station_keys[-1])
+    if password is not None:
+        # The first password approves itself, the others are approved by those before.
+        approving = guard.password or password
+        is_sound &= found.is_by_supervisor(approving.key) or (
+            _is_by_old_key(guard, change) and change.password is None
+        )
+    if change.password is not None:
+        supervisor_keys = *supervisor_keys, change.password.key
+    if not is_sound:
+        raise FileError("limits.unsigned", file=printable(str(file)))
+    return Supervision(
+        password,
+        _with_limits(guard.limits, change),
+        guard.chain or change.chain,
+        *(station_keys, supervisor_keys),
+        guard.unsigned or change.unsigned,
+        (*guard.hashes, sha256(content).hexdigest()),
+    )
 
 
-def _add(data: Path, change: LimitsChange) -> None:
-    add_numbered(data / LIMITS_FOLDER, record_bytes(change))
+def _with_limits(
+    limits: Mapping[str, StationLimits], change: LimitsChange
+) -> Mapping[str, StationLimits]:
+    if change.limits is None:
+        return limits
+    folded = folded_name(change.station)
+    others = {n: each for n, each in limits.items() if folded_name(n) != folded}
+    return {**others, change.station: StationLimits().with_values(change.limits)}
+
+
+def _is_introduced(guard: Supervision, change: LimitsChange) -> bool:
+    """Return whether a station key may be used from a change on."""
+    if not guard.station_keys and chain_of(change.station_key) == change.chain:
+        return True
+    if guard.password is None:  # nobody could approve it
+        return True
+    content = key_change(guard.chain, change.station_key)
+    return is_signed(
+        guard.password.key, change.key_approval, content
+    ) or _is_by_old_key(guard, change)
+
+
+def _is_by_old_key(guard: Supervision, change: LimitsChange) -> bool:
+    """Return whether a change of the station key is signed by the one before."""
+    if not change.station_key or not guard.station_keys or change.limits is not None:
+        return False
+    content = key_change(guard.chain, change.station_key)
+    return is_signed(guard.station_keys[-1], change.station_key_signature, content)

@@ -32,6 +32,7 @@ from lightpen.formats.upgrades import LaterFormatError, parse_upgraded
 from lightpen.messages import Message, message
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
 from lightpen.record.library.numbered_files import numbered_files
+from lightpen.record.library.supervision import Supervision, read_supervision
 from lightpen.record.swings.assumed import Plain
 
 LIBRARY = "library"
@@ -262,8 +263,9 @@ def library_changes(data: Path) -> Iterator[tuple[Path, LibraryChange]]:
     FileError
         As of `read_library`.
     """
+    supervision = read_supervision(data)
     for file in library_files(data):
-        yield file, read_change(file)
+        yield file, read_change(file, supervision)
 
 
 def library_files(data: Path) -> tuple[Path, ...]:
@@ -277,21 +279,32 @@ def library_files(data: Path) -> tuple[Path, ...]:
     return tuple(reversed(numbered_files(data / LIBRARY)))
 
 
-def read_change(file: Path) -> LibraryChange:
+def read_change(file: Path, supervision: Supervision | None = None) -> LibraryChange:
     """Return the change that a file holds.
+
+    Parameters
+    ----------
+    supervision : Supervision, optional
+        Of the data folder, if it was read already.
 
     Raises
     ------
     FileError
-        It cannot be read, was changed, or is of a later version of the program.
+        It cannot be read, was changed, is not signed though there is a supervisor
+        password, or is of a later version of the program.
     """
     text = read_bytes(file, WHAT, MEGABYTE)
+    data = file.parents[1]
+    if supervision is None:
+        supervision = read_supervision(data)
     try:
-        return parse_upgraded(text, LibraryChange, upgrades.LIBRARY)
+        change = parse_upgraded(text, LibraryChange, upgrades.LIBRARY)
     except LaterFormatError as error:
         raise FileError("library.later-version", file=printable(str(file))) from error
     except DamagedError as error:
         raise FileError("library.damaged", file=printable(str(file))) from error
+    supervision.require_signed(data, file, text, has_supervisor=True)
+    return change
 
 
 def _of(

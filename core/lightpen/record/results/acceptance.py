@@ -29,11 +29,11 @@ from lightpen.record.library.supervision import (
 from lightpen.record.results.assessment import SwingAssessment, assess
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result, TipChange
+from lightpen.record.signing.keys import SigningKey
 from lightpen.record.swings.interrupted import InterruptedSwings
 from lightpen.record.swings.reading import (
     Record,
     open_record,
-    recorded_limits,
     recorded_names,
     recorded_origin,
 )
@@ -88,12 +88,12 @@ def accept(
             assessment = assess(archive, record, solution)
             require_in_use(archive, recorded_names(record).tip)
             _require_acceptable(assessment.verdict, reason)
-            supervisor = _supervisor(archive.supervision(), assessment, signature)
-            result = replace(
-                _result(record, solution, assessment, now, reason.strip()),
-                supervisor=supervisor,
-            )
-            archive.store(result)
+            supervision, station = archive.supervision(), recorded_names(record).station
+            key = _approval(supervision, station, assessment, signature, reason)
+            result = _result(record, solution, assessment, now, reason.strip())
+            if key is not None and signature is not None:
+                result = replace(result, supervisor=signature.name.strip())
+            archive.store(result, key)
             _logger.info("result stored of %s", record.folder)
         _conclude(writer, record, result)
     return result
@@ -120,23 +120,33 @@ def conclude_accepted(
     return replace(found, interrupted=tuple(interrupted))
 
 
-def takes_supervisor(supervision: Supervision, assessment: SwingAssessment) -> bool:
-    """Return whether only a supervisor can accept a tip: it is beyond the limit."""
+def takes_supervisor(
+    supervision: Supervision, assessment: SwingAssessment, station: str
+) -> bool:
+    """Return whether only a supervisor can accept a tip.
+
+    It is beyond the limit, or its station has no limits.
+    """
     told = assessment.verdict.reason, *assessment.doubts
     is_beyond = any(each.code in BEYOND_LIMIT for each in told)
-    return supervision.is_guarded and is_beyond
+    return supervision.is_guarded and (is_beyond or supervision.is_unknown(station))
 
 
-def _supervisor(
-    supervision: Supervision, assessment: SwingAssessment, signature: Signature | None
-) -> str:
-    """Return the supervisor who accepts a tip; empty if none is needed."""
-    if not takes_supervisor(supervision, assessment):
-        return ""
+def _approval(
+    supervision: Supervision,
+    station: str,
+    assessment: SwingAssessment,
+    signature: Signature | None,
+    reason: str,
+) -> SigningKey | None:
+    """Return the key of the supervisor who accepts a tip; None where it takes none."""
+    if not takes_supervisor(supervision, assessment, station):
+        return None
+    if supervision.is_unknown(station) and (signature is None or not reason.strip()):
+        raise AcceptanceError("acceptance.unknown-station", station=printable(station))
     if signature is None:
         raise AcceptanceError("acceptance.no-supervisor", why=assessment.verdict.reason)
-    require_supervisor(supervision, signature)
-    return signature.name.strip()
+    return require_supervisor(supervision, signature)
 
 
 def require_in_use(archive: FolderArchive, name: str) -> None:
@@ -182,7 +192,7 @@ def _result(
         images=_images_of(record),
         calibration=calibration_record(
             *(solution.calibration, record_inputs(solution.source), "joint"),
-            recorded_limits(record),
+            assessment.limits,
         ),
         origin=recorded_origin(record),
         reason=reason,

@@ -1,13 +1,13 @@
 """Assessment of a solved swing beside the current result."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from datetime import date
 from itertools import chain
 
 import numpy as np
 
-from lightpen.errors import FileError
+from lightpen.errors import AcceptanceError, FileError
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import (
     Change,
@@ -23,7 +23,7 @@ from lightpen.estimation.reports.verdict import (
 from lightpen.local_time import local_time
 from lightpen.messages import Message, message
 from lightpen.model.coverage import dial_counts
-from lightpen.model.limits import SwingLimits
+from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.library.tip_library import KIND_WORDS, Library
 from lightpen.record.results.result_folder import FolderArchive
@@ -54,6 +54,8 @@ class SwingAssessment:
         Limit of the tip for the distance from that, mm; None if it has none.
     doubts : tuple of Message
         Warnings besides the reason of the verdict, the most important first.
+    limits : SwingLimits
+        By which it was judged.
     """
 
     verdict: Verdict
@@ -61,6 +63,7 @@ class SwingAssessment:
     change: Change | None
     doubts: tuple[Message, ...]
     max_change: float | None = None
+    limits: SwingLimits = field(default_factory=SwingLimits)
 
 
 def assess(
@@ -68,17 +71,18 @@ def assess(
 ) -> SwingAssessment:
     """Judge a solved swing by itself and beside the current result."""
     names, origin = recorded_names(record), recorded_origin(record)
-    limits = recorded_limits(record)
-    verdict = judge(solution.calibration, limits)
-    last, limit, unknown = None, None, None
+    limits, limit, last, unknown = recorded_limits(record), None, None, None
     library = Library()
     try:
+        limits = _limits_in_force(archive, names, limits)
         library = archive.library()
         listed = library.tips.get(names.tip)
         limit = None if listed is None else listed.max_change_mm
         last = _last(archive, names, origin)
-    except FileError as error:
+    except (FileError, AcceptanceError) as error:
         unknown = error.message
+    verdict = judge(solution.calibration, limits)
+    if unknown is not None:
         verdict = judge_unknown(verdict, unknown)
     change, doubt = None, None
     if last is not None:
@@ -89,13 +93,25 @@ def assess(
     all_doubts = chain(
         [] if unknown is None else [last_unknown(unknown)],
         [] if doubt is None else [doubt],
-        _overdue(library, names, local_time(record.header.created).date()),
+        overdue_items(library, names, local_time(record.header.created).date()),
         _far_from_nominal(solution),
         _bare_sides(solution, limits) if is_of_recording(record) else [],
         warnings_of(solution.calibration),
     )
     doubts = tuple(each for each in all_doubts if not repeats(each, verdict.reason))
-    return SwingAssessment(verdict, last, change, doubts, limit)
+    return SwingAssessment(verdict, last, change, doubts, limit, limits)
+
+
+def _limits_in_force(
+    archive: FolderArchive, names: Names, recorded: SwingLimits
+) -> SwingLimits:
+    """Return the limits set for a station now; those of the swing where there are none.
+
+    Those of the swing are in a file that anybody can edit, and may be older.
+    """
+    chosen = StationLimits(swing=recorded)
+    now = archive.supervision().limits_at(names.station, chosen).swing
+    return replace(now, spacing=recorded.spacing, min_per_field=recorded.min_per_field)
 
 
 def _last(archive: FolderArchive, names: Names, origin: Origin | None) -> Result | None:
@@ -113,7 +129,7 @@ def _change(solution: Solution, last: Result) -> Change:
     )
 
 
-def _overdue(library: Library, names: Names, day: date) -> Iterator[Message]:
+def overdue_items(library: Library, names: Names, day: date) -> Iterator[Message]:
     """Tell what should have been looked after before the day of the swing."""
     for item in (
         library.pens.get(names.pen),

@@ -7,28 +7,37 @@ folder of their own.
 """
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
 from lightpen.errors import FileError
 from lightpen.formats.files import MEGABYTE, printable, read_bytes, unreadable
 from lightpen.messages import message
 from lightpen.record.library.numbered_files import add_numbered, numbered_files
-from lightpen.record.library.supervision import Supervision, read_supervision
+from lightpen.record.library.supervision import (
+    Signature,
+    Supervision,
+    approval_of_change,
+    read_supervision,
+)
 from lightpen.record.library.tip_library import Library, read_library
 from lightpen.record.results.results import (
     Result,
     ResultHeading,
     Withdrawal,
     has_head,
+    head_of,
     parse_heading,
     parse_result,
     parse_withdrawal,
     result_bytes,
     withdrawal_bytes,
 )
+from lightpen.record.signing.keys import SigningKey
+from lightpen.record.signing.signed_text import place_in
 
 RECORDS, RESULTS = "records", "results"
 SIMULATED = "simulated"  # that the files of the simulated pen, and its results, are in
@@ -52,53 +61,91 @@ class FolderArchive:
     ----------
     data : Path
         Folder of the records and the results; it need not exist.
+    confirm : callable, optional
+        Raises an `AcceptanceError` where the limits are not those of the archive.
     """
 
-    def __init__(self, data: Path) -> None:
+    def __init__(
+        self,
+        data: Path,
+        confirm: Callable[[Supervision], None] = lambda supervision: None,
+    ) -> None:
         self._data = data.absolute()
+        self._confirm = confirm
 
     @property
     def folder(self) -> Path:
         """That the files of real pens are in."""
         return self._data / RESULTS
 
-    def store(self, result: Result) -> None:
+    def store(self, result: Result, supervisor: SigningKey | None = None) -> None:
         """Put a result in force.
 
         When this returns, the result is kept whatever happens next; when it raises, or
         is killed, it is kept whole or not at all.
+
+        Parameters
+        ----------
+        supervisor : SigningKey, optional
+            Of the supervisor whom the result names.
 
         Raises
         ------
         FileError
             It cannot be kept; what was in force before stays so.
         """
-        root = self._root(result.is_simulated)
-        data = result_bytes(result, self.place_of(result.record))
-        parse_result(data, root, Path)  # what cannot be read again is never in force
-        add_numbered(root, data)
+        root, record = self._root(result.is_simulated), self.place_of(result.record)
+        sign = self._signing(read_supervision(self._data), supervisor)
+        # What cannot be read again is never in force.
+        parse_result(result_bytes(result, record), root, Path)
+        add_numbered(root, lambda file: result_bytes(result, record, sign(file)))
 
-    def revoke(self, result: Result, operator: str, now: datetime) -> None:
+    def revoke(
+        self,
+        result: Result,
+        operator: str,
+        now: datetime,
+        reason: str = "",
+        signature: Signature | None = None,
+    ) -> None:
         """Let the result before a result in force be in force again.
 
-        It is one step, as `store`.
+        It is one step, as `store`. Where there is a supervisor password, it takes a
+        supervisor and a reason, as what comes into force again was not judged by the
+        present limits.
 
         Parameters
         ----------
         operator : str
             Operator who revokes it.
+        reason : str
+            In their words.
+        signature : Signature, optional
+            Of a supervisor.
 
         Raises
         ------
+        AcceptanceError
+            There is a password, and no supervisor or no reason.
         FileError
             It is not in force any more, or what takes it back cannot be kept.
         """
-        names = result.names
+        names, supervision = result.names, self.supervision()
+        key = approval_of_change(supervision, signature, reason)
         is_simulated = result.is_simulated
         file = self.file_in_force(names.pen, names.tip, is_simulated=is_simulated)
         if file is None or not _is_same(self.read(file), result):
             raise FileError("results.not-in-force", tip=names.tip, pen=names.pen)
-        add_numbered(file.parent, withdrawal_bytes(result, file.stem, operator, now))
+        withdrawal = Withdrawal(
+            *(file.stem, now, operator, names.pen, names.tip, reason.strip()),
+            supervisor=""
+            if signature is None or key is None
+            else signature.name.strip(),
+        )
+        sign = self._signing(supervision, key)
+        add_numbered(
+            file.parent, lambda place: withdrawal_bytes(withdrawal, sign(place))
+        )
         _logger.info("result withdrawn: %s, by %r", file, operator)
 
     def in_force(
@@ -163,8 +210,18 @@ class FolderArchive:
         )
 
     def supervision(self) -> Supervision:
-        """Return what supervisors have laid down."""
-        return read_supervision(self._data)
+        """Return the present limits and who guards them, as the archive confirms them.
+
+        Raises
+        ------
+        FileError
+            A file of them is missing, changed or not signed; see `read_supervision`.
+        AcceptanceError
+            They are not those that were entered in the archive.
+        """
+        supervision = read_supervision(self._data)
+        self._confirm(supervision)
+        return supervision
 
     def library(self) -> Library:
         """Return the pens, tips and cones that are known."""
@@ -207,7 +264,7 @@ class FolderArchive:
         FileError
             It cannot be read, or is damaged.
         """
-        if _read_heading(file).takes_back is None:
+        if self._heading(file, read_supervision(self._data)).takes_back is None:
             return self.read(file)
         return parse_withdrawal(read_bytes(file, WHAT, LIMIT), file)
 
@@ -245,10 +302,10 @@ class FolderArchive:
         self, root: Path, *, passes_over_damage: bool = False
     ) -> Iterator[tuple[Path, ResultHeading]]:
         """Yield the results that are not taken back, the newest first."""
-        revoked = set[str]()
+        revoked, supervision = set[str](), read_supervision(self._data)
         for file in numbered_files(root):
             try:
-                heading = _read_heading(file)
+                heading = self._heading(file, supervision)
             except FileError:
                 if passes_over_damage:
                     continue
@@ -257,6 +314,30 @@ class FolderArchive:
                 revoked.add(heading.takes_back)
             elif file.stem not in revoked:
                 yield file, heading
+
+    def _heading(self, file: Path, supervision: Supervision) -> ResultHeading:
+        """Read the first entries of a result, all of them if it has no calibration."""
+        try:
+            with file.open("rb") as stream:
+                start = stream.read(HEAD)
+        except OSError as error:
+            raise unreadable(file, WHAT, error) from error
+        if not has_head(start):
+            start = read_bytes(file, WHAT, LIMIT)
+        heading = parse_heading(start, file)
+        supervision.require_signed(
+            *(self._data, file, head_of(start)), has_supervisor=bool(heading.supervisor)
+        )
+        return heading
+
+    def _signing(
+        self, supervision: Supervision, supervisor: SigningKey | None
+    ) -> Callable[[Path], Callable[[bytes], bytes]]:
+        """Return a function that returns, for a file, what signs its text."""
+        if not supervision.is_guarded:
+            return lambda file: bytes
+        signers = supervision.signers(supervisor)
+        return lambda file: partial(signers.signed, place=place_in(self._data, file))
 
     def read(self, file: Path) -> Result:
         """Return the result in a file of the archive.
@@ -273,15 +354,3 @@ class FolderArchive:
 def _is_same(one: Result, other: Result) -> bool:
     """Return whether two results are of the same acceptance."""
     return (one.accepted, one.record) == (other.accepted, other.record)
-
-
-def _read_heading(file: Path) -> ResultHeading:
-    """Read the first entries of a result, all of them if it has no calibration."""
-    try:
-        with file.open("rb") as stream:
-            start = stream.read(HEAD)
-    except OSError as error:
-        raise unreadable(file, WHAT, error) from error
-    if not has_head(start):
-        start = read_bytes(file, WHAT, LIMIT)
-    return parse_heading(start, file)

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, to_builtins
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
@@ -72,6 +72,7 @@ class ResultHeading(Struct):
     record: str | None = None
     takes_back: str | None = None
     origin: str | None = None
+    supervisor: str = ""
 
     def __post_init__(self) -> None:
         require_path(self.record or "")
@@ -86,6 +87,10 @@ class Withdrawal(Struct, frozen=True):
         Name of the result's file, without suffix.
     operator : str
         Operator who revokes it.
+    reason : str
+        In the words of the operator.
+    supervisor : str
+        Who approved it; empty where nobody had to.
     """
 
     takes_back: str
@@ -93,6 +98,8 @@ class Withdrawal(Struct, frozen=True):
     operator: str
     pen: str
     tip: str
+    reason: str = ""
+    supervisor: str = ""
 
     def __post_init__(self) -> None:
         require_usual(self.at)
@@ -247,13 +254,17 @@ class Result:
         return np.array(self.calibration.expanded_uncertainty_mm)
 
 
-def result_bytes(result: Result, record: str) -> bytes:
+def result_bytes(
+    result: Result, record: str, sign: Callable[[bytes], bytes] = bytes
+) -> bytes:
     """Return a result as JSON.
 
     Parameters
     ----------
     record : str
         Path of the swing's folder as written in the file.
+    sign : callable
+        Returns the text of the head with its signatures.
     """
     names = result.names
     rest = CALIBRATION + json_bytes(result.calibration).rstrip(b"\n") + END
@@ -278,31 +289,15 @@ def result_bytes(result: Result, record: str) -> bytes:
         restores=result.restores,
         calibration_sha256=sha256(rest).hexdigest(),
     )
-    return with_checksum(json_bytes(head)).removesuffix(b"}") + rest
+    return with_checksum(sign(json_bytes(head))).removesuffix(b"}") + rest
 
 
-def withdrawal_bytes(result: Result, name: str, operator: str, now: datetime) -> bytes:
-    """Return what takes a result back, as JSON.
-
-    Parameters
-    ----------
-    name : str
-        Of the result's file, without suffix.
-    operator : str
-        Operator who revokes it.
-    """
-    return with_checksum(
-        json_bytes(
-            {
-                "format": newest_format(WITHDRAWAL),
-                "takes_back": name,
-                "at": now.isoformat(),
-                "operator": operator,
-                "pen": result.names.pen,
-                "tip": result.names.tip,
-            }
-        )
-    )
+def withdrawal_bytes(
+    withdrawal: Withdrawal, sign: Callable[[bytes], bytes] = bytes
+) -> bytes:
+    """Return what takes a result back, as JSON; ``sign`` as of `result_bytes`."""
+    entries = {"format": newest_format(WITHDRAWAL), **to_builtins(withdrawal)}
+    return with_checksum(sign(json_bytes(entries)))
 
 
 def has_head(start: bytes) -> bool:
@@ -319,7 +314,7 @@ def parse_heading(start: bytes, file: Path) -> ResultHeading:
         It is damaged.
     """
     try:
-        return parse_checked(_head_of(start), ResultHeading)
+        return parse_checked(head_of(start), ResultHeading)
     except DamagedError as error:
         raise _damaged(file) from error
 
@@ -354,7 +349,7 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
         It is damaged, or written by a later version of the program.
     """
     try:
-        head = _head_of(data)
+        head = head_of(data)
         parse_checked(head, ResultHeading)
         whole = parse_own_json(data, dict[str, Any])
         entries = in_shape(upgraded(whole, RESULT), _Whole)
@@ -387,7 +382,7 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
         raise _damaged(file) from error
 
 
-def _head_of(data: bytes) -> bytes:
+def head_of(data: bytes) -> bytes:
     """Return the beginning of the file, before the calibration, as JSON."""
     head, found, _ = data.partition(CALIBRATION)
     return head + b"}" if found else data

@@ -38,7 +38,8 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import DueRule, StationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.library.library_changes import Author, add_item
-from lightpen.record.library.supervision import Signature, save_limits
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.supervision_changes import save_limits
 from lightpen.record.library.tip_library import ListedTip
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result

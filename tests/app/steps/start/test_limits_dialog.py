@@ -124,7 +124,7 @@ def test_limits_are_laid_down_once_however_often_enter_is_pressed(
 
 
 def test_what_is_laid_down_counts_for_its_station_alone(workbench: Workbench) -> None:
-    workbench.selection.set_supervision(Supervision("a hash", {"Hall 2": TIGHT}))
+    workbench.selection.set_supervision(Supervision(limits={"Hall 2": TIGHT}))
     assert workbench.selection.preparation.limits == TIGHT.swing
     assert workbench.selection.choices.limits == TIGHT.verification
 

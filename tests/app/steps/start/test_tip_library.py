@@ -19,7 +19,8 @@ from tests.app.undressed import undressed
 from lightpen.local_time import local_now
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.record.library.library_changes import Author, add_item, retire_item
-from lightpen.record.library.supervision import Signature, set_password
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.supervision_changes import set_password
 from lightpen.record.library.tip_library import (
     AxisOrigin,
     ItemKind,

@@ -13,15 +13,14 @@ from lightpen.model.limits import (
     SwingLimits,
     VerificationLimits,
 )
+from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.supervision import (
-    LIMITS_FOLDER,
     Signature,
     Supervision,
     read_supervision,
     require_supervisor,
-    set_limits,
-    set_password,
 )
+from lightpen.record.library.supervision_changes import set_limits, set_password
 
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
 SECRET = "correct horse"
@@ -46,7 +45,7 @@ def test_without_a_password_nothing_is_guarded(tmp_path: Path) -> None:
 def test_the_password_itself_is_nowhere_on_the_disk(guarded: Path) -> None:
     (file,) = (guarded / LIMITS_FOLDER).iterdir()
 
-    assert read_supervision(guarded).password_hash.startswith("$argon2id$")
+    assert read_supervision(guarded).is_guarded
     assert SECRET.encode() not in file.read_bytes()
     assert SECRET not in repr(EVE)
 

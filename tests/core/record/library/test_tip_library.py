@@ -1,5 +1,7 @@
 """The tip library: what follows from its changes, and which changes are refused."""
 
+import json
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, date, datetime
 from pathlib import Path
 
@@ -9,6 +11,8 @@ from msgspec import structs
 
 from lightpen.errors import AcceptanceError, FileError, UsageError
 from lightpen.formats.decoding import encode_png
+from lightpen.formats.json_records import json_bytes
+from lightpen.formats.own_json import with_checksum
 from lightpen.model.limits import DueRule
 from lightpen.record.library.library_changes import (
     Author,
@@ -17,7 +21,8 @@ from lightpen.record.library.library_changes import (
     keep_picture,
     retire_item,
 )
-from lightpen.record.library.supervision import Signature, set_password
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.supervision_changes import set_password
 from lightpen.record.library.tip_library import (
     LIBRARY,
     AxisOrigin,
@@ -191,3 +196,49 @@ def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(FileError):
         keep_picture(tmp_path / "data", tmp_path / "tip.png")
+
+
+def test_of_two_who_add_the_same_id_at_once_one_does(tmp_path: Path) -> None:
+    def add(n: int) -> bool:
+        try:
+            add_item(tmp_path, ListedTip(id="T-10", note=str(n)), ANN, NOON)
+        except UsageError:
+            return False
+        return True
+
+    with ThreadPoolExecutor(8) as executor:
+        assert sum(executor.map(add, range(8))) == 1
+    assert len(library_files(tmp_path)) == 1
+
+
+def test_a_form_that_is_older_than_the_item_overwrites_nothing(tmp_path: Path) -> None:
+    shown = ListedTip(id="T-10")
+    add_item(tmp_path, shown, ANN, NOON)
+    newer = structs.replace(shown, max_change_mm=0.01)
+    change_item(tmp_path, newer, ANN, NOON, before=shown)
+    stale = structs.replace(shown, note="bent", max_change_mm=1.0)
+    with pytest.raises(UsageError, match="changed in another window"):
+        change_item(tmp_path, stale, ANN, NOON, before=shown)
+    assert read_library(tmp_path).tips["T-10"] == newer
+
+
+@pytest.mark.parametrize("name", ["a/b", "a\\b"])
+def test_an_id_has_no_separator_of_folders(tmp_path: Path, name: str) -> None:
+    with pytest.raises(UsageError, match="not a valid ID"):
+        add_item(tmp_path, ListedTip(id=name), ANN, NOON)
+
+
+def test_with_a_password_a_change_that_was_written_by_hand_is_refused(
+    tmp_path: Path,
+) -> None:
+    eve = Signature("Eve", "correct horse")
+    set_password(tmp_path, eve, eve.password, NOON)
+    signed = Author("Hall 2", "Ann", signature=eve)
+    add_item(tmp_path, ListedTip(id="T-10"), signed, NOON)
+    (file,) = library_files(tmp_path)
+    entries = json.loads(file.read_bytes())
+    del entries["checksum"]
+    entries["item"]["max_change_mm"] = 9.0
+    file.write_bytes(with_checksum(json_bytes(entries)))
+    with pytest.raises(FileError, match="not signed"):
+        read_library(tmp_path)

@@ -14,14 +14,17 @@ from typing import IO, Any
 import numpy as np
 import pytest
 from benchmarks.small_records import entries_of, small_record
+from msgspec import structs
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import AcceptanceError, FileError
 from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.formats.stored_messages import StoredMessage
-from lightpen.model.limits import SwingLimits
+from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.library.library_changes import Author, add_item, retire_item
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.supervision_changes import set_limits, set_password
 from lightpen.record.library.tip_library import (
     ItemKind,
     ListedCone,
@@ -31,6 +34,7 @@ from lightpen.record.library.tip_library import (
 from lightpen.record.results.acceptance import accept, conclude_accepted
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import Result
+from lightpen.record.swings.header import HEADER, header_bytes, read_header
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import open_record, recorded_names
 from lightpen.record.swings.solving import (
@@ -638,3 +642,67 @@ def test_an_accepted_swing_is_not_offered_though_it_cannot_be_concluded(
     assert len(found.interrupted) == 1
     assert conclude_accepted(case.archive, found).interrupted == ()
     assert case.verdict() is None
+
+
+EVE = Signature("Eve", "correct horse")
+
+
+@pytest.fixture
+def guarded(swing: Path, solved: Solution, tmp_path: Path) -> tuple[Path, Solution]:
+    """A copy of the swing whose U is beyond the limits that a supervisor has set.
+
+    The header of the swing says that it is far within.
+    """
+    data = Path(shutil.copytree(swing, tmp_path / "data"))
+    folder = data / RECORDS / "swing"
+    own = replace(solved, source=replace(solved.source, folder=folder))
+    largest = own.calibration.budget.weakest_uncertainty
+    limits = StationLimits(replace(LIMITS, max_uncertainty=0.9 * largest))
+    set_password(data, EVE, EVE.password, NOON)
+    set_limits(data, "Hall 2", limits, EVE, NOON)
+    return data, own
+
+
+def named(folder: Path, station: str) -> None:
+    """Write another station into the header of a swing, with its checksum."""
+    header = structs.replace(read_header(folder), station=station)
+    (folder / HEADER).write_bytes(header_bytes(header))
+
+
+@pytest.mark.parametrize("station", ["Hall 2", "hall 2 ", "HALL 2"])
+def test_the_limits_in_force_count_and_not_those_of_the_header(
+    guarded: tuple[Path, Solution], station: str
+) -> None:
+    data, own = guarded
+    named(own.source.folder, station)
+    archive = FolderArchive(data)
+    with pytest.raises(AcceptanceError, match="outside the limits of this station"):
+        accept(archive, own, LATER, REASON)
+    with pytest.raises(AcceptanceError, match="Wrong"):
+        accept(archive, own, LATER, REASON, replace(EVE, password="no"))
+
+    result = accept(archive, own, LATER, REASON, EVE)
+    assert (result.supervisor, result.grade) == ("Eve", Grade.CHECK)
+    stored = archive.in_force(result.names.pen, result.names.tip)
+    assert stored is not None
+    assert stored.supervisor == "Eve"
+
+
+def test_a_station_without_limits_needs_the_supervisor(
+    guarded: tuple[Path, Solution],
+) -> None:
+    data, own = guarded
+    named(own.source.folder, "Hall 22")
+    with pytest.raises(AcceptanceError, match="Hall 22 has no limits"):
+        accept(FolderArchive(data), own, LATER, REASON)
+    assert accept(FolderArchive(data), own, LATER, REASON, EVE).supervisor == "Eve"
+
+
+def test_nothing_is_accepted_once_the_limits_were_removed(
+    guarded: tuple[Path, Solution],
+) -> None:
+    data, own = guarded
+    shutil.rmtree(data / "limits")
+    with pytest.raises(FileError, match="Nothing is accepted"):
+        accept(FolderArchive(data), own, LATER, REASON)
+    assert FolderArchive(data).folder.exists() is False

@@ -1,0 +1,137 @@
+"""Changes of what guards a data folder: password, limits and station key, one a file.
+
+Each file has the hash of the one before and the signatures of the station and of the
+supervisor who made the change, see `lightpen.record.signing`. The first introduces the
+station key, and says which files of the folder were there before, without signatures.
+All files have the mode 0600: a password can be guessed by its salt and public key.
+"""
+
+from collections.abc import Mapping
+from hashlib import sha256
+from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from lightpen.errors import FileError
+from lightpen.formats import upgrades
+from lightpen.formats.files import create_whole, printable
+from lightpen.formats.json_records import json_bytes
+from lightpen.formats.own_json import (
+    DamagedError,
+    Digest,
+    ZonedTime,
+    require_usual,
+    with_checksum,
+)
+from lightpen.formats.upgrades import LaterFormatError, parse_upgraded
+from lightpen.messages import message
+from lightpen.model.limits import StationLimits
+from lightpen.record.library.numbered_files import make_folder, numbered_file
+from lightpen.record.signing.keys import (
+    PRIVATE,
+    SALT_LENGTH,
+    PublicKey,
+    SigningKey,
+    supervisor_key,
+)
+from lightpen.record.signing.signed_text import Signers, place_in
+
+LIMITS_FOLDER = "limits"
+WHAT = message("file.limits")
+NOTHING_BEFORE = "0" * 64
+
+
+class PasswordVerifier(Struct, frozen=True):
+    """What a password is verified by: the supervisor's public key that follows from it.
+
+    Attributes
+    ----------
+    salt : str
+        Hexadecimal digits.
+    """
+
+    salt: Annotated[str, Meta(pattern=f"^[0-9a-f]{{{2 * SALT_LENGTH}}}$")]
+    key: PublicKey
+
+    def key_from(self, password: str) -> SigningKey | None:
+        """Return the supervisor's key, in some 0.1 s; None for another password."""
+        key = supervisor_key(password, bytes.fromhex(self.salt))
+        return key if key.public == self.key else None
+
+
+class LimitsChange(Struct, omit_defaults=True, kw_only=True):
+    """What was set at one time: a password, limits of a station, or a station key.
+
+    Attributes
+    ----------
+    password : PasswordVerifier or None
+        None where the password stays.
+    limits : mapping of str to float or None
+        By `Limit.key`; None where they stay.
+    previous : str
+        Hash of the file before.
+    chain : str
+        Of the archive; in the first file.
+    station_key : str
+        Public key from then on; empty where it stays.
+    station_key_signature, key_approval : str
+        By the station key before, and by the supervisor, of
+        `lightpen.record.library.key_changes.key_change`.
+    unsigned : mapping of str to int
+        Number of the newest file without signatures in each folder; with the first
+        password.
+    """
+
+    format: int
+    at: ZonedTime
+    supervisor: str
+    station: str = ""
+    password: PasswordVerifier | None = None
+    limits: dict[str, float] | None = None
+    previous: Digest = NOTHING_BEFORE
+    chain: str = ""
+    station_key: str = ""
+    station_key_signature: str = ""
+    key_approval: str = ""
+    unsigned: Mapping[str, int] = {}
+
+    def __post_init__(self) -> None:
+        require_usual(self.at)
+        StationLimits().with_values(self.limits or {})
+
+
+def read_limits_change(content: bytes, file: Path) -> LimitsChange:
+    """Return what a file of limits says; its signatures are not verified.
+
+    Raises
+    ------
+    FileError
+        It was changed since.
+    """
+    try:
+        return parse_upgraded(content, LimitsChange, upgrades.LIMITS)
+    except LaterFormatError as error:
+        raise FileError("limits.later-version", file=printable(str(file))) from error
+    except DamagedError as error:
+        raise FileError("limits.damaged", file=printable(str(file))) from error
+
+
+def write_limits_change(
+    data: Path, number: int, change: LimitsChange, signers: Signers
+) -> str:
+    """Write a change as the file of a number, and return its hash.
+
+    Raises
+    ------
+    NameTakenError
+        Another program made a change meanwhile.
+    FileError
+        It cannot be written.
+    """
+    file = numbered_file(data / LIMITS_FOLDER, number)
+    make_folder(file.parent)
+    text = signers.signed(json_bytes(change), place_in(data, file))
+    content = with_checksum(text) + b"\n"
+    create_whole(file, content, PRIVATE)
+    return sha256(content).hexdigest()

@@ -1,0 +1,221 @@
+"""Setting a supervisor password, limits and another station key.
+
+Each change continues the one that was read: where another program made one meanwhile,
+nothing is written.
+"""
+
+import os
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+from msgspec import structs
+
+from lightpen.errors import AcceptanceError, NameTakenError
+from lightpen.formats import upgrades
+from lightpen.formats.upgrades import newest_format
+from lightpen.model.limits import LIMITS, StationLimits
+from lightpen.record.library.guard_files import (
+    NOTHING_BEFORE,
+    LimitsChange,
+    PasswordVerifier,
+    write_limits_change,
+)
+from lightpen.record.library.key_changes import key_change
+from lightpen.record.library.numbered_files import newest_number
+from lightpen.record.library.supervision import (
+    Signature,
+    Supervision,
+    read_supervision,
+    require_name,
+    require_supervisor,
+)
+from lightpen.record.signing.keys import (
+    SALT_LENGTH,
+    SigningKey,
+    chain_of,
+    make_station_key,
+    station_key,
+    supervisor_key,
+)
+from lightpen.record.signing.signed_text import Signers
+from lightpen.record.signing.station import remember, station_name
+
+LEAST_PASSWORD = 8  # characters
+SIGNED_FOLDERS = ("results", "simulated/results", "library")
+
+
+def set_password(data: Path, signature: Signature, new: str, now: datetime) -> None:
+    """Set a supervisor's password; where there is one, by that one only.
+
+    Raises
+    ------
+    AcceptanceError
+        The present password is another one, the name is missing, or the new one is too
+        short.
+    FileError
+        It cannot be kept.
+    """
+    guard = read_supervision(data)
+    approving = None
+    if guard.is_guarded:
+        approving = require_supervisor(guard, signature)
+    else:
+        require_name(signature)
+    if len(new) < LEAST_PASSWORD:
+        raise AcceptanceError(
+            "supervisor.short-password", length=len(new), needed=LEAST_PASSWORD
+        )
+    salt = os.urandom(SALT_LENGTH)
+    key = supervisor_key(new, salt)
+    change = structs.replace(
+        _change(guard, now, signature),
+        password=PasswordVerifier(salt.hex(), key.public),
+    )
+    if not guard.is_guarded:
+        folders = {each: newest_number(data / each) for each in SIGNED_FOLDERS}
+        change = structs.replace(change, unsigned=folders)
+    _write(data, guard, change, approving or key)
+
+
+def set_limits(
+    data: Path,
+    station: str,
+    limits: StationLimits,
+    signature: Signature,
+    now: datetime,
+    before: StationLimits | None = None,
+) -> None:
+    """Set the limits of a station.
+
+    Parameters
+    ----------
+    before : StationLimits, optional
+        Limits that were shown while these were entered.
+
+    Raises
+    ------
+    AcceptanceError
+        It is not signed by a supervisor, or the limits were changed meanwhile.
+    FileError
+        It cannot be kept.
+    """
+    guard = read_supervision(data)
+    key = require_supervisor(guard, signature)
+    if before is not None and guard.limits_at(station, before) != before:
+        raise AcceptanceError("supervisor.changed-meanwhile")
+    entry = {limit.key: limits.value(limit) for limit in LIMITS}
+    change = structs.replace(
+        _change(guard, now, signature), station=station.strip(), limits=entry
+    )
+    _write(data, guard, change, key)
+
+
+def save_limits(
+    data: Path,
+    station: str,
+    limits: StationLimits,
+    signature: Signature,
+    new_password: str,
+    now: datetime,
+    before: StationLimits | None = None,
+) -> Supervision:
+    """Set limits, and a password where there is none or a new one is given.
+
+    Parameters
+    ----------
+    before
+        As of `set_limits`.
+
+    Returns
+    -------
+    Supervision
+        What is set now.
+
+    Raises
+    ------
+    AcceptanceError
+        It is not signed by a supervisor, the password is too short, or the limits were
+        changed meanwhile.
+    FileError
+        It cannot be kept.
+    """
+    if not read_supervision(data).is_guarded:
+        set_password(data, signature, signature.password, now)
+    if new_password:
+        set_password(data, signature, new_password, now)
+        signature = replace(signature, password=new_password)
+    set_limits(data, station, limits, signature, now, before)
+    return read_supervision(data)
+
+
+def renew_station_key(
+    data: Path, chain: str, signature: Signature | None, now: datetime
+) -> str:
+    """Introduce another station key, and return its public half.
+
+    It is approved by the key before where that is in this user account, and by the
+    supervisor who signs. Where there is a password, one of both is needed.
+
+    Parameters
+    ----------
+    chain : str
+        Of the archive.
+
+    Raises
+    ------
+    AcceptanceError
+        There is a password, the key before is not here, and no supervisor signs.
+    FileError
+        It cannot be kept.
+    """
+    guard = read_supervision(data)
+    old = station_key(chain_of(guard.station_keys[-1]) if guard.station_keys else chain)
+    approving = None
+    if guard.is_guarded and (old is None or signature is not None):
+        approving = require_supervisor(guard, signature)
+    new = make_station_key()
+    content = key_change(guard.chain or chain, new.public)
+    change = structs.replace(
+        _change(guard, now, signature or Signature("", "")),
+        chain="" if guard.chain else chain,
+        station_key=new.public,
+        station_key_signature="" if old is None else old.sign(content),
+        key_approval="" if approving is None else approving.sign(content),
+    )
+    _write(data, guard, change, approving, new)
+    return new.public
+
+
+def _change(guard: Supervision, now: datetime, signature: Signature) -> LimitsChange:
+    return LimitsChange(
+        format=newest_format(upgrades.LIMITS),
+        at=now,
+        supervisor=signature.name.strip(),
+        previous=guard.hashes[-1] if guard.hashes else NOTHING_BEFORE,
+    )
+
+
+def _write(
+    data: Path,
+    guard: Supervision,
+    change: LimitsChange,
+    supervisor: SigningKey | None,
+    station: SigningKey | None = None,
+) -> None:
+    if station is None and not guard.station_keys:
+        name = station_name(data)
+        station = station_key(name)
+        if station is None:
+            raise AcceptanceError("signing.key-missing", chain=name[:8])
+        change = structs.replace(change, chain=name, station_key=station.public)
+    signers = (
+        guard.signers(supervisor) if station is None else Signers(station, supervisor)
+    )
+    number = len(guard.hashes) + 1
+    try:
+        digest = write_limits_change(data, number, change, signers)
+    except NameTakenError as error:
+        raise AcceptanceError("supervisor.changed-meanwhile") from error
+    if guard.is_guarded or change.password is not None:
+        remember(data, number, digest)

@@ -1,0 +1,114 @@
+"""The station key of a data folder, and what its user account remembers of the folder.
+
+``station.pub`` names the first key, so that the limits and the chain of the archive
+begin with the same one, whichever is first. Which keys count from then on, the signed
+limits and entries say; the file is not asked again.
+
+What is remembered stands beside the private keys, outside of the data folder: how many
+changes of limits it had. So one who removes or rolls back the limits is found even
+where the archive was removed, too.
+"""
+
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+
+from msgspec import Struct
+
+from lightpen.errors import FileError, NameTakenError
+from lightpen.formats.files import (
+    MEGABYTE,
+    create_whole,
+    printable,
+    read_bytes,
+    write_whole,
+)
+from lightpen.formats.json_records import json_bytes
+from lightpen.formats.own_json import DamagedError, Digest, parse_own_json
+from lightpen.messages import message
+from lightpen.record.signing.keys import (
+    PublicKey,
+    chain_of,
+    key_folder,
+    make_station_key,
+)
+
+STATION_FILE = "station.pub"
+WHAT = message("file.station-key")
+
+
+class RememberedFolder(Struct, frozen=True):
+    """What a user account remembers of a data folder with a supervisor password.
+
+    Attributes
+    ----------
+    n_changes : int
+        Files of limits.
+    sha256 : str
+        Of the newest of them.
+    """
+
+    folder: str
+    n_changes: int
+    sha256: Digest
+
+
+class _StationFile(Struct):
+    station_key: PublicKey
+
+
+def station_name(data: Path) -> str:
+    """Return the name of the first station key of a data folder, made if need be.
+
+    Raises
+    ------
+    FileError
+        It cannot be stored or read.
+    """
+    file = data / STATION_FILE
+    if not file.exists():
+        public = make_station_key().public
+        data.mkdir(parents=True, exist_ok=True)
+        with suppress(NameTakenError):  # another program was first
+            create_whole(file, json_bytes({"station_key": public}))
+    try:
+        found = parse_own_json(read_bytes(file, WHAT, MEGABYTE), _StationFile)
+    except DamagedError as error:
+        raise FileError("signing.key-damaged", file=printable(str(file))) from error
+    return chain_of(found.station_key)
+
+
+def remembered(data: Path) -> RememberedFolder | None:
+    """Return what this user account remembers of a data folder, if anything.
+
+    Raises
+    ------
+    FileError
+        It cannot be read.
+    """
+    file = memory_file(data)
+    if not file.exists():
+        return None
+    try:
+        return parse_own_json(read_bytes(file, WHAT, MEGABYTE), RememberedFolder)
+    except DamagedError as error:
+        raise FileError("signing.key-damaged", file=printable(str(file))) from error
+
+
+def remember(data: Path, n_changes: int, digest: str) -> None:
+    """Remember the limits of a data folder.
+
+    Raises
+    ------
+    FileError
+        It cannot be stored.
+    """
+    entry = RememberedFolder(str(data.absolute()), n_changes, digest)
+    key_folder().mkdir(parents=True, exist_ok=True, mode=0o700)
+    write_whole(memory_file(data), json_bytes(entry))
+
+
+def memory_file(data: Path) -> Path:
+    """Return the file in which a user account remembers a data folder."""
+    place = str(data.absolute()).encode("utf-8", "surrogateescape")
+    return key_folder() / f"folder-{sha256(place).hexdigest()[:32]}.json"

@@ -1,0 +1,146 @@
+"""Limits that were removed, replaced or rolled back are refused."""
+
+import shutil
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from lightpen.errors import AcceptanceError, FileError
+from lightpen.formats.json_records import json_bytes
+from lightpen.formats.own_json import parse_own_json, with_checksum
+from lightpen.model.limits import StationLimits, SwingLimits
+from lightpen.record.library.guard_files import LIMITS_FOLDER
+from lightpen.record.library.password_delay import FREE
+from lightpen.record.library.supervision import (
+    Signature,
+    read_supervision,
+    require_supervisor,
+)
+from lightpen.record.library.supervision_changes import (
+    renew_station_key,
+    set_limits,
+    set_password,
+)
+from lightpen.record.signing.keys import key_folder, station_key
+from lightpen.record.signing.station import memory_file, station_name
+
+NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
+EVE = Signature("Eve", "correct horse")
+STRICT = StationLimits(SwingLimits(0.0005))
+LAX = StationLimits(SwingLimits(5.0))
+
+
+@pytest.fixture
+def guarded(tmp_path: Path) -> Path:
+    data = tmp_path / "data"
+    set_password(data, EVE, EVE.password, NOON)
+    set_limits(data, "Hall 2", STRICT, EVE, NOON)
+    return data
+
+
+def of_another_folder(data: Path, number: int) -> None:
+    """Put in a file of limits that is signed, but for another data folder."""
+    other = data.parent / "other"
+    set_password(other, EVE, EVE.password, NOON)
+    for n in range(2, number + 1):
+        set_limits(other, f"Hall {n}", LAX, EVE, NOON)
+    name = f"{number:06d}.json"
+    shutil.copy(other / LIMITS_FOLDER / name, data / LIMITS_FOLDER / name)
+
+
+def edited(data: Path) -> None:
+    """Loosen the limits, with another checksum."""
+    file = data / LIMITS_FOLDER / "000002.json"
+    entries = parse_own_json(file.read_bytes(), dict[str, object])
+    del entries["checksum"]
+    limits = entries["limits"]
+    assert isinstance(limits, dict)
+    limits["max_uncertainty_mm"] = 5.0
+    file.write_bytes(with_checksum(json_bytes(entries)))
+
+
+TAMPERING: dict[str, Callable[[Path], object]] = {
+    "folder removed": lambda data: shutil.rmtree(data / LIMITS_FOLDER),
+    "newest removed": lambda data: (data / LIMITS_FOLDER / "000002.json").unlink(),
+    "first removed": lambda data: (data / LIMITS_FOLDER / "000001.json").unlink(),
+    "edited with another checksum": edited,
+    "password of another folder": lambda data: of_another_folder(data, 1),
+    "limits of another folder": lambda data: of_another_folder(data, 3),
+    "copied to the end": lambda data: shutil.copy(
+        data / LIMITS_FOLDER / "000002.json", data / LIMITS_FOLDER / "000003.json"
+    ),
+}
+
+
+@pytest.mark.parametrize("how", TAMPERING)
+def test_a_guard_that_was_tampered_with_is_refused(guarded: Path, how: str) -> None:
+    TAMPERING[how](guarded)
+    with pytest.raises(FileError, match="Nothing is accepted until"):
+        read_supervision(guarded)
+
+
+def test_an_administrator_can_begin_anew(guarded: Path) -> None:
+    shutil.rmtree(guarded / LIMITS_FOLDER)
+    memory_file(guarded).unlink()
+    assert not read_supervision(guarded).is_guarded
+
+
+def test_files_by_which_a_password_can_be_guessed_are_private(guarded: Path) -> None:
+    for file in (guarded / LIMITS_FOLDER).iterdir():
+        assert file.stat().st_mode & 0o077 == 0
+
+
+def test_limits_hold_for_every_spelling_of_the_station(guarded: Path) -> None:
+    supervision = read_supervision(guarded)
+    for name in ("hall 2", "HALL 2 ", " Hall  2", "Hall\u00a02", "\uff28all 2"):
+        assert supervision.limits_at(name, LAX) == STRICT
+        assert not supervision.is_unknown(name)
+    assert supervision.is_unknown("Hall 22")
+
+
+def test_wrong_passwords_are_delayed(guarded: Path) -> None:
+    supervision = read_supervision(guarded)
+    for _ in range(FREE + 1):
+        with pytest.raises(AcceptanceError, match="Wrong supervisor password"):
+            require_supervisor(supervision, Signature("Eve", "wrong"))
+    with pytest.raises(AcceptanceError, match="Wait 1 s"):
+        require_supervisor(supervision, EVE)
+
+
+def test_limits_that_were_changed_meanwhile_are_not_overwritten(guarded: Path) -> None:
+    with pytest.raises(AcceptanceError, match="changed in another window"):
+        set_limits(guarded, "Hall 2", LAX, EVE, NOON, before=StationLimits())
+    set_limits(guarded, "Hall 2", LAX, EVE, NOON, before=STRICT)
+    assert read_supervision(guarded).limits_at("Hall 2", STRICT) == LAX
+
+
+def without_key(data: Path) -> str:
+    """Move a data folder to an account without its station key; return its chain."""
+    name = station_name(data)
+    (key_folder() / f"{name}.key").unlink()
+    return name
+
+
+def test_a_lost_station_key_is_replaced_by_a_supervisor_alone(guarded: Path) -> None:
+    chain = without_key(guarded)
+    with pytest.raises(FileError, match="not in this user account"):
+        set_limits(guarded, "Hall 2", LAX, EVE, NOON)
+    with pytest.raises(AcceptanceError, match="approval"):
+        renew_station_key(guarded, chain, None, NOON)
+    with pytest.raises(AcceptanceError, match="Wrong"):
+        renew_station_key(guarded, chain, Signature("Eve", "wrong"), NOON)
+
+    renew_station_key(guarded, chain, EVE, NOON)
+    set_limits(guarded, "Hall 2", LAX, EVE, NOON)
+    supervision = read_supervision(guarded)
+    assert supervision.limits_at("Hall 2", STRICT) == LAX
+    assert len(supervision.station_keys) == 2
+
+
+def test_the_station_key_introduces_the_next(guarded: Path) -> None:
+    chain = station_name(guarded)
+    assert station_key(chain) is not None
+    public = renew_station_key(guarded, chain, None, NOON)
+    assert read_supervision(guarded).station_keys[-1] == public
