@@ -38,6 +38,7 @@ COMMANDS = (
     ("pivot", "calibrate the tip from given poses", "pivot:add_pivot"),
     ("pen", "transform measured LED coordinates into the pen frame", "pen:add_pen"),
     ("verify", "verify a tip on reference artefacts", "verify:add_verify"),
+    ("measure", "measure a part by a plan", "measure:add_measure"),
     (
         "discover",
         "tip, pen and camera from one swing and one length",

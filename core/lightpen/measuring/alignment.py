@@ -126,6 +126,29 @@ def align_points(
     return Alignment(found, np.linalg.norm(actual @ R.T + t - nominals, axis=1))
 
 
+def tie(then: Sequence[Quantity], now: Sequence[Quantity]) -> Alignment:
+    """Return the motion that brings datum points touched again to where they were.
+
+    The part or the camera was moved in between. Both touches of each point are
+    uncertain, and the motion carries the covariance of both.
+
+    Parameters
+    ----------
+    then, now : sequence of Quantity
+        The same features before and after; their origins count.
+    """
+    n = len(then)
+
+    def motion(*values: FloatArray) -> FloatArray:
+        before = np.array([each[PLACE] for each in values[:n]])
+        after = [Quantity(each[PLACE], np.zeros((3, 1))) for each in values[n:]]
+        return align_points(after, before).motion.values
+
+    before = np.array([each.values[PLACE] for each in then])
+    residuals = align_points(now, before).residuals
+    return Alignment(derive(motion, *then, *now), residuals)
+
+
 def _thinness(points: FloatArray) -> float:
     extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return float(extents[1] / max(extents[0], np.finfo(float).tiny))

@@ -55,6 +55,8 @@ class Feature:
         Of the points from it, mm.
     by_points : (6 + S, 3 N) array
         Derivative of origin, axis and sizes by the points.
+    distances_by_points : (N K, 3 N) array
+        Derivative of the distances by the points, the feature following.
     """
 
     kind: FeatureKind
@@ -63,6 +65,7 @@ class Feature:
     sizes: FloatArray
     distances: FloatArray
     by_points: FloatArray
+    distances_by_points: FloatArray
 
     @property
     def axis(self) -> FloatArray:
@@ -181,14 +184,17 @@ def _feature(kind: FeatureKind, points: FloatArray, at: Start) -> Feature:
     n, k, _ = by_point.shape
     G = np.zeros((n, k, n, 3))
     G[np.arange(n), :, np.arange(n)] = by_point
-    unknowns = -np.linalg.pinv(J) @ G.reshape(n * k, 3 * n)
+    direct = G.reshape(n * k, 3 * n)
+    unknowns = -np.linalg.pinv(J) @ direct
     n_free = len(surface.free)
     motion = np.zeros((6, 3 * n))
     motion[list(surface.free)] = unknowns[:n_free]
     by_points = np.concatenate(
         [axes @ motion[:3], -skew(axes[:, 2]) @ axes @ motion[3:], unknowns[n_free:]]
     )
-    return Feature(kind, origin, axes, sizes, values.reshape(n, k), by_points)
+    distances = values.reshape(n, k)
+    by_distances = direct + J @ unknowns
+    return Feature(kind, origin, axes, sizes, distances, by_points, by_distances)
 
 
 def _condition(J: FloatArray) -> float:

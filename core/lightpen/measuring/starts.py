@@ -25,11 +25,11 @@ Start = tuple[FloatArray, FloatArray, FloatArray]
 
 
 def frame_about(axis: FloatArray) -> FloatArray:
-    """Return right-handed axes (3, 3), as columns, with z along a vector (3,)."""
-    z = axis / np.linalg.norm(axis)
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
+    """Return right-handed axes (..., 3, 3) as columns, z along vectors (..., 3)."""
+    z = axis / np.linalg.norm(axis, axis=-1, keepdims=True)
+    x = np.cross(np.eye(3)[np.argmin(np.abs(z), axis=-1)], z)
+    x /= np.linalg.norm(x, axis=-1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=-1)
 
 
 def starts(kind: FeatureKind, points: FloatArray) -> Iterator[Start]:
@@ -93,7 +93,7 @@ def _by_direction(
     kind: FeatureKind, points: FloatArray, middle: FloatArray, axes: FloatArray
 ) -> Iterator[Start]:
     directions = _directions(axes)
-    frames = np.stack([frame_about(each) for each in directions])
+    frames = frame_about(directions)
     x, y, z = np.moveaxis(points @ frames, -1, 0)  # (D, N) each
     columns = [x, y, np.ones_like(x)]
     if kind is FeatureKind.CONE:

@@ -1,0 +1,223 @@
+"""Measurement of a part: features, alignment and characteristics of a plan."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.measuring import constructions
+from lightpen.measuring.alignment import Alignment, align_321, align_points
+from lightpen.measuring.characteristics import AXIAL, FLAT, Measured, Value, evaluate
+from lightpen.measuring.compensation import Evidence, Surface, surface_of
+from lightpen.measuring.features import Feature, fit_feature
+from lightpen.measuring.plan import (
+    NEVER,
+    Construction,
+    Plan,
+    PlannedCharacteristic,
+    PlannedConstruction,
+    PlannedFeature,
+    Side,
+)
+from lightpen.measuring.quantities import derive
+from lightpen.measuring.surfaces import FeatureKind
+from lightpen.measuring.touches import PartTouches
+from lightpen.measuring.zones import Criterion, fit_zone
+from lightpen.model.decision_rules import Decision, conformity_probability, decide
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A characteristic beside its tolerance.
+
+    Attributes
+    ----------
+    independent_uncertainty : float or None
+        U (k = 2) if the touches shared nothing, for comparison; None for geometrical
+        deviations.
+    decision : Decision or None
+        None without a tolerance.
+    probability : float or None
+        Probability of conformity (JCGM 106).
+    """
+
+    planned: PlannedCharacteristic
+    value: Value
+    independent_uncertainty: float | None
+    decision: Decision | None
+    probability: float | None
+
+    @property
+    def deviation(self) -> float | None:
+        """Value less nominal, mm or degrees."""
+        nominal = self.planned.nominal
+        return None if nominal is None else self.value.value - nominal
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPart:
+    """A measured part.
+
+    Attributes
+    ----------
+    features : mapping of str to Measured
+        All features and constructed features by name.
+    alignment : Alignment or None
+        None if results are in the frame of the camera.
+    """
+
+    plan: Plan
+    touches: PartTouches
+    features: Mapping[str, Measured]
+    alignment: Alignment | None
+    results: tuple[Result, ...]
+
+    def uncertainty(self, name: str) -> FloatArray:
+        """Return U (k = 2) of a feature's values in the frame of the part."""
+        return self.features[name].in_part.uncertainty(self.touches.inputs)
+
+
+def measure_part(plan: Plan, touches: PartTouches) -> MeasuredPart:
+    """Measure a part by a plan.
+
+    Raises
+    ------
+    CalibrationError
+        A feature has too few touches or none, its side is unknown, or a characteristic
+        is not defined for its features.
+    """
+    fits = {each.name: _fitted(each, touches) for each in plan.features}
+    surfaces = {
+        each.name: surface_of(each, fits[each.name], touches) for each in plan.features
+    }
+    for construction in plan.constructions:
+        surfaces[construction.name] = _constructed(construction, surfaces)
+    alignment = _aligned(plan, surfaces)
+    features = {
+        name: _measured(plan, name, surface, fits.get(name), touches, alignment)
+        for name, surface in surfaces.items()
+    }
+    results = tuple(
+        _result(plan, planned, features, touches) for planned in plan.characteristics
+    )
+    return MeasuredPart(plan, touches, features, alignment, results)
+
+
+def _fitted(planned: PlannedFeature, touches: PartTouches) -> Feature:
+    at = touches.of(planned.name)
+    if not len(at) or len(at) < (planned.touches or 0):
+        raise CalibrationError(
+            "measuring.missing-touches",
+            name=planned.name,
+            n_touches=len(at),
+            needed=planned.touches or 1,
+        )
+    points = touches.points_cam[at]
+    feature = fit_feature(planned.kind, points)
+    if planned.criterion == NEVER:
+        return feature
+    # The points that touch the zone carry it; its U is that of least squares.
+    criterion = Criterion(planned.criterion)
+    origin, axes, sizes, _ = fit_zone(planned.kind, points, criterion)
+    return Feature(
+        planned.kind,
+        origin,
+        axes,
+        sizes,
+        feature.distances,
+        feature.by_points,
+        feature.distances_by_points,
+    )
+
+
+def _measured(
+    plan: Plan,
+    name: str,
+    surface: Surface,
+    fit: Feature | None,
+    touches: PartTouches,
+    alignment: Alignment | None,
+) -> Measured:
+    in_part = (
+        surface.quantity if alignment is None else alignment.in_part(surface.quantity)
+    )
+    if fit is None:
+        return Measured(surface, in_part)
+    points = touches.points(touches.of(name))
+    return Measured(surface, in_part, fit, points, plan.feature(name).nominal)
+
+
+def _constructed(
+    planned: PlannedConstruction, surfaces: Mapping[str, Surface]
+) -> Surface:
+    of = [surfaces[name] for name in planned.of]
+    quantities = [each.quantity for each in of]
+    flat = [each.kind in FLAT for each in of]
+    axial = [each.kind in AXIAL for each in of]
+    match planned.construct, len(of):
+        case Construction.MIDPOINT, 2:
+            found = derive(constructions.midpoint, *quantities)
+        case Construction.PROJECTION, 2 if flat[1]:
+            found = derive(constructions.projection_on_plane, *quantities)
+        case Construction.PROJECTION, 2 if axial[1]:
+            found = derive(constructions.projection_on_line, *quantities)
+        case Construction.INTERSECTION, 2 if axial[0] and flat[1]:
+            found = derive(constructions.intersection_of_line_and_plane, *quantities)
+        case Construction.INTERSECTION, 2 if flat[0] and axial[1]:
+            found = derive(
+                constructions.intersection_of_line_and_plane, *quantities[::-1]
+            )
+        case Construction.INTERSECTION, 2 if all(flat):
+            line = derive(constructions.intersection_of_planes, *quantities)
+            return Surface(FeatureKind.LINE, line, Side.OUTSIDE, Evidence.NONE)
+        case Construction.INTERSECTION, 3 if all(flat):
+            found = derive(constructions.intersection_of_three_planes, *quantities)
+        case Construction.APEX, 1 if of[0].kind is FeatureKind.CONE:
+            found = derive(constructions.apex, *quantities)
+        case _:
+            raise CalibrationError("measuring.no-construction", name=planned.name)
+    point = derive(lambda place: np.concatenate([place, [0.0, 0.0, 1.0]]), found)
+    return Surface(FeatureKind.POINT, point, Side.OUTSIDE, Evidence.NONE)
+
+
+def _aligned(plan: Plan, surfaces: Mapping[str, Surface]) -> Alignment | None:
+    planned = plan.alignment
+    if planned is None:
+        return None
+    if planned.points:
+        nominals = [plan.feature(name).nominal for name in planned.points]
+        places = np.array([each.origin for each in nominals if each is not None])
+        return align_points([surfaces[n].quantity for n in planned.points], places)
+    return align_321(
+        surfaces[planned.plane].quantity,
+        surfaces[planned.line].quantity,
+        surfaces[planned.point].quantity,
+    )
+
+
+def _result(
+    plan: Plan,
+    planned: PlannedCharacteristic,
+    features: Mapping[str, Measured],
+    touches: PartTouches,
+) -> Result:
+    inputs = touches.inputs
+    value, quantity = evaluate(planned, features, inputs)
+    independent = None
+    if quantity is not None:
+        alone = quantity.uncertainty(touches.independent_inputs)
+        independent = float(alone[0])
+    if planned.tolerance is None:
+        return Result(planned, value, independent, None, None)
+    lower, upper = planned.limits
+    return Result(
+        planned,
+        value,
+        independent,
+        decide(plan.rule, value.value, value.uncertainty, lower=lower, upper=upper),
+        conformity_probability(
+            value.value, value.uncertainty, lower=lower, upper=upper
+        ),
+    )

@@ -1,0 +1,82 @@
+"""Touches of a part, with the covariance that they share."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.measuring.quantities import Quantity
+
+
+@dataclass(frozen=True, eq=False)
+class PartTouches:
+    """All touches of a part in their order.
+
+    Attributes
+    ----------
+    points_cam : (N, 3) array
+        Centres of the ball, camera frame, mm.
+    covariance : (3 N, 3 N) array
+        Of all coordinates, with what they share, mm^2.
+    approaches_cam : (N, 3) array
+        Unit vectors along which the ball came to the surface; NaN if unknown.
+    styli_cam : (N, 3) array
+        Unit vectors from the ball along its stylus into the pen.
+    owners : tuple of str
+        Feature of each touch.
+    ball_radius, ball_uncertainty : float
+        Radius of the ball and its U (k = 2), mm; 0 to measure at the centre of the tip.
+    """
+
+    points_cam: FloatArray
+    covariance: FloatArray
+    approaches_cam: FloatArray
+    styli_cam: FloatArray
+    owners: tuple[str, ...]
+    ball_radius: float = 0.0
+    ball_uncertainty: float = 0.0
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs: all coordinates and the ball radius."""
+        return 3 * len(self.points_cam) + 1
+
+    @property
+    def inputs(self) -> FloatArray:
+        """Covariance of all inputs, (P, P), mm^2."""
+        covariance = np.zeros((self.n_inputs, self.n_inputs))
+        covariance[:-1, :-1] = self.covariance
+        covariance[-1, -1] = (self.ball_uncertainty / 2) ** 2
+        return covariance
+
+    @property
+    def independent_inputs(self) -> FloatArray:
+        """The same if the touches shared nothing, for comparison."""
+        blocks = np.kron(np.eye(len(self.points_cam)), np.ones((3, 3)))
+        inputs = self.inputs
+        inputs[:-1, :-1] *= blocks
+        return inputs
+
+    @property
+    def ball(self) -> Quantity:
+        """The ball radius as a quantity."""
+        by_inputs = np.zeros((1, self.n_inputs))
+        by_inputs[0, -1] = 1.0
+        return Quantity(np.array([self.ball_radius]), by_inputs)
+
+    def of(self, name: str) -> IntArray:
+        """Return the indices of the touches of a feature."""
+        return np.flatnonzero([owner == name for owner in self.owners])
+
+    def columns(self, touches: IntArray) -> IntArray:
+        """Return the indices of their coordinates among the inputs, (3 n,)."""
+        return np.asarray((3 * touches[:, None] + np.arange(3)).ravel())
+
+    def points(self, touches: IntArray | Sequence[int]) -> Quantity:
+        """Return the coordinates of touches as one quantity, (3 n,)."""
+        at = np.asarray(touches)
+        columns = self.columns(at)
+        by_inputs = np.zeros((len(columns), self.n_inputs))
+        by_inputs[np.arange(len(columns)), columns] = 1.0
+        return Quantity(self.points_cam[at].ravel(), by_inputs)

@@ -1,0 +1,259 @@
+"""A part measured by a plan: features, frame, characteristics, each with its U."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.measuring.part import MeasuredPart, measure_part
+from lightpen.measuring.plan import Plan, Side, parse_plan
+from lightpen.measuring.touches import PartTouches
+from lightpen.model.decision_rules import Decision
+from lightpen.model.rigid import rotation_from_vector
+
+R = rotation_from_vector(np.array([0.4, -0.7, 0.2]))
+T = np.array([120.0, -80.0, 1400.0])
+BALL = 3.0  # mm, radius
+NOISE, COMMON = 0.004, 0.02  # mm
+TURN = np.deg2rad(np.arange(0, 360, 45))
+UP = np.array([0.0, 0.0, 1.0])
+
+PLAN = """
+name: Plate
+features:
+  - {name: top, kind: plane, touches: 6}
+  - {name: front, kind: line}
+  - {name: hole, kind: circle, side: inside, nominal: {origin: [0, 0, 0]}}
+  - {name: bore, kind: cylinder, side: inside, nominal: {origin: [60, 0, 0]}}
+  - {name: dome, kind: sphere}
+  - {name: cone, kind: cone, side: inside}
+  - {name: side, kind: plane}
+constructions:
+  - {name: middle, construct: midpoint, of: [hole, dome]}
+  - {name: edge, construct: intersection, of: [top, side]}
+alignment: {plane: top, line: front, point: hole}
+characteristics:
+  - {quantity: diameter, of: [hole], nominal: 20, tolerance: 0.05}
+  - {quantity: distance, of: [hole, bore], nominal: 60, tolerance: [-0.1, 0.1]}
+  - {quantity: angle, of: [top, side], nominal: 90, tolerance: 0.2}
+  - {quantity: x, of: [dome], nominal: 30}
+  - {quantity: cone angle, of: [cone], nominal: 60}
+  - {quantity: distance, of: [dome, top], nominal: 4}
+  - {quantity: flatness, of: [top], tolerance: 0.05}
+  - {quantity: position, of: [bore], tolerance: 0.1}
+  - {quantity: perpendicularity, of: [bore], datum: top, tolerance: 0.1}
+  - {quantity: perpendicularity, of: [side], datum: top, tolerance: 0.1}
+  - {quantity: concentricity, of: [hole], datum: bore, tolerance: 200}
+"""
+EXPECTED = [20, 60, 90, 30, 60, 4, 0, 0, 0, 0, 120]
+
+
+def ring(radius: float, x: float, y: float, z: float) -> FloatArray:
+    return np.column_stack(
+        [x + radius * np.cos(TURN), y + radius * np.sin(TURN), np.full(len(TURN), z)]
+    )
+
+
+def ball_centres() -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return the centres of the ball at each feature, and its approaches."""
+    grid = np.array([[x, y, BALL] for x in (-30, 40, 80) for y in (-25, 25)])
+    inward = np.column_stack([np.cos(TURN), np.sin(TURN), 0 * TURN])
+    bore = np.vstack([ring(8 - BALL, 60, 0, -2), ring(8 - BALL, 60, 0, -12)])
+    normals = np.array(
+        [
+            [np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)]
+            for a in TURN[::2]
+            for e in (0.4, 0.9)
+        ]
+    )
+    # A cone of 60 degrees that opens upwards; the centres run on one inside of it.
+    half = np.deg2rad(30)
+    cone = []
+    for z in (-1.0, -5.0):
+        on_wall = ring(10 + z * np.tan(half), -30, 40, z)
+        out = np.column_stack(
+            [
+                np.cos(TURN) * np.cos(half),
+                np.sin(TURN) * np.cos(half),
+                np.full(len(TURN), -np.sin(half)),
+            ]
+        )
+        cone.append(on_wall - BALL * out)
+    side = np.array([[-50 - BALL, y, z] for y in (-20, 0, 20) for z in (-3, -9)])
+    front = np.array([[x, -40.0 - BALL, -5.0] for x in (-30, 0, 30, 60)])
+    unknown = np.full((1, 3), np.nan)
+    return {
+        "top": (grid, np.tile(-UP, (6, 1))),
+        "front": (front, np.tile([[0.0, 1.0, 0.0]], (4, 1))),
+        "hole": (ring(10 - BALL, 0, 0, -3), inward),
+        "bore": (bore, np.tile(unknown, (len(bore), 1))),
+        "dome": (np.array([30, 20, 4.0]) + (5 + BALL) * normals, -normals),
+        "cone": (np.vstack(cone), np.tile(unknown, (16, 1))),
+        "side": (side, np.tile([[1.0, 0.0, 0.0]], (6, 1))),
+    }
+
+
+def touched(noise: FloatArray | None = None) -> PartTouches:
+    centres = ball_centres()
+    points = np.concatenate([own for own, _ in centres.values()]) @ R.T + T
+    approaches = np.concatenate([way for _, way in centres.values()]) @ R.T
+    shape = (points - points.mean(axis=0)).ravel() / 100
+    covariance = NOISE**2 * np.eye(points.size) + COMMON**2 * np.outer(shape, shape)
+    if noise is not None:
+        points = points + noise.reshape(-1, 3)
+    owners = tuple(name for name, (own, _) in centres.items() for _ in own)
+    styli = np.tile(R @ UP, (len(points), 1))
+    return PartTouches(points, covariance, approaches, styli, owners, BALL)
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    return parse_plan(PLAN, "plan.yaml")
+
+
+@pytest.fixture(scope="module")
+def exact(plan: Plan) -> MeasuredPart:
+    return measure_part(plan, touched())
+
+
+def test_exact_touches_give_the_exact_part(exact: MeasuredPart) -> None:
+    values = [result.value.value for result in exact.results]
+
+    assert values == pytest.approx(EXPECTED, abs=1e-6)
+
+
+def test_features_are_told_in_the_frame_of_the_part(exact: MeasuredPart) -> None:
+    top, hole, dome = (exact.features[name].in_part for name in ("top", "hole", "dome"))
+
+    assert top.values[[2, 3, 4, 5]] == pytest.approx([0, 0, 0, 1], abs=1e-9)
+    assert hole.values[:2] == pytest.approx([0, 0], abs=1e-9)
+    assert dome.values[[0, 1, 2, 6]] == pytest.approx([30, 20, 4, 5], abs=1e-8)
+    assert exact.features["middle"].in_part.values[:3] == pytest.approx(
+        [15, 10, 0.5], abs=1e-8
+    )
+    edge = exact.features["edge"].in_part.values
+    assert edge[[0, 2]] == pytest.approx([-50, 0], abs=1e-8)
+    assert abs(edge[4]) == pytest.approx(1)
+
+
+def test_u_covers_the_scatter_of_many_parts(plan: Plan, exact: MeasuredPart) -> None:
+    rng = np.random.default_rng(1)
+    root = np.linalg.cholesky(exact.touches.covariance)
+    smooth = [i for i, one in enumerate(exact.results) if one.deviation is not None]
+    plain = replace_characteristics(plan, smooth)
+    values = []
+    for _ in range(80):
+        part = measure_part(plain, touched(root @ rng.standard_normal(len(root))))
+        values.append([result.value.value for result in part.results])
+    # About the truth, as an angle of 90 degrees is told without its sign.
+    errors = np.array(values) - [EXPECTED[i] for i in smooth]
+    spread = np.sqrt(np.mean(errors**2, axis=0))
+    stated = [exact.results[i].value.uncertainty / 2 for i in smooth]
+
+    assert spread == pytest.approx(stated, rel=0.25)
+
+
+def test_u_of_a_geometrical_deviation_bounds_its_error(
+    plan: Plan, exact: MeasuredPart
+) -> None:
+    rng = np.random.default_rng(2)
+    root = np.linalg.cholesky(exact.touches.covariance)
+    deviations = [i for i, one in enumerate(exact.results) if one.deviation is None]
+    some = replace_characteristics(plan, deviations)
+    covered = []
+    for _ in range(40):
+        part = measure_part(some, touched(root @ rng.standard_normal(len(root))))
+        covered.append(
+            [
+                abs(result.value.value - EXPECTED[i]) <= result.value.uncertainty
+                for i, result in zip(deviations, part.results, strict=True)
+            ]
+        )
+
+    assert np.mean(covered, axis=0).min() >= 0.9
+
+
+def test_a_distance_is_known_better_than_by_independent_points(
+    exact: MeasuredPart,
+) -> None:
+    # Hole and dome share the error of the scale, which is all but the same at both.
+    angle = exact.results[2]
+
+    assert angle.independent_uncertainty is not None
+    assert angle.value.uncertainty < angle.independent_uncertainty
+
+
+def test_a_value_near_its_limit_is_not_proven(plan: Plan) -> None:
+    off = replace_tolerance(plan, 0.001)
+    result = measure_part(off, touched()).results[0]
+
+    assert result.decision is Decision.OPEN
+    assert result.probability is not None
+    assert 0.05 < result.probability < 0.5
+
+
+def test_the_side_comes_from_the_approach(plan: Plan) -> None:
+    auto = Plan(plan.name, (replace_side(plan, "hole"),), characteristics=())
+    part = measure_part(auto, only(touched(), "hole"))
+
+    surface = part.features["hole"].surface
+    assert surface.quantity.values[6] == pytest.approx(10)
+    assert (surface.side, surface.evidence) == ("inside", "approach")
+
+
+def test_touches_that_do_not_show_their_side_ask_for_it(plan: Plan) -> None:
+    auto = Plan(plan.name, (replace_side(plan, "bore"),))
+
+    with pytest.raises(CalibrationError, match="State 'side: inside'"):
+        measure_part(auto, only(touched(), "bore"))
+
+
+def test_touches_from_both_sides_are_refused(plan: Plan) -> None:
+    touches = only(touched(), "hole")
+    mixed = touches.approaches_cam * np.where(np.arange(8) % 2, 1, -1)[:, None]
+
+    with pytest.raises(CalibrationError, match="both sides"):
+        measure_part(
+            Plan(plan.name, (replace_side(plan, "hole"),)),
+            replace(touches, approaches_cam=mixed),
+        )
+
+
+def test_missing_touches_are_named(plan: Plan) -> None:
+    with pytest.raises(CalibrationError, match="front has 0 touches"):
+        measure_part(plan, only(touched(), "top"))
+
+
+def only(touches: PartTouches, name: str) -> PartTouches:
+    at = touches.of(name)
+    columns = touches.columns(at)
+    return replace(
+        touches,
+        points_cam=touches.points_cam[at],
+        covariance=touches.covariance[np.ix_(columns, columns)],
+        approaches_cam=touches.approaches_cam[at],
+        styli_cam=touches.styli_cam[at],
+        owners=len(at) * (name,),
+    )
+
+
+def replace_characteristics(plan: Plan, kept: list[int]) -> Plan:
+    import msgspec
+
+    chosen = tuple(plan.characteristics[i] for i in kept)
+    return msgspec.structs.replace(plan, characteristics=chosen)
+
+
+def replace_tolerance(plan: Plan, tolerance: float) -> Plan:
+    import msgspec
+
+    first = msgspec.structs.replace(plan.characteristics[0], tolerance=tolerance)
+    return msgspec.structs.replace(plan, characteristics=(first,))
+
+
+def replace_side(plan: Plan, name: str):  # type: ignore[no-untyped-def]
+    import msgspec
+
+    return msgspec.structs.replace(plan.feature(name), side=Side.AUTO, touches=None)
