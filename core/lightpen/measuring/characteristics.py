@@ -20,7 +20,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.measuring import constructions
-from lightpen.measuring.compensation import Surface
+from lightpen.measuring.compensation import TouchedSurface
 from lightpen.measuring.features import AXIS, PLACE, Feature
 from lightpen.measuring.plan import CharacteristicKind as Of
 from lightpen.measuring.plan import Nominal, PlannedCharacteristic
@@ -66,7 +66,7 @@ class Measured:
 
     Attributes
     ----------
-    surface : Surface
+    surface : TouchedSurface
         Compensated by the ball radius, camera frame.
     in_part : Quantity
         The same in the frame of the part.
@@ -78,7 +78,7 @@ class Measured:
         By design.
     """
 
-    surface: Surface
+    surface: TouchedSurface
     in_part: Quantity
     feature: Feature | None = None
     points: Quantity | None = None

@@ -47,7 +47,7 @@ class Evidence(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class TouchedSurface:
     """A feature at the surface of a part.
 
     Attributes
@@ -67,7 +67,7 @@ class Surface:
 
 def surface_of(
     planned: PlannedFeature, feature: Feature, touches: PartTouches
-) -> Surface:
+) -> TouchedSurface:
     """Return the surface that was touched.
 
     Raises
@@ -80,7 +80,7 @@ def surface_of(
     if planned.kind in {FeatureKind.LINE, FeatureKind.CYLINDER}:
         quantity = _along_touches(quantity, touches.points_cam[at])
     if planned.kind is not FeatureKind.PLANE and not touches.ball_radius:
-        return Surface(planned.kind, quantity, Side.OUTSIDE, Evidence.NONE)
+        return TouchedSurface(planned.kind, quantity, Side.OUTSIDE, Evidence.NONE)
     if planned.kind in ROUND:
         side, evidence = _side(planned, feature, touches)
         sign = 1.0 if side is Side.INSIDE else -1.0
@@ -94,7 +94,7 @@ def surface_of(
         moved = derive(resized, quantity, touches.ball)
         if moved.values[6] <= 0:
             raise CalibrationError("measuring.ball-too-large", name=planned.name)
-        return Surface(planned.kind, moved, side, evidence)
+        return TouchedSurface(planned.kind, moved, side, evidence)
     outwards, evidence = _outwards(planned, feature, touches)
     if planned.kind is FeatureKind.PLANE:
         sign = 1.0 if feature.axis @ outwards > 0 else -1.0
@@ -104,7 +104,7 @@ def surface_of(
             return np.concatenate([values[PLACE] - ball[0] * normal, normal])
 
         moved = derive(shifted, quantity, touches.ball)
-        return Surface(planned.kind, moved, Side.OUTSIDE, evidence)
+        return TouchedSurface(planned.kind, moved, Side.OUTSIDE, evidence)
 
     def offset(values: FloatArray, ball: FloatArray) -> FloatArray:
         way = outwards
@@ -115,7 +115,7 @@ def surface_of(
         return moved
 
     moved = derive(offset, quantity, touches.ball)
-    return Surface(planned.kind, moved, Side.OUTSIDE, evidence)
+    return TouchedSurface(planned.kind, moved, Side.OUTSIDE, evidence)
 
 
 def _along_touches(axis: Quantity, points: FloatArray) -> Quantity:

@@ -10,7 +10,7 @@ from lightpen.errors import CalibrationError
 from lightpen.measuring import constructions
 from lightpen.measuring.alignment import Alignment, align_321, align_points
 from lightpen.measuring.characteristics import AXIAL, FLAT, Measured, Value, evaluate
-from lightpen.measuring.compensation import Evidence, Surface, surface_of
+from lightpen.measuring.compensation import Evidence, TouchedSurface, surface_of
 from lightpen.measuring.features import Feature, fit_feature
 from lightpen.measuring.plan import (
     NEVER,
@@ -29,7 +29,7 @@ from lightpen.model.decision_rules import Decision, conformity_probability, deci
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class CharacteristicResult:
     """A characteristic beside its tolerance.
 
     Attributes
@@ -72,7 +72,7 @@ class MeasuredPart:
     touches: PartTouches
     features: Mapping[str, Measured]
     alignment: Alignment | None
-    results: tuple[Result, ...]
+    results: tuple[CharacteristicResult, ...]
 
     def uncertainty(self, name: str) -> FloatArray:
         """Return U (k = 2) of a feature's values in the frame of the part."""
@@ -135,7 +135,7 @@ def _fitted(planned: PlannedFeature, touches: PartTouches) -> Feature:
 def _measured(
     plan: Plan,
     name: str,
-    surface: Surface,
+    surface: TouchedSurface,
     fit: Feature | None,
     touches: PartTouches,
     alignment: Alignment | None,
@@ -150,8 +150,8 @@ def _measured(
 
 
 def _constructed(
-    planned: PlannedConstruction, surfaces: Mapping[str, Surface]
-) -> Surface:
+    planned: PlannedConstruction, surfaces: Mapping[str, TouchedSurface]
+) -> TouchedSurface:
     of = [surfaces[name] for name in planned.of]
     quantities = [each.quantity for each in of]
     flat = [each.kind in FLAT for each in of]
@@ -171,7 +171,7 @@ def _constructed(
             )
         case Construction.INTERSECTION, 2 if all(flat):
             line = derive(constructions.intersection_of_planes, *quantities)
-            return Surface(FeatureKind.LINE, line, Side.OUTSIDE, Evidence.NONE)
+            return TouchedSurface(FeatureKind.LINE, line, Side.OUTSIDE, Evidence.NONE)
         case Construction.INTERSECTION, 3 if all(flat):
             found = derive(constructions.intersection_of_three_planes, *quantities)
         case Construction.APEX, 1 if of[0].kind is FeatureKind.CONE:
@@ -179,10 +179,10 @@ def _constructed(
         case _:
             raise CalibrationError("measuring.no-construction", name=planned.name)
     point = derive(lambda place: np.concatenate([place, [0.0, 0.0, 1.0]]), found)
-    return Surface(FeatureKind.POINT, point, Side.OUTSIDE, Evidence.NONE)
+    return TouchedSurface(FeatureKind.POINT, point, Side.OUTSIDE, Evidence.NONE)
 
 
-def _aligned(plan: Plan, surfaces: Mapping[str, Surface]) -> Alignment | None:
+def _aligned(plan: Plan, surfaces: Mapping[str, TouchedSurface]) -> Alignment | None:
     planned = plan.alignment
     if planned is None:
         return None
@@ -202,7 +202,7 @@ def _result(
     planned: PlannedCharacteristic,
     features: Mapping[str, Measured],
     touches: PartTouches,
-) -> Result:
+) -> CharacteristicResult:
     inputs = touches.inputs
     value, quantity = evaluate(planned, features, inputs)
     independent = None
@@ -210,9 +210,9 @@ def _result(
         alone = quantity.uncertainty(touches.independent_inputs)
         independent = float(alone[0])
     if planned.tolerance is None:
-        return Result(planned, value, independent, None, None)
+        return CharacteristicResult(planned, value, independent, None, None)
     lower, upper = planned.limits
-    return Result(
+    return CharacteristicResult(
         planned,
         value,
         independent,

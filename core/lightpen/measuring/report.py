@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.measuring.characteristics import IS_ANGLE, Measured
-from lightpen.measuring.part import MeasuredPart, Result
+from lightpen.measuring.part import MeasuredPart, CharacteristicResult
 from lightpen.measuring.plan import Nominal
 from lightpen.measuring.surfaces import SURFACES
 from lightpen.model.decision_rules import Decision
@@ -62,7 +62,7 @@ def _line(name: str, values: Any, uncertainty: Any, digits: int = 4) -> str:
     return f"    {name:12} {numbers}   U {spread}"
 
 
-def _result_line(result: Result) -> str:
+def _result_line(result: CharacteristicResult) -> str:
     planned, value = result.planned, result.value
 
     def number(given: float | None, width: int) -> str:
@@ -124,7 +124,7 @@ def _nominal(nominal: Nominal | None) -> Any:
     return None if nominal is None else msgspec.to_builtins(nominal)
 
 
-def _result_entries(result: Result) -> dict[str, Any]:
+def _result_entries(result: CharacteristicResult) -> dict[str, Any]:
     planned = result.planned
     lower, upper = planned.limits
     return {
