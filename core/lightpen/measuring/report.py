@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.measuring.characteristics import IS_ANGLE, Measured
-from lightpen.measuring.part import MeasuredPart, CharacteristicResult
+from lightpen.measuring.part import CharacteristicResult, MeasuredPart
 from lightpen.measuring.plan import Nominal
 from lightpen.measuring.surfaces import SURFACES
 from lightpen.model.decision_rules import Decision
