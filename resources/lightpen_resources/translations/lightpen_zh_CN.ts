@@ -613,6 +613,10 @@
         <translation>只有已接受的测头才能恢复使用。</translation>
     </message>
     <message>
+        <source>This tip was accepted at another station.</source>
+        <translation>关于 Lightpen</translation>
+    </message>
+    <message>
         <source>This tip is current.</source>
         <translation>该测头为当前测头。</translation>
     </message>
@@ -1923,6 +1927,14 @@
         <translation>请打开本光笔的 LED 文件，并将光笔置于相机视野内。</translation>
     </message>
     <message>
+        <source>{0} The swing will probably fail.</source>
+        <translation>此测头为当前测头。</translation>
+    </message>
+    <message>
+        <source>Swing anyway</source>
+        <translation>仍然摆动</translation>
+    </message>
+    <message>
         <source>The LED table has unsaved changes.</source>
         <translation>LED 表格有未保存的修改。</translation>
     </message>
@@ -2293,6 +2305,10 @@
     <message>
         <source>An internal error occurred. The program can continue; all images are saved. No report was written: the disk is full or write-protected.</source>
         <translation>发生内部错误。程序可继续运行；全部图像已保存。无法写入报告：磁盘已满或没有写入权限。</translation>
+    </message>
+    <message>
+        <source>Answer the question first.</source>
+        <translation>LED 表有未保存的更改。</translation>
     </message>
     <message>
         <source>Press this button at the computer.</source>
@@ -2968,6 +2984,37 @@
     </message>
 </context>
 <context>
+    <name>ReasonBar</name>
+    <message>
+        <source>The tip was replaced or refitted.</source>
+        <translation>请在计算机上按此按钮。</translation>
+    </message>
+    <message>
+        <source>The pen was repaired or its LEDs were measured again.</source>
+        <translation>光笔已维修，或其 LED 已重新测量。</translation>
+    </message>
+    <message>
+        <source>The station is being set up.</source>
+        <translation>工作站正在设置。</translation>
+    </message>
+    <message>
+        <source>The cause was found and has no effect on this tip.</source>
+        <translation>原因已查明，对此测头没有影响。</translation>
+    </message>
+    <message>
+        <source>The accuracy is sufficient for this measurement.</source>
+        <translation>其准确度足以满足本次测量。</translation>
+    </message>
+    <message>
+        <source>Reasons</source>
+        <translation>理由</translation>
+    </message>
+    <message>
+        <source>Enter at least {0} letters; there are {1}.</source>
+        <translation>请至少输入 {0} 个字符；现有 {1} 个。</translation>
+    </message>
+</context>
+<context>
     <name>ResidualView</name>
     <message>
         <source>Recorded image</source>
@@ -3187,6 +3234,10 @@
     <message>
         <source>Start next calibration</source>
         <translation>开始下一次标定</translation>
+    </message>
+    <message>
+        <source>Read the result first.</source>
+        <translation>记录的图像</translation>
     </message>
     <message>
         <source>Check settings</source>
@@ -4214,6 +4265,14 @@
         <translation>进度</translation>
     </message>
     <message>
+        <source>Left and right are swapped</source>
+        <translation>检查设置</translation>
+    </message>
+    <message>
+        <source>Learn again on which side you stand.</source>
+        <translation>重新识别您所站的一侧。</translation>
+    </message>
+    <message>
         <source>Start over</source>
         <translation>重新开始</translation>
     </message>
@@ -4739,6 +4798,25 @@
     <message>
         <source>PEN DETECTED</source>
         <translation>已检测到光笔</translation>
+    </message>
+</context>
+<context>
+    <name>WithdrawalBar</name>
+    <message>
+        <source>Revoke this acceptance? The previous result becomes current again, which a supervisor has to approve.</source>
+        <translation>重新开始</translation>
+    </message>
+    <message>
+        <source>Reason</source>
+        <translation>理由</translation>
+    </message>
+    <message>
+        <source>Revoke acceptance</source>
+        <translation>撤销接受</translation>
+    </message>
+    <message>
+        <source>Keep acceptance</source>
+        <translation>保留接受</translation>
     </message>
 </context>
 <context>
@@ -5917,6 +5995,10 @@
         <translation>无法读取档案服务器的地址。其格式为 postgresql://user:password@host/database，口令中的 @ 写作 %40。</translation>
     </message>
     <message>
+        <source>&apos;{id}&apos; is not a valid ID. Enter up to {most} letters and digits without / and \, as on the label.</source>
+        <translation>本程序在使用同一数据文件夹 {0} 的其他窗口中打开。结果共享。</translation>
+    </message>
+    <message>
         <source>The swing is paused.</source>
         <translation>摆动已暂停。</translation>
     </message>
@@ -6481,10 +6563,6 @@
         <translation>固定点的离散为 {of_point:.4f} mm，而各次标定间测头的离散仅 {of_tip:.4f} mm。测头是稳定的：测点之间锥孔或相机移动过，或测头未落稳在锥孔中。</translation>
     </message>
     <message>
-        <source>&apos;{id}&apos; is not a valid ID. Enter up to {most} letters and digits, as on the label.</source>
-        <translation>“{id}”不是有效编号。请按标签输入最多 {most} 个字母和数字。</translation>
-    </message>
-    <message>
         <source>0 0 0 is not a direction. Enter the stylus axis from the ball into the pen, in the pen frame, such as 0 1 0.</source>
         <translation>0 0 0 不是方向。请给出测杆轴线在光笔坐标系中由测球指向光笔的方向，例如 0 1 0。</translation>
     </message>
@@ -6501,7 +6579,19 @@
         <translation>采用 8 个畸变系数：交叉验证误差由 {held_out:.4f} px 减小到 {held_out_more:.4f} px。</translation>
     </message>
     <message>
+        <source>A file is missing among the limits in {folder}. Nothing is accepted until the folder is restored from a copy.</source>
+        <translation>摆动已暂停。</translation>
+    </message>
+    <message>
+        <source>A length from LED {number} to itself is none. Give the numbers of two LEDs.</source>
+        <translation>LED {number} 到自身的长度没有意义。请给出两个 LED 的编号。</translation>
+    </message>
+    <message>
         <source>A name, the camera images or a file is missing. Complete the earlier steps, then continue the verification.</source>
+        <translation>缺少名称、相机图像或文件。请完成前面的步骤，然后继续验证。</translation>
+    </message>
+    <message>
+        <source>A pen file needs one known length. Measure the distance between two LEDs, and give it.</source>
         <translation>缺少名称、相机图像或文件。请完成前面的步骤，然后继续验证。</translation>
     </message>
     <message>
@@ -6511,6 +6601,10 @@
     <message>
         <source>A result with U within the limit is CHECK if the tips from odd and even images differ by more than the limit and by more than {halves:g} times U (k = 2) of their difference, if the images contradict a file by more than {contradicted:g} standard deviations, if cone and camera moved by more than {moved:.4f} mm, if the residuals exceed {sigma:g} px, if an LED is displaced by more than {displaced:g} mm, if the cameras are not synchronised, if more than {dropped:.0f} % of the images with the pen are excluded, if fewer than {n_images} images show the pen, or none on one of the eight sides.</source>
         <translation>即使 U 合格，出现下列任一情形仍判为“需检查”：由奇数图像与偶数图像求得的测头之差既超过限值，又超过该差值 U (k = 2) 的 {halves:g} 倍；图像与文件的矛盾超过 {contradicted:g} 倍标准差；锥孔与相机的相对移动超过 {moved:.4f} mm；残差超过 {sigma:g} px；某个 LED 明显偏离且超过 {displaced:g} mm；多台相机中有一台不同步；拍到光笔的图像中未参与计算的超过 {dropped:.0f} %；拍到光笔的图像少于 {n_images} 幅；八个方向中有一个方向没有图像。</translation>
+    </message>
+    <message>
+        <source>A supervisor&apos;s approval and a reason are needed. Enter the supervisor&apos;s name and password.</source>
+        <translation>与其他点相距 {distance:.1f} mm 的点无效：测头不在锥孔中。请将其放入锥孔并保持静止。</translation>
     </message>
     <message>
         <source>All LEDs changed by one scale factor, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (aluminium), or the distance between cone and camera changed. No single LED moved.</source>
@@ -6559,6 +6653,10 @@
     <message>
         <source>Ball diameter {diameter:g} mm is not valid; the range is above 0 to {most:g} mm. Enter the measured diameter, or leave it empty.</source>
         <translation>测球直径 {diameter:g} mm 无效；范围为大于 0 至 {most:g} mm。请输入测得的直径，或留空。</translation>
+    </message>
+    <message>
+        <source>Beside one pen {n_others} other lights move with each other: there is a second pen, or a mirror. Remove or cover it, and repeat the swing.</source>
+        <translation>所有 LED 按同一比例变化 {growth:+.0f} ppm：光笔温度变化 {kelvin:+.1f} K（铝），或锥孔与相机的距离发生了变化。没有单个 LED 移动。</translation>
     </message>
     <message>
         <source>Both cameras see the board in {n_pairs} views; at least {least} are needed. Add views in which both cameras see the whole board.</source>
@@ -6625,6 +6723,14 @@
         <translation>桌面条目仅适用于 Linux。在 Windows 上，开始菜单项由安装程序创建。</translation>
     </message>
     <message>
+        <source>Different poses of the board: {n_views}; at least {least} are needed, 15 are better. Move and tilt the board between views.</source>
+        <translation>两台相机同时看到标定板的视图有 {n_pairs} 个；至少需要 {least} 个。请增加两台相机都能看到整块标定板的视图。</translation>
+    </message>
+    <message>
+        <source>Enter the reason for reinstating this tip.</source>
+        <translation>请输入恢复此测头的理由。</translation>
+    </message>
+    <message>
         <source>Entries {first} to {last} of chain {chain} are missing.</source>
         <translation>链 {chain} 的第 {first} 至第 {last} 个条目缺失。</translation>
     </message>
@@ -6637,6 +6743,10 @@
         <translation>条目 {number} 不是已接受的测头。请选择已接受测头的条目。</translation>
     </message>
     <message>
+        <source>Entry {number} is not of this station. Only a tip that was accepted here can be reinstated.</source>
+        <translation>链 {chain} 的第 {first} 至 {last} 条记录缺失。</translation>
+    </message>
+    <message>
         <source>Entry {number} of chain {chain} does not match its predecessor: one of the two was replaced.</source>
         <translation>链 {chain} 的第 {number} 个条目与前一条不衔接：两者之一被替换。</translation>
     </message>
@@ -6645,8 +6755,16 @@
         <translation>链 {chain} 的第 {number} 条在档案关闭时存在，现已不存在：有条目被删除，或档案被替换。</translation>
     </message>
     <message>
+        <source>Entry {number} of chain {chain} introduces a station key that neither the key before nor a supervisor approved. Ask the station whether its data folder was moved to another computer.</source>
+        <translation>链 {chain} 的第 {number} 条记录与前一条不匹配：其中一条被替换。</translation>
+    </message>
+    <message>
         <source>Entry {number} of chain {chain} is missing.</source>
         <translation>链 {chain} 的第 {number} 个条目缺失。</translation>
+    </message>
+    <message>
+        <source>Entry {number} of chain {chain} is signed by a key that is not the station&apos;s: it was forged, or entered by a copy of the data folder on another computer.</source>
+        <translation>链 {chain} 的第 {number} 条记录缺失。</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} was modified.</source>
@@ -6655,6 +6773,10 @@
     <message>
         <source>Fewer than {least} views have the board tilted {sides}. Add such views.</source>
         <translation>标定板{sides}倾斜的视图少于 {least} 幅。请补充。</translation>
+    </message>
+    <message>
+        <source>For a moment, the tip in the cone. Then the program learns where you stand.</source>
+        <translation>链 {chain} 的第 {number} 条记录被修改。</translation>
     </message>
     <message>
         <source>Frame rate {sent:.1f} fps instead of {wanted:.1f} fps, limited by link or exposure. Lower the frame rate, or use a smaller region or a shorter exposure.</source>
@@ -6797,6 +6919,10 @@
         <translation>最大变化 {limit:g} mm 无效。请输入大于 0 且不超过 {most:g} mm 的值。</translation>
     </message>
     <message>
+        <source>Most centres are outside the image: they reach to ({x:.0f}, {y:.0f}) px, and the images have {width} x {height} px. Check the size of the images.</source>
+        <translation>帧率为 {sent:.1f} fps 而不是 {wanted:.1f} fps，受链路或曝光限制。请降低帧率，或使用更小的区域或更短的曝光。</translation>
+    </message>
+    <message>
         <source>Most images show fewer than {n_needed} spots (median {median:.0f}); at least {n_needed} of the {n_leds} LEDs are needed. Check that the LEDs are lit and in the image, and check the exposure.</source>
         <translation>多数图像中的光点少于 {n_needed} 个（中位数 {median:.0f}）；光笔的 {n_leds} 个 LED 中须看到 {n_needed} 个。请检查 LED 是否点亮并在图像内，以及曝光是否合适。</translation>
     </message>
@@ -6881,6 +7007,10 @@
         <translation>在 {n_swings} 次摆动中，没有 LED 相对其他 LED 移动。</translation>
     </message>
     <message>
+        <source>No focal length from 0.3 to 12 image widths explains the tracks. Check that the tip stayed in the cone, and tilt the pen in all directions, with roll.</source>
+        <translation>大多数图像中的光斑少于 {n_needed} 个（中位数 {median:.0f}）；{n_leds} 个 LED 中至少需要 {n_needed} 个。请检查 LED 是否点亮并在图像内，并检查曝光。</translation>
+    </message>
+    <message>
         <source>No image from camera {serial} for {silence:.0f} s. Check cable and power.</source>
         <translation>相机 {serial} 已有 {silence:.0f} s 没有送来图像。请检查线缆和电源。</translation>
     </message>
@@ -6905,12 +7035,24 @@
         <translation>图像中没有标定板 {board}，看到的是 {other}：列数与行数颠倒了。请指定该标定板。</translation>
     </message>
     <message>
+        <source>No length is known: all lengths are in hundredths of the largest distance between two LEDs.</source>
+        <translation>相机 {serial} 已 {silence:.0f} s 没有图像。请检查电缆和电源。</translation>
+    </message>
+    <message>
+        <source>No pen, no camera and no fixed tip explain the tracks: they miss by {misfit:.1f} px. Check that the tip stayed in the cone, that the LEDs are fixed to one pen, and that camera and cone stand still.</source>
+        <translation>没有任何光笔、相机和固定测头能解释这些轨迹：偏差 {misfit:.1f} px。请检查测头是否始终在锥孔中，LED 是否固定在同一支光笔上，以及相机和锥孔是否静止。</translation>
+    </message>
+    <message>
         <source>No supervisor password is set. Set it at Start, All limits.</source>
         <translation>尚未设置主管密码。请在“开始”步骤的“所有限值”中设置。</translation>
     </message>
     <message>
         <source>No task is chosen. Choose at least one.</source>
         <translation>没有选择任何项。请至少选择一项。</translation>
+    </message>
+    <message>
+        <source>No touches of {name} are given. Give them as {name}=IMAGES, or as a folder of that name.</source>
+        <translation>尚未设置主管密码。请在“开始”的“所有限值”中设置。</translation>
     </message>
     <message>
         <source>No view covers these image corners: {corners}. Add such views.</source>
@@ -6927,6 +7069,10 @@
     <message>
         <source>One swing does not show how a pen changes; give two at least.</source>
         <translation>仅凭一次摆动看不出光笔的变化；请至少给出两次。</translation>
+    </message>
+    <message>
+        <source>Only {n_used} of {n_images} images agree on one tip. Press the tip into the cone, clamp cone and camera, and repeat the swing.</source>
+        <translation>没有视图覆盖图像的这些角：{corners}。请增加这样的视图。</translation>
     </message>
     <message>
         <source>Point std. deviation: u {u:.4f}, v {v:.4f}, w {w:.4f} mm over all postures.</source>
@@ -7013,8 +7159,20 @@
         <translation>LED 不在光笔坐标系中：LED {led} 与规定位置相差 {distance:.2f} mm（原点在 LED 1 前方，y 轴沿 LED 1-4，LED 5-10 位于 z = 0）。请将测量机坐标转换到光笔坐标系。</translation>
     </message>
     <message>
+        <source>The LEDs cannot be followed from image to image: in no {needed} of {n_images} images in a row the same 5 LEDs are seen. Give the images in the order in which they were taken, 10 or more a second, with the whole pen in view.</source>
+        <translation>各姿态下点的标准差：u {u:.4f}、v {v:.4f}、w {w:.4f} mm。</translation>
+    </message>
+    <message>
+        <source>The LEDs found do not resemble the sketch, in whatever order. Check that it is of this pen, right-handed and in millimetres to 5 mm.</source>
+        <translation>找到的 LED 无论按何种顺序都与草图不符。请检查草图是否属于本光笔、是否为右手系、单位为毫米且误差不超过 5 mm。</translation>
+    </message>
+    <message>
         <source>The adjustment did not converge in {n_steps} iterations: the views are too similar, or show another board. Add views with the board tilted by 20° to 40° to each side and in each corner of the image; otherwise count and measure the squares again.</source>
         <translation>平差在 {n_steps} 次迭代内未收敛：视图过于相似，或标定板与所指定的不符。请补充标定板向各侧倾斜 20° 至 40° 以及位于图像各角的视图；否则请重新清点并测量格子。</translation>
+    </message>
+    <message>
+        <source>The archive of this data folder is not the one its limits belong to. Nothing is accepted until the archive is restored from a copy.</source>
+        <translation>平差在 {n_steps} 次迭代内未收敛：视图过于相似，或显示的是另一块标定板。请增加标定板向各侧倾斜 20° 至 40° 以及位于图像各角的视图；否则请重新清点并测量方格。</translation>
     </message>
     <message>
         <source>The archive {file} does not exist or is empty. Check the data folder.</source>
@@ -7033,6 +7191,10 @@
         <translation>档案库 {name} 由更新版本的程序写入。请使用该版本。档案库未作更改。</translation>
     </message>
     <message>
+        <source>The ball is larger than the feature {name}. Check the ball diameter, and the side in the plan.</source>
+        <translation>档案 {file} 不存在或为空。请检查数据文件夹。</translation>
+    </message>
+    <message>
         <source>The board does not match {board}: lengths along the rows are {stretch:+.2%} longer than along the columns, and right angles deviate by {shear:+.2f}°. It may have been scaled in printing. Print it at true scale, or measure it again.</source>
         <translation>标定板与 {board} 不符：沿行的长度比沿列长 {stretch:+.2%}，直角偏差 {shear:+.2f}°。打印时可能被缩放。请按实际尺寸打印，或重新测量。</translation>
     </message>
@@ -7041,12 +7203,28 @@
         <translation>标定板弯曲 {bend:.2f} mm，假定值为 {stated:.2f} mm。计算中已考虑，但请将其固定在平板上。</translation>
     </message>
     <message>
+        <source>The board&apos;s squares are stated as {pitch:g} mm, which makes a board of {side:.3g} m. Lengths are in mm: check them. Intrinsics do not depend on it; distances do.</source>
+        <translation>标定板与 {board} 不符：沿行的长度比沿列的长 {stretch:+.2%}，直角偏差 {shear:+.2f}°。打印时可能被缩放。请按实际比例打印，或重新测量。</translation>
+    </message>
+    <message>
+        <source>The calibration of this tip expired on {due}. Calibrate it again.</source>
+        <translation>此测头的标定已于 {due} 到期。请重新标定。</translation>
+    </message>
+    <message>
         <source>The calibration {path} was modified or damaged after it was written. Restore it from a copy, or calibrate again.</source>
         <translation>标定结果 {path} 与写出时不同：此后被改动或损坏。请从副本恢复，或重新标定。</translation>
     </message>
     <message>
         <source>The camera calibration in {file} was modified or damaged after it was written. Restore the file from a copy.</source>
         <translation>{file} 中的相机标定与写入时不同：之后被更改或损坏。请从副本恢复该文件。</translation>
+    </message>
+    <message>
+        <source>The camera changed during the swing: its focal length was {first:.0f} px first and {second:.0f} px later. Lock zoom, focus and image stabilisation, and repeat the swing.</source>
+        <translation>标定文件 {path} 在写入后被修改或损坏。请从副本恢复，或重新标定。</translation>
+    </message>
+    <message>
+        <source>The camera drifts during the set: by {px:.2f} px over the image from the first view to the last (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px). Let the camera warm up, fix lens and mount, and take the views again.</source>
+        <translation>相机在拍摄期间漂移：从第一个视图到最后一个视图，图像上变化 {px:.2f} px（fx {fx:+.2f}，cx {cx:+.2f}，cy {cy:+.2f} px）。请让相机预热，固定镜头和支架，然后重新拍摄视图。</translation>
     </message>
     <message>
         <source>The camera file belongs to camera {stated}; the camera in use is {used}. Give the file of this camera.</source>
@@ -7089,6 +7267,22 @@
         <translation>两台相机不同步：{camera} 相差两幅视图间隔的 {lag:.2f} ± {u:.2f} 倍。光笔以 100 mm/s 移动时，每毫秒相当于 {px:.2f} px。请用同一信号触发两台相机。</translation>
     </message>
     <message>
+        <source>The characteristic {name} is not defined for features of this kind or number. Check the plan.</source>
+        <translation>该相机文件属于相机 {stated}；当前使用的相机是 {used}。请给出此相机的文件。</translation>
+    </message>
+    <message>
+        <source>The characteristic {name} needs a datum. Name a feature as its datum in the plan.</source>
+        <translation>特性 {name} 需要基准。请在计划中指定一个要素作为其基准。</translation>
+    </message>
+    <message>
+        <source>The characteristic {name} needs the nominal origin of its feature. Add it to the plan.</source>
+        <translation>特性 {name} 需要其要素的标称原点。请将其加入计划。</translation>
+    </message>
+    <message>
+        <source>The columns of pixels are not perpendicular to the rows, by {degrees:.2f}°: the images were sheared by software, an interlaced source, or a rolling shutter before a moving board. Use images as the sensor reads them, of a board at rest.</source>
+        <translation>像素列与行不垂直，偏差 {degrees:.2f}°：图像因软件、隔行信号源或标定板移动时的卷帘快门而错切。请使用传感器的原始图像，并使标定板静止。</translation>
+    </message>
+    <message>
         <source>The cone has {n_touches} usable points, at least {needed} are needed, {usual} are usual. Probe it again, each time in another posture.</source>
         <translation>锥孔有 {n_touches} 个可用的测点，至少需要 {needed} 个，通常为 {usual} 个。请再次触测，每次换一个姿态。</translation>
     </message>
@@ -7099,6 +7293,18 @@
     <message>
         <source>The cone moved by {distance:.4f} mm relative to the camera during the swing; U includes this. Clamp both, let the camera warm up, and repeat the swing.</source>
         <translation>摆动期间锥孔相对相机移动了 {distance:.4f} mm，已计入 U。请将两者夹紧，待相机预热后重新摆动。</translation>
+    </message>
+    <message>
+        <source>The construction {name} is not defined for features of this kind or number. Check the plan.</source>
+        <translation>锥孔有 {n_touches} 个可用点，至少需要 {needed} 个，通常为 {usual} 个。请重新探测，每次采用不同的姿态。</translation>
+    </message>
+    <message>
+        <source>The copy of chain {chain} in this archive is damaged. Check the archive.</source>
+        <translation>本档案中链 {chain} 的副本已损坏。请检查档案。</translation>
+    </message>
+    <message>
+        <source>The covariance of the lens field of {name} is not a covariance matrix: it must be symmetric, with correlations from -1 to 1. Correct or remove the entry lens_field.</source>
+        <translation>{name} 中镜头残差场的协方差不是协方差矩阵：它必须对称，且相关系数在 -1 到 1 之间。请更正或删除条目 lens_field。</translation>
     </message>
     <message>
         <source>The criterion {criterion} is not defined for a {kind}. Use least squares.</source>
@@ -7141,6 +7347,10 @@
         <translation>由这些视图得出的畸变使图像在角部翻折，而那里没有视图显示标定板。请补充标定板位于图像各角的视图。</translation>
     </message>
     <message>
+        <source>The feature {name} has {n_touches} touches; the plan needs {needed}. Probe the missing points.</source>
+        <translation>准则“{criterion}”对{kind}没有定义。请使用最小二乘法。</translation>
+    </message>
+    <message>
         <source>The file agrees with the images if it contains rig_from_cam; cam_from_rig is needed. For each camera transpose the rotation R and replace the translation t by -R^T t.</source>
         <translation>若该文件给出的是 rig_from_cam，则与图像一致；而此处需要 cam_from_rig。请将每台相机的旋转 R 转置，并用 -R^T t 代替平移 t。</translation>
     </message>
@@ -7159,6 +7369,10 @@
     <message>
         <source>The file agrees with the images if those of {one} and {other} are swapped. Give the images in the order of the rig file, {names}.</source>
         <translation>若将 {one} 与 {other} 的图像对调，则与图像一致：请按相机组文件中的顺序（{names}）给出图像。</translation>
+    </message>
+    <message>
+        <source>The file {file} is not signed by this station and its supervisor: it was changed or comes from elsewhere. Restore it from a copy, or move it away to continue without it.</source>
+        <translation>若文件内容为 rig_from_cam，则与图像一致；但需要的是 cam_from_rig。请对每台相机将旋转 R 转置，并将平移 t 替换为 -R^T t。</translation>
     </message>
     <message>
         <source>The file {file} of entry {number} was modified after it was entered.</source>
@@ -7193,6 +7407,10 @@
         <translation>文件夹 {folder} 不是空的：其中有 {example}。请选择其他文件夹，或将其清空；不会覆盖任何内容。</translation>
     </message>
     <message>
+        <source>The images are from two cameras, or one camera with two zoom or focus settings (fx {fx:.1f} and {other_fx:.1f} px): {n_named} of {n_views} differ from the others: {names}. Give the images of one camera with one setting.</source>
+        <translation>第 {number} 条记录的文件 {file} 在登记后被修改。</translation>
+    </message>
+    <message>
         <source>The images contradict the LED file: the standard deviation of its coordinates is {found:.4f} mm, stated {stated:.4f} mm. Measure the pen again, or check that the file belongs to this pen.</source>
         <translation>图像与 LED 文件矛盾：其坐标的标准差为 {found:.4f} mm，文件给出 {stated:.4f} mm。请重新测量光笔，或检查该文件是否属于此光笔。</translation>
     </message>
@@ -7211,6 +7429,10 @@
     <message>
         <source>The images contradict the rig file: {what} of camera {camera} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file. Check that no camera was moved, or calibrate the rig again.</source>
         <translation>图像与相机组文件矛盾：相机 {camera} 的{what}由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件为 {stated:.6g} ± {stated_u:.2g}{unit}。请检查是否有相机移动过，或重新标定相机组。</translation>
+    </message>
+    <message>
+        <source>The images do not decide between the pen and its mirror image. Tilt the pen further towards the camera and away from it, by 30 degrees or more, and come closer to the camera.</source>
+        <translation>图像与 LED 文件矛盾：其坐标的标准差为 {found:.4f} mm，文件给出 {stated:.4f} mm。请重新测量光笔，或检查文件是否属于本光笔。</translation>
     </message>
     <message>
         <source>The images do not determine the tip yet. Tilt the pen to all sides.</source>
@@ -7249,6 +7471,10 @@
         <translation>联合拟合在 {n_steps} 次迭代内未收敛。请检查两个文件是否属于这支光笔和这台相机。</translation>
     </message>
     <message>
+        <source>The key of the station with chain {chain} is not in this user account, so that nothing can be signed. Use the account and computer of the station, copy the key here, or let a supervisor introduce another (documents: security).</source>
+        <translation>图像尚不能确定测头。请将光笔向各侧倾斜。</translation>
+    </message>
+    <message>
         <source>The lamp at {x:.0f}, {y:.0f} px moved by {shift:.2f} px during the swing, but the pen did not. No correction is made. Fix or cover the lamp.</source>
         <translation>位于 {x:.0f}, {y:.0f} px 的灯在摆动过程中移动了 {shift:.2f} px，而光笔没有随之移动。未作任何扣除。请固定该灯，或将其遮住。</translation>
     </message>
@@ -7261,8 +7487,32 @@
         <translation>未指定长度。请输入证书值。</translation>
     </message>
     <message>
+        <source>The length limits U: known to {sigma:.3f} mm it would reduce U from {now:.0f} to {then:.0f} um.</source>
+        <translation>位于 {x:.0f}, {y:.0f} px 的灯在摆动期间移动了 {shift:.2f} px，而光笔没有。不作修正。请固定或遮住该灯。</translation>
+    </message>
+    <message>
+        <source>The length of {length:g} mm is not that between LEDs {first} and {second}: by it the discs would be {found:.2f} mm wide, and {stated:g} mm is stated. It may be that between LEDs {other} and {another}. Check which LEDs were measured, and the diameter of the discs.</source>
+        <translation>长度 {length:g} mm 不是 LED {first} 与 {second} 之间的长度：由它得出的圆盘直径为 {found:.2f} mm，而给出的是 {stated:g} mm。它可能是 LED {other} 与 {another} 之间的长度。请检查测量的是哪两个 LED 以及圆盘直径。</translation>
+    </message>
+    <message>
+        <source>The lengths contradict each other: LEDs {first} and {second} are {stated:.3f} mm apart as measured, and {implied:.3f} mm by the other lengths. Check the numbers of the LEDs, and measure again.</source>
+        <translation>各长度相互矛盾：LED {first} 与 {second} 的测得距离为 {stated:.3f} mm，而由其他长度得出 {implied:.3f} mm。请检查 LED 编号并重新测量。</translation>
+    </message>
+    <message>
         <source>The lengths of the board {text} are not valid: they must be above 0 mm, and markers or circles smaller than their squares. Measure them again.</source>
         <translation>标定板 {text} 的尺寸不合理：单位为 mm，须大于 0，且标记或圆须小于其所在的格子。请重新测量。</translation>
+    </message>
+    <message>
+        <source>The limits and the supervisor password in {folder} are missing, or older than those seen here before. Nothing is accepted until the folder is restored. To begin anew without them, an administrator removes {memory}.</source>
+        <translation>标定板 {text} 的长度无效：必须大于 0 mm，且标记或圆必须小于其方格。请重新测量。</translation>
+    </message>
+    <message>
+        <source>The limits and the supervisor password of this data folder are not those entered in its archive: {file} is missing or was changed. Nothing is accepted until the folder is restored from a copy.</source>
+        <translation>本数据文件夹的限值和主管密码与其档案中登记的不符：{file} 缺失或被更改。在从副本恢复该文件夹之前，不接受任何结果。</translation>
+    </message>
+    <message>
+        <source>The limits in {file} are not signed by this station and its supervisor: the file was changed or comes from elsewhere. Nothing is accepted until it is restored from a copy or removed.</source>
+        <translation>{file} 中的限值未由本工作站及其主管签名：该文件被更改或来自别处。在从副本恢复或删除之前，不接受任何结果。</translation>
     </message>
     <message>
         <source>The limits in {file} were modified or damaged after they were saved. Restore the file from a copy.</source>
@@ -7273,12 +7523,20 @@
         <translation>{file} 中的限值由更新版本的程序写入。请使用该版本。</translation>
     </message>
     <message>
+        <source>The limits were changed in another window after they were shown here. Nothing was saved. Read the present limits, then change them again.</source>
+        <translation>{file} 中的限值在保存后被修改或损坏。请从副本恢复该文件。</translation>
+    </message>
+    <message>
         <source>The line of the alignment is perpendicular to its plane and defines no direction in it. Choose another line.</source>
         <translation>找正所用直线垂直于其平面，不能在平面内定出方向。请选择另一条直线。</translation>
     </message>
     <message>
         <source>The local entries do not continue with {entry}. A data folder was copied and both copies were used, or entries were modified. Check both archives.</source>
         <translation>此处保存的内容与{entry}不相接。可能是数据文件夹被复制后两份都在继续使用，或条目被改动过。请检查两边的档案库。</translation>
+    </message>
+    <message>
+        <source>The measuring plan {name} is not valid: {found}. Correct the plan; docs/measuring.md describes its entries.</source>
+        <translation>找正所用的直线垂直于其平面，在平面内不能确定方向。请选择另一条直线。</translation>
     </message>
     <message>
         <source>The next image of {place} follows in {seconds:.1f} s. Wait, or replay the images faster.</source>
@@ -7327,6 +7585,10 @@
     <message>
         <source>The picture {path} was modified after it was saved. Save it again.</source>
         <translation>图片 {path} 在保存后被更改。请重新保存。</translation>
+    </message>
+    <message>
+        <source>The plan has no feature {name}. Its features are: {names}. Name the touches after a feature.</source>
+        <translation>{place} 的下一幅图像将在 {seconds:.1f} s 后出现。请等待，或加快回放。</translation>
     </message>
     <message>
         <source>The point moves with the pen tilt, std. deviation {deviation:.4f} mm along {axis} (limit {limit:.4f} mm): the tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position. Was the tip replaced, bent or refitted, or is it that of another pen?</source>
@@ -7437,12 +7699,32 @@
         <translation>t{axis} 的符号似乎有误：按现有数据，各位姿的测头散布为 {as_read:.3g} mm，改变符号后为 {undone:.3g} mm。请在同一右手坐标系中给出旋转和平移。</translation>
     </message>
     <message>
+        <source>The signature of entry {number} of chain {chain} is missing or wrong: the entry or its signature was changed.</source>
+        <translation>点随光笔倾斜而移动，沿 {axis} 的标准差为 {deviation:.4f} mm（限值 {limit:.4f} mm）：测头偏离其标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm。测头是否被更换、弯曲或重新安装，或属于另一支光笔？</translation>
+    </message>
+    <message>
+        <source>The station key {file} was changed or damaged. Restore it from a copy, or remove it and let a supervisor introduce another (documents: security).</source>
+        <translation>工作站密钥 {file} 被更改或损坏。请从副本恢复，或删除后由主管引入新密钥（见文档：安全）。</translation>
+    </message>
+    <message>
+        <source>The station {station} has no limits in this data folder. A supervisor&apos;s approval and a reason are needed, or limits for this station.</source>
+        <translation>工作站 {station} 在本数据文件夹中没有限值。需要主管批准并说明理由，或为该工作站设置限值。</translation>
+    </message>
+    <message>
+        <source>The supervisor password was wrong several times. Wait {seconds:.0f} s, then enter it again.</source>
+        <translation>主管密码多次错误。请等待 {seconds:.0f} s 后重新输入。</translation>
+    </message>
+    <message>
         <source>The swing in {folder} cannot be read: {reason}. Check the read permission, or move the folder away.</source>
         <translation>{folder} 中的摆动无法读取：{reason}。请确认您有读取权限，或移走该文件夹。</translation>
     </message>
     <message>
         <source>The swing in {folder} changed after the tip was computed. Compute the tip again, then accept it.</source>
         <translation>{folder} 中的摆动在计算测头后有变化。请重新计算，然后接受。</translation>
+    </message>
+    <message>
+        <source>The swing is too weak: U of the tip is {U:.2g} mm, the focal length is known to {focal:.2g} %, and the pen&apos;s tilt varies by {tilt:.0f} degrees. Tilt the pen by 30 degrees in all directions, and turn it about its axis.</source>
+        <translation>无法读取 {folder} 中的摆动：{reason}。请检查读取权限，或移走该文件夹。</translation>
     </message>
     <message>
         <source>The swing {swing} does not confirm the new LED file: residuals {after:.4f} px, with the old file {before:.4f} px. The old file is as good, or the pen changed in between.</source>
@@ -7521,6 +7803,14 @@
         <translation>奇数与偶数图像求得的测头相差 {difference:.4f} mm，通常为 {usual:.4f} mm。测头可能移动过。请压紧测头，重新摆动。</translation>
     </message>
     <message>
+        <source>The touches of {name} come from both sides of the surface. Probe the feature again from one side.</source>
+        <translation>摆动 {swing} 不能证实新的 LED 文件：残差 {after:.4f} px，旧文件为 {before:.4f} px。旧文件同样好，或光笔在此期间发生了变化。</translation>
+    </message>
+    <message>
+        <source>The touches of {name} do not show on which side of the surface the ball was. State &apos;side: inside&apos; or &apos;side: outside&apos; in the plan.</source>
+        <translation>{name} 的测点不能表明测球位于表面的哪一侧。请在计划中写明 &apos;side: inside&apos; 或 &apos;side: outside&apos;。</translation>
+    </message>
+    <message>
         <source>The translations seem to be in metres: as millimetres they are only {typical:.3f} mm long (median). Multiply tx, ty and tz by 1000.</source>
         <translation>平移似乎以米为单位：若按毫米计，其长度只有 {typical:.3f} mm（中位数）。需要毫米：请将 tx、ty、tz 乘以 1000。</translation>
     </message>
@@ -7531,6 +7821,10 @@
     <message>
         <source>The two recordings have different numbers of images. Choose two simultaneous recordings.</source>
         <translation>两台相机的录像图像数量不同。请选择同时录制的两组录像。</translation>
+    </message>
+    <message>
+        <source>The uncertainty of the certified value is not specified. Enter U (k = 2) of its certificate.</source>
+        <translation>平移似乎以米为单位：按毫米计仅 {typical:.3f} mm（中位数）。请将 tx、ty 和 tz 乘以 1000。</translation>
     </message>
     <message>
         <source>The uncertainty of the stylus axis is {uncertainty:.1f}°; the limit is {needed:.1f}°. The pen was tilted during the rotation. Hold the stylus upright between two fingers and only turn it.</source>
@@ -7569,6 +7863,14 @@
         <translation>视图未覆盖图像四角，由其得出的畸变会使图像在那里折叠。已将 {coefficients} 减小到恰好不折叠；四角为外推值。请补充标定板位于各角的视图，或不要让光笔进入四角。</translation>
     </message>
     <message>
+        <source>The views fit only a board {board} that is bent by {bend:.0f} mm, as no board is. Check the number and size of its squares, and that all images are from one camera with one setting.</source>
+        <translation>测杆轴线的不确定度为 {uncertainty:.1f}°；限值为 {needed:.1f}°。旋转期间光笔发生了倾斜。请用两指将测杆保持竖直，仅作旋转。</translation>
+    </message>
+    <message>
+        <source>The views from {name} on differ from those before by {px:.2f} px over the image (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px), more than by chance. Check whether zoom, focus or mount changed there.</source>
+        <translation>从 {name} 起的视图与之前的视图在图像上相差 {px:.2f} px（fx {fx:+.2f}，cx {cx:+.2f}，cy {cy:+.2f} px），超出偶然误差。请检查变焦、对焦或支架是否在那里发生了变化。</translation>
+    </message>
+    <message>
         <source>The {kind} {id} expired on {due}. Send it for inspection.</source>
         <translation>{kind} {id} 已于 {due} 到期。请送检。</translation>
     </message>
@@ -7579,6 +7881,10 @@
     <message>
         <source>The {kind} {id} is in the library already. Edit that item, or choose another ID.</source>
         <translation>测头库中已有{kind} {id}。请更改那一个，或为这一个另取编号。</translation>
+    </message>
+    <message>
+        <source>The {kind} {id} was changed in another window after it was shown here. Nothing was saved. Read the present entries, then edit them again.</source>
+        <translation>{kind} {id} 已于 {due} 到期。请送检。</translation>
     </message>
     <message>
         <source>The {what} of recorded images is fixed. Choose a live camera to change it.</source>
@@ -7613,8 +7919,16 @@
         <translation>{what} {path} 不是文本：第 {line} 行含有控制字符 {character}。请检查是否选对了文件，或另存为 UTF-8。</translation>
     </message>
     <message>
+        <source>There are {n_images} images; at least {needed} are needed, and 300 are usual. Record a swing of 15 seconds or more, 10 images a second or more.</source>
+        <translation>记录图像的{what}是固定的。如需更改，请选择实时相机。</translation>
+    </message>
+    <message>
         <source>There are {n_postures} postures, {needed} are needed: upright, and tilted to four sides.</source>
         <translation>有 {n_postures} 个姿态，需要 {needed} 个：竖直，以及向四个方向倾斜。</translation>
+    </message>
+    <message>
+        <source>There is no LED {number}; {n_leds} LEDs are found, numbered from the tip upwards and from left to right. Give a length between two of these.</source>
+        <translation>现有 {n_postures} 个姿态，需要 {needed} 个：竖直，以及向四侧倾斜。</translation>
     </message>
     <message>
         <source>This end was probed before. Probe the other one.</source>
@@ -7713,6 +8027,10 @@
         <translation>主管密码错误。请重新输入。</translation>
     </message>
     <message>
+        <source>Zoom, focus or camera changed at {name}: fx, cx, cy are {before:.1f}, {cx_before:.1f}, {cy_before:.1f} px in the {n_before} views before it and {after:.1f}, {cx_after:.1f}, {cy_after:.1f} px in the {n_after} views from there on. Lock zoom and focus, and take all views again.</source>
+        <translation>此端已探测过。请探测另一端。</translation>
+    </message>
+    <message>
         <source>calibration result</source>
         <translation>标定结果</translation>
     </message>
@@ -7769,6 +8087,10 @@
         <translation>最大内切要素</translation>
     </message>
     <message>
+        <source>measuring plan</source>
+        <translation>标定结果</translation>
+    </message>
+    <message>
         <source>minimum circumscribed feature</source>
         <translation>最小外接要素</translation>
     </message>
@@ -7815,6 +8137,10 @@
     <message>
         <source>spots do not match the pen</source>
         <translation>光点与光笔不匹配</translation>
+    </message>
+    <message>
+        <source>station key</source>
+        <translation>最小外接要素</translation>
     </message>
     <message>
         <source>systematic errors common to all poses: the scale of the tracker and of the pen, a worn or badly seated tip</source>
@@ -7865,6 +8191,10 @@
         <translation>{count} 无效。请输入 1 至 {most} 天或次。</translation>
     </message>
     <message>
+        <source>{entry} belongs to the chain of this station, but was not entered here. Nothing was imported. If this data folder was replaced by an older copy, fetch the missing entries from the server; if not, the file was forged.</source>
+        <translation>所有位姿共有的系统误差：跟踪器和光笔的比例、测头磨损或未就位</translation>
+    </message>
+    <message>
         <source>{file} is damaged: its verification cannot be continued. The images of its points stay where they are.</source>
         <translation>{file} 已损坏：无法继续它所属的验证。其测点图像保留在原处。</translation>
     </message>
@@ -7885,12 +8215,28 @@
         <translation>{place}的 {key} 必须给出绕 x y z 的转角（rad）和平移（mm）的不确定度：6 个非负的标准差，或一个对称的正定协方差矩阵；最大为 1 rad 和 10 m。请更正或删除它。</translation>
     </message>
     <message>
+        <source>{misfit} Also: {why}</source>
+        <translation>{file} 已损坏：其验证无法继续。各点的图像保持原位。</translation>
+    </message>
+    <message>
         <source>{n_dropped} of {n_images} images are excluded. Repeat the swing if the tip slipped.</source>
+        <translation>{n_images} 幅图像中有 {n_dropped} 幅被剔除。若测头滑动过，请重新摆动。</translation>
+    </message>
+    <message>
+        <source>{n_duplicates} views show the board where another view shows it, and do not count; {n_views} views remain: {names}. Move the board between views.</source>
         <translation>{n_images} 幅图像中有 {n_dropped} 幅被剔除。若测头滑动过，请重新摆动。</translation>
     </message>
     <message>
         <source>{n_failed} of {n_trials} trials failed: the swing is too weak for simulation. Capture more images in other postures.</source>
         <translation>{n_trials} 次模拟中有 {n_failed} 次求不出测头：该摆动太差，无法用模拟重复。请以其他姿态采集更多图像。</translation>
+    </message>
+    <message>
+        <source>{n_found} LEDs are found, and the sketch has {n_sketched}. Give a sketch with all LEDs of the pen, or none.</source>
+        <translation>{n_trials} 次试算中有 {n_failed} 次失败：摆动的几何条件太弱，无法模拟。请以其他姿态采集更多图像。</translation>
+    </message>
+    <message>
+        <source>{n_leds} LEDs are seen; at least {needed} are needed. Keep the whole pen in view, switch on all LEDs, and check exposure and focus.</source>
+        <translation>看到 {n_leds} 个 LED；至少需要 {needed} 个。请使整支光笔在视野内，点亮所有 LED，并检查曝光和对焦。</translation>
     </message>
     <message>
         <source>{n_left_out} of {n_poses} poses are outliers and were excluded: {poses}. Check the tracking for disturbances.</source>
@@ -7905,6 +8251,10 @@
         <translation>{n_left_out} 个测点不在环上，已排除，第一个为 {first}：光笔曾抬起或滑动。</translation>
     </message>
     <message>
+        <source>{n_named} of {n_views} images are rotated by 180°: {names}. Rotate them back, or leave them out; the camera must not be turned during a calibration, and viewers must not rotate its images.</source>
+        <translation>{n_poses} 个位姿中有 {n_left_out} 个为粗差，已剔除：{poses}。请检查跟踪是否受到干扰。</translation>
+    </message>
+    <message>
         <source>{n_points} datum points are given; an alignment needs at least {needed}, each with its nominal position.</source>
         <translation>给出了 {n_points} 个基准点；找正至少需要 {needed} 个，且每个都有标称位置。</translation>
     </message>
@@ -7915,6 +8265,14 @@
     <message>
         <source>{n_tips} calibration does not show repeatability; give two at least, ten are usual.</source>
         <translation>{n_tips} 次标定看不出重复性；请至少给出两次，通常为十次。</translation>
+    </message>
+    <message>
+        <source>{name} has a lens field of the amplitude {amplitude:g} px and the correlation length {length:g} px; an amplitude above 0 and up to {largest:g} px, and a length from {shortest:g} px are needed. Correct or remove the entry lens_field.</source>
+        <translation>给出了 {n_points} 个基准点；找正至少需要 {needed} 个，且每个都有标称位置。</translation>
+    </message>
+    <message>
+        <source>{name} has a lens field of {columns:g} columns and {rows:g} rows; 2 to {most} of each are needed. Correct or remove the entry lens_field.</source>
+        <translation>{name} 的镜头残差场有 {columns:g} 列、{rows:g} 行；行列各需 2 至 {most}。请更正或删除条目 lens_field。</translation>
     </message>
     <message>
         <source>{name} has two cameras named {camera}. Give each camera a unique name.</source>
@@ -8174,6 +8532,10 @@
     <message>
         <source>rejected</source>
         <translation>已拒绝</translation>
+    </message>
+    <message>
+        <source>other station</source>
+        <translation>{name} 中有两台名为 {camera} 的相机。请为每台相机指定唯一的名称。</translation>
     </message>
     <message>
         <source>current</source>
