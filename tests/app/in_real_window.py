@@ -118,7 +118,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     assert find_unfinished(record.folder.parent).interrupted == ()
     assert calibrated(lightpen, record.folder) == result.tip_pen.tolist()
     walker.until(walker.main_button().isEnabled)
-    walker.click("Start next calibration")
+    walker.click_step("Start")
 
     assert walker.title() == "Start"
     walker.until_says("Today")

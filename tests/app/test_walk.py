@@ -94,7 +94,8 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
     assert result_on_disk(walker).names.operator == "Ann"
     assert walker.workbench.settings.station("Hall 2").heading == 0.0
     walker.until(walker.main_button().isEnabled)
-    walker.press(Key.Key_PageDown)
+    assert walker.main_button().text() == "Swing tip T-10"
+    walker.click_step("Start")
     walker.until_says("Today")
 
 

@@ -14,13 +14,14 @@ from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.print_report.pages import PrintReport
 from lightpen_app.print_report.printing import A4, paint_on, pdf_of
+from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job
 from lightpen_app.work.save_place import SavePlace
 
 
-class PrintReportWindow(Translated, QWidget):
+class PrintReportWindow(FittedWindow, Translated, QWidget):
     """Shows the pages by the strokes by which they are saved and printed.
 
     Parameters

@@ -7,9 +7,10 @@ from PySide6.QtWidgets import QDialog, QDialogButtonBox, QWidget
 
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.fitted_window import FittedWindow
 
 
-class About(QDialog):
+class About(FittedWindow, QDialog):
     """Names, versions and licences; the text can be copied into a report.
 
     Parameters

@@ -15,6 +15,7 @@ from typing_extensions import override
 
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID, RESOURCES
+from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.translated import Translated
 from lightpen_resources import SOURCE_LANGUAGE
 
@@ -31,7 +32,7 @@ def help_text(key: str, language: str) -> str:
     raise ValueError(f"There is no help about {key!r}.")
 
 
-class HelpWindow(Translated, QWidget):
+class HelpWindow(FittedWindow, Translated, QWidget):
     """Shows one help text; Escape or F1 closes it."""
 
     def __init__(self, parent: QWidget | None = None) -> None:

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from PySide6.QtCore import QEvent, QPoint, QRect, QSize, Qt, Signal
-from PySide6.QtGui import QAction, QCloseEvent, QGuiApplication, QIcon, QKeyEvent
+from PySide6.QtCore import QEvent, QPoint, QSize, Qt, Signal
+from PySide6.QtGui import QAction, QCloseEvent, QIcon, QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
@@ -29,6 +29,7 @@ from lightpen_app.shell.sidebar import Sidebar, Subject
 from lightpen_app.shell.step_list import Status, Step, list_steps
 from lightpen_app.shell.stream_dialog import StreamDialog, StreamState
 from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.widgets.fitted_window import FRAME, fit_screen
 from lightpen_app.widgets.keys import ENTER_KEYS, PAGE_KEYS
 from lightpen_app.widgets.operator_view import OperatorView
 from lightpen_app.widgets.prompt_bar import AskingBar
@@ -36,19 +37,7 @@ from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.settings import Preferences, Settings, data_folder
 
-FRAME = QSize(GRID, 5 * GRID)  # of a window, at most; not known before it is shown
-
-
-def fitted_place(place: QRect, available: QRect) -> QRect:
-    """Return the frame of a window, moved inside a screen."""
-    size = place.size().boundedTo(available.size() - FRAME)
-    last = available.bottomRight() - QPoint(size.width() - 1, size.height() - 1)
-    left = max(available.left(), min(place.left(), last.x()))
-    top = max(available.top(), min(place.top(), last.y()))
-    return QRect(QPoint(left, top), size)
-
-
-LEAST_SIZE = QSize(116 * GRID, 62 * GRID)  # for the wizard; fits 1920 x 1080 at 200 %
+LEAST_SIZE = QSize(104 * GRID, 60 * GRID)  # for the wizard; fits 1280 x 800 at 150 %
 FIRST_SIZE = QSize(160 * GRID, 100 * GRID)
 OPTIONS = "options"  # cause of a notification
 KEYS_THAT_LEAD_ON = (*ENTER_KEYS, *PAGE_KEYS)
@@ -154,7 +143,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._use_room()
         self._retranslate()
         if settings.restore_geometry(self):
-            self._fit_screen()
+            fit_screen(self)
         else:
             available = self.screen().availableGeometry()
             self.resize(FIRST_SIZE.boundedTo(available.size() - FRAME))
@@ -364,16 +353,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         layout.setRowStretch(0, 1)
         return central
 
-    def _fit_screen(self) -> None:
-        """Keep the window within its screen, its buttons with it."""
-        if self.isMaximized() or self.isFullScreen():
-            return
-        place = self.geometry()
-        screen = QGuiApplication.screenAt(place.center()) or self.screen()
-        fitted = fitted_place(place, screen.availableGeometry())
-        if fitted != place:
-            self.setGeometry(fitted)
-
     @override
     def _use_room(self) -> None:
         """Adapt the layout around the page to the window size."""
@@ -391,7 +370,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             for each in self._pages
         ]
         self._sidebar.set_steps(list_steps(statuses, self._now))
-        self._area.set_heading(page.title(), page.lead(), page.lead_tone())
+        self._area.set_heading(page.heading(), page.lead(), page.lead_tone())
         self._action_bar.set_action(self._main_action(), can_go_back=self._now > 0)
         for each in self._hands_free_actions:
             each.setEnabled(page.is_hands_free())

@@ -1,7 +1,7 @@
 """The steps of the wizard: done, now, to do, or closed with the reason."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
@@ -53,11 +53,14 @@ class Step:
     ----------
     why_closed : str
         A sentence for a closed step, else empty.
+    shows_reason : bool
+        Whether the sentence is shown; only the first closed step does.
     """
 
     title: str
     state: StepState
     why_closed: str = ""
+    shows_reason: bool = False
 
 
 def list_steps(statuses: Sequence[Status], now: int) -> tuple[Step, ...]:
@@ -66,9 +69,13 @@ def list_steps(statuses: Sequence[Status], now: int) -> tuple[Step, ...]:
     The page that is shown is never closed, and going back is always free: a step
     before it is closed only by its own reason.
     """
-    return tuple(
+    steps = [
         _step(status, is_now=index == now) for index, status in enumerate(statuses)
-    )
+    ]
+    closed = [i for i, step in enumerate(steps) if step.state is StepState.CLOSED]
+    for index in closed[:1]:
+        steps[index] = replace(steps[index], shows_reason=True)
+    return tuple(steps)
 
 
 def _step(status: Status, *, is_now: bool) -> Step:
@@ -134,7 +141,7 @@ class StepButton(Translated, QAbstractButton):
     @override
     def heightForWidth(self, width: int) -> int:
         height = 5 * GRID
-        if self._step.why_closed:
+        if self._step.shows_reason:
             height += round(self._reason_height(width)) + GRID
         return height
 
@@ -166,7 +173,7 @@ class StepButton(Translated, QAbstractButton):
             self._text_left, 0, self.width() - self._text_left - GRID, 5 * GRID
         )
         painter.drawText(name, Qt.AlignmentFlag.AlignVCenter, step.title)
-        if step.why_closed:
+        if step.shows_reason:
             painter.setPen(QColor(colors.muted))
             painter.setFont(font(TextSize.SMALL))
             reason = QRectF(

@@ -11,6 +11,7 @@ from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.choice_field import ChoiceField
+from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -36,7 +37,7 @@ class StreamState:
     trouble: str = ""
 
 
-class StreamDialog(Translated, QDialog):
+class StreamDialog(FittedWindow, Translated, QDialog):
     """Shows and changes where the stream can be listened to.
 
     Signals

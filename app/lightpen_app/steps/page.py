@@ -72,6 +72,10 @@ class Page(Translated, QWidget):
         """Return the name of the step, one to three words."""
         raise NotImplementedError
 
+    def heading(self) -> str:
+        """Return what stands above the page; by default, the name of the step."""
+        return self.title()
+
     def lead(self) -> str:
         """Return the purpose of the step, a sentence below the title."""
         return ""

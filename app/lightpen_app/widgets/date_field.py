@@ -9,7 +9,7 @@ from lightpen_app.look.theme import Tone, set_tone
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.translated import Translated
 
-EXAMPLE = date(2026, 8, 14)
+EXAMPLE = date(2025, 8, 14)  # of a day that is over
 
 
 class DateField(Translated, EnterEdit):

@@ -20,6 +20,7 @@ from lightpen_app.work.job import Job
 from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView
 from lightpen_app.work.notifications import Notifications
+from lightpen_app.work.pen_files import PenFiles
 from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.settings import Settings
@@ -55,6 +56,10 @@ class Workbench(QObject):
         Reads the files that are chosen.
     library : LibraryWatch
         The tips, and how they stand.
+    pens : PenFiles
+        The LED file of each pen.
+    pens : PenFiles
+        The LED file of each pen.
     streaming : Streaming
         Lets other programs follow the pen.
     folder_watch : FolderWatch
@@ -89,6 +94,9 @@ class Workbench(QObject):
         rule = settings.due_rule()
         self.library = LibraryWatch(
             folder, self.run.logbook, rule, around.now, notices, self
+        )
+        self.pens = PenFiles(
+            self.selection, self.library, notices, folder, around.now, self
         )
         self.folder_watch = FolderWatch(folder, self)
         self.archive_writer = ArchiveWriter(
@@ -135,6 +143,7 @@ class Workbench(QObject):
         for told in (self.run, self.verification):
             told.blockSignals(True)  # nothing more is begun because of what they tell
         self.folder_watch.stop()
+        self.pens.shut_down()
         self.library.shut_down()
         self.run.runner.shut_down()
         self.verification.runner.shut_down()

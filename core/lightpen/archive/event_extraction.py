@@ -12,6 +12,7 @@ from lightpen.archive.entries import Event, FileHash, Kind, text_sha256, this_pr
 from lightpen.errors import FileError
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen.estimation.reports.report import calibration_record
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import read_bytes
 from lightpen.formats.files import sha256 as file_sha256
 from lightpen.formats.json_records import json_bytes
@@ -140,7 +141,9 @@ def account_of_refused(
     assessment: SwingAssessment,
     at: datetime,
 ) -> ExtractedEvent:
-    """Return the event of a solved swing whose tip was rejected.
+    """Return the event of a solved swing whose tip was not accepted.
+
+    A tip that passed is abandoned by its operator, any other is refused.
 
     Raises
     ------
@@ -148,8 +151,10 @@ def account_of_refused(
         A file of the swing cannot be read.
     """
     record, calibration = open_record(solution.source.folder), solution.calibration
+    has_passed = assessment.verdict.grade is Grade.PASS
+    kind = Kind.ABANDONED if has_passed else Kind.REFUSED
     event = replace(
-        _event_of_swing(results, record, Kind.REFUSED, at),
+        _event_of_swing(results, record, kind, at),
         grade=assessment.verdict.grade.value,
         why=StoredMessage.of(assessment.verdict.reason),
         tip_pen_mm=tuple(calibration.joint.tip_pen.tolist()),

@@ -4,6 +4,7 @@ from datetime import datetime
 
 from lightpen.archive.database import Database
 from lightpen.archive.due import due_tips
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import CurrentResult, StationStatus
 from lightpen.record.library.tip_library import Library
@@ -25,5 +26,10 @@ def statuses(
     for tip in due_tips(database, chain, rule, library):
         event = tip.entry.entry.event
         pair = event.names.pen, event.names.tip
-        in_force[pair] = CurrentResult(tip.calibrated, tip.due, tip.is_due(now))
+        u = event.expanded_uncertainty_mm
+        in_force[pair] = CurrentResult(
+            *(tip.calibrated, tip.due, tip.is_due(now)),
+            None if u is None else max(u),
+            Grade(event.grade) if event.grade else None,
+        )
     return StationStatus(library, in_force, now)

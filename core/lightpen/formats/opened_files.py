@@ -6,6 +6,7 @@ from typing import Self
 
 from lightpen.errors import LightpenError
 from lightpen.formats.camera_files import read_camera
+from lightpen.formats.files import sha256
 from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import RigFile, read_rig
 from lightpen.formats.simulated_files import is_simulated
@@ -50,12 +51,15 @@ class PenFile:
         Given for a file that states none.
     is_simulated : bool
         Whether it is of a simulated pen.
+    sha256 : str
+        Hash of the content that was read; empty for a pen that is in no file yet.
     """
 
     path: Path
     pen: Pen
     units: str | None = None
     is_simulated: bool = False
+    sha256: str = ""
 
     @classmethod
     def read(cls, path: Path, units: str | None = None) -> Self:
@@ -68,7 +72,8 @@ class PenFile:
         FileError
             It cannot be read.
         """
-        return cls(path, read_pen(path, units), units, is_simulated(path))
+        pen = read_pen(path, units)
+        return cls(path, pen, units, is_simulated(path), sha256(path))
 
 
 @dataclass(frozen=True, eq=False)

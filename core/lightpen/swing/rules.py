@@ -149,8 +149,11 @@ def forget_side(state: SwingState) -> SwingState:
 
 
 def has_just_slipped(state: SwingState) -> bool:
-    """Return whether the last slip is so recent that it is shown."""
-    return state.slipped_at is not None and state.time - state.slipped_at < SLIP_TOLD
+    """Return whether the last slip is shown: just now, and no image was kept since."""
+    at, times = state.slipped_at, state.kept.times
+    if at is None or (len(times) and times[-1] > at):
+        return False
+    return state.time - at < SLIP_TOLD
 
 
 def has_enough(setup: SwingSetup, state: SwingState) -> bool:

@@ -25,12 +25,13 @@ from lightpen.record.swings.names import Names
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Appearance
 from lightpen_app.shell.help_window import HelpWindow
-from lightpen_app.shell.main_window import MainWindow, fitted_place
+from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.page_area import NoticeBar
 from lightpen_app.shell.sidebar import Subject
 from lightpen_app.shell.step_list import StepButton, StepState
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.widgets.fitted_text import FittedText
+from lightpen_app.widgets.fitted_window import fitted_place
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.work.notifications import Notifications

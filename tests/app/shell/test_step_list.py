@@ -22,6 +22,14 @@ def test_a_closed_step_says_why_and_no_other_does() -> None:
     assert reasons == ["", "", "", "Needs a camera."]
 
 
+def test_several_closed_steps_show_one_common_reason() -> None:
+    closed = Status("Review", complete=False, why_closed="Swing the pen first.")
+
+    shown = [step.shows_reason for step in list_steps((*STATUSES, closed), now=1)]
+
+    assert shown == [False, False, False, True, False]
+
+
 def test_going_back_keeps_what_is_done() -> None:
     complete = Status("Camera", complete=True, why_closed="")
 

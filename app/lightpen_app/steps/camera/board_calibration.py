@@ -253,8 +253,8 @@ def facts_text(found: CameraCalibration) -> str:
     )
     return "\n".join(
         [
-            f"fx {fx:.2f} \u00b1 {u[0]:.2f}, fy {fy:.2f} \u00b1 {u[1]:.2f} px",
-            f"cx {cx:.2f} \u00b1 {u[2]:.2f}, cy {cy:.2f} \u00b1 {u[3]:.2f} px",
+            f"fx {fx:.2f} \u00b1 {u[0]:.2f}, fy {fy:.2f} \u00b1 {u[1]:.2f} px (k = 2)",
+            f"cx {cx:.2f} \u00b1 {u[2]:.2f}, cy {cy:.2f} \u00b1 {u[3]:.2f} px (k = 2)",
             residuals.format(found.adjustment.rms, found.held_out_rms),
             projection.format(uncertain.typical, uncertain.worst),
             worded(found.choice.message),

@@ -22,6 +22,7 @@ from lightpen_app.steps.camera.board_capture import (
 )
 from lightpen_app.steps.camera.board_overlay import board_overlay
 from lightpen_app.steps.camera.board_view import BoardView
+from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
@@ -32,7 +33,7 @@ USUAL_BOARD = "chessboard:11x8:20"
 SIDE_WIDTH = 46 * GRID
 
 
-class BoardWindow(Translated, QWidget):
+class BoardWindow(FittedWindow, Translated, QWidget):
     """Leads the board through the image, calibrates, and saves the camera file.
 
     Signals

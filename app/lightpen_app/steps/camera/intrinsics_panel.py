@@ -209,7 +209,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         """Return the content of the file, one text for each name."""
         assert self._file is not None
         stated = camera.covariance
-        u = None if stated is None else np.sqrt(np.diag(stated)).tolist()
+        u = None if stated is None else (2 * np.sqrt(np.diag(stated))).tolist()
         values = [camera.fx, camera.fy, camera.cx, camera.cy]
         fx, fy, cx, cy = (
             f"{value:.2f}" if u is None else f"{value:.2f} \u00b1 {u[i]:.2f}"
@@ -228,6 +228,8 @@ class IntrinsicsPanel(Translated, QGroupBox):
         if u is None:
             date += self.tr(", no uncertainty in the file")
         pair = self.tr("{0} and {1} px")
+        if u is not None:
+            pair = self.tr("{0} and {1} px (k = 2)")
         return [
             self._file.path.name if self._problem.value().text else "",
             pair.format(fx, fy),

@@ -26,6 +26,7 @@ from lightpen_app.steps.leds.draft import (
 from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.work.chosen_files import ChosenFiles
 from lightpen_app.work.job import Job, Report
+from lightpen_app.work.pen_files import PenFiles
 
 T = TypeVar("T")
 
@@ -42,10 +43,15 @@ class LedFileControl(QObject):
     status_changed = Signal(str)
 
     def __init__(
-        self, leds: LedDraft, chosen_files: ChosenFiles, panel: LedFilePanel
+        self,
+        leds: LedDraft,
+        chosen_files: ChosenFiles,
+        pens: PenFiles,
+        panel: LedFilePanel,
     ) -> None:
         super().__init__(panel)
         self._leds, self._chosen_files, self._panel = leds, chosen_files, panel
+        self._pens = pens
         self._shown = LedState()
         self._problem: Callable[[], str] = self._frame_error
         self._job: Job | None = None
@@ -136,9 +142,11 @@ class LedFileControl(QObject):
         self._start(lambda _: open_pen(path, units), take)
 
     def _on_opened(self, opened: OpenedPen) -> None:
-        if opened.file is not None:
-            self._leds.use(opened.file)
-            self._tell(str)
+        if opened.file is not None and self._pens.doubt_about(opened.file):
+            use = partial(self._use, opened.file)
+            self._panel.ask(partial(self._doubting, opened.file), use)
+        elif opened.file is not None:
+            self._use(opened.file)
         elif opened.draft is not None:  # those in use stay in use
             self._leds.open(opened.draft, opened.path)
             self._tell(partial(worded, opened.problem))
@@ -147,6 +155,16 @@ class LedFileControl(QObject):
             self._panel.ask_units(opened.path.name)
         else:
             self._tell(partial(self._refusal, opened.problem, self._panel.value()))
+
+    def _use(self, file: PenFile) -> None:
+        self._leds.use(file)
+        self._pens.keep(file)
+        self._tell(str)
+
+    def _doubting(self, file: PenFile) -> tuple[str, str]:
+        words = self.tr("{0} Use it for this pen from now on?")
+        text = words.format(self._pens.doubt_about(file))
+        return text, self.tr("Use this file")
 
     def _refusal(self, why: Message | None, still_open: str) -> str:
         """Return why a file cannot be opened, and which one is open."""
@@ -170,6 +188,7 @@ class LedFileControl(QObject):
     def _on_saved(self, saved: PenDraft, file: PenFile) -> None:
         is_same = self._leds.state.draft == saved
         self._leds.use(file, keeps_changes=not is_same)
+        self._pens.keep(file)
         if is_same:
             self._tell(str)
         words = self.tr("LEDs saved as {0} and in use.")

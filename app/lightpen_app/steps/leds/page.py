@@ -54,7 +54,10 @@ class LedsPage(ResponsiveLayout, Page):
         self._hand = LedSimulatorControls(workbench.live)
         self._match = MatchPanel(self._hand)
 
-        self._files = LedFileControl(self._leds, workbench.files, self._file)
+        self._pens = workbench.pens
+        self._files = LedFileControl(
+            self._leds, workbench.files, workbench.pens, self._file
+        )
         self._matching = MatchControl(
             self._leds, self._selection, workbench.run, workbench.live, self._match
         )
@@ -83,6 +86,7 @@ class LedsPage(ResponsiveLayout, Page):
         self._match.mend_requested.connect(self._on_mend_requested)
         self._matching.watch.value_changed.connect(self._on_match_changed)
         self._leds.changed.connect(self._on_draft_changed)
+        self._pens.changed.connect(self.changed)
         self._selection.changed.connect(self._on_selection_changed)
         self._selection.station_changed.connect(self._files.drop_job)
 
@@ -110,7 +114,7 @@ class LedsPage(ResponsiveLayout, Page):
 
     @override
     def is_doubtful(self) -> bool:
-        return bool(self._matching.doubt())
+        return bool(self._pens.doubt() or self._matching.doubt())
 
     @override
     def why_closed(self) -> str:
@@ -124,7 +128,7 @@ class LedsPage(ResponsiveLayout, Page):
 
     @override
     def run_main_action(self) -> None:
-        if self._matching.doubt():
+        if self.is_doubtful():
             self._file.ask(self._doubting, self.advance_requested.emit)
         else:
             super().run_main_action()
@@ -212,9 +216,10 @@ class LedsPage(ResponsiveLayout, Page):
 
     def _doubting(self) -> tuple[str, str]:
         """Return the question whether to swing with LEDs that do not fit."""
-        words = self.tr("{0} The swing will probably fail.")
-        text = words.format(self._matching.doubt()).strip()
-        return text, self.tr("Swing anyway")
+        misfit = self._matching.doubt()
+        words = self.tr("The swing will probably fail.") if misfit else ""
+        parts = self._pens.doubt(), misfit, words
+        return " ".join(filter(None, parts)), self.tr("Swing anyway")
 
     def _on_match_changed(self, match: PenMatch | None) -> None:
         self._match.set_value(match)

@@ -9,6 +9,7 @@ from typing_extensions import override
 from lightpen.record.exports.dcc import Laboratory, is_country
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.translated import Translated
 
@@ -16,7 +17,7 @@ LONGEST = 200  # characters
 N_FIELDS = 4
 
 
-class LaboratoryDialog(Translated, QDialog):
+class LaboratoryDialog(FittedWindow, Translated, QDialog):
     """Name, e-mail address, city and country; can be confirmed when all are there.
 
     Signals

@@ -118,14 +118,16 @@ class ReviewPage(Page):
         status, painted = self._run.status, self._painted
         is_read = painted is status.assessment and not self._reading.isActive()
         is_new = self._acceptance.isActive()
-        return review_action(status, is_new=is_new, is_read=is_read)
+        tip = self._next_tip()
+        return review_action(status, is_new=is_new, is_read=is_read, next_tip=tip)
 
     @override
     def run_main_action(self) -> None:
         status = self._run.status
         if status.result is not None:
-            self._runner.abandon()
-            self.step_requested.emit("start")
+            if not self._next_tip():
+                self.step_requested.emit("start")
+            self._runner.abandon()  # which leads to the next swing
             return
         if status.verdict is None or why_not_now(status):
             return
@@ -217,6 +219,11 @@ class ReviewPage(Page):
         self._refresh_words()
         images.take_out_requested.connect(self._runner.take_out)
         images.put_back_requested.connect(self._runner.put_back)
+
+    def _next_tip(self) -> str:
+        """Return the tip that can be swung at once, as it is chosen by now."""
+        now = self._selection.preparation
+        return "" if now.missing_inputs() else now.names.tip
 
     def _ask_to_repeat(self) -> None:
         self._view.question.ask_about(repeat_question, self._runner.set_aside)

@@ -118,7 +118,7 @@ def returns_to_swing(before: SwingStatus, now: SwingStatus) -> bool:
 
 
 def review_action(
-    status: SwingStatus, *, is_new: bool, is_read: bool = True
+    status: SwingStatus, *, is_new: bool, is_read: bool = True, next_tip: str = ""
 ) -> MainAction:
     """Return the present action of the main button.
 
@@ -128,11 +128,16 @@ def review_action(
         Whether the tip was accepted a moment ago.
     is_read : bool
         Whether the result was shown long enough to be read before it is accepted.
+    next_tip : str
+        Tip that is swung next; empty where something is missing for a swing.
     """
     translate = QCoreApplication.translate
     if status.result is not None:
         why_not = translate("ReviewPage", "Tip accepted.") if is_new else ""
-        return MainAction(translate("ReviewPage", "Start next calibration"), why_not)
+        if not next_tip:
+            return MainAction(translate("ReviewPage", "Back to Start"), why_not)
+        text = translate("ReviewPage", "Swing tip {0}").format(shortened(next_tip, 12))
+        return MainAction(text, why_not)
     verdict, why_not = status.verdict, why_not_now(status)
     match None if verdict is None else verdict.next_step:
         case None | NextStep.ACCEPT:

@@ -20,6 +20,7 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
@@ -48,7 +49,7 @@ KINDS = (
 )
 
 
-class AssumptionsDialog(Translated, QDialog):
+class AssumptionsDialog(FittedWindow, Translated, QDialog):
     """Default uncertainties for what camera and LED files do not state.
 
     Signals

@@ -74,7 +74,7 @@ class LibraryControl(QObject):
 
         # Connections
         self._watch.changed.connect(self.refresh)
-        self.barcodes.scanned.connect(self._on_scanned)
+        self.barcodes.scanned.connect(self.take_code)
         names.item_chosen.connect(self.chosen)
         names.library_requested.connect(self.open)
         question.agreed.connect(self._on_agreed)
@@ -146,7 +146,7 @@ class LibraryControl(QObject):
                 found.append(ItemChoice(item.id, status_message(standing)))
         return tuple(found)
 
-    def _on_scanned(self, code: str) -> None:
+    def take_code(self, code: str) -> None:
         """Choose the tip of a barcode; offer to add one that is not known."""
         tip = self._watch.library.tip_of_code(code)
         if tip is None:

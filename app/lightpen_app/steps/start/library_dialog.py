@@ -25,6 +25,7 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.words import PARTED
 from lightpen_app.steps.start.item_form import MADE, ItemForm, kept_picture
 from lightpen_app.steps.start.tip_picture import TipPicture
+from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.row_table import ROW_HEIGHT, RowTable
@@ -66,7 +67,7 @@ class RequestedChange:
     before: AnyItem | None = None
 
 
-class LibraryDialog(Translated, QDialog):
+class LibraryDialog(FittedWindow, Translated, QDialog):
     """Shows what there is; adds, changes and retires.
 
     Parameters
@@ -144,7 +145,7 @@ class LibraryDialog(Translated, QDialog):
         parts = (self._what, self._form, self._supervisor, self._fault)
         panel = vertical_layout(self._panel, *parts, margins=margins)
         horizontal_layout(panel, (self._reason, 1), self._leave, self._save)
-        self.setMinimumWidth(112 * GRID)
+        self.setMinimumWidth(100 * GRID)
 
         # Connections
         self._tabs.currentChanged.connect(self._on_kind_changed)
@@ -168,6 +169,14 @@ class LibraryDialog(Translated, QDialog):
     def form(self) -> ItemForm:
         """In which an item is typed."""
         return self._form
+
+    @override
+    def reject(self) -> None:
+        """Close the form that is open; only without one, the dialog."""
+        if self._panel.isVisible():
+            self._stop_editing()
+        else:
+            super().reject()
 
     @override
     def done(self, result: int) -> None:

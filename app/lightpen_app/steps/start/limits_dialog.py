@@ -11,6 +11,7 @@ from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
@@ -19,7 +20,7 @@ from lightpen_app.work.job import Job
 from lightpen_app.work.workbench import Workbench
 
 
-class LimitsDialog(Translated, QDialog):
+class LimitsDialog(FittedWindow, Translated, QDialog):
     """Shows limits; a supervisor may change them.
 
     Signals
@@ -66,7 +67,7 @@ class LimitsDialog(Translated, QDialog):
             grid.addWidget(field, row, 2 * column + 1)
         fill(layout, self._signing, self._supervisor, self._new_password)
         fill(layout, self._fault, self._buttons)
-        self.setMinimumWidth(112 * GRID)
+        self.setMinimumWidth(100 * GRID)
 
         # Connections
         self._supervisor.value_edited.connect(self._refresh)

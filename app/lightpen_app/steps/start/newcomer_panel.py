@@ -8,13 +8,15 @@ from PySide6.QtWidgets import QDialog, QDialogButtonBox, QGroupBox, QWidget
 from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.start.pictures import Pictures
+from lightpen_app.widgets.fitted_window import FittedWindow
+from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 WIDTH = 112 * GRID  # px
 
 
-class Introduction(QDialog):
+class Introduction(FittedWindow, QDialog):
     """Shows item, method and steps.
 
     Signals
@@ -42,10 +44,14 @@ class Introduction(QDialog):
         trial.setDefault(True)
 
         # Layout
-        layout = vertical_layout(
-            *(self, pictures, buttons), spacing=2 * GRID, margins=3 * GRID
+        scroll = PageScroll()
+        scroll.setWidget(pictures)
+        margins = 3 * GRID
+        vertical_layout(
+            *(self, (scroll, 1), buttons), spacing=2 * GRID, margins=margins
         )
-        self.setFixedSize(WIDTH, layout.totalHeightForWidth(WIDTH))
+        height = pictures.heightForWidth(WIDTH - 2 * margins)
+        self.resize(WIDTH, height + buttons.sizeHint().height() + 3 * margins)
 
         # Connections
         buttons.rejected.connect(self.reject)

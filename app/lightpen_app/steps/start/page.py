@@ -1,30 +1,28 @@
-"""The step Start: station, operator, item, and interrupted work."""
+"""The step Start: the tips of a station each day, and how the station is set up."""
 
 from PySide6.QtCore import QEvent, QSize
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
-from PySide6.QtWidgets import QBoxLayout, QWidget
+from PySide6.QtWidgets import QStackedWidget, QWidget
 from typing_extensions import override
 
-from lightpen.swing.preparation import Preparation
-from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen.swing.preparation import MissingInput, Preparation
+from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.phrases import missing_input_text
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import shortened
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
-from lightpen_app.steps.start.data_folder_panel import DataFolderPanel
+from lightpen_app.steps.start.day_control import DayControl
+from lightpen_app.steps.start.day_view import DayView
 from lightpen_app.steps.start.entries import EntryPresenter
-from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.interrupted_control import InterruptedControl
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.large_screen_panel import LargeScreenPanel
 from lightpen_app.steps.start.last_result import LastResultPresenter
 from lightpen_app.steps.start.library_control import LibraryControl
 from lightpen_app.steps.start.limits_dialog import LimitsControl
-from lightpen_app.steps.start.newcomer_panel import NewcomerPanel
 from lightpen_app.steps.start.result_panel import LastResultPanel
-from lightpen_app.steps.start.sound_test import SoundTest
+from lightpen_app.steps.start.setup_view import SetupView
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
@@ -33,7 +31,7 @@ from lightpen_app.work.workbench import Workbench
 
 
 class StartPage(ResponsiveLayout, Page):
-    """Names, limits, the last result of the pen and tip, and interrupted swings."""
+    """Shows the day page; before a station is set up, and on request, its set-up."""
 
     key = "start"
     narrow_below = 100 * GRID  # px; then it has one column
@@ -47,75 +45,79 @@ class StartPage(ResponsiveLayout, Page):
         self._selection, self._run = workbench.selection, workbench.run
         self._tips = workbench.library
         self._camera, self._chosen_files = workbench.camera, workbench.files
-        self._is_known = bool(workbench.selection.stations())
 
         # Widgets: the order of making them is the order of the Tab key
-        self._names = NamesForm()
-        self._limits = LimitsForm()
-        self._all_limits = LimitsControl(workbench, self)
         self._unknown_code = QuestionBar()
-        self._library = LibraryControl(workbench, self._names, self._unknown_code, self)
-        self._assumed = AssumptionsPanel()
         self._interrupted = InterruptedPanel()
+        self._day = DayView()
+        is_known = bool(workbench.selection.stations())
+        self._setup = setup = SetupView(workbench, sounds, is_known=is_known)
+        self._result = LastResultPanel(workbench.around.now)
+        self._large = LargeScreenPanel(workbench.run.logbook)
+        self._views = QStackedWidget()
+        self._all_limits = LimitsControl(workbench, self)
+        self._library = LibraryControl(workbench, setup.names, self._unknown_code, self)
         self._unfinished = InterruptedControl(
             workbench, self._interrupted, self._settle, self
         )
-        self._result = LastResultPanel(workbench.around.now)
-        self._sound_test = SoundTest(sounds)
-        self._folder = DataFolderPanel(workbench.folder, workbench.notifications)
-        self._newcomer = NewcomerPanel()
-        self._large = LargeScreenPanel(workbench.run.logbook)
         self._last = LastResultPresenter(
             *(self._selection, self._run, self._tips, self._result, self._large)
         )
         self._entries = EntryPresenter(
-            self._selection, self._library, self._names, self._limits, self._assumed
+            *(self._selection, self._library, setup.names, setup.limits), setup.assumed
         )
+        self._control = DayControl(workbench, self._library, self._day)
 
         # Layout
+        bars = self._unknown_code, self._interrupted
+        vertical_layout(self, *bars, (self._views, 1), spacing=2 * GRID)
+        fill(self._day.side, self._result, 1)
         content = QWidget()
-        rows = vertical_layout(content, spacing=3 * GRID)
-        self._columns = horizontal_layout(rows, spacing=3 * GRID)
-        self._left = vertical_layout(
-            *(self._columns, self._unknown_code, self._names, self._limits),
-            *(self._assumed, 1),
-            spacing=2 * GRID,
-            stretch=5,
-        )
-        self._right = vertical_layout(self._columns, spacing=2 * GRID, stretch=4)
-        self._use_room()  # before the rest: the order of the Tab key
-        fill(self._right, self._result, self._sound_test, self._folder)
-        if self._is_known:
-            fill(self._right, self._newcomer)
-        fill(self._right, 1)
-        fill(rows, (self._large, 1))
-        scroll = PageScroll()
-        scroll.setWidget(content)
-        vertical_layout(self, scroll)
+        vertical_layout(content, (self._day, 1), (self._large, 1))
+        for each in (content, setup):
+            scroll = PageScroll()
+            scroll.setWidget(each)
+            self._views.addWidget(scroll)
+        self.show_setup()
 
         # Connections
-        self._names.station_entered.connect(self.show_missing_input)
-        self._limits.all_requested.connect(self._all_limits.open)
-        self._entries.edited.connect(self.changed)
+        setup.names.station_entered.connect(self.show_missing_input)
+        setup.limits.all_requested.connect(self._all_limits.open)
+        setup.newcomer.trial_requested.connect(self._on_trial_requested)
+        setup.folder.change_requested.connect(self.data_folder_requested)
+        setup.done.connect(self.show_day)
+        self._day.setup_requested.connect(self.show_setup)
+        self._control.changed.connect(self.changed)
+        self._control.step_requested.connect(self.step_requested)
+        self._entries.edited.connect(self._refresh)
         self._entries.tip_named.connect(self._last.look_up_tip)
         self._unfinished.step_requested.connect(self.step_requested)
-        self._newcomer.trial_requested.connect(self._on_trial_requested)
         self._last.verification_requested.connect(self._on_verification_requested)
-        self._folder.change_requested.connect(self.data_folder_requested)
-        workbench.folder_watch.counted.connect(self._folder.set_others)
-        workbench.folder_watch.doubted.connect(self._folder.set_fault)
-        workbench.library.changed.connect(self.changed)
+        workbench.folder_watch.counted.connect(setup.folder.set_others)
+        workbench.folder_watch.doubted.connect(setup.folder.set_fault)
+        workbench.library.changed.connect(self._refresh)
         workbench.selection.changed.connect(self._on_selected)
         workbench.run.changed.connect(self._show_trial)
 
         self._retranslate()
+
+    @property
+    def is_day(self) -> bool:
+        """Whether the day page is shown, and not the set-up of the station."""
+        return self._views.currentIndex() == 0
 
     @override
     def title(self) -> str:
         return self.tr("Start")
 
     @override
+    def heading(self) -> str:
+        return self.title() if self.is_day else self.tr("Set up station")
+
+    @override
     def lead(self) -> str:
+        if self.is_day:
+            return self.tr("Choose a tip, seat it in the cone and start the swing.")
         return self.tr(
             "Enter what you are calibrating. Entries are saved for this station."
         )
@@ -126,48 +128,70 @@ class StartPage(ResponsiveLayout, Page):
 
     @override
     def main_action(self) -> MainAction:
-        return MainAction(self.tr("Continue to the camera"), self._why_not_on())
+        why_not = self._why_not_on()
+        if not self.is_day:
+            return MainAction(self.tr("Continue to the camera"), why_not)
+        return MainAction(self._control.main_action().text, why_not)
 
     @override
     def run_main_action(self) -> None:
-        self._entries.settle()
-        super().run_main_action()
+        self._settle()
+        if self.is_day:
+            self._control.run_main_action()
+        else:
+            super().run_main_action()
 
     @override
     def show_missing_input(self) -> None:
         missing_inputs = self._entries.typed().start_missing_inputs()
         if missing_inputs:
-            self._names.focus_missing_input(missing_inputs[0])
+            self.show_setup()
+            self._setup.names.focus_missing_input(missing_inputs[0])
+
+    @override
+    def first_control(self) -> QWidget | None:
+        return self._day.first_control() if self.is_day else None
 
     @override
     def entered(self) -> None:
-        self._names.set_stations(self._selection.stations())
+        self._setup.names.set_stations(self._selection.stations())
         self._tips.refresh()
         self._last.look_up()
+        if not self._entries.typed().start_missing_inputs():
+            self.show_day()
+        self._control.start()
 
     @override
     def left(self) -> None:
-        self._entries.settle()
-        self._sound_test.stop()
+        self._control.stop()
+        self._settle()
+        self._setup.sound_test.stop()
 
     @override
     def shut_down(self) -> None:
+        self._control.stop()
         for each in (self._unfinished, self._last, self._all_limits):
             each.shut_down()
 
+    def show_day(self) -> None:
+        """Show the tips of the station."""
+        self._views.setCurrentIndex(0)
+        if self.isVisible():
+            self._day.first_control().setFocus()
+        self._refresh()
+
+    def show_setup(self) -> None:
+        """Show what is set up once."""
+        self._views.setCurrentIndex(1)
+        if self.isVisible():
+            self._setup.names.focus_missing_input(MissingInput.STATION)
+        self._refresh()
+
     @override
     def _use_room(self) -> None:
-        direction = QBoxLayout.Direction
         is_narrow = self._room.is_narrow
-        self._columns.setDirection(
-            direction.TopToBottom if is_narrow else direction.LeftToRight
-        )
-        # What waits for an answer comes first.
-        column = self._left if is_narrow else self._right
-        column.insertWidget(0, self._interrupted)
-        if not self._is_known:
-            self._newcomer.set_wide(is_narrow)
-            column.insertWidget(1, self._newcomer)
+        self._day.set_narrow(is_narrow)
+        self._setup.set_narrow(is_narrow)
         self._result.set_room(self._room)
         self._large.setVisible(self._room.is_vast)
         self._last.show_trend()
@@ -201,17 +225,22 @@ class StartPage(ResponsiveLayout, Page):
         self._show_trial()
         self._last.show_status()
         self._library.refresh()
+        self._control.refresh()
+        self._refresh()
+
+    def _refresh(self) -> None:
+        self._setup.set_why_not_done(self._why_not_on())
         self.changed.emit()
 
     def _why_not_on(self) -> str:
         """Return what is missing, or that the tip is retired."""
         typed = self._entries.typed()
-        missing_inputs, tip = (
+        missing, tip = (
             typed.start_missing_inputs(),
             self._library.tip(typed.names.tip),
         )
-        if missing_inputs:
-            return missing_input_text(missing_inputs[0])
+        if missing:
+            return missing_input_text(missing[0])
         if tip is None or not tip.is_retired:
             return ""
         return self.tr(
@@ -228,7 +257,9 @@ class StartPage(ResponsiveLayout, Page):
             self.step_requested.emit("swing")
         if before.names != now.names or before.origin is not now.origin:
             self._library.refresh()
-        self.changed.emit()
+        if not before.names.station and not now.start_missing_inputs():
+            self.show_day()  # the station is known from before
+        self._refresh()
 
     def _on_trial_requested(self) -> None:
         self._selection.set_preparation(trial_of(self._selection.preparation))
@@ -238,8 +269,9 @@ class StartPage(ResponsiveLayout, Page):
 
     def _show_trial(self) -> None:
         is_on = self._run.status.state is not None
-        self._newcomer.set_why_not(self.tr("A swing is in progress.") if is_on else "")
+        why_not = self.tr("A swing is in progress.") if is_on else ""
+        self._setup.newcomer.set_why_not(why_not)
 
     def _on_verification_requested(self) -> None:
-        self._entries.settle()
+        self._settle()
         self.step_requested.emit("verify")

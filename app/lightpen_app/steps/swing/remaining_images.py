@@ -1,6 +1,6 @@
 """Displayed number of remaining images, which does not increase slightly."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import Self
 
@@ -22,28 +22,35 @@ class RemainingImages:
         Remaining images, rounded to the accuracy of the estimate.
     n_kept : int
         Number of images at the time of the estimate.
+    fraction : float
+        Of all images, that are there; it goes back only when images are dropped.
     has_risen : bool
         Whether more are to go than was told before, though none were dropped.
     """
 
     n_images: int
     n_kept: int
+    fraction: float
     has_risen: bool = False
 
     @classmethod
     def first(cls, n_more: int, n_kept: int) -> Self:
         """Return the first displayed number of a swing."""
-        return cls(in_true_steps(n_more), n_kept)
+        fraction = n_kept / max(n_kept + n_more, 1)
+        return cls(in_true_steps(n_more), n_kept, fraction)
 
     def after(self, n_more: int, n_kept: int) -> Self:
         """Return the displayed number after the next estimate."""
         now = self.first(n_more, n_kept)
-        if n_kept < self.n_kept or now.n_images < self.n_images:
+        if n_kept < self.n_kept:
+            return now
+        now = replace(now, fraction=max(now.fraction, self.fraction))
+        if now.n_images < self.n_images:
             return now
         rise = now.n_images - self.n_images
         if rise > max(_step(self.n_images), LEAST_RISE):
-            return type(self)(now.n_images, n_kept, has_risen=True)
-        return type(self)(self.n_images, n_kept, self.has_risen)
+            return replace(now, has_risen=True)
+        return replace(now, n_images=self.n_images, has_risen=self.has_risen)
 
 
 def in_true_steps(n_more: int) -> int:

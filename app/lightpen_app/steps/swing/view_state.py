@@ -404,7 +404,7 @@ def images_period(times: FloatArray) -> float | None:
 
 
 def _fraction(moment: SwingViewState) -> float | None:
-    n_kept, progress = moment.state.n_kept, moment.state.progress
+    progress = moment.state.progress
     match moment.state.phase:
         case Phase.VERDICT:
             return None
@@ -412,7 +412,7 @@ def _fraction(moment: SwingViewState) -> float | None:
             return moment.solving or 0.0
     if moment.setup.is_recording:
         return progress.n_read / max(progress.n_images, 1)
-    return n_kept / max(n_kept + _n_more(moment), 1)
+    return _to_go(moment).fraction
 
 
 def _to_go(moment: SwingViewState) -> RemainingImages:

@@ -17,6 +17,7 @@ from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
 
 ROOM = 2 * GRID  # px, beside the longest title
+STATE_ROOM = 6 * GRID  # px, of the state that a title gets later
 
 
 class ListedPages(ResponsiveLayout, QWidget):
@@ -70,7 +71,9 @@ class ListedPages(ResponsiveLayout, QWidget):
         index = self._stack.indexOf(page)
         if self._list.item(index).text() != title:
             self._list.item(index).setText(title)
-            self._list.setFixedWidth(self._list.sizeHintForColumn(0) + ROOM)
+            width = self._list.sizeHintForColumn(0) + ROOM
+            if width > self._list.minimumWidth():  # else it stays under the pointer
+                self._list.setFixedWidth(width + STATE_ROOM)
             self._field.setItemText(index, title)
 
     def show_page(self, page: QWidget) -> None:

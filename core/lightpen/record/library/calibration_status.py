@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from datetime import date, datetime
 from enum import StrEnum
 
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.local_time import local_time
 from lightpen.record.library.tip_library import Item, ItemKind, Library
 
@@ -20,11 +21,22 @@ class TipStatus(StrEnum):
 
 @dataclass(frozen=True)
 class CurrentResult:
-    """A tip in force: since when, until when by its age, and whether it is due."""
+    """A tip in force.
+
+    Attributes
+    ----------
+    calibrated, due : datetime
+        Since when, and until when by its age.
+    uncertainty : float or None
+        Largest U (k = 2) of its coordinates, mm; None where it is not known.
+    grade : Grade or None
+    """
 
     calibrated: datetime
     due: datetime
     is_due: bool
+    uncertainty: float | None = None
+    grade: Grade | None = None
 
 
 @dataclass(frozen=True)

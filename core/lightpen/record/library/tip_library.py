@@ -41,6 +41,7 @@ WHAT = message("file.library")
 LONGEST_ID = 200  # characters
 LARGEST_BALL = 100.0  # mm
 LARGEST_CHANGE = 10.0  # mm
+LARGEST_EXPANSION = 1e-3  # 1/K
 
 Id: TypeAlias = Annotated[str, Meta(min_length=1, max_length=LONGEST_ID)]
 ItemT = TypeVar("ItemT", bound="Item")
@@ -99,10 +100,35 @@ class Item(Struct, frozen=True, kw_only=True):
         return self.due is not None and today > self.due
 
 
+class LedFile(Struct, frozen=True):
+    """The LED file of a pen: its path and hash, and the units of one without."""
+
+    path: str
+    sha256: Digest
+    units: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name of the file without its folder."""
+        return Path(self.path).name
+
+
 class ListedPen(Item, frozen=True, kw_only=True, tag="pen"):
-    """A pen, by its serial number."""
+    """A pen, by its serial number.
+
+    Attributes
+    ----------
+    led_file : LedFile or None
+        None until one was opened for the pen.
+    expansion : float or None
+        Of the pen by warmth, 1/K, where its LED file states none; None for the default
+        of the station.
+    """
 
     kind: ClassVar[ItemKind] = ItemKind.PEN
+
+    led_file: LedFile | None = None
+    expansion: Annotated[float, Meta(ge=0, le=LARGEST_EXPANSION)] | None = None
 
 
 class ListedCone(Item, frozen=True, kw_only=True, tag="cone"):
@@ -215,6 +241,13 @@ class Library:
         listed = self.tips.get(tip)
         return usual if listed is None else listed.rule(usual)
 
+    def pen_of_leds(self, sha256: str) -> ListedPen | None:
+        """Return the pen with which an LED file of this hash is stored."""
+        for pen in self.pens.values():
+            if pen.led_file is not None and pen.led_file.sha256 == sha256:
+                return pen
+        return None
+
     def alike(self, kind: ItemKind, name: str) -> AnyItem | None:
         """Return the item whose name differs in case only."""
         return _alike(self.items(kind), name)
@@ -248,8 +281,8 @@ def item_entries(item: AnyItem) -> dict[str, Plain]:
     for name, value in to_builtins(item).items():
         if name == "type" or value is None:
             continue
-        if isinstance(value, dict):  # a picture
-            value = value["place"]
+        if isinstance(value, dict):  # a file
+            value = value.get("place") or f"{value['path']} {value['sha256']}"
         is_vector = isinstance(value, list | tuple)
         entries[name] = " ".join(map(repr, value)) if is_vector else value
     return entries

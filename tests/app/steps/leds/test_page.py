@@ -30,6 +30,8 @@ from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.pen_check.match import Finding, MatchFinding, PenMatch
+from lightpen.record.library.library_changes import Author, add_item
+from lightpen.record.library.tip_library import LedFile, ListedPen, read_library
 from lightpen.record.swings.names import Names
 from lightpen.simulator.hand import HandActivity
 from lightpen.simulator.samples import fanned_pen, six_led_pen
@@ -945,6 +947,36 @@ def test_another_pens_file_is_told(live: "Seen", tmp_path: Path) -> None:
 
     live.wait("Pen not found")
     live.wait("LEDs of the LED file.")
+
+
+def test_the_file_of_another_pen_is_used_after_a_question_only(
+    seen: "Seen", workbench: Workbench, tmp_path: Path
+) -> None:
+    path = write_table(tmp_path / "lp05.csv", LEDS + np.array([0.0, 0.0, 0.1]))
+    other = LedFile(str(path), PenFile.read(path).sha256)
+    add_item(
+        workbench.folder,
+        ListedPen(id="LP-05", led_file=other),
+        Author("Hall 2", "Ann"),
+        workbench.around.now(),
+    )
+    workbench.library.refresh()
+    seen.settle()
+    source = SourceChoice(SourceKind.RECORDED, str(tmp_path))
+    now = workbench.selection.preparation.with_source(source)
+    workbench.selection.set_preparation(now)
+
+    open_file(seen, path)
+    assert workbench.selection.preparation.pen_file is None
+    assert "lp05.csv is the LED file of pen LP-05, not of pen LP-04." in seen.words
+
+    seen.click("Use this file")
+    assert in_use(workbench).path == path
+    for _ in range(3):
+        seen.settle()
+    stored = read_library(workbench.folder).pens["LP-04"].led_file
+    assert stored == other
+    assert not seen.page.is_doubtful()
 
 
 def test_a_file_that_misfits_leaves_the_step_amber_and_asks_before_the_swing(

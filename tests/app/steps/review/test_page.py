@@ -1418,7 +1418,7 @@ def test_after_acceptance_the_next_calibration_starts(
 ) -> None:
     accept(page, qtbot)
     # The second click of a double one must not go on.
-    assert page.main_action() == MainAction("Start next calibration", "Tip accepted.")
+    assert page.main_action() == MainAction("Back to Start", "Tip accepted.")
     qtbot.waitUntil(lambda: not page.main_action().why_not)
 
     with qtbot.waitSignal(page.step_requested) as asked:

@@ -32,6 +32,7 @@ def test_a_simulated_pen_is_at_the_swing_after_one_click(
     assert walker.workbench.run.status.origin is Origin.SIMULATED
     assert settings.stations() == ()  # nobody wants it back at the next start
     walker.window.go_to(0)
+    walker.click("Set up station...")
     assert not walker.control("Try it with a simulated pen").isEnabled()
 
 

@@ -65,6 +65,7 @@ class Desk:
         self.page.resize(1000, 640)
         self.page.show()
         self.page.entered()
+        self.page.show_setup()
         self.settle()
 
     def subject(self) -> Subject:

@@ -1,0 +1,153 @@
+"""Fills the day page, and does what is asked for there."""
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from lightpen.swing.preparation import Preparation
+from lightpen_app.look.words import PARTED, shortened
+from lightpen_app.steps.page import MainAction
+from lightpen_app.steps.start.day_state import (
+    CameraState,
+    ReadinessItem,
+    readiness,
+    tip_details,
+    tip_rows,
+)
+from lightpen_app.steps.start.day_view import DayView
+from lightpen_app.steps.start.library_control import LibraryControl
+from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.workbench import Workbench
+
+REFRESH_MS = 500
+N_MISFITS = 10  # images by which the LEDs are judged
+
+
+class DayControl(QObject):
+    """Shows tips and readiness in the view; chooses tips.
+
+    Signals
+    -------
+    changed()
+        `main_action` may be different.
+    step_requested(str)
+        The step of this key is to be shown.
+    """
+
+    changed = Signal()
+    step_requested = Signal(str)
+
+    def __init__(
+        self, workbench: Workbench, library: LibraryControl, view: DayView
+    ) -> None:
+        super().__init__(view)
+        self._workbench, self._library, self._view = workbench, library, view
+        self._selection, self._live = workbench.selection, workbench.live
+        self._misfits: deque[float] = deque(maxlen=N_MISFITS)
+        self._refreshing = QTimer(self)
+        self._refreshing.setInterval(REFRESH_MS)
+
+        # Connections
+        self._refreshing.timeout.connect(self.refresh_readiness)
+        self._selection.changed.connect(self._on_selected)
+        workbench.library.changed.connect(self.refresh)
+        workbench.pens.changed.connect(self.refresh_readiness)
+        self._live.image_shown.connect(self._on_image_shown)
+        self._live.connection_changed.connect(self.refresh_readiness)
+        view.tip_chosen.connect(self._on_tip_chosen)
+        view.tip_entered.connect(self._on_tip_entered)
+        view.step_requested.connect(self.step_requested)
+        view.swing_requested.connect(lambda: self.step_requested.emit("swing"))
+
+    def start(self) -> None:
+        """Follow the camera while the page is shown."""
+        self._misfits.clear()
+        self.refresh()
+        self._refreshing.start()
+
+    def stop(self) -> None:
+        """Leave the page as it is."""
+        self._refreshing.stop()
+
+    def refresh(self) -> None:
+        """Show tips and readiness as they are now."""
+        now, statuses = self._selection.preparation, self._workbench.library.statuses
+        names = now.names
+        self._view.set_tips(
+            tip_rows(now, statuses), (names.pen, names.tip), tip_details(now, statuses)
+        )
+        self.refresh_readiness()
+
+    def refresh_readiness(self) -> None:
+        """Show whether a swing can start."""
+        names = self._selection.preparation.names
+        place = PARTED.join(map(shortened, (names.station, names.operator)))
+        before, items = self._view.readiness(), self._items()
+        can_swing = not self._selection.preparation.missing_inputs()
+        self._view.set_ready(place, items, can_swing=can_swing)
+        if items != before:
+            self.changed.emit()
+
+    def main_action(self) -> MainAction:
+        """Return what the main button does: swing, or lead to what is not ready."""
+        amber = self._first_amber()
+        if amber is None:
+            return MainAction(self.tr("Start swing"))
+        names = {
+            "camera": self.tr("Check the camera"),
+            "leds": self.tr("Check the LEDs"),
+            "verify": self.tr("Verify the tip"),
+        }
+        return MainAction(names[amber.step])
+
+    def run_main_action(self) -> None:
+        """Do it."""
+        amber = self._first_amber()
+        self.step_requested.emit("swing" if amber is None else amber.step)
+
+    def _first_amber(self) -> ReadinessItem | None:
+        return next((item for item in self._items() if item.is_amber), None)
+
+    def _items(self) -> tuple[ReadinessItem, ...]:
+        misfit = float(np.median(self._misfits)) if self._misfits else None
+        rate = self._live.settings.frame_rate if self._live.is_open else None
+        camera = CameraState(self._live.worst_connection, rate, misfit)
+        return readiness(
+            self._selection.preparation,
+            self._workbench.library.statuses,
+            camera,
+            self._workbench.pens.doubt(),
+            self._workbench.verification.status,
+        )
+
+    def _on_selected(self, before: Preparation) -> None:
+        now = self._selection.preparation
+        if now.pen is not before.pen or now.camera is not before.camera:
+            self._misfits.clear()
+        self.refresh()
+
+    def _on_image_shown(self, shown: DisplayedImage) -> None:
+        detection = shown.seen.detection
+        if detection is not None and detection.has_pose:
+            self._misfits.append(detection.sigma)
+
+    def _on_tip_chosen(self, pen: str, tip: str) -> None:
+        now = self._selection.preparation
+        listed = self._library.tip(tip)
+        names = replace(now.names, pen=pen, tip=tip)
+        chosen = now.renamed(names)
+        if listed is not None:
+            chosen = chosen.with_listed(listed)
+        self._selection.set_preparation(chosen)
+
+    def _on_tip_entered(self, text: str) -> None:
+        """Choose the only tip that matches; else take it for a barcode."""
+        rows = self._view.rows()
+        exact = [row for row in rows if row.tip.casefold() == text.casefold()]
+        matching = exact or [row for row in rows if row.matches(text)]
+        if len(matching) == 1:
+            self._on_tip_chosen(matching[0].pen, matching[0].tip)
+        else:
+            self._library.take_code(text)

@@ -1,0 +1,250 @@
+"""What the day page shows: the tips of a station, and whether a swing can start."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from datetime import date, datetime, timedelta
+
+from PySide6.QtCore import QCoreApplication
+
+from lightpen.cameras.worker_events import Connection
+from lightpen.estimation.contact.single_images import USUAL_SIGMA
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.local_time import local_time
+from lightpen.model.origin import Origin
+from lightpen.record.library.calibration_status import StationStatus, TipStatus
+from lightpen.record.library.tip_library import ItemKind
+from lightpen.swing.preparation import MissingInput, Preparation
+from lightpen.verification.session.status import VerificationStatus
+from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.phrases import first_missing, grade_text
+from lightpen_app.look.quantities import number_text
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import Tone
+from lightpen_app.look.words import PARTED, shortened
+from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.widgets.status_mark import status_message
+
+SOON = timedelta(days=7)  # before a tip is due: then it is listed as due
+
+
+@dataclass(frozen=True)
+class TipRow:
+    """A tip of a pen, as the table shows it."""
+
+    pen: str
+    tip: str
+    due: StatusMessage
+    uncertainty: str
+    age: str
+    grade: StatusMessage
+    is_due: bool
+
+    def matches(self, text: str) -> bool:
+        """Return whether a text is part of the name of tip or pen."""
+        return any(text.casefold() in name.casefold() for name in (self.tip, self.pen))
+
+
+@dataclass(frozen=True)
+class ReadinessItem:
+    """One thing that a swing needs.
+
+    Attributes
+    ----------
+    step : str
+        Key of the step where it is put right.
+    """
+
+    step: str
+    message: StatusMessage
+
+    @property
+    def is_amber(self) -> bool:
+        """Whether something is to be done about it."""
+        return self.message.tone is Tone.WARN
+
+
+@dataclass(frozen=True)
+class CameraState:
+    """How the live images are.
+
+    Attributes
+    ----------
+    rate : float or None
+        Images received per second.
+    misfit : float or None
+        RMS residual of the LEDs in the last images, px; None where no pen is seen.
+    """
+
+    connection: Connection
+    rate: float | None = None
+    misfit: float | None = None
+
+
+def tip_rows(now: Preparation, statuses: StationStatus) -> tuple[TipRow, ...]:
+    """Return the tips of the station, those that are due first."""
+    names = now.names
+    pairs = set(statuses.in_force)
+    listed = statuses.library.tips
+    pairs |= {
+        (names.pen, tip.id)
+        for tip in listed.values()
+        if not tip.is_retired and not statuses.pens_of(tip.id)
+    }
+    if names.tip:
+        pairs.add((names.pen, names.tip))
+    is_simulated = now.origin is Origin.SIMULATED
+    rows = [
+        _row(pen, tip, statuses, is_simulated=is_simulated)
+        for pen, tip in pairs
+        if statuses.of_tip(pen, tip) is not TipStatus.RETIRED
+    ]
+    last = date.max
+    return tuple(
+        sorted(
+            rows,
+            key=lambda row: (
+                not row.is_due,
+                statuses.due(row.pen, row.tip) or last,
+                row.tip,
+                row.pen,
+            ),
+        )
+    )
+
+
+def readiness(
+    now: Preparation,
+    statuses: StationStatus,
+    camera: CameraState,
+    file_doubt: str,
+    verification: VerificationStatus,
+) -> tuple[ReadinessItem, ...]:
+    """Return what a swing needs, in the order in which it is looked at."""
+    return (
+        ReadinessItem("camera", _camera_message(now, camera)),
+        ReadinessItem("leds", _leds_message(now, statuses, camera, file_doubt)),
+        ReadinessItem("verify", _reference_message(verification)),
+    )
+
+
+def tip_details(now: Preparation, statuses: StationStatus) -> str:
+    """Return what is known of the tip that is chosen, in one line."""
+    translate, names = QCoreApplication.translate, now.names
+    tip, point = statuses.library.tips.get(names.tip), now.nominal_tip
+    if point is None and now.pen is not None:
+        point = now.pen.nominal_tip
+    parts = [translate("DayPage", "Tip {0}, pen {1}").format(names.tip, names.pen)]
+    if names.ball_diameter:
+        parts.append(translate("DayPage", "ball {0:g} mm").format(names.ball_diameter))
+    if names.cone:
+        parts.append(translate("DayPage", "cone {0}").format(names.cone))
+    if point is not None:
+        x, y, z = (f"{each:g}" for each in point.tolist())
+        parts.append(translate("DayPage", "nominal {0} {1} {2}").format(x, y, z))
+    limit = now.limits.max_uncertainty
+    parts.append(translate("DayPage", "limit of U {0:g} mm").format(limit))
+    if tip is not None and tip.note:
+        parts.append(tip.note)
+    return PARTED.join(parts)
+
+
+def _row(pen: str, tip: str, statuses: StationStatus, *, is_simulated: bool) -> TipRow:
+    translate = QCoreApplication.translate
+    found, status = statuses.in_force.get((pen, tip)), statuses.of_tip(pen, tip)
+    if found is None:
+        mark = status_message(None if is_simulated else status)
+        is_due = status is TipStatus.UNCALIBRATED and not is_simulated
+        return TipRow(pen, tip, mark, "", "", StatusMessage(), is_due)
+    assert statuses.now is not None
+    today, last = local_time(statuses.now).date(), statuses.due(pen, tip)
+    is_over = status is TipStatus.OVERDUE
+    is_due = is_over or (last is not None and last <= today + SOON)
+    due = StatusMessage(_due_text(last, today), Sign.NONE, Tone.PLAIN)
+    if is_due:
+        due = replace(due, sign=Sign.WARNING, tone=Tone.WARN)
+    if is_over:
+        due = status_message(status)
+    u = found.uncertainty
+    um = (
+        ""
+        if u is None
+        else translate("DayPage", "{0} \u00b5m").format(number_text(1000 * u, 1))
+    )
+    age = _age_text(found.calibrated, today)
+    return TipRow(pen, tip, due, um, age, _grade_message(found.grade), is_due)
+
+
+def _grade_message(grade: Grade | None) -> StatusMessage:
+    if grade is None:
+        return StatusMessage()
+    return StatusMessage(grade_text(grade), *GRADE_MARKS[grade])
+
+
+def _due_text(last: date | None, today: date) -> str:
+    translate = QCoreApplication.translate
+    if last is None:
+        return ""
+    days = (last - today).days
+    if days == 0:
+        return translate("DayPage", "due today")
+    return translate("DayPage", "due in {0} days").format(days)
+
+
+def _age_text(calibrated: datetime, today: date) -> str:
+    translate = QCoreApplication.translate
+    days = (today - local_time(calibrated).date()).days
+    if days == 0:
+        return translate("DayPage", "today")
+    if days == 1:
+        return translate("DayPage", "yesterday")
+    return translate("DayPage", "{0} days ago").format(days)
+
+
+def _amber(*sentences: str) -> StatusMessage:
+    text = next(filter(None, sentences))
+    return StatusMessage(text, Sign.WARNING, Tone.WARN)
+
+
+def _first_of(missing: Iterable[MissingInput]) -> str:
+    return first_missing(tuple(missing))
+
+
+def _camera_message(now: Preparation, camera: CameraState) -> StatusMessage:
+    translate = QCoreApplication.translate
+    missing = _first_of(now.camera_missing_inputs())
+    if camera.connection is not Connection.STREAMING or missing:
+        no_images = translate("DayPage", "The camera sends no images.")
+        return _amber(missing, no_images)
+    text = translate("DayPage", "Camera")
+    if camera.rate is not None:
+        text = translate("DayPage", "Camera {0:.0f} fps").format(camera.rate)
+    return StatusMessage(text, Sign.CHECK, Tone.GOOD)
+
+
+def _leds_message(
+    now: Preparation, statuses: StationStatus, camera: CameraState, file_doubt: str
+) -> StatusMessage:
+    translate, pen = QCoreApplication.translate, now.names.pen
+    if missing := _first_of(now.leds_missing_inputs()):
+        return _amber(missing)
+    if file_doubt:
+        return _amber(file_doubt)
+    if camera.misfit is not None and camera.misfit > USUAL_SIGMA:
+        words = translate("DayPage", "LEDs fit to {0:.2f} px only, usual is {1:g} px.")
+        return _amber(words.format(camera.misfit, USUAL_SIGMA))
+    if statuses.of_item(ItemKind.PEN, pen) is TipStatus.OVERDUE:
+        return _amber(translate("DayPage", "Pen {0} is overdue.").format(pen))
+    text = translate("DayPage", "LEDs of pen {0}").format(shortened(pen))
+    return StatusMessage(text, Sign.CHECK, Tone.GOOD)
+
+
+def _reference_message(status: VerificationStatus) -> StatusMessage:
+    translate, drift = QCoreApplication.translate, status.lamp_drift
+    if drift is None:
+        text = translate("DayPage", "Drift reference not watched")
+        return StatusMessage(text, Sign.RING, Tone.QUIET)
+    grade = drift.assessment.grade
+    if grade is not Grade.PASS:
+        return _amber(translate("DayPage", "The camera moved. Verify the tip."))
+    text = translate("DayPage", "Drift reference stable")
+    return StatusMessage(text, Sign.CHECK, Tone.GOOD)

@@ -1,0 +1,220 @@
+"""The day page: the tips of the station, and whether a swing can start."""
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QStandardItem, QStandardItemModel
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QBoxLayout,
+    QHeaderView,
+    QLineEdit,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
+from lightpen_app.steps.start.day_state import ReadinessItem, TipRow
+from lightpen_app.steps.start.readiness_line import ReadinessLine
+from lightpen_app.widgets.choice_field import ChoiceField
+from lightpen_app.widgets.keys import ENTER_KEYS
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.row_table import RowTable
+from lightpen_app.widgets.translated import Translated
+
+N_ITEMS = 3  # of the readiness line
+N_COLUMNS = 6
+LEAST_HEIGHT = 22 * GRID  # px, of the table
+
+
+class SearchEdit(QLineEdit):
+    """A field of which Enter takes what is typed; empty, it leaves Enter to the page.
+
+    Signals
+    -------
+    entered(str)
+    """
+
+    entered = Signal(str)
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        text = self.text().strip()
+        if event.key() in ENTER_KEYS and text:
+            self.clear()
+            self.entered.emit(text)
+            return
+        super().keyPressEvent(event)
+
+
+class DayView(Translated, QWidget):
+    """Shows what a day needs; what is set up once is elsewhere.
+
+    Signals
+    -------
+    tip_chosen(str, str)
+        Pen and tip of the row that was chosen.
+    tip_entered(str)
+        What was typed and entered.
+    step_requested(str)
+        Where something is put right.
+    swing_requested(), setup_requested()
+        The plain buttons.
+
+    Attributes
+    ----------
+    side : QBoxLayout
+        Beside the table: the last result.
+    """
+
+    tip_chosen = Signal(str, str)
+    tip_entered = Signal(str)
+    step_requested = Signal(str)
+    swing_requested = Signal()
+    setup_requested = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._rows: tuple[TipRow, ...] = ()
+        self._shown: tuple[TipRow, ...] = ()
+        self._chosen = ("", "")
+
+        # Widgets
+        self._ready = ReadinessLine(N_ITEMS)
+        self._search = SearchEdit()
+        self._which = ChoiceField()
+        for _ in range(2):
+            self._which.addItem("")
+        self._model = QStandardItemModel(0, N_COLUMNS, self)
+        self._table = RowTable(self._model)
+        self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self._table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self._table.setMinimumHeight(LEAST_HEIGHT)
+        across = self._table.horizontalHeader()
+        across.setStretchLastSection(False)
+        across.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self._details = text_label(TextSize.BODY, Tone.QUIET)
+        self._swing, self._setup = PushButton(), PushButton()
+
+        # Layout
+        layout = vertical_layout(self, spacing=2 * GRID)
+        layout.addWidget(self._ready)
+        self._columns = horizontal_layout(layout, spacing=3 * GRID, stretch=1)
+        left = vertical_layout(self._columns, stretch=3)
+        horizontal_layout(left, (self._search, 1), self._which)
+        fill(left, (self._table, 1), self._details)
+        self.side = vertical_layout(self._columns, spacing=2 * GRID, stretch=2)
+        horizontal_layout(layout, self._setup, 1, self._swing)
+
+        # Connections
+        self._ready.step_requested.connect(self.step_requested)
+        self._search.textChanged.connect(self._fill)
+        self._search.entered.connect(self.tip_entered)
+        self._which.activated.connect(self._fill)
+        self._table.selectionModel().currentRowChanged.connect(self._on_row_changed)
+        self._swing.clicked.connect(self.swing_requested)
+        self._setup.clicked.connect(self.setup_requested)
+
+        self._retranslate()
+
+    def first_control(self) -> QWidget:
+        """Return the field that has the focus at first."""
+        return self._search
+
+    def readiness(self) -> tuple[ReadinessItem, ...]:
+        """Return what is said about the swing."""
+        return self._ready.items()
+
+    def rows(self) -> tuple[TipRow, ...]:
+        """Return the rows that are shown."""
+        return self._shown
+
+    def set_narrow(self, narrow: bool) -> None:
+        """Put the last result below the table where there is little width."""
+        direction = QBoxLayout.Direction
+        self._columns.setDirection(
+            direction.TopToBottom if narrow else direction.LeftToRight
+        )
+        self._ready.set_narrow(narrow)
+
+    def set_ready(
+        self, place: str, items: Sequence[ReadinessItem], *, can_swing: bool
+    ) -> None:
+        """Show who is where, and what is ready; offer a swing where not all is."""
+        self._ready.set_place(place)
+        names = self.tr("Camera"), self.tr("LEDs"), self.tr("Drift reference")
+        self._ready.set_items(items, names)
+        is_amber = any(item.is_amber for item in items)
+        self._swing.setVisible(is_amber and can_swing)
+
+    def set_tips(
+        self, rows: Sequence[TipRow], chosen: tuple[str, str], details: str
+    ) -> None:
+        """Show other tips, with the one that is chosen, pen and tip."""
+        self._details.setText(details)
+        if tuple(rows) == self._rows and chosen == self._chosen:
+            return
+        self._rows, self._chosen = tuple(rows), chosen
+        self._fill()
+
+    def _fill(self) -> None:
+        """Show the rows that match what is typed."""
+        text, is_all = self._search.text().strip(), self._which.currentIndex() == 0
+        self._shown = tuple(
+            row
+            for row in self._rows
+            if row.matches(text)
+            and (is_all or row.is_due or (row.pen, row.tip) == self._chosen)
+        )
+        selection = self._table.selectionModel()
+        blocked = selection.blockSignals(True)
+        self._model.removeRows(0, self._model.rowCount())
+        for row in self._shown:
+            self._model.appendRow(self._cells(row))
+        selection.blockSignals(blocked)
+        for index, row in enumerate(self._shown):
+            if (row.pen, row.tip) == self._chosen:
+                flags = QItemSelectionModel.SelectionFlag
+                at = self._model.index(index, 0)
+                blocked = selection.blockSignals(True)
+                selection.setCurrentIndex(at, flags.ClearAndSelect | flags.Rows)
+                selection.blockSignals(blocked)
+        self._table.viewport().update()
+
+    def _cells(self, row: TipRow) -> list[QStandardItem]:
+        texts = (row.tip, row.pen, row.due.text, row.uncertainty, row.age)
+        cells = [QStandardItem(text) for text in (*texts, row.grade.text)]
+        colors = colors_of(self.palette())
+        for column, tone in ((2, row.due.tone), (5, row.grade.tone)):
+            cells[column].setForeground(QColor(colors.tone(tone)))
+        cells[3].setTextAlignment(
+            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        )
+        for cell in cells:
+            cell.setToolTip(cell.text())
+        return cells
+
+    def _on_row_changed(self, now: QModelIndex) -> None:
+        if now.isValid() and now.row() < len(self._shown):
+            row = self._shown[now.row()]
+            if (row.pen, row.tip) != self._chosen:
+                self.tip_chosen.emit(row.pen, row.tip)
+
+    @override
+    def _retranslate(self) -> None:
+        self._search.setPlaceholderText(self.tr("Scan or type a tip"))
+        self._search.setAccessibleName(self.tr("Search tips"))
+        self._which.setItemText(0, self.tr("All tips"))
+        self._which.setItemText(1, self.tr("Due tips"))
+        self._which.setAccessibleName(self.tr("Tips shown"))
+        self._table.setAccessibleName(self.tr("Tips of this station"))
+        self._model.setHorizontalHeaderLabels(
+            [
+                *(self.tr("Tip"), self.tr("Pen"), self.tr("Due")),
+                *(self.tr("U (k = 2)"), self.tr("Calibrated"), self.tr("Verdict")),
+            ]
+        )
+        self._swing.setText(self.tr("Swing anyway"))
+        self._setup.setText(self.tr("Set up station..."))
+        self._fill()

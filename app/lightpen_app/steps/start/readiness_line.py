@@ -1,0 +1,99 @@
+"""The line that says whether a swing can start, one button for each thing it needs."""
+
+from collections.abc import Sequence
+from functools import partial
+
+from PySide6.QtCore import QEvent, Signal
+from PySide6.QtGui import QIcon
+from PySide6.QtWidgets import QBoxLayout, QFrame, QWidget
+from typing_extensions import override
+
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
+from lightpen_app.look.theme import GRID, TextSize, set_tone, text_label
+from lightpen_app.steps.start.day_state import ReadinessItem
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
+from lightpen_app.widgets.status_mark import message_icon
+
+
+class ReadinessLine(QFrame):
+    """Shows station and operator, what is ready, and below it what is not.
+
+    Signals
+    -------
+    step_requested(str)
+        Where an item is put right.
+    """
+
+    step_requested = Signal(str)
+
+    def __init__(self, n_items: int, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setProperty("area", "panel")
+        self._items: tuple[ReadinessItem, ...] = ()
+
+        # Widgets
+        self._place = text_label(TextSize.LEAD)
+        self._place.setWordWrap(False)
+        self._buttons = tuple(PushButton(0) for _ in range(n_items))
+        self._reasons = tuple(SignLabel() for _ in range(n_items))
+
+        # Layout
+        margins = (2 * GRID, GRID, 2 * GRID, GRID)
+        layout = vertical_layout(self, margins=margins)
+        self._row = horizontal_layout(layout, self._place, 1)
+        horizontal_layout(self._row, *self._buttons, 1)
+        for reason in self._reasons:
+            layout.addWidget(reason)
+
+        # Connections
+        for index, button in enumerate(self._buttons):
+            button.setFlat(True)
+            button.clicked.connect(partial(self._on_clicked, index))
+
+    def items(self) -> tuple[ReadinessItem, ...]:
+        """Return what is shown."""
+        return self._items
+
+    def set_narrow(self, narrow: bool) -> None:
+        """Put the place above the items where there is little width."""
+        direction = QBoxLayout.Direction
+        self._row.setDirection(
+            direction.TopToBottom if narrow else direction.LeftToRight
+        )
+
+    def set_place(self, place: str) -> None:
+        """Show station and operator."""
+        self._place.setText(place)
+
+    def set_items(self, items: Sequence[ReadinessItem], names: Sequence[str]) -> None:
+        """Show other items; those that are not ready by their names and reasons."""
+        if tuple(items) == self._items:
+            return
+        self._items = tuple(items)
+        for item, name, button, reason in zip(
+            items, names, self._buttons, self._reasons, strict=True
+        ):
+            text = name if item.is_amber else item.message.text
+            button.setText(text)
+            button.setIcon(message_icon(item.message, self))
+            button.setAccessibleDescription(item.message.text)
+            button.setToolTip(item.message.text if item.is_amber else "")
+            set_tone(button, item.message.tone)
+            reason.set_value(item.message if item.is_amber else StatusMessage())
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._restyle()
+
+    def _restyle(self) -> None:
+        """Draw the signs in the present colours."""
+        for item, button in zip(self._items, self._buttons, strict=False):
+            icon = message_icon(item.message, self) if item.message.text else QIcon()
+            button.setIcon(icon)
+
+    def _on_clicked(self, index: int) -> None:
+        if index < len(self._items):
+            self.step_requested.emit(self._items[index].step)

@@ -1,0 +1,92 @@
+"""Set up station: what is entered once, for all days."""
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QBoxLayout, QWidget
+
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.sounds import Sounds
+from lightpen_app.look.theme import GRID
+from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
+from lightpen_app.steps.start.data_folder_panel import DataFolderPanel
+from lightpen_app.steps.start.form import LimitsForm, NamesForm
+from lightpen_app.steps.start.newcomer_panel import NewcomerPanel
+from lightpen_app.steps.start.sound_test import SoundTest
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.workbench import Workbench
+
+
+class SetupView(Translated, QWidget):
+    """Shows what is set up at a station.
+
+    Signals
+    -------
+    done()
+        The day page shall be shown.
+
+    Attributes
+    ----------
+    names, limits, assumed, sound_test, folder, newcomer
+        The panels.
+    """
+
+    done = Signal()
+
+    def __init__(
+        self,
+        workbench: Workbench,
+        sounds: Sounds,
+        *,
+        is_known: bool,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._is_known = is_known
+
+        # Widgets: the order of making them is the order of the Tab key
+        self.names, self.limits = NamesForm(), LimitsForm()
+        self.assumed = AssumptionsPanel()
+        self.sound_test = SoundTest(sounds)
+        self.folder = DataFolderPanel(workbench.folder, workbench.notifications)
+        self.newcomer = NewcomerPanel()
+        self._done = PushButton()
+
+        # Layout
+        rows = vertical_layout(self, spacing=3 * GRID)
+        self._columns = horizontal_layout(rows, spacing=3 * GRID)
+        self._left = vertical_layout(
+            *(self._columns, self.names, self.limits, self.assumed, 1),
+            spacing=2 * GRID,
+            stretch=5,
+        )
+        self._right = vertical_layout(self._columns, spacing=2 * GRID, stretch=4)
+        fill(self._right, self.sound_test, self.folder)
+        if is_known:
+            fill(self._right, self.newcomer)
+        fill(self._right, 1)
+        horizontal_layout(rows, self._done, 1)
+        rows.addStretch(1)
+
+        # Connections
+        self._done.clicked.connect(self.done)
+
+        self.set_narrow(False)
+        self._retranslate()
+
+    def set_narrow(self, narrow: bool) -> None:
+        """Use one column where there is little width."""
+        direction = QBoxLayout.Direction
+        self._columns.setDirection(
+            direction.TopToBottom if narrow else direction.LeftToRight
+        )
+        if not self._is_known:
+            self.newcomer.set_wide(narrow)
+            column = self._left if narrow else self._right
+            column.insertWidget(0, self.newcomer)
+
+    def set_why_not_done(self, why_not: str) -> None:
+        """Say what is missing for the day page."""
+        self._done.set_why_not(why_not)
+
+    def _retranslate(self) -> None:
+        self._done.setText(self.tr("Show the tips of this station"))

@@ -1,0 +1,47 @@
+"""Windows and dialogs that stay within their screen, their buttons with them."""
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QPoint, QRect, QSize
+from PySide6.QtGui import QGuiApplication, QShowEvent
+from PySide6.QtWidgets import QWidget
+from typing_extensions import override
+
+from lightpen_app.look.theme import GRID
+
+if TYPE_CHECKING:
+    _Base = QWidget
+else:  # a class of Qt's cannot be a base twice
+    _Base = object
+
+FRAME = QSize(GRID, 5 * GRID)  # of a window, at most; not known before it is shown
+
+
+def fitted_place(place: QRect, available: QRect) -> QRect:
+    """Return the place of a window without its frame, within what a screen has."""
+    size = place.size().boundedTo(available.size() - FRAME)
+    last = available.bottomRight() - QPoint(size.width() - 1, size.height() - 1)
+    left = max(available.left(), min(place.left(), last.x()))
+    top = max(available.top(), min(place.top(), last.y()))
+    return QRect(QPoint(left, top), size)
+
+
+def fit_screen(window: QWidget) -> None:
+    """Keep a window within its screen."""
+    if window.isMaximized() or window.isFullScreen():
+        return
+    place = window.geometry()
+    screen = QGuiApplication.screenAt(place.center()) or window.screen()
+    fitted = fitted_place(place, screen.availableGeometry())
+    if fitted != place:
+        window.setGeometry(fitted)
+
+
+class FittedWindow(_Base):
+    """Put before the base of a window, it keeps that within the screen when shown."""
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if not event.spontaneous():
+            fit_screen(self)
