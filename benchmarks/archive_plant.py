@@ -27,9 +27,10 @@ from benchmarks.rows import Row, table
 
 from lightpen.archive.chains import chain_at_home, entries_of, heads
 from lightpen.archive.check import check_archive
-from lightpen.archive.database import look_into, open_server
+from lightpen.archive.database import look_into
 from lightpen.archive.lazy_logbook import SERVER
 from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.archive.server import open_server
 from lightpen.errors import ArchiveError
 
 STATIONS = ("Hall 2", "Hall 3")

@@ -36,7 +36,13 @@ def free_port() -> int:
 
 
 class Postgres:
-    """A server on the loopback, which can be stopped and started again."""
+    """A server on the loopback, which can be stopped and started again.
+
+    Attributes
+    ----------
+    certificate : Path
+        Of itself, for the name ``localhost``.
+    """
 
     def __init__(self, folder: Path, programs: Path) -> None:
         self._folder, self._programs = folder, programs
@@ -51,11 +57,19 @@ class Postgres:
             *("initdb", "--no-sync", "--auth=scram-sha-256", "--username=plant"),
             f"--pwfile={secret}",
         )
+        self.certificate = folder / "data" / "server.crt"
+        self._run_any(
+            *("openssl", "req", "-x509", "-nodes", "-newkey", "ec"),
+            *("-pkeyopt", "ec_paramgen_curve:prime256v1"),
+            *("-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost"),
+            *("-out", self.certificate, "-keyout", folder / "data" / "server.key"),
+        )
         self.start()
 
     def start(self) -> None:
         """Start it, and wait until it answers."""
         options = f"-p {self.port} -c listen_addresses=127.0.0.1 -k {self._folder}"
+        options += " -c ssl=on"
         self._run(
             *("pg_ctl", "start", "--wait", f"--timeout={START_S:.0f}"),
             *(f"--log={self._folder / 'log'}", f"--options={options}"),
@@ -65,25 +79,49 @@ class Postgres:
         """Stop it at once, as a power cut does."""
         self._run("pg_ctl", "stop", "--wait", "--mode=immediate")
 
-    def new_database(self) -> str:
-        """Return the address of a database that is made anew."""
-        from sqlalchemy import create_engine, text
+    def new_database(self, sql: str | None = None) -> str:
+        """Return the address of a database that is made anew.
+
+        Parameters
+        ----------
+        sql : str, optional
+            That sets it up; as an archive unless given.
+        """
+        import psycopg
+
+        from lightpen.archive.server_setup import server_sql
 
         name = f"plant_{secrets.token_hex(4)}"
-        address = self.address("postgres").replace("://", "+psycopg://")
-        engine = create_engine(address, isolation_level="AUTOCOMMIT")
-        with engine.connect() as connection:
-            connection.execute(text(f"CREATE DATABASE {name}"))
-        engine.dispose()
+        admin = self.address("postgres")
+        with psycopg.connect(admin, autocommit=True) as connection:
+            connection.execute(f"CREATE DATABASE {name}")
+        with psycopg.connect(self.address(name), autocommit=True) as connection:
+            connection.execute(server_sql() if sql is None else sql)
         return self.address(name)
 
+    def new_role(self, address: str, group: str, name: str = "") -> str:
+        """Return the address of a database for a new role of a group."""
+        import psycopg
+
+        role = name or f"role_{secrets.token_hex(4)}"
+        with psycopg.connect(address, autocommit=True) as connection:
+            connection.execute(
+                f"CREATE ROLE {role} LOGIN PASSWORD '{PASSWORD}' IN ROLE {group}"
+            )
+        return address.replace("//plant:", f"//{role}:")
+
     def address(self, name: str, password: str = PASSWORD) -> str:
-        """Return the address of a database."""
-        return f"postgresql://plant:{password}@127.0.0.1:{self.port}/{name}"
+        """Return the address of a database, called without TLS."""
+        place = f"127.0.0.1:{self.port}/{name}"
+        return f"postgresql://plant:{password}@{place}?sslmode=disable"
 
     def _run(self, program: str, *words: str) -> None:
+        data = f"--pgdata={self._folder / 'data'}"
+        self._run_any(self._programs / program, data, *words)
+
+    def _run_any(self, *words: str | Path) -> None:
         subprocess.run(
-            [self._programs / program, f"--pgdata={self._folder / 'data'}", *words],
+            words,
             user=self._user,
             cwd=self._folder,
             stdin=subprocess.DEVNULL,

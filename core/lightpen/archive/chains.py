@@ -5,7 +5,18 @@ from dataclasses import dataclass, replace
 from datetime import timedelta
 from typing import Any
 
-from sqlalchemy import Column, Connection, Row, func, insert, select, update
+from sqlalchemy import (
+    Column,
+    Connection,
+    Row,
+    delete,
+    func,
+    insert,
+    select,
+    tuple_,
+    update,
+)
+from sqlalchemy.dialects import postgresql
 
 from lightpen.archive.database import Database
 from lightpen.archive.entries import (
@@ -24,7 +35,7 @@ from lightpen.archive.entries import (
     text_sha256,
 )
 from lightpen.archive.signatures import ChainKeys, entry_signature, key_in
-from lightpen.archive.tables import CHAINS, ENTRIES, RECORDS
+from lightpen.archive.tables import CHAIN_WRITERS, CHAINS, ENTRIES, RECORDS
 from lightpen.errors import ArchiveError, FileError
 from lightpen.formats.own_json import DamagedError
 from lightpen.messages import Message, message
@@ -78,6 +89,8 @@ def own_chain(database: Database) -> str:
 
 def chain_at_home(database: Database) -> str | None:
     """Return the chain that is at home in a database, if it has begun."""
+    if database.file is None:
+        return None
     with database.reading() as connection:
         return connection.execute(_AT_HOME).scalar_one_or_none()
 
@@ -131,7 +144,7 @@ def copy_entries(
         chain, are beyond the head of a chain at home, or the copy says otherwise.
     """
     with database.writing() as connection:
-        if connection.dialect.name == "postgresql":
+        if _is_server(connection):
             connection.execute(select(func.pg_advisory_xact_lock(int(chain[:15], 16))))
         head = _head(connection, chain)
         if head.number == 0 and not _is_known(connection, chain):
@@ -147,11 +160,74 @@ def copy_entries(
     return CopyResult(len(new), len(known))
 
 
+def adopt_entries(
+    database: Database,
+    chain: str,
+    entries: Sequence[StoredEntry],
+    records: Mapping[str, str],
+) -> None:
+    """Let a chain that is at home here grow by entries that this folder lost.
+
+    Raises
+    ------
+    ArchiveError
+        They do not go on where the chain ends, are not signed by its station, or
+        another chain is at home here.
+    """
+    empty = delete(CHAINS).where(
+        CHAINS.c.is_own, CHAINS.c.number == 0, CHAINS.c.chain != chain
+    )
+    with database.writing() as connection:
+        connection.execute(empty)
+        home = connection.execute(_AT_HOME).scalar_one_or_none()
+        if home is None:
+            if not _is_known(connection, chain):
+                _begin(connection, chain, is_own=True)
+            own = update(CHAINS).where(CHAINS.c.chain == chain).values(is_own=True)
+            connection.execute(own)
+        elif home != chain:
+            raise ArchiveError(_forked(entries[0]))
+        _require_next(_head(connection, chain), list(entries))
+        _require_signed(connection, chain, entries)
+        _keep_records(connection, _named(entries, records))
+        _put(connection, chain, entries)
+
+
 def heads(database: Database) -> tuple[ChainHead, ...]:
     """Return the head of each chain."""
+    if database.file is None:
+        place = tuple_(ENTRIES.c.chain, ENTRIES.c.number)
+        ends = select(ENTRIES.c.chain, func.max(ENTRIES.c.number))
+        found = (
+            select(ENTRIES.c.chain, ENTRIES.c.number, ENTRIES.c.sha256)
+            .where(place.in_(ends.group_by(ENTRIES.c.chain)))
+            .order_by(ENTRIES.c.chain)
+        )
+    else:
+        found = select(CHAINS).order_by(CHAINS.c.chain)
     with database.reading() as connection:
-        rows = connection.execute(select(CHAINS).order_by(CHAINS.c.chain)).all()
+        rows = connection.execute(found).all()
     return tuple(ChainHead(row.chain, row.number, row.sha256) for row in rows)
+
+
+def head_of(database: Database, chain: str) -> ChainHead:
+    """Return the last entry of a chain as the entries have it."""
+    with database.reading() as connection:
+        return _head(connection, chain)
+
+
+def delivered_number(database: Database, chain: str) -> int:
+    """Return the number of the last entry of a chain that a server was given."""
+    wanted = select(CHAINS.c.delivered).where(CHAINS.c.chain == chain)
+    with database.reading() as connection:
+        return connection.execute(wanted).scalar_one_or_none() or 0
+
+
+def note_delivered(database: Database, chain: str, number: int) -> None:
+    """Note the number of the last entry of a chain that a server has."""
+    noted = update(CHAINS).where(CHAINS.c.chain == chain, CHAINS.c.delivered != number)
+    with database.writing() as connection:
+        connection.execute(noted.values(delivered=number))
 
 
 def entries_of(database: Database, chain: str, after: int = 0) -> Iterator[StoredEntry]:
@@ -344,7 +420,8 @@ def _is_entered(connection: Connection, chain: str, event: Event) -> bool:
 
 
 def _is_known(connection: Connection, chain: str) -> bool:
-    wanted = select(CHAINS.c.chain).where(CHAINS.c.chain == chain)
+    table = CHAIN_WRITERS if _is_server(connection) else CHAINS
+    wanted = select(table.c.chain).where(table.c.chain == chain)
     return connection.execute(wanted).one_or_none() is not None
 
 
@@ -356,17 +433,26 @@ def _new_chain(database: Database) -> str:
 
 
 def _begin(connection: Connection, chain: str, *, is_own: bool) -> None:
+    if _is_server(connection):
+        connection.execute(insert(CHAIN_WRITERS).values(chain=chain))
+        return
     connection.execute(
         insert(CHAINS).values(
-            chain=chain, is_own=is_own, number=0, sha256=NOTHING_BEFORE
+            chain=chain, is_own=is_own, number=0, sha256=NOTHING_BEFORE, delivered=0
         )
     )
+
+
+def _is_server(connection: Connection) -> bool:
+    return connection.dialect.name == "postgresql"
 
 
 def _put(connection: Connection, chain: str, entries: Sequence[StoredEntry]) -> None:
     if not entries:
         return
     connection.execute(insert(ENTRIES), list(map(columns_of, entries)))
+    if _is_server(connection):
+        return
     last = entries[-1]
     connection.execute(
         update(CHAINS)
@@ -380,8 +466,9 @@ def _keep_records(connection: Connection, records: Mapping[str, str]) -> None:
     wanted = select(RECORDS.c.sha256).where(RECORDS.c.sha256.in_(list(records)))
     known = set(connection.execute(wanted).scalars())
     new = [{"sha256": n, "text": t} for n, t in records.items() if n not in known]
-    if new:
-        connection.execute(insert(RECORDS), new)
+    if new:  # of a server another role may have one that this one does not see
+        put = postgresql.insert(RECORDS).on_conflict_do_nothing()
+        connection.execute(put if _is_server(connection) else insert(RECORDS), new)
 
 
 def _parted(
@@ -416,6 +503,8 @@ def _require_next(head: ChainHead, new: list[StoredEntry]) -> None:
 
 def _require_elsewhere(connection: Connection, new: StoredEntry) -> None:
     """Refuse an entry of the chain at home that was not entered here."""
+    if _is_server(connection):
+        return
     if connection.execute(_AT_HOME).scalar_one_or_none() == new.entry.chain:
         raise ArchiveError("archive.own-chain-ahead", entry=_named_entry(new))
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy import Row, exists, select, text
 
-from lightpen.archive.chains import chain_at_home, heads, sound_entry
+from lightpen.archive.chains import chain_at_home, heads, searchable, sound_entry
 from lightpen.archive.database import Database, is_open, look_into
 from lightpen.archive.entries import (
     NOTHING_BEFORE,
@@ -204,7 +204,9 @@ def _rows_after(database: Database, chain: str, number: int) -> list[Row[Any]]:
 
 
 def _strays(database: Database) -> Iterator[Message]:
-    """Yield the entries that are of no chain."""
+    """Yield the entries of a file that are of no chain."""
+    if database.file is None:  # where a foreign key prevents it
+        return
     known = select(CHAINS.c.chain)
     strays = select(ENTRIES.c.chain).where(ENTRIES.c.chain.not_in(known)).distinct()
     with database.reading() as connection:
@@ -214,26 +216,22 @@ def _strays(database: Database) -> Iterator[Message]:
 
 
 def _changed_records(database: Database) -> Iterator[Message]:
-    last = ""
+    n_read = 0  # by their hashes it cannot be told, which may be damaged, too
+    in_order = select(RECORDS).order_by(RECORDS.c.sha256).limit(BATCH)
     while True:
-        rows = (
-            select(RECORDS)
-            .where(RECORDS.c.sha256 > last)
-            .order_by(RECORDS.c.sha256)
-            .limit(BATCH)
-        )
         with database.reading() as connection:
-            found = connection.execute(rows).all()
+            found = connection.execute(in_order.offset(n_read)).all()
         for row in found:
             if not isinstance(row.text, str) or text_sha256(row.text) != row.sha256:
+                name = searchable(str(row.sha256))
                 yield message(
                     "archive.record-changed",
-                    record=row.sha256[:SHORT],
-                    entries=_entries_of(database, row.sha256),
+                    record=name[:SHORT],
+                    entries=_entries_of(database, name),
                 )
         if len(found) < BATCH:
             return
-        last = found[-1].sha256
+        n_read += BATCH
 
 
 def _lost_records(database: Database) -> Iterator[Message]:

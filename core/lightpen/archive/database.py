@@ -1,8 +1,8 @@
 """The database of an archive: a file of SQLite, or a server of PostgreSQL.
 
 It is looked at before anything is written: one of another program, or of a later
-version of this one, stays as it is. A new one gets the tables as they are now, one of
-an earlier version is brought up to date by the steps in the folder ``migrations``.
+version of this one, stays as it is. A new file gets the tables as they are now; what is
+of an earlier version is brought up to date by the steps in the folder ``migrations``.
 """
 
 import socket
@@ -20,7 +20,6 @@ from functools import partial
 from pathlib import Path
 from threading import Timer
 from time import monotonic, sleep
-from typing import Any
 
 from sqlalchemy import (
     Column,
@@ -37,8 +36,7 @@ from sqlalchemy import (
     select,
     text,
 )
-from sqlalchemy.engine import URL, make_url
-from sqlalchemy.exc import ArgumentError, SQLAlchemyError
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.pool import QueuePool
 
 from lightpen.archive.tables import METADATA
@@ -55,24 +53,6 @@ LONGEST_FAREWELL_S = 2  # for those who use it when it closes
 MALFORMED = "database disk image is malformed"  # as SQLite says it
 LONGEST_WAIT_S = 10  # for another program to finish what it writes
 PAUSE_S = 0.02  # between two attempts where SQLite makes none by itself
-# A server that does not answer, or not any more, is given up.
-_CALLING = {
-    "connect_timeout": 5,  # s
-    "keepalives_idle": 5,
-    "keepalives_interval": 2,
-    "keepalives_count": 3,
-    "tcp_user_timeout": 10_000,  # ms
-}
-
-# So does the server, or it would wait for hours for a station whose line was cut, and
-# let nobody else do what that one had begun.
-_SERVER_NOTICES = """\
-SET tcp_keepalives_idle = 5;
-SET tcp_keepalives_interval = 2;
-SET tcp_keepalives_count = 3;
-SET tcp_user_timeout = 10000;
-SET idle_in_transaction_session_timeout = 60000;
-SET lock_timeout = 30000"""
 # A relay between may keep a line open though nobody is at its other end any more.
 LONGEST_ANSWER_S = 120.0
 
@@ -161,7 +141,7 @@ def open_file(path: Path) -> Database:
         is_there = path.exists()
     if is_there:
         with closing(_read_only(path)) as database:  # which changes nothing
-            _require_known(database)
+            known_version(database)
     try:
         make_folder(path.parent)
     except FileError as error:
@@ -173,7 +153,7 @@ def open_file(path: Path) -> Database:
             connection.execute("PRAGMA synchronous = FULL")
             return connection
 
-    return _brought_up_to_date(Database(_sqlite_engine(connect), name, path))
+    return update_tables(Database(_sqlite_engine(connect), name, path))
 
 
 def look_into(path: Path) -> Database:
@@ -189,7 +169,7 @@ def look_into(path: Path) -> Database:
     database = _read_only(path)
     with _looking_at(path):
         is_there = path.is_file()
-    if not is_there or _require_known(database) is None:
+    if not is_there or known_version(database) is None:
         database.close()
         raise NoArchiveError("archive.missing", file=database.name)
     return database
@@ -205,42 +185,6 @@ def is_open(path: Path) -> bool:
     """
     with _looking_at(path):
         return Path(f"{path}-wal").exists()
-
-
-def open_server(address: str) -> Database:
-    """Open the archive on a server, or make its tables.
-
-    Parameters
-    ----------
-    address : str
-        ``postgresql://user:password@host/database``.
-
-    Raises
-    ------
-    ArchiveError
-        It does not answer, or not as an archive of this program.
-    """
-    try:
-        url = make_url(address)
-        if url.get_backend_name() != "postgresql":
-            raise ArgumentError("no PostgreSQL")
-        if "@" in (url.host or ""):
-            raise ArgumentError("a password with a sign that is to be written as %40")
-        url = url.set(drivername="postgresql+psycopg")
-        engine = create_engine(url, connect_args=_CALLING)
-        event.listen(engine, "connect", _ask_to_notice)
-    except (ArgumentError, ValueError) as error:
-        raise ArchiveError("archive.no-address") from error
-    except ModuleNotFoundError as error:
-        raise ArchiveError("archive.no-driver") from error
-    return _brought_up_to_date(Database(engine, _without_password(url)))
-
-
-def _without_password(url: URL) -> str:
-    """Return an address fit to be shown: its options may hold the password, too."""
-    user = f"{url.username}@" if url.username else ""
-    place = f"{url.host or 'localhost'}:{url.port}" if url.port else url.host or ""
-    return printable(f"postgresql://{user}{place}/{url.database or ''}")
 
 
 def _read_only(path: Path) -> Database:
@@ -301,10 +245,13 @@ def _begin(connection: Connection) -> None:
     connection.exec_driver_sql("BEGIN IMMEDIATE" if is_writing else "BEGIN")
 
 
-def _require_known(database: Database) -> str | None:
+def known_version(database: Database) -> str | None:
     """Return of which version a database is, None of one that holds nothing yet.
 
-    Of another program's, and of one of a later version, the reason is raised.
+    Raises
+    ------
+    ArchiveError
+        It is of another program, or of a later version of this one, and is closed.
     """
     try:
         with database.reading() as connection:
@@ -323,8 +270,15 @@ def _is_known(version: str) -> bool:
     return version.isdecimal() and int(version) <= int(VERSION)
 
 
-def _brought_up_to_date(database: Database) -> Database:
-    _require_known(database)
+def update_tables(database: Database) -> Database:
+    """Make the tables of a file, or bring those of an earlier version up to date.
+
+    Raises
+    ------
+    ArchiveError
+        It cannot be done; the database is closed.
+    """
+    known_version(database)
     try:
         with database.writing() as connection:
             if _found_version(connection) != VERSION:
@@ -333,12 +287,6 @@ def _brought_up_to_date(database: Database) -> Database:
         database.close()
         raise
     return database
-
-
-def _ask_to_notice(connection: Any, record: object) -> None:
-    connection.autocommit = True  # a line cut here leaves nothing begun
-    connection.execute(_SERVER_NOTICES)
-    connection.autocommit = False
 
 
 @contextmanager

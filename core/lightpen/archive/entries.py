@@ -107,7 +107,9 @@ class Event(Struct, frozen=True):
         The record of the swing, whose journal names the images with their hashes; of
         a verification the journals of its touches; of the library a picture.
     record_sha256 : str or None
-        Checksum of the record as JSON.
+        Checksum of the record: the file of ``result`` as a text, except of limits,
+        which may have the hash of a password; of a tip that was not accepted its
+        calibration.
     concerns : str or None
         Hash of the entry that it restores, takes back, or is a note on.
     """

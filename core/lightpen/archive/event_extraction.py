@@ -10,7 +10,6 @@ from msgspec.structs import replace
 
 from lightpen.archive.entries import Event, FileHash, Kind, text_sha256, this_program
 from lightpen.errors import FileError
-from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import read_bytes
@@ -46,7 +45,8 @@ class ExtractedEvent:
     Attributes
     ----------
     record : str or None
-        The record of the calibration as JSON; the event has its hash.
+        The file that tells of it, from which the file can be made again; of a tip that
+        was not accepted its calibration record. The event has its hash.
     takes_back : str
         File of the result that is taken back, as `FileHash.place`; else empty.
     """
@@ -64,11 +64,12 @@ def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
     FileError
         It cannot be read, or is damaged.
     """
-    digest = sha256(read_bytes(file, WHAT, LIMIT)).hexdigest()
-    place = FileHash(results.place_of(file), digest)
+    content = read_bytes(file, WHAT, LIMIT)
+    place = FileHash(results.place_of(file), sha256(content).hexdigest())
     found = results.content(file)
     if isinstance(found, Result):
-        return _account_of_acceptance(results, place, found)
+        event = _event_of_acceptance(results, place, found)
+        return ExtractedEvent(event, file_text(content))
     event = Event(
         kind=Kind.TAKEN_BACK,
         at=found.at,
@@ -77,9 +78,10 @@ def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
         reason=found.reason,
         settings={"supervisor": found.supervisor} if found.supervisor else {},
         result=place,
+        record_sha256=place.sha256,
     )
     revoked = file.with_name(f"{found.takes_back}.json")
-    return ExtractedEvent(event, takes_back=results.place_of(revoked))
+    return ExtractedEvent(event, file_text(content), results.place_of(revoked))
 
 
 def account_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
@@ -90,7 +92,8 @@ def account_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
     FileError
         It cannot be read, or is damaged.
     """
-    digest, change = file_sha256(file), read_change(file)
+    content, change = read_bytes(file, WHAT, LIMIT), read_change(file)
+    place = FileHash(results.place_of(file), sha256(content).hexdigest())
     item, picture = change.item, None
     if isinstance(item, ListedTip):
         picture = item.picture
@@ -107,10 +110,16 @@ def account_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
         program=this_program(),
         reason=change.reason,
         settings=item_entries(item) | {"supervisor": change.supervisor},
-        result=FileHash(results.place_of(file), digest),
+        result=place,
         files=() if picture is None else (FileHash(picture.place, picture.sha256),),
+        record_sha256=place.sha256,
     )
-    return ExtractedEvent(event)
+    return ExtractedEvent(event, file_text(content))
+
+
+def file_text(content: bytes) -> str:
+    """Return a file as it is entered beside its event, and fetched again from there."""
+    return content.decode("utf-8", "surrogateescape")
 
 
 def account_of_abandoned(
@@ -163,12 +172,14 @@ def account_of_refused(
         ),
     )
     inputs, limits = record_inputs(solution.source), assessment.limits
-    return _with_record(event, calibration_record(calibration, inputs, "joint", limits))
+    told = calibration_record(calibration, inputs, "joint", limits)
+    text = json_bytes(told).decode()
+    return ExtractedEvent(replace(event, record_sha256=text_sha256(text)), text)
 
 
-def _account_of_acceptance(
+def _event_of_acceptance(
     results: FolderArchive, place: FileHash, result: Result
-) -> ExtractedEvent:
+) -> Event:
     event = Event(
         kind=Kind.ACCEPTED if result.restores is None else Kind.RESTORED,
         at=result.accepted,
@@ -183,13 +194,14 @@ def _account_of_acceptance(
         change=result.change,
         swing=results.place_of(result.record),
         result=place,
+        record_sha256=place.sha256,
         concerns=result.restores,
     )
     with suppress(FileError):  # a result outlives the record of its swing
         record = open_record(result.record)
         files = _files_of(results, record)
         event = replace(event, settings=record.header.settings, files=files)
-    return _with_record(event, result.calibration)
+    return event
 
 
 def _event_of_swing(
@@ -220,8 +232,3 @@ def _files_of(results: FolderArchive, record: Record) -> tuple[FileHash, ...]:
         for name in (HEADER, *header_copies(record.header))
     )
     return (header, read, *copies)
-
-
-def _with_record(event: Event, record: CalibrationRecord) -> ExtractedEvent:
-    text = json_bytes(record).decode()
-    return ExtractedEvent(replace(event, record_sha256=text_sha256(text)), text)

@@ -23,9 +23,12 @@ from lightpen.archive.chains import (
     batch_of,
     copy_entries,
     entries_of,
+    head_of,
     heads,
+    note_delivered,
     records_of,
 )
+from lightpen.archive.comparison import require_continued
 from lightpen.archive.database import Database
 from lightpen.archive.entries import StoredEntry, read_entry
 from lightpen.errors import FileError, NameTakenError
@@ -61,13 +64,15 @@ def deliver(database: Database, chain: str, server: Database) -> CopyResult:
     Raises
     ------
     ArchiveError
-        It does not answer, or holds other entries of this chain.
+        It does not answer, is ahead of this chain, or holds other entries of it.
     """
-    known = next((h.number for h in heads(server) if h.chain == chain), 0)
+    require_continued(database, chain, server)
+    known = head_of(server, chain).number
     n_new, last = 0, max(0, known - 1)  # the last that it has is compared
     while batch := batch_of(database, chain, last)[:DELIVERED]:
         n_new += copy_entries(server, chain, batch, records_of(database, batch)).n_new
         last = batch[-1].entry.number
+        note_delivered(database, chain, last)
     return CopyResult(n_new, known)
 
 

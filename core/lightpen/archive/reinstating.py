@@ -10,16 +10,14 @@ from lightpen.archive.database import Database
 from lightpen.archive.entries import IN_FORCE_BY, StoredEntry
 from lightpen.archive.files_check import file_finding
 from lightpen.archive.queries import calibrating
-from lightpen.errors import AcceptanceError, ArchiveError
-from lightpen.estimation.reports.calibration_record import CalibrationRecord
+from lightpen.errors import AcceptanceError, ArchiveError, FileError
 from lightpen.estimation.reports.verdict import Grade, change_since
-from lightpen.formats.own_json import parse_own_json
 from lightpen.local_time import local_time
 from lightpen.messages import Message, message
 from lightpen.model.limits import DueRule
 from lightpen.record.library.tip_library import Library
 from lightpen.record.results.assessment import overdue_items
-from lightpen.record.results.results import Result, TipChange
+from lightpen.record.results.results import Result, TipChange, parse_result
 from lightpen.record.swings.names import Names
 
 
@@ -88,7 +86,7 @@ def restored_result(
     Parameters
     ----------
     record : str or None
-        Record of the entry, as JSON.
+        Record of the entry: the file of its result.
     data : Path
         Data folder.
     by : Names
@@ -105,9 +103,10 @@ def restored_result(
     if event.kind not in IN_FORCE_BY:
         raise ArchiveError("archive.not-restorable", number=entry.entry.number)
     try:
-        calibration = parse_own_json((record or "").encode(), CalibrationRecord)
+        data_then = (record or "").encode("utf-8", "surrogateescape")
+        calibration = parse_result(data_then, data, data.joinpath).calibration
         grade = Grade(event.grade)
-    except ValueError as error:
+    except (ValueError, FileError) as error:
         raise ArchiveError(
             "archive.too-little-kept", number=entry.entry.number
         ) from error

@@ -5,14 +5,17 @@ before the server does, and keeps it. So nothing is lost while the server is awa
 as entries are copied in their order and known ones passed over, none is doubled.
 
 The server is called for each delivery and then let go of: it has many stations to
-serve, and a line that is kept may be dead without either end knowing.
+serve, and a line that is kept may be dead without either end knowing. At the first
+call the whole chain is compared, at each other its end.
 """
 
 from contextlib import closing
 from threading import Event, Thread
 
-from lightpen.archive.database import Database, open_server
+from lightpen.archive.comparison import require_same
+from lightpen.archive.database import Database
 from lightpen.archive.exchange import deliver
+from lightpen.archive.server import open_server
 from lightpen.errors import ArchiveError
 from lightpen.messages import Message
 
@@ -64,6 +67,8 @@ class Replicator:
             self._is_due.clear()
             try:
                 with closing(open_server(self._address)) as server:
+                    if self.n_delivered is None:
+                        require_same(self._database, self._chain, server)
                     copied = deliver(self._database, self._chain, server)
                 self.n_delivered = copied.n_known + copied.n_new
                 self.trouble = None

@@ -5,7 +5,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from lightpen.archive.entries import Event, FileHash, Kind, this_program
-from lightpen.archive.event_extraction import ExtractedEvent
+from lightpen.archive.event_extraction import ExtractedEvent, file_text
 from lightpen.formats.files import MEGABYTE, read_bytes
 from lightpen.record.folder.camera_calibrations import (
     CAMERA_CALIBRATIONS,
@@ -72,7 +72,7 @@ def account_of_station(results: FolderArchive, file: Path) -> ExtractedEvent:
         event = _of_camera(file, content, place)
     else:
         event = _of_tip(results, file, content, place)
-    return ExtractedEvent(event, content.decode("utf-8", "surrogateescape"))
+    return ExtractedEvent(event, file_text(content))
 
 
 def _of_limits(file: Path, content: bytes, place: FileHash) -> Event:

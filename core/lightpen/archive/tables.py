@@ -1,13 +1,16 @@
-"""The tables of the archive, on SQLite and on PostgreSQL alike.
+"""The tables of the archive: entries and records, on SQLite and PostgreSQL alike.
 
 What the columns of an entry say stands in its text, too: they are there to be searched
-by, and `lightpen.archive.check` compares them with it.
+by, and `lightpen.archive.check` compares them with it. How far a chain has come, a file
+says beside its entries; on a server the entries alone do, see
+`lightpen.archive.server_setup`.
 """
 
 from sqlalchemy import (
     BigInteger,
     Boolean,
     Column,
+    FetchedValue,
     Index,
     Integer,
     MetaData,
@@ -18,13 +21,21 @@ from sqlalchemy import (
 
 METADATA = MetaData()
 
-CHAINS = Table(
+CHAINS = Table(  # of a file
     "archive_chains",
     METADATA,
     Column("chain", String(32), primary_key=True),
     Column("is_own", Boolean, nullable=False),
     Column("number", Integer, nullable=False),
     Column("sha256", String(64), nullable=False),
+    Column("delivered", Integer, nullable=False),  # entries that a server was given
+)
+
+CHAIN_WRITERS = Table(  # of a server
+    "archive_writers",
+    MetaData(),
+    Column("chain", String(32), primary_key=True),
+    Column("writer", Text, nullable=False, server_default=FetchedValue()),  # its role
 )
 
 ENTRIES = Table(
@@ -53,6 +64,7 @@ ENTRIES = Table(
     Index("archive_of_result", "chain", "result"),
     Index("archive_of_entry", "concerns"),
     Index("archive_by_hash", "sha256"),
+    Index("archive_by_record", "record_sha256"),
     Index("archive_by_clock", "at_us", "since_us", "chain", "number"),
 )
 

@@ -1,4 +1,4 @@
-"""``lightpen archive``: check, list, send and import entries."""
+"""``lightpen archive``: check, list, deliver, fetch and exchange entries."""
 
 import argparse
 from collections.abc import Callable
@@ -33,7 +33,29 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
     delivered = actions.add_parser(
         "deliver", help="deliver the entries to the server set by LIGHTPEN_ARCHIVE"
     )
-    for action in (check, listed, export, taken, delivered):
+    fetched = actions.add_parser(
+        "fetch", help="restore entries and files of this folder from the server"
+    )
+    actions.add_parser(
+        "server-sql", help="print the SQL that sets up a PostgreSQL server"
+    )
+    check.add_argument(
+        "--server",
+        action="store_true",
+        help="check the copy on the server set by LIGHTPEN_ARCHIVE, too",
+    )
+    delivered.add_argument(
+        "--again",
+        action="store_true",
+        help="deliver again what the server had and has lost",
+    )
+    fetched.add_argument(
+        "--chain",
+        default="",
+        metavar="NAME",
+        help="start of the chain to restore, where the server has several",
+    )
+    for action in (check, listed, export, taken, delivered, fetched):
         action.add_argument(
             "--data",
             type=Path,

@@ -7,17 +7,26 @@ from contextlib import closing, contextmanager
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
-from lightpen.archive.chains import chain_at_home, own_chain
+from lightpen.archive.chains import (
+    chain_at_home,
+    head_of,
+    note_delivered,
+    own_chain,
+)
 from lightpen.archive.check import check_file
-from lightpen.archive.database import Database, look_into, open_file, open_server
+from lightpen.archive.comparison import check_server, require_same
+from lightpen.archive.database import Database, look_into, open_file
 from lightpen.archive.entries import SHORT, Kind
 from lightpen.archive.exchange import deliver, export_entries, import_entries
+from lightpen.archive.fetching import fetch
 from lightpen.archive.history import Line, lines
 from lightpen.archive.lazy_logbook import SERVER
 from lightpen.archive.listing import entries_csv
 from lightpen.archive.logbook import ARCHIVE
 from lightpen.archive.queries import EntryFilter, newest
 from lightpen.archive.seal import close_sealed
+from lightpen.archive.server import open_server
+from lightpen.archive.server_setup import server_sql
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.errors import UsageError
 from lightpen.formats.files import printable
@@ -35,11 +44,19 @@ def _check(options: argparse.Namespace) -> int:
         data = _data(options)
         with progress("Checking") as report:
             checked = check_file(data / ARCHIVE, data, report)
-        for finding in checked.findings:
+        findings, told = checked.findings, ""
+        if options.server:
+            with _looked_into(data) as database, _server() as server:
+                there = check_server(database, server)
+            findings += there.findings
+            told = f" On the server: {there.n_entries} entries"
+            told += f", {there.n_waiting} not delivered yet."
+        for finding in findings:
             print(shown(str(finding)))
-        has_findings = bool(checked.findings)
-        told = "No change was found" if not has_findings else "Something was changed"
-        print(f"{told}: {checked.n_entries} entries, {checked.n_files} files.")
+        has_findings = bool(findings)
+        outcome = "Something was changed" if has_findings else "No change was found"
+        n_files = checked.n_files
+        print(f"{outcome}: {checked.n_entries} entries, {n_files} files.{told}")
 
     return run(options) or (CHANGED if has_findings else 0)
 
@@ -80,12 +97,28 @@ def _import(options: argparse.Namespace) -> None:
 
 @printing
 def _deliver(options: argparse.Namespace) -> None:
-    address = os.environ.get(SERVER, "")
-    if not address:
-        raise UsageError("archive.no-server", variable=SERVER)
-    with _opened(_data(options)) as database, closing(open_server(address)) as server:
-        copied = deliver(database, own_chain(database), server)
+    with _opened(_data(options)) as database, _server() as server:
+        chain = own_chain(database)
+        if options.again:
+            note_delivered(database, chain, head_of(server, chain).number)
+        require_same(database, chain, server)
+        copied = deliver(database, chain, server)
     print(f"{copied.n_new} entries are new, {copied.n_known} were there already.")
+
+
+@printing
+def _fetch(options: argparse.Namespace) -> None:
+    data = _data(options)
+    with _opened(data) as database, _server() as server:
+        fetched = fetch(database, data, server, options.chain)
+    print(f"{fetched.n_entries} entries and {fetched.n_files} files were restored.")
+    for place in fetched.lost:
+        print(shown(f"Not on the server: {place}"))
+
+
+@printing
+def _server_sql(options: argparse.Namespace) -> None:
+    print(server_sql(), end="")
 
 
 ACTIONS: dict[str, Command] = {
@@ -94,6 +127,8 @@ ACTIONS: dict[str, Command] = {
     "export": _export,
     "import": _import,
     "deliver": _deliver,
+    "fetch": _fetch,
+    "server-sql": _server_sql,
 }
 
 
@@ -106,6 +141,15 @@ def _data(options: argparse.Namespace) -> Path:
 def _looked_into(data: Path) -> Iterator[Database]:
     with closing(look_into(data / ARCHIVE)) as database:
         yield database
+
+
+@contextmanager
+def _server() -> Iterator[Database]:
+    address = os.environ.get(SERVER, "")
+    if not address:
+        raise UsageError("archive.no-server", variable=SERVER)
+    with closing(open_server(address)) as server:
+        yield server
 
 
 @contextmanager

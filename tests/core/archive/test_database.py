@@ -5,7 +5,6 @@ import sqlite3
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from datetime import timedelta
 from pathlib import Path
 from threading import Event
 from time import sleep
@@ -14,9 +13,8 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from benchmarks.postgres_server import PASSWORD, Postgres
 from sqlalchemy import inspect
-from tests.core.archive.conftest import NOON, Station
+from tests.core.archive.conftest import Station
 
 from lightpen.archive import database
 from lightpen.archive.check import check_archive
@@ -27,10 +25,7 @@ from lightpen.archive.database import (
     Database,
     look_into,
     open_file,
-    open_server,
 )
-from lightpen.archive.exchange import deliver
-from lightpen.archive.queries import EntryFilter, n_wanted
 from lightpen.archive.tables import METADATA
 from lightpen.errors import ArchiveError, NoArchiveError
 
@@ -144,25 +139,6 @@ def test_an_archive_whose_migration_fails_stays_as_it_was(
         assert check_archive(archive).findings == ()
 
 
-def test_a_server_of_an_earlier_version_is_brought_up_to_date(
-    station: Station,
-    postgres: Postgres,
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> None:
-    station.enter(2)
-    address = postgres.new_database()
-    with closing(open_server(address)) as server:
-        deliver(station.database, station.chain, server)
-    fill = "UPDATE archive_entries SET shift = 'early'"
-    add_migration(monkeypatch, tmp_path / "migrations", fill)
-
-    with closing(open_server(address)) as server:
-        assert "shift" in columns(server)
-        assert n_wanted(server, EntryFilter(begin=NOON + timedelta(minutes=1))) == 1
-        assert check_archive(server).findings == ()
-
-
 def test_a_database_of_another_program_is_refused_and_untouched(tmp_path: Path) -> None:
     file = tmp_path / "archive.sqlite"
     with closing(sqlite3.connect(file)) as connection, connection:
@@ -237,55 +213,6 @@ def test_an_archive_that_another_program_is_making_is_opened_when_that_is_done(
         open_file(file).close()
 
     look_into(file).close()
-
-
-@pytest.mark.parametrize("address", ["", "sqlite:///x", "no address", "http://h/d"])
-def test_an_address_that_is_none_is_refused(address: str) -> None:
-    with pytest.raises(ArchiveError, match="It has the form postgresql://"):
-        open_server(address)
-
-
-def test_wrong_credentials_are_said_without_the_password(postgres: Postgres) -> None:
-    wrong = f"not-{PASSWORD}"
-    with pytest.raises(ArchiveError) as caught:
-        open_server(postgres.address("postgres", wrong))
-
-    told = str(caught.value.message)
-    assert "password authentication failed" in told
-    assert PASSWORD not in told
-
-
-@pytest.mark.parametrize(
-    "address",
-    [
-        f"postgresql://plant:{PASSWORD}@127.0.0.1:1/plant",
-        f"postgresql://plant:it-is@{PASSWORD}@127.0.0.1:1/plant",
-        f"postgresql://127.0.0.1:1/plant?user=plant&password={PASSWORD}",
-    ],
-)
-def test_no_way_of_giving_a_password_has_it_told(address: str) -> None:
-    with pytest.raises(ArchiveError) as caught:
-        open_server(address)
-
-    assert PASSWORD not in str(caught.value.message)
-
-
-def test_a_server_that_is_no_postgresql_is_said_to_be_unusable(gopher: int) -> None:
-    with pytest.raises(ArchiveError, match="is not available"):
-        open_server(f"postgresql://plant:{PASSWORD}@127.0.0.1:{gopher}/plant")
-
-
-def test_tables_of_another_program_on_a_server_are_left_alone(
-    postgres: Postgres,
-) -> None:
-    import psycopg
-
-    address = postgres.new_database()
-    with psycopg.connect(address) as connection:
-        connection.execute("CREATE TABLE songs (name TEXT)")
-
-    with pytest.raises(ArchiveError, match="contains the tables of another program"):
-        open_server(address)
 
 
 def test_an_archive_closes_after_those_who_use_it(tmp_path: Path) -> None:

@@ -129,5 +129,5 @@ def test_a_server_with_another_last_entry_is_told_though_nothing_is_new(
     with server.database.writing() as connection:
         connection.execute(other)
 
-    with pytest.raises(ArchiveError, match="entry 2"):
+    with pytest.raises(ArchiveError, match="Entry 2"):
         deliver(here.database, here.chain, server.database)

@@ -2,7 +2,7 @@
 
 A file's number is one higher than that of any before, an order that no clock that was
 set back can turn round. Of two programs that take the same number one gets it, and the
-other the next.
+other the next. A file that was lost leaves its number to an empty ``000007.missing``.
 """
 
 from collections.abc import Callable
@@ -19,6 +19,8 @@ from lightpen.formats.files import (
     unreadable,
 )
 from lightpen.formats.system_reasons import strerror
+
+MISSING = ".missing"
 
 
 def add_numbered(folder: Path, data: bytes | Callable[[Path], bytes]) -> Path:
@@ -52,15 +54,14 @@ def numbered_file(folder: Path, number: int) -> Path:
 
 
 def newest_number(folder: Path) -> int:
-    """Return the number of the newest file; 0 where there is none.
+    """Return the number of the newest file, lost ones counted; 0 without any.
 
     Raises
     ------
     FileError
         The folder cannot be read.
     """
-    newest = numbered_files(folder)[:1]
-    return number_of(newest[0]) if newest else 0
+    return max(map(number_of, _paths_in(folder)), default=0)
 
 
 def make_folder(folder: Path) -> None:
@@ -90,12 +91,29 @@ def numbered_files(folder: Path) -> list[Path]:
     FileError
         The folder cannot be read.
     """
+    files = [p for p in _paths_in(folder) if p.suffix == ".json" and number_of(p)]
+    return sorted(files, key=lambda file: (number_of(file), file.name), reverse=True)
+
+
+def reserve_number(lost: Path) -> None:
+    """Let no new file get the number of one that was lost.
+
+    Raises
+    ------
+    FileError
+        The folder cannot be written.
+    """
+    make_folder(lost.parent)
+    with suppress(NameTakenError):
+        create_whole(lost.with_suffix(MISSING), b"")
+
+
+def _paths_in(folder: Path) -> list[Path]:
     try:
         paths = list(folder.iterdir()) if folder.is_dir() else []
     except OSError as error:
         raise unreadable(folder, FOLDER, error) from error
-    files = [path for path in paths if path.suffix == ".json" and number_of(path)]
-    return sorted(files, key=lambda file: (number_of(file), file.name), reverse=True)
+    return [path for path in paths if path.suffix in (".json", MISSING)]
 
 
 def number_of(file: Path) -> int:
