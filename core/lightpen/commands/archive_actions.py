@@ -7,12 +7,7 @@ from contextlib import closing, contextmanager
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
-from lightpen.archive.chains import (
-    chain_at_home,
-    head_of,
-    note_delivered,
-    own_chain,
-)
+from lightpen.archive.chains import chain_at_home, head_of, note_delivered, own_chain
 from lightpen.archive.check import check_file
 from lightpen.archive.comparison import check_server, require_same
 from lightpen.archive.database import Database, look_into, open_file

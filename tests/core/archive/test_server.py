@@ -86,7 +86,7 @@ def test_tables_of_another_program_on_a_server_are_left_alone(
 def test_an_empty_database_names_the_command_that_sets_it_up(
     postgres: Postgres,
 ) -> None:
-    with pytest.raises(ArchiveError, match="lightpen archive server-sql"):
+    with pytest.raises(ArchiveError, match="Its administrator sets it up"):
         open_server(postgres.new_database(""))
 
 
@@ -117,7 +117,7 @@ def test_the_password_may_be_in_a_file(postgres: Postgres, tmp_path: Path) -> No
     open_server(f"{address}&passfile={file}").close()
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def address(postgres: Postgres) -> str:
     """The address of a server, for its administrator."""
     return postgres.new_database()
@@ -154,8 +154,9 @@ def test_a_station_adds_entries_and_can_change_none(
 
 
 def test_a_station_sees_and_continues_its_own_chain_alone(
-    postgres: Postgres, address: str, make_station: Callable[[str], Station]
+    postgres: Postgres, make_station: Callable[[str], Station]
 ) -> None:
+    address = postgres.new_database()
     here, there = make_station("Hall 2"), make_station("Hall 3")
     entries = here.enter(2)
     there.enter(3, first=10)
@@ -185,8 +186,8 @@ def test_what_does_not_have_its_hash_is_not_taken(
             "INSERT INTO archive_records VALUES (repeat('0', 64), '{}')",
             "INSERT INTO archive_entries (chain, number, sha256, since_us, kind,"
             " station, pen, tip, is_simulated, swing, result, concerns,"
-            " record_sha256, text, at_us, signature) VALUES ('c', 1, repeat('0', 64), 0, '', '',"
-            " '', '', false, '', '', '', '', '{}', 0, '')",
+            " record_sha256, text, at_us, signature) VALUES ('c', 1, repeat('0', 64),"
+            " 0, '', '', '', '', false, '', '', '', '', '{}', 0, '')",
         ):
             with pytest.raises(psycopg.Error), connection.transaction():
                 connection.execute(put)

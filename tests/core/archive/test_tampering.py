@@ -294,7 +294,7 @@ def test_a_rolled_back_folder_delivers_nothing_and_says_what_to_do(
     with (
         closing(Logbook(plant.data)) as logbook,
         closing(open_server(plant.server)) as server,
-        pytest.raises(ArchiveError, match="lightpen archive fetch"),
+        pytest.raises(ArchiveError, match="Fetch the missing entries"),
     ):
         deliver(logbook.database, logbook.chain, server)
 
