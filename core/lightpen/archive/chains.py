@@ -210,7 +210,7 @@ def heads(database: Database) -> tuple[ChainHead, ...]:
     return tuple(ChainHead(row.chain, row.number, row.sha256) for row in rows)
 
 
-def head_of(database: Database, chain: str) -> ChainHead:
+def chain_head(database: Database, chain: str) -> ChainHead:
     """Return the last entry of a chain as the entries have it."""
     with database.reading() as connection:
         return _head(connection, chain)

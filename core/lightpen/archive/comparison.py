@@ -10,7 +10,7 @@ from hashlib import sha256
 
 from sqlalchemy import select, text
 
-from lightpen.archive.chains import chain_at_home, delivered_number, head_of, heads
+from lightpen.archive.chains import chain_at_home, chain_head, delivered_number, heads
 from lightpen.archive.check import check_archive
 from lightpen.archive.database import Database
 from lightpen.archive.entries import SHORT
@@ -79,7 +79,7 @@ def require_continued(database: Database, chain: str, server: Database) -> None:
     ArchiveError
         As of `require_same`.
     """
-    head = head_of(server, chain)
+    head = chain_head(server, chain)
     here = _hashes(database, chain, head.number - 1, head.number)
     is_same = head.number == 0 or here == [(head.number, head.sha256)]
     if not is_same or head.number < delivered_number(database, chain):
@@ -117,7 +117,7 @@ def first_difference(
 
 
 def _findings(database: Database, chain: str, server: Database) -> Iterator[Message]:
-    here, there = (head_of(each, chain).number for each in (database, server))
+    here, there = (chain_head(each, chain).number for each in (database, server))
     different = first_difference(database, chain, server, min(here, there))
     if different is not None:
         yield message("archive.server-differs", number=different, chain=chain[:SHORT])

@@ -21,9 +21,9 @@ from lightpen.archive.chains import (
     BATCH,
     CopyResult,
     batch_of,
+    chain_head,
     copy_entries,
     entries_of,
-    head_of,
     heads,
     note_delivered,
     records_of,
@@ -67,7 +67,7 @@ def deliver(database: Database, chain: str, server: Database) -> CopyResult:
         It does not answer, is ahead of this chain, or holds other entries of it.
     """
     require_continued(database, chain, server)
-    known = head_of(server, chain).number
+    known = chain_head(server, chain).number
     n_new, last = 0, max(0, known - 1)  # the last that it has is compared
     while batch := batch_of(database, chain, last)[:DELIVERED]:
         n_new += copy_entries(server, chain, batch, records_of(database, batch)).n_new

@@ -12,8 +12,8 @@ from lightpen.archive.chains import (
     adopt_entries,
     batch_of,
     chain_at_home,
+    chain_head,
     entries_of,
-    head_of,
     heads,
     note_delivered,
     records_of,
@@ -67,9 +67,9 @@ def fetch(
         A file cannot be written.
     """
     home = chain_at_home(database)
-    if home is None or head_of(database, home).number == 0:
+    if home is None or chain_head(database, home).number == 0:
         home = _chosen(server, chain)
-    n_here, n_there = (head_of(each, home).number for each in (database, server))
+    n_here, n_there = (chain_head(each, home).number for each in (database, server))
     if n_there == 0:
         raise ArchiveError("archive.nothing-to-fetch", name=server.name)
     number = first_difference(database, home, server, min(n_here, n_there))
@@ -96,7 +96,7 @@ def _chosen(server: Database, start: str) -> str:
 
 
 def _named(server: Database, chain: str) -> str:
-    (last,) = batch_of(server, chain, head_of(server, chain).number - 1)
+    (last,) = batch_of(server, chain, chain_head(server, chain).number - 1)
     return f"{chain[:SHORT]} ({last.entry.event.names.station or '-'})"
 
 

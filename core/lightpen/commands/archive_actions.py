@@ -7,7 +7,7 @@ from contextlib import closing, contextmanager
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
-from lightpen.archive.chains import chain_at_home, head_of, note_delivered, own_chain
+from lightpen.archive.chains import chain_at_home, chain_head, note_delivered, own_chain
 from lightpen.archive.check import check_file
 from lightpen.archive.comparison import check_server, require_same
 from lightpen.archive.database import Database, look_into, open_file
@@ -95,7 +95,7 @@ def _deliver(options: argparse.Namespace) -> None:
     with _opened(_data(options)) as database, _server() as server:
         chain = own_chain(database)
         if options.again:
-            note_delivered(database, chain, head_of(server, chain).number)
+            note_delivered(database, chain, chain_head(server, chain).number)
         require_same(database, chain, server)
         copied = deliver(database, chain, server)
     print(f"{copied.n_new} entries are new, {copied.n_known} were there already.")

@@ -262,7 +262,7 @@ def test_an_archive_that_was_emptied_and_begun_anew_is_found(
     assert "does not exist or is empty." in findings(archive)[0]
 
     station = make_station(archive.parent.name)
-    station.enter(7)
+    station.enter(7, first=10)
     close_sealed(station.database)
     (found,) = findings(archive)
     assert found.startswith("Entry 5 of chain")

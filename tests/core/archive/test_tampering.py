@@ -27,7 +27,8 @@ from lightpen.archive.server import open_server
 from lightpen.errors import ArchiveError
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.library_changes import Author, add_item
-from lightpen.record.library.supervision import Signature, save_limits
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.supervision_changes import save_limits
 from lightpen.record.library.tip_library import ListedCone
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 
