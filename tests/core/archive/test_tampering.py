@@ -62,15 +62,15 @@ class Plant:
 
 
 @pytest.fixture(scope="module")
-def server(postgres: Postgres) -> str:
+def address(postgres: Postgres) -> str:
     """A database for all tests of this file, as each takes a second to make."""
     return postgres.new_database()
 
 
 @pytest.fixture
-def plant(tmp_path: Path, swung: Callable[..., Path], server: str) -> Plant:
-    made = Plant(tmp_path / "data", tmp_path / "before", server)
-    with psycopg.connect(server) as connection:
+def plant(tmp_path: Path, swung: Callable[..., Path], address: str) -> Plant:
+    made = Plant(tmp_path / "data", tmp_path / "before", address)
+    with psycopg.connect(address) as connection:
         connection.execute("TRUNCATE archive_entries, archive_records, archive_writers")
     shutil.copytree(swung(), made.data / SWING)
     add_item(made.data, ListedCone(id="C-1"), Author("Hall 2", "Ann"), NOON)
