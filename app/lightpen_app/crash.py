@@ -111,13 +111,23 @@ class CrashHook(QObject):
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             path.write_text(
-                f"{_circumstances(now)}\n\n{text}\n{_log()}",
+                _without_home(f"{_circumstances(now)}\n\n{text}\n{_log()}"),
                 encoding="utf-8",
                 errors="backslashreplace",
             )
         except OSError:
             return ""
         return str(path)
+
+
+def _without_home(text: str) -> str:
+    """Return a text in which the home folder, and so the user's name, is ``~``."""
+    home = str(Path.home())
+    # A Windows path may stand in the text of an exception with doubled backslashes.
+    for path in (home, home.replace("\\", "\\\\"), home.replace("\\", "/")):
+        if len(path) > 1:
+            text = text.replace(path, "~")
+    return text
 
 
 def versions() -> dict[str, str]:

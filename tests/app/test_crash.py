@@ -147,3 +147,15 @@ def test_a_report_reaches_the_window_on_its_own_thread(
         worker.start()
 
     worker.join()
+
+
+def test_a_report_does_not_tell_whose_home_folder_it_is(
+    qtbot: QtBot, hook: CrashHook
+) -> None:
+    with qtbot.waitSignal(hook.reported) as blocker:
+        raise_and_report(hook, f"cannot open {Path.home() / 'data' / 'tip.json'}")
+
+    assert blocker.args is not None
+    text = Path(blocker.args[0]).read_text("utf-8")
+    assert str(Path.home()) not in text
+    assert str(Path("~", "data", "tip.json")) in text

@@ -19,6 +19,7 @@ from msgspec import Meta, Struct, to_builtins
 from lightpen import __version__
 from lightpen.formats.files import printable
 from lightpen.formats.own_json import (
+    DamagedError,
     Digest,
     Vector,
     ZonedTime,
@@ -228,7 +229,10 @@ def read_entry(text: str, signature: str = "") -> StoredEntry:
     DamagedError
         It holds none, or was not written so.
     """
-    data = text.encode("utf-8", "surrogateescape")
+    try:
+        data = text.encode("utf-8", "surrogateescape")
+    except UnicodeEncodeError as error:  # half of a character
+        raise DamagedError(str(error)) from error
     return StoredEntry(parse_own_json(data, Entry), text, text_sha256(text), signature)
 
 

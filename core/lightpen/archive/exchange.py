@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from hashlib import sha256
 from itertools import groupby, islice
 from pathlib import Path
+from typing import BinaryIO
 
 from msgspec import Struct
 
@@ -41,6 +42,8 @@ FORMAT = 1
 WHAT = message("file.exported-archive")
 DELIVERED = 20  # entries at one time: some MB, which a slow line carries in time
 LIMIT = 10**6 * MEGABYTE  # it is read line by line
+LONGEST_LINE = 16 * MEGABYTE  # an entry with its record; 2000 images take some 4
+LARGEST_BATCH = 16 * MEGABYTE  # of texts that are copied in one transaction
 
 
 class _FirstLine(Struct):
@@ -123,7 +126,7 @@ def import_entries(database: Database, path: Path) -> CopyResult:
         pass
     n_new = n_known = 0
     for chain, found in groupby(_read(path), lambda each: each[0].entry.chain):
-        while batch := list(islice(found, BATCH)):
+        while batch := list(_few(found)):
             records = {
                 entry.entry.event.record_sha256 or "": record or ""
                 for entry, record in batch
@@ -132,6 +135,33 @@ def import_entries(database: Database, path: Path) -> CopyResult:
             copied = copy_entries(database, chain, entries, records)
             n_new, n_known = n_new + copied.n_new, n_known + copied.n_known
     return CopyResult(n_new, n_known)
+
+
+def _few(
+    found: Iterator[tuple[StoredEntry, str | None]],
+) -> Iterator[tuple[StoredEntry, str | None]]:
+    """Yield entries for one transaction, so few that they take little memory."""
+    size = 0
+    for entry, record in islice(found, BATCH):
+        yield entry, record
+        size += len(entry.text) + len(record or "")
+        if size > LARGEST_BATCH:
+            return
+
+
+def _next_line(stream: BinaryIO) -> bytes:
+    line = stream.readline(LONGEST_LINE + 1)
+    if len(line) > LONGEST_LINE:
+        raise DamagedError("A line is too long.")
+    return line
+
+
+def _require_text(text: str) -> None:
+    """Refuse half of a character, which no database can hold."""
+    try:
+        text.encode("utf-8", "surrogateescape")
+    except UnicodeEncodeError as error:
+        raise DamagedError(str(error)) from error
 
 
 def _contents(database: Database) -> Iterator[dict[str, object]]:
@@ -156,11 +186,11 @@ def _read(path: Path) -> Iterator[tuple[StoredEntry, str | None]]:
     n_read = 0
     with opened(path, WHAT, LIMIT) as stream:
         try:
-            first = stream.readline()
+            first = _next_line(stream)
             if parse_own_json(first, _FirstLine).lightpen_archive != FORMAT:
                 raise DamagedError("It is of another version.")
             checksum = sha256(first)
-            for line in stream:
+            while line := _next_line(stream):
                 if line.startswith(b'{"n_entries"'):
                     if parse_own_json(line, _LastLine) != _LastLine(
                         n_read, checksum.hexdigest()
@@ -168,6 +198,8 @@ def _read(path: Path) -> Iterator[tuple[StoredEntry, str | None]]:
                         raise DamagedError("Lines are missing or changed.")
                     return
                 found = parse_own_json(line, _EntryLine)
+                if found.record is not None:
+                    _require_text(found.record)
                 yield read_entry(found.entry, found.signature), found.record
                 checksum.update(line)
                 n_read += 1

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from lightpen.archive.entries import Entry, FileHash, StoredEntry
 from lightpen.errors import FileError
-from lightpen.formats.files import A_FILE, printable, unreadable
+from lightpen.formats.files import printable, start_sha256
 from lightpen.messages import Message, message
 from lightpen.record.swings.journal import (
     JOURNAL,
@@ -113,14 +113,13 @@ def _images(data: Path, journal: FileHash) -> Iterator[FileHash]:
 def file_finding(data: Path, number: int, file: FileHash) -> Message | None:
     """Return what differs between a file and its entry."""
     path = data / file.place
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
+    if not path.exists():
         return message(
             "archive.vouched-missing", file=printable(file.place), number=number
         )
-    except OSError as error:
-        return unreadable(path, A_FILE, error).message
-    if sha256(content[: file.n_bytes]).hexdigest() == file.sha256:
-        return None
+    try:
+        if start_sha256(path, file.n_bytes) == file.sha256:
+            return None
+    except FileError as error:
+        return error.message
     return message("archive.vouched-changed", file=printable(file.place), number=number)

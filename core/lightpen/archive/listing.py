@@ -1,7 +1,5 @@
 """Entries for other programs: as a table, and as JSON."""
 
-import csv
-import io
 import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -11,6 +9,7 @@ from lightpen.archive.database import Database
 from lightpen.archive.entries import StoredEntry
 from lightpen.archive.queries import EntryFilter, newest
 from lightpen.estimation.reports.verdict import AXES
+from lightpen.formats.csv_cells import csv_table
 from lightpen.formats.files import write_whole
 
 COLUMNS = (
@@ -52,11 +51,7 @@ def entries_csv(entries: Iterable[StoredEntry], home: str | None) -> str:
     home : str or None
         Chain at home in the archive; entries of all others are foreign.
     """
-    lines = io.StringIO()
-    writer = csv.writer(lines, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows(_row(each, home) for each in entries)
-    return lines.getvalue()
+    return csv_table([COLUMNS, *(_row(each, home) for each in entries)])
 
 
 def entries_json(entries: Iterable[StoredEntry], home: str | None) -> str:

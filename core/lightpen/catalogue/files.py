@@ -61,6 +61,7 @@ MESSAGES = {
     "entry.unknown": "{name} has the unknown key {key}. Remove it, or correct it to one of {known}.",
     "file.file": "file",
     "file.folder": "folder",
+    "write.reserved": "{path} is the name of a device on Windows, not of a file. Choose another name.",
     "write.denied": "permission is denied. Choose another folder, or ask for access.",
     "write.disk-full": "the disk is full. Free some space, or write to another disk.",
     "write.quota-used-up": "your disk quota is used up. Free some space, or write elsewhere.",

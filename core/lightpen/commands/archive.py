@@ -9,6 +9,7 @@ from typing import TypeAlias
 import platformdirs
 
 from lightpen.commands.arguments import whole_number
+from lightpen.formats.own_json import FIRST_YEAR, LAST_YEAR
 
 USUAL_LENGTH = 50  # entries that are listed
 
@@ -91,13 +92,18 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
 
 
 def parse_date(text: str) -> date:
-    """Return a day."""
+    """Return a day that lies in every time zone."""
     try:
-        return date.fromisoformat(text)
+        day = date.fromisoformat(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(
             f"{text} is no date such as 2026-08-14."
         ) from error
+    if not FIRST_YEAR <= day.year <= LAST_YEAR:
+        raise argparse.ArgumentTypeError(
+            f"{text} is not between the years {FIRST_YEAR} and {LAST_YEAR}."
+        )
+    return day
 
 
 def _run(options: argparse.Namespace) -> int:

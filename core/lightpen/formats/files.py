@@ -23,6 +23,7 @@ FOLDER = message("file.folder")
 PATIENCE = 2.0  # s to wait for another program's rename
 EXCERPT_LENGTH = 40  # characters of a file's content quoted in a message
 
+_DEVICES = r"(?i:con|prn|aux|nul|com[0-9\u00b9\u00b2\u00b3]|lpt[0-9\u00b9\u00b2\u00b3])"
 _CONTROL = r"[\x00-\x08\x0b\x0e-\x1f\x7f]"
 _DENIED = message("write.denied")
 _REASONS = {
@@ -144,6 +145,7 @@ def write_whole(path: Path, data: bytes) -> None:
     FileError
         The file cannot be written; the text says why and what to do.
     """
+    _require_file(path)
     try:
         if path.exists() and not path.is_file() and not path.is_dir():
             path.write_bytes(data)
@@ -173,6 +175,7 @@ def create_whole(path: Path, data: bytes, mode: int = 0o666) -> None:
     FileError
         The file cannot be written; the text says why and what to do.
     """
+    _require_file(path)
     sweep_parts(path.parent)
     try:
         with part_of(path, data, mode) as part:
@@ -187,6 +190,17 @@ def create_whole(path: Path, data: bytes, mode: int = 0o666) -> None:
         raise NameTakenError(_unwritten(path, error).message) from error
     except OSError as error:
         raise _unwritten(path, error) from error
+
+
+def is_reserved(name: str) -> bool:
+    """Return whether Windows takes a file name for a device, whatever its suffix."""
+    return re.fullmatch(_DEVICES, name.partition(".")[0].rstrip()) is not None
+
+
+def _require_file(path: Path) -> None:
+    """Refuse the name of a device on Windows, where all that is written is lost."""
+    if os.name == "nt" and is_reserved(path.name):
+        raise FileError("write.reserved", path=printable(str(path)))
 
 
 def sync_folder(folder: Path) -> None:
@@ -219,17 +233,31 @@ def sha256(path: Path) -> str:
     Raises
     ------
     FileError
-        The file cannot be read.
+        The file cannot be read, or is a pipe or device, which never ends.
     """
+    return start_sha256(path, None)
+
+
+def start_sha256(path: Path, n_bytes: int | None) -> str:
+    """Return the digest of the first bytes of a file; of all if None; as `sha256`."""
     import hashlib  # 3 ms that a start of the program need not take
 
+    digest = hashlib.sha256()
     try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise FileError("read.device", what=A_FILE, path=printable(str(path)))
         with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
+            left = n_bytes
+            while part := stream.read(
+                MEGABYTE if left is None else min(left, MEGABYTE)
+            ):
+                digest.update(part)
+                left = None if left is None else left - len(part)
     except OSError as error:
         raise FileError(
             "hash.failed", path=printable(str(path)), reason=strerror(error)
         ) from error
+    return digest.hexdigest()
 
 
 def printable(text: str) -> str:

@@ -22,7 +22,7 @@ from lightpen.messages import message
 from lightpen.model.rigid import nearest_rotation
 
 OBSERVATION_FILE_LIMIT = 16 * MEGABYTE
-MAX_FRAMES = 30_000
+MAX_FRAMES = 5_000  # 0.3 GB while a tip is calibrated from them
 LARGEST_PIXEL = 1e6
 LARGEST_TRANSLATION = 1e6  # mm
 LARGEST_COVARIANCE = 1e12  # rad^2, rad mm or mm^2

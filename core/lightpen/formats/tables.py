@@ -14,7 +14,7 @@ from lightpen.errors import FileError
 from lightpen.formats.files import printable, quoted, read_text
 from lightpen.messages import Message, message
 
-MAX_LINES = 300_000  # 30 000 frames of ten LEDs, 0.2 GB while they are read
+MAX_LINES = 300_000  # 0.2 GB while they are read
 MAX_LINE_LENGTH = 10_000  # characters
 MAX_CELL_LENGTH = 500  # characters
 MAX_CELLS = 2_000_000

@@ -12,7 +12,7 @@ import socket
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from ipaddress import ip_address
 from threading import Lock, Thread
@@ -33,6 +33,9 @@ LAST_PORT = 65535
 MOST_CLIENTS = 16
 ON_THE_WAY = 16_384  # bytes; a slow client misses poses rather than get old ones
 ROOM = 4096  # bytes; what clients send is ignored
+IDLE_S = 20.0  # a client that takes no data for so long is dropped
+# Of the system, so that a client whose line was cut is found.
+_KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
 
 _logger = logging.getLogger(__name__)
 
@@ -86,6 +89,11 @@ class _Client:
     connection: socket.socket
     rest: bytes = b""
     newest: bytes = b""
+    active_s: float = field(default_factory=time.monotonic)  # it took or sent data
+
+    def is_stuck(self, now_s: float) -> bool:
+        """Return whether data waits for a client that takes none."""
+        return bool(self.rest) and now_s - self.active_s > IDLE_S
 
     @property
     def awaited(self) -> int:
@@ -199,7 +207,7 @@ class PoseStream:
             selector.register(listener, selectors.EVENT_READ)
             selector.register(woken, selectors.EVENT_READ)
             while True:
-                for key, ready in selector.select():
+                for key, ready in selector.select(IDLE_S / 4):
                     if key.fileobj is woken:
                         if not woken.recv(ROOM):
                             return
@@ -208,6 +216,10 @@ class PoseStream:
                         _admit(listener, selector)
                     elif not _served(key.data, ready):
                         _dismiss(key.data, selector)
+                now_s = time.monotonic()
+                for client in _clients(selector):
+                    if client.is_stuck(now_s):
+                        _dismiss(client, selector)
                 clients = _clients(selector)
                 if len(clients) != self._status.n_clients:
                     self._tell(replace(self._status, n_clients=len(clients)))
@@ -248,13 +260,29 @@ def _admit(listener: socket.socket, selector: selectors.BaseSelector) -> None:
         connection, _ = listener.accept()
     except OSError:  # it has gone already
         return
-    if len(_clients(selector)) >= MOST_CLIENTS:
+    if not _has_slot(selector):
         connection.close()
         return
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in _KEEPALIVE.items():
+        with suppress(AttributeError, OSError):  # not on every system
+            connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
     connection.setblocking(False)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, ON_THE_WAY)
     selector.register(connection, selectors.EVENT_READ, _Client(connection))
+
+
+def _has_slot(selector: selectors.BaseSelector) -> bool:
+    """Return whether a client can be admitted, in place of a silent one if need be."""
+    clients = _clients(selector)
+    if len(clients) < MOST_CLIENTS:
+        return True
+    oldest = min(clients, key=lambda client: client.active_s)
+    if time.monotonic() - oldest.active_s <= IDLE_S:
+        return False
+    _dismiss(oldest, selector)
+    return True
 
 
 def _dismiss(client: _Client, selector: selectors.BaseSelector) -> None:
@@ -273,12 +301,15 @@ def _dismiss_all(selector: selectors.BaseSelector) -> None:
 def _served(client: _Client, ready: int) -> bool:
     """Send pending data to a client; return whether it is still connected."""
     try:
-        if ready & selectors.EVENT_READ and not client.connection.recv(ROOM):
-            return False
+        if ready & selectors.EVENT_READ:
+            if not client.connection.recv(ROOM):
+                return False
+            client.active_s = time.monotonic()
         if ready & selectors.EVENT_WRITE:
             if not client.rest:
                 client.rest, client.newest = client.newest, b""
             client.rest = client.rest[client.connection.send(client.rest) :]
+            client.active_s = time.monotonic()
     except BlockingIOError:
         return True
     except OSError:

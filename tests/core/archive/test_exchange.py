@@ -1,16 +1,29 @@
 """Entries travel by a file, and what is there already is passed over."""
 
+import json
 import os
 from collections.abc import Callable
+from contextlib import closing
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 from sqlalchemy import text
-from tests.core.archive.conftest import Station
+from tests.core.archive.conftest import Station, accepted
 
-from lightpen.archive.chains import entries_of, heads, records_of
-from lightpen.archive.check import check_archive
-from lightpen.archive.exchange import deliver, export_entries, import_entries
+from lightpen.archive.chains import append, entries_of, heads, own_chain, records_of
+from lightpen.archive.check import check_archive, check_file
+from lightpen.archive.database import open_file
+from lightpen.archive.entries import FileHash
+from lightpen.archive.exchange import (
+    LONGEST_LINE,
+    deliver,
+    export_entries,
+    import_entries,
+)
+from lightpen.archive.logbook import ARCHIVE
+from lightpen.archive.seal import close_sealed
 from lightpen.errors import ArchiveError, FileError, NameTakenError
 
 
@@ -131,3 +144,56 @@ def test_a_server_with_another_last_entry_is_told_though_nothing_is_new(
 
     with pytest.raises(ArchiveError, match="Entry 2"):
         deliver(here.database, here.chain, server.database)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes")
+def test_a_check_reads_no_pipe_and_no_device(data_of_pipes: Path) -> None:
+    findings = check_file(
+        data_of_pipes / ARCHIVE, data_of_pipes, lambda _: None
+    ).findings
+    assert [each.code for each in findings] == ["read.device"] * 2
+
+
+@pytest.fixture
+def data_of_pipes(tmp_path: Path) -> Path:
+    """A data folder whose entries vouch for a pipe and a device."""
+    data = tmp_path / "data"
+    database = open_file(data / ARCHIVE)
+    chain = own_chain(database)
+    os.mkfifo(data / "pipe")
+    for n, place in enumerate((data / "pipe", Path("/dev/zero"))):
+        event, record = accepted(n)
+        file = FileHash(str(place), "0" * 64)
+        append(database, chain, structs.replace(event, result=file), record)
+    close_sealed(database)
+    return data
+
+
+def test_an_import_takes_no_line_without_end(station: Station, tmp_path: Path) -> None:
+    file = tmp_path / "long.jsonl"
+    with file.open("wb") as stream:
+        stream.write(b'{"lightpen_archive": 1}\n{"entry": "')
+        stream.seek(LONGEST_LINE, os.SEEK_CUR)
+        stream.write(b'"}\n')
+    with pytest.raises(FileError, match="line 2"):
+        import_entries(station.database, file)
+
+
+@pytest.mark.parametrize("part", ["entry", "record", "signature"])
+def test_half_of_a_character_is_refused(
+    station: Station, tmp_path: Path, part: str
+) -> None:
+    station.enter(1)
+    export_entries(station.database, tmp_path / "all.jsonl")
+    first, line, _ = (tmp_path / "all.jsonl").read_bytes().splitlines(keepends=True)
+    entry = json.loads(line)
+    entry[part] += "\ud800"
+    body = first + json.dumps(entry).encode() + b"\n"
+    end = {"n_entries": 1, "sha256": sha256(body).hexdigest()}
+    file = tmp_path / "half.jsonl"
+    file.write_bytes(body + json.dumps(end).encode() + b"\n")
+    with (
+        closing(open_file(tmp_path / "other" / ARCHIVE)) as other,
+        pytest.raises((FileError, ArchiveError)),
+    ):
+        import_entries(other, file)

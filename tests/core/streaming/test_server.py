@@ -4,6 +4,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 
 import numpy as np
@@ -341,3 +342,44 @@ def test_without_its_package_it_says_what_to_install(
 
     with pytest.raises(StreamError, match=r"pip install \"lightpen\[stream\]\""):
         PoseStream().open(ANY)
+
+
+def test_silent_clients_leave_their_places_to_others(
+    stream: PoseStream, statuses: Statuses, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lightpen.streaming.server.IDLE_S", 0.2)
+    with ExitStack() as stack:
+        silent = [
+            stack.enter_context(socket.create_connection((LOOPBACK, port_of(stream))))
+            for _ in range(MOST_CLIENTS)
+        ]
+        statuses.wait_for_clients(MOST_CLIENTS)
+        served = False
+        while not served:  # as soon as one was silent for long enough
+            late = socket.create_connection((LOOPBACK, port_of(stream)))
+            stack.enter_context(late)
+            late.settimeout(0.1)
+            try:
+                served = late.recv(1) != b""
+            except TimeoutError:
+                served = True  # it was not turned away
+        assert len(silent) == MOST_CLIENTS
+
+
+def test_a_client_that_takes_no_data_is_dropped(
+    stream: PoseStream,
+    statuses: Statuses,
+    detection: PenDetection,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lightpen.streaming.server.IDLE_S", 0.2)
+    with socket.socket() as stuck:
+        stuck.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        stuck.connect((LOOPBACK, port_of(stream)))
+        statuses.wait_for_clients(1)
+        number = 0
+        while stream.is_heard:  # until its buffers are full and it is dropped
+            number += 1
+            stream.take(frame(number), detection)
+            time.sleep(0.001)
+        statuses.wait_for_clients(0)

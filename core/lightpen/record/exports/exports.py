@@ -17,7 +17,7 @@ from lightpen.formats.files import create_whole
 from lightpen.formats.json_records import record_bytes
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile, parse_calibration
-from lightpen.record.swings.names import LONGEST_WORD, UNFIT, Names
+from lightpen.record.swings.names import LONGEST_WORD, UNFIT, Names, not_reserved
 from lightpen.record.swings.reading import open_record, recorded_limits
 from lightpen.record.swings.solving import Solution, record_inputs
 
@@ -29,7 +29,7 @@ def export_stem(names: Names, moment: datetime, origin: Origin | None) -> str:
     """
     pen, tip = names.pen[:LONGEST_WORD], names.tip[:LONGEST_WORD]
     words = (pen, tip, f"{moment:%Y-%m-%d}", _mark(origin))
-    return UNFIT.sub("-", "_".join(filter(None, words)))
+    return not_reserved(UNFIT.sub("-", "_".join(filter(None, words))))
 
 
 def save_new(folder: Path, name: str, data: bytes) -> Path:

@@ -6,8 +6,6 @@ tip, its origin (live, recorded, simulated) and its grade. Transforms keep the a
 the pen: the tip is the origin of a frame parallel to the pen frame.
 """
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,6 +14,7 @@ from itertools import product
 import yaml
 
 from lightpen.estimation.reports.verdict import AXES
+from lightpen.formats.csv_cells import csv_table
 from lightpen.formats.files import printable
 from lightpen.formats.json_records import record_bytes
 from lightpen.local_time import local_time
@@ -98,7 +97,7 @@ def _tip(file: CalibrationFile) -> str:
     row["calibrated"] = calibration.created.isoformat()
     row["accepted"] = "" if accepted is None else accepted.isoformat()
     row["grade"] = file.grade.value
-    return _table([list(row), list(row.values())])
+    return csv_table([list(row), list(row.values())])
 
 
 def _images(file: CalibrationFile) -> str:
@@ -112,7 +111,7 @@ def _images(file: CalibrationFile) -> str:
         fit = (image.reason, image.rms_px, *image.tip_cam_mm)
         of_all = (image.camera, file.origin or "", file.grade.value)
         rows.append([numbers[image.camera], image.file, image.used, *fit, *of_all])
-    return _table(rows)
+    return csv_table(rows)
 
 
 def _text(file: CalibrationFile) -> str:
@@ -191,12 +190,6 @@ def _qdas(file: CalibrationFile) -> str:
         lines += [f"K0001/{i} {value:.{N_DECIMALS}f}", f"K0002/{i} 0"]  # 0: valid
         lines.append(f"K0004/{i} {when}")
     return _lines(*lines)
-
-
-def _table(rows: Sequence[Sequence[object]]) -> str:
-    lines = io.StringIO()
-    csv.writer(lines, lineterminator="\n").writerows(rows)
-    return lines.getvalue()
 
 
 def _lines(*lines: str) -> str:

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE, printable, read_bytes, unreadable
+from lightpen.formats.files import MEGABYTE, opened, printable, read_bytes
 from lightpen.messages import message
 from lightpen.record.library.numbered_files import add_numbered, numbered_files
 from lightpen.record.library.supervision import (
@@ -317,11 +317,8 @@ class FolderArchive:
 
     def _heading(self, file: Path, supervision: Supervision) -> ResultHeading:
         """Read the first entries of a result, all of them if it has no calibration."""
-        try:
-            with file.open("rb") as stream:
-                start = stream.read(HEAD)
-        except OSError as error:
-            raise unreadable(file, WHAT, error) from error
+        with opened(file, WHAT, LIMIT) as stream:
+            start = stream.read(HEAD)
         if not has_head(start):
             start = read_bytes(file, WHAT, LIMIT)
         heading = parse_heading(start, file)

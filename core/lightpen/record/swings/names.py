@@ -4,6 +4,8 @@ import re
 from dataclasses import dataclass
 from datetime import datetime
 
+from lightpen.formats.files import is_reserved
+
 UNFIT = re.compile(r"[^\w.-]+")  # for the name of a folder
 LONGEST_WORD = 24  # characters; of up to 4 bytes, of the 255 that a name may have
 
@@ -39,4 +41,9 @@ def folder_name(names: Names, now: datetime) -> str:
     pen, tip = names.pen[:LONGEST_WORD], names.tip[:LONGEST_WORD]
     words = (f"{now:%Y%m%d-%H%M%S}", pen, tip)
     # Windows leaves dots at the end of a name out, and then finds the folder no more.
-    return UNFIT.sub("-", "_".join(filter(None, words))).rstrip(".")
+    return not_reserved(UNFIT.sub("-", "_".join(filter(None, words))).rstrip("."))
+
+
+def not_reserved(name: str) -> str:
+    """Return a file name, changed where Windows takes it for a device: ``nul.x``."""
+    return f"_{name}" if is_reserved(name) else name

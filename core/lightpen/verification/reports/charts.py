@@ -4,8 +4,10 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 import numpy as np
+from typing_extensions import override
 
 from lightpen.errors import UsageError
+from lightpen.formats.csv_cells import csv_table
 from lightpen.formats.files import printable, write_whole
 from lightpen.verification.tasks.repeatability import Repeatability
 
@@ -34,9 +36,9 @@ def write_chart(found: Repeatability, path: Path) -> None:
 
 
 def _table(found: Repeatability) -> str:
-    lines = ["number,name,axis,value_mm,lower_mm,center_mm,upper_mm"]
+    header = "number,name,axis,value_mm,lower_mm,center_mm,upper_mm"
+    rows: list[list[object]] = [list(header.split(","))]
     for i, tip in enumerate(found.tips):
-        name = '"' + tip.name.replace('"', '""') + '"'
         for k, axis in enumerate("xyz"):
             cells = (
                 tip.tip_pen[k],
@@ -44,9 +46,17 @@ def _table(found: Repeatability) -> str:
                 found.control.center[k],
                 found.control.upper[k],
             )
-            numbers = ",".join(f"{cell:.6f}" for cell in cells)
-            lines.append(f"{i + 1},{name},{axis},{numbers}")
-    return "\n".join(lines) + "\n"
+            # Rounded numbers, not texts: a minus makes no formula of them.
+            rows.append([i + 1, tip.name, axis, *(_Rounded(cell) for cell in cells)])
+    return csv_table(rows)
+
+
+class _Rounded(float):
+    """A number that is written with six decimals."""
+
+    @override
+    def __repr__(self) -> str:
+        return f"{self:.6f}"
 
 
 def _picture(found: Repeatability) -> str:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from lightpen.record.swings.names import Names
+from lightpen.formats.files import is_reserved
+from lightpen.record.swings.names import Names, not_reserved
 from lightpen.record.swings.writing import make_record_folder
 
 NOW = datetime(2026, 8, 14, 9, 5, 3)
@@ -63,3 +64,11 @@ def test_whatever_the_names_the_folder_can_be_made(tmp_path: Path, name: str) ->
     assert folder.parent == tmp_path
     assert len(folder.name.encode()) < 250
     assert not folder.name.endswith(".")  # which Windows would leave out
+
+
+def test_no_name_is_a_device_of_windows() -> None:
+    for name in ("nul.x", "CON", "com1.tar.gz", "lpt9", "Aux.json"):
+        assert is_reserved(name)
+        assert not is_reserved(not_reserved(name))
+    for name in ("null.x", "com10", "T-10", "console.log"):
+        assert not_reserved(name) == name
