@@ -15,7 +15,7 @@ from lightpen_app.work.stations import FilePaths, Station
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
 
-WAY = "Choose the data folder at the step Start or in the options (F10)."
+WAY = "Choose the data folder at Set up station or in the options (F10)."
 
 
 def test_a_read_only_data_folder_is_told_with_the_way_to_another(
@@ -43,13 +43,13 @@ def test_a_read_only_data_folder_is_told_with_the_way_to_another(
     walker = open_wizard()
     walker.until_tells(f"The data folder {data} is not writable: the disk is")
     walker.until_tells(WAY)
-    assert walker.offers("Choose another data folder")
-
     walker.click("Close")
-    for title in ("Camera", "LEDs", "Swing"):
-        walker.until(walker.main_button().isEnabled)
-        walker.main_button().click()
-        walker.until_shows(title)
+    walker.click("Set up station...")
+    assert walker.offers("Choose another data folder")
+    walker.click("Show the tips of this station")
+    walker.until(lambda: walker.main_button().text() == "Start swing")
+    walker.main_button().click()
+    walker.until_shows("Swing")
     walker.until_says("No swing")
     walker.until_tells(WAY)
     walker.window.resize(940, 500)

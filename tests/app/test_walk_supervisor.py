@@ -49,6 +49,8 @@ def sign(walker: "Walker", name: str, password: str) -> None:
 
 
 def lay_down_limits(walker: "Walker", password: str, limit: str) -> None:
+    if walker.offers("Set up station..."):
+        walker.click("Set up station...")
     walker.click("All limits...")
     walker.click_into(
         "Fixed point: std. deviation perpendicular to the line of sight", limit

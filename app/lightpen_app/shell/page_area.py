@@ -101,7 +101,7 @@ class NoticeBar(Translated, QFrame):
             return text
         way = QCoreApplication.translate(
             "MainWindow",
-            "Choose the data folder at the step Start or in the options (F10).",
+            "Choose the data folder at Set up station or in the options (F10).",
         )
         return f"{text} {way}"
 

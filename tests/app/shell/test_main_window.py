@@ -717,7 +717,7 @@ def test_what_is_told_of_an_unwritable_data_folder_says_where_another_is_chosen(
     def told() -> str:
         return shell.window.words()[0]
 
-    way = "Choose the data folder at the step Start or in the options (F10)."
+    way = "Choose the data folder at Set up station or in the options (F10)."
     shell.window.set_unwritable("/data", "Nothing can be kept in /data.")
     assert told() == f"Nothing can be kept in /data. {way}"
     shell.notifications.tell(
