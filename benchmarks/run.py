@@ -20,6 +20,7 @@ from benchmarks.archive_cuts import cut_rows
 from benchmarks.archive_plant import plant_rows
 from benchmarks.camera_calibrations import camera_calibration_rows
 from benchmarks.cramer_rao import cramer_rao_rows
+from benchmarks.discoveries import discovery_rows
 from benchmarks.guided import guided_rows
 from benchmarks.hard_scene import hard_scene_rows
 from benchmarks.hostile import hostile_rows
@@ -48,6 +49,7 @@ SECTIONS: dict[str, Section] = {
     "bound": lambda workers, data: cramer_rao_rows(workers),
     "files": lambda workers, data: wrong_file_rows(workers),
     "cameras": camera_calibration_rows,
+    "discover": lambda workers, data: discovery_rows(workers),
     "hard": lambda workers, data: hard_scene_rows(workers),
     "labels": lambda workers, data: labelling_rows(workers),
     "tracker": tracker_rows,

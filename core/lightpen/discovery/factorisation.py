@@ -17,7 +17,7 @@ from lightpen.model.rigid import nearest_rotation
 
 FILLING_STEPS = 60
 SIZE_WEIGHT = 10.0  # of the mean scale of 1 beside the other equations
-LEAST_METRIC = 1e-6  # of the largest eigenvalue
+LEAST_METRIC = 1e-6  # of the largest eigenvalue, that the least is taken to be
 
 
 class WeakShape(NamedTuple):
@@ -48,13 +48,16 @@ class WeakShape(NamedTuple):
         return self._replace(points=self.points * flip, rotations=rotations)
 
 
-def factorise(pixels: FloatArray) -> WeakShape:
+def factorise(pixels: FloatArray, least_metric: float = LEAST_METRIC) -> WeakShape:
     """Return shape and motion from tracks.
 
     Parameters
     ----------
     pixels : (N, L, 2) array
         px; NaN where a point is not seen, which is filled by the points beside it.
+    least_metric : float
+        Where a flat pen or strong perspective leaves the depth of the shape open, the
+        least eigenvalue of its metric is taken to be this share of the largest.
     """
     filled = filled_tracks(pixels)
     n = len(filled)
@@ -63,7 +66,7 @@ def factorise(pixels: FloatArray) -> WeakShape:
     left, values, right = np.linalg.svd(tracks, full_matrices=False)
     motion = left[:, :3] * np.sqrt(values[:3])
     shape = np.sqrt(values[:3])[:, None] * right[:3]
-    upgrade = _metric_upgrade(motion[:n], motion[n:])
+    upgrade = _metric_upgrade(motion[:n], motion[n:], least_metric)
     motion, points = motion @ upgrade, np.linalg.solve(upgrade, shape).T
     a, b = motion[:n], motion[n:]
     lengths = np.linalg.norm(a, axis=1) + np.linalg.norm(b, axis=1)
@@ -94,7 +97,7 @@ def filled_tracks(pixels: FloatArray) -> FloatArray:
     return np.stack([tracks[:n], tracks[n:]], axis=2)
 
 
-def _metric_upgrade(a: FloatArray, b: FloatArray) -> FloatArray:
+def _metric_upgrade(a: FloatArray, b: FloatArray, least: float) -> FloatArray:
     """Return the matrix (3, 3) by which the rows of motion become axes of a camera."""
     size = (_product(a, a) + _product(b, b)).mean(axis=0, keepdims=True)
     alike = np.concatenate([_product(a, a) - _product(b, b), _product(a, b)])
@@ -103,7 +106,7 @@ def _metric_upgrade(a: FloatArray, b: FloatArray) -> FloatArray:
     right[-1] = 2 * SIZE_WEIGHT
     m = np.linalg.lstsq(rows, right, rcond=None)[0]
     values, vectors = np.linalg.eigh(m[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]])
-    floor = max(LEAST_METRIC * float(np.abs(values).max()), 1e-300)
+    floor = max(least * float(np.abs(values).max()), 1e-300)
     return np.asarray(vectors * np.sqrt(np.maximum(values, floor)))
 
 

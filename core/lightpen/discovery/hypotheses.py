@@ -30,7 +30,20 @@ from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import fit_rigid
 
-FOCAL_LENGTHS = (1.0, 1.7, 2.8, 0.7, 4.5)  # image widths, tried where none fits
+USUAL_FOCAL = 1.7  # image widths, where the shape tells none
+# Parts of the images, and what is assumed of the depth of a shape; in turn, until one
+# fits.
+ATTEMPTS = (
+    (0.0, 1.0, 1e-6),
+    (0.0, 1.0, 0.2),
+    (0.0, 0.67, 1e-6),
+    (0.33, 1.0, 1e-6),
+    (0.17, 0.83, 0.2),
+    (0.0, 1.0, 0.5),
+    (0.33, 1.0, 0.5),
+    (0.0, 0.67, 0.5),
+    (0.25, 0.75, 1e-6),
+)
 SHORTEST, LONGEST = 0.3, 12.0  # image widths, of a focal length that may be
 MIN_PIECES = 5  # of a part of the swing to begin with
 MIN_IMAGES = 25
@@ -124,9 +137,40 @@ def _solved(
     size: tuple[int, int],
     known: Camera | None,
 ) -> Seed:
-    """Return the best of all hypotheses for a part of a swing."""
+    """Return the best of all hypotheses for a part of a swing.
+
+    Where none fits, smaller parts and other depths of the shape are tried.
+    """
+    tried: list[Seed] = []
+    for first, last, least_metric in ATTEMPTS:
+        n = len(images)
+        part = images[int(first * n) : int(last * n)]
+        if tried and len(part) < MIN_IMAGES:
+            continue
+        seed = _attempted(pieces, part, chosen, size, known, least_metric)
+        if seed is not None:
+            tried.append(seed)
+            if seed.start.sigma < FITTING:
+                break
+    if not tried:
+        raise CalibrationError("discover.no-start")
+    best = min(tried, key=lambda each: each.start.sigma)
+    others = [each for seed in tried if seed is not best for each in seed.hypotheses]
+    failed = tuple(replace(each, is_best=False) for each in others)
+    return replace(best, hypotheses=best.hypotheses + failed)
+
+
+def _attempted(
+    pieces: Pieces,
+    images: IntArray,
+    chosen: IntArray,
+    size: tuple[int, int],
+    known: Camera | None,
+    least_metric: float,
+) -> Seed | None:
+    """Return the better of both mirror images; None without a focal length."""
     pixels = pieces.pixels[np.ix_(images, chosen)]
-    shape = factorise(pixels)
+    shape = factorise(pixels, least_metric)
     used = np.unique(np.linspace(0, len(images) - 1, N_USED).astype(int))
     shape = shape._replace(
         rotations=shape.rotations[used],
@@ -137,15 +181,13 @@ def _solved(
     both = ((False, shape), (True, shape.mirrored))
     # The mirrored shape has the same focal length, but for its sign.
     focal = abs(focal_length_of(shape)) if known is None else known.fx
+    if known is None and focal < SHORTEST * size[0]:
+        focal = USUAL_FOCAL * size[0]
     tried: list[tuple[Hypothesis, Start]] = []
     for mirrored, each in both:
         tried += trial.starts(each, [focal], mirrored=mirrored)
-    if known is None and not any(h.misfit < FITTING for h, _ in tried):
-        focal_lengths = [size[0] * width for width in FOCAL_LENGTHS]
-        for mirrored, each in both:
-            tried += trial.starts(each, focal_lengths, mirrored=mirrored)
     if not tried:
-        raise CalibrationError("discover.no-start")
+        return None
     _, start = min(tried, key=lambda pair: pair[0].misfit)
     hypotheses = tuple(
         replace(each, is_best=_are_alike(other, start)) for each, other in tried
