@@ -1,6 +1,6 @@
 """The part of a page that scrolls when the window is small."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QScrollArea, QWidget
 from typing_extensions import override
@@ -73,6 +73,15 @@ class PageScroll(QScrollArea):
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
         event.ignore()
+
+
+class DialogScroll(PageScroll):
+    """The fields of a dialog, as high as they are where the screen has the room."""
+
+    @override
+    def sizeHint(self) -> QSize:
+        content = self.widget()
+        return super().sizeHint() if content is None else content.sizeHint()
 
 
 class ShrinkingScrollContent(QWidget):

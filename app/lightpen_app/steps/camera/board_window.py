@@ -23,6 +23,7 @@ from lightpen_app.steps.camera.board_capture import (
 from lightpen_app.steps.camera.board_overlay import board_overlay
 from lightpen_app.steps.camera.board_view import BoardView
 from lightpen_app.widgets.fitted_window import FittedWindow
+from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
@@ -31,6 +32,7 @@ from lightpen_app.work.live_view import DisplayedImage, LiveView
 
 USUAL_BOARD = "chessboard:11x8:20"
 SIDE_WIDTH = 46 * GRID
+LEAST_LIST = 20 * GRID  # px, of the views
 
 
 class BoardWindow(FittedWindow, Translated, QWidget):
@@ -87,10 +89,13 @@ class BoardWindow(FittedWindow, Translated, QWidget):
             side, self._shows_residuals, self._shows_uncertainty, spacing=-1
         )
         fill(side, self._worst_title, (self._worst, 1), self._remove, self._save)
-        panel.setFixedWidth(SIDE_WIDTH)
+        self._worst.setMinimumHeight(LEAST_LIST)
+        scroll = PageScroll()
+        scroll.setWidget(panel)
+        scroll.setFixedWidth(SIDE_WIDTH)
         layout = horizontal_layout(self, spacing=2 * GRID, margins=2 * GRID)
         vertical_layout(layout, (self._image, 1), self._remark, stretch=1, spacing=-1)
-        layout.addWidget(panel)
+        layout.addWidget(scroll)
 
         # Connections
         live.image_shown.connect(self._on_image_shown)

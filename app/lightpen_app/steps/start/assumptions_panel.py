@@ -22,6 +22,7 @@ from lightpen_app.look.layouts import (
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.page_scroll import DialogScroll
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
@@ -82,12 +83,14 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
 
         # Layout
         layout = vertical_layout(self, self._lead, spacing=2 * GRID, margins=3 * GRID)
-        grid = grid_layout(layout, spacing=(2 * GRID, GRID))
+        fields, scroll = QWidget(), DialogScroll()
+        grid = grid_layout(fields, spacing=(2 * GRID, GRID))
         grid.setColumnStretch(0, 1)
         for row, (name, field) in enumerate(self._fields.items()):
             grid.addWidget(self._labels[name], row, 0)
             grid.addWidget(field, row, 1)
-        fill(layout, self._buttons)
+        scroll.setWidget(fields)
+        fill(layout, (scroll, 1), self._buttons)
         self.setMinimumWidth(70 * GRID)
 
         # Connections

@@ -101,6 +101,8 @@ class ItemForm(Translated, QWidget):
         self._labels: dict[QWidget, QLabel] = {
             field: field_label(field) for field in (*fields, self._nominal)
         }
+        for field in own:
+            self._labels[field].setWordWrap(True)
 
         # Layout
         grid = grid_layout(self, spacing=(2 * GRID, GRID))

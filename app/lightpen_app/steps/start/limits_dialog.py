@@ -13,6 +13,7 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.page_scroll import DialogScroll
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
 from lightpen_app.widgets.translated import Translated
@@ -57,7 +58,8 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
 
         # Layout
         layout = vertical_layout(self, self._lead, spacing=2 * GRID, margins=3 * GRID)
-        grid = grid_layout(layout, spacing=(2 * GRID, GRID // 2))
+        fields, scroll = QWidget(), DialogScroll()
+        grid = grid_layout(fields, spacing=(2 * GRID, GRID // 2))
         for column in (0, 2):
             grid.setColumnStretch(column, 1)
         n_rows = (len(self._fields) + 1) // 2
@@ -65,6 +67,8 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
             column, row = divmod(index, n_rows)
             grid.addWidget(self._labels[index], row, 2 * column)
             grid.addWidget(field, row, 2 * column + 1)
+        scroll.setWidget(fields)
+        fill(layout, (scroll, 1))
         fill(layout, self._signing, self._supervisor, self._new_password)
         fill(layout, self._fault, self._buttons)
         self.setMinimumWidth(100 * GRID)

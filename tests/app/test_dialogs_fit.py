@@ -1,0 +1,70 @@
+"""Every dialog fits a screen of 1280 x 800 at 150 %, and clips no words."""
+
+from collections.abc import Callable
+
+import pytest
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QApplication, QWidget
+from pytestqt.qtbot import QtBot
+from tests.app.room import clipped_words, scrolled_sideways
+
+from lightpen.record.library.tip_library import ItemKind
+from lightpen_app.shell.about import About
+from lightpen_app.shell.help_window import HelpWindow
+from lightpen_app.shell.stream_dialog import StreamDialog
+from lightpen_app.steps.camera.board_window import BoardWindow
+from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog
+from lightpen_app.steps.start.assumptions_panel import AssumptionsDialog
+from lightpen_app.steps.start.library_dialog import LibraryDialog
+from lightpen_app.steps.start.limits_dialog import LimitsDialog
+from lightpen_app.steps.start.newcomer_panel import Introduction
+from lightpen_app.widgets.fitted_window import FRAME, fitted_place
+from lightpen_app.work.workbench import Workbench
+
+SMALL = QSize(853, 533)  # 1280 x 800 at 150 %
+Made = Callable[[Workbench], QWidget]
+
+
+def library(workbench: Workbench) -> LibraryDialog:
+    return LibraryDialog(workbench.folder)
+
+
+def library_form(workbench: Workbench) -> LibraryDialog:
+    dialog = library(workbench)
+    dialog.add("T-7", ItemKind.TIP)
+    return dialog
+
+
+MADE: dict[str, Made] = {
+    "about": lambda _: About({"Python": "3.11", "Qt": "6.11"}),
+    "stream": lambda _: StreamDialog(),
+    "help": lambda _: HelpWindow(),
+    "board": lambda workbench: BoardWindow(workbench.live),
+    "laboratory": lambda _: LaboratoryDialog(None),
+    "assumptions": lambda _: AssumptionsDialog(),
+    "limits": lambda _: LimitsDialog(),
+    "introduction": lambda _: Introduction(),
+    "library": library,
+    "library form": library_form,
+}
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_dialog_fits_a_small_screen_and_clips_no_words(
+    qtbot: QtBot, workbench: Workbench, name: str
+) -> None:
+    dialog = MADE[name](workbench)
+    qtbot.addWidget(dialog)
+    dialog.show()
+    available = dialog.screen().availableGeometry()
+    available.setSize(SMALL)
+    place = fitted_place(dialog.geometry(), available)
+
+    dialog.setGeometry(place)
+    QApplication.processEvents()
+
+    # Else it cannot be made so small.
+    assert dialog.size().boundedTo(SMALL - FRAME) == dialog.size()
+    assert clipped_words(dialog) == ()
+    assert scrolled_sideways(dialog) == ()
+    dialog.close()
