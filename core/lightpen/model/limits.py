@@ -11,6 +11,7 @@ from math import isfinite, radians
 from typing import Any
 
 from lightpen.messages import Message, message
+from lightpen.model.decision_rules import Decision, DecisionRule, decide
 
 IMAGES = LEAST_IMAGES, MOST_IMAGES = 10, 2000
 MOST_DAYS, MOST_SWINGS = 3650, 10_000
@@ -27,8 +28,10 @@ class Limit:
     name : str
         Field of that part.
     unit : str
-        Empty of a count.
+        Empty of a count, and of a choice.
     range : (least, greatest)
+    choices : tuple of Message
+        Of a choice, whose value is the index of one of them.
     """
 
     part: str
@@ -37,12 +40,14 @@ class Limit:
     label: Message
     unit: str
     range: tuple[float, float]
+    choices: tuple[Message, ...] = ()
 
     @property
     def key(self) -> str:
         """Name among stored entries."""
         prefix = {"swing": "", "verification": "max_", "due": "due_"}[self.part]
-        return prefix + self.name + (f"_{self.unit}" if self.unit else "")
+        unit = self.unit.replace("%", "percent")
+        return prefix + self.name + (f"_{unit}" if unit else "")
 
 
 def _limit(
@@ -53,6 +58,24 @@ def _limit(
 ) -> Any:
     described = {"default": default, "label": label, "unit": unit, "range": between}
     return field(default=default, metadata=described)
+
+
+RULES = tuple(DecisionRule)
+
+
+def _rule() -> Any:
+    choices = tuple(
+        message(f"decision-rule.{each.name.lower().replace('_', '-')}")
+        for each in RULES
+    )
+    described = {
+        "default": 0.0,
+        "label": message("limit.rule"),
+        "unit": "",
+        "range": (0.0, len(RULES) - 1.0),
+        "choices": choices,
+    }
+    return field(default=DecisionRule.SIMPLE, metadata=described)
 
 
 @dataclass(frozen=True)
@@ -86,10 +109,12 @@ class SwingLimits:
 
 @dataclass(frozen=True)
 class VerificationLimits:
-    """Maximum deviations of a verification, mm.
+    """Maximum deviations of a verification, mm, and the rule by which they are judged.
 
     Attributes
     ----------
+    tip : float
+        Error of the tip; a task verifies the tip if it would find one as large.
     across, along : float
         Standard deviation of a fixed point perpendicular to the line of sight (u, v)
         and along it (w), where one camera resolves some ten times less.
@@ -105,8 +130,13 @@ class VerificationLimits:
         Standard deviation of a coordinate of the tip over calibrations.
     drift : float
         How far a drift reference may move during a session.
+    rule : DecisionRule
+        How a value with its U is compared with its limit.
+    risk : float
+        Of a wrong decision, where the rule is the risk, percent.
     """
 
+    tip: float = _limit(0.04, message("limit.tip"))
     across: float = _limit(0.01, message("limit.across"))
     along: float = _limit(0.03, message("limit.along"))
     radius: float = _limit(0.02, message("limit.radius"))
@@ -115,12 +145,25 @@ class VerificationLimits:
     location: float = _limit(0.1, message("limit.location"))
     repeatability: float = _limit(0.01, message("limit.repeatability"))
     drift: float = _limit(0.02, message("limit.drift"))
+    rule: DecisionRule = _rule()
+    risk: float = _limit(5.0, message("limit.risk"), "%", (0.1, 50.0))
 
     def __post_init__(self) -> None:
         for item in fields(self):
             value = getattr(self, item.name)
-            if not (isfinite(value) and value > 0):
+            if item.name != "rule" and not (isfinite(value) and value > 0):
                 raise ValueError(f"`{item.name}` must be above 0, got {value}.")
+
+    def decision(self, value: float, uncertainty: float, limit: float) -> Decision:
+        """Return whether a value with its U (k = 2) keeps a limit either way, mm."""
+        return decide(
+            self.rule,
+            value,
+            uncertainty,
+            lower=-limit,
+            upper=limit,
+            max_risk=self.risk / 100,
+        )
 
 
 @dataclass(frozen=True)
@@ -158,15 +201,20 @@ class StationLimits:
 
     def value(self, limit: Limit) -> float:
         """Return the value of a limit."""
-        value: float = getattr(getattr(self, limit.part), limit.name)
-        return value
+        value = getattr(getattr(self, limit.part), limit.name)
+        return float(RULES.index(value) if limit.choices else value)
 
     def with_values(self, values: Mapping[str, float]) -> "StationLimits":
         """Return these limits with other values, by `Limit.key`; counts are rounded."""
-        parts = {name: dict[str, float]() for name in PARTS}
+        parts = {name: dict[str, Any]() for name in PARTS}
         for limit in LIMITS:
             value = values.get(limit.key, self.value(limit))
-            parts[limit.part][limit.name] = value if limit.unit else round(value)
+            if limit.choices:
+                if not 0 <= round(value) < len(RULES):
+                    raise ValueError(f"There is no decision rule {value}.")
+                parts[limit.part][limit.name] = RULES[round(value)]
+            else:
+                parts[limit.part][limit.name] = value if limit.unit else round(value)
         changed = {n: replace(getattr(self, n), **new) for n, new in parts.items()}
         return replace(self, **changed)
 
@@ -178,3 +226,11 @@ LIMITS = tuple(
     for each in fields(kind)
     if each.metadata
 )
+
+
+def rule_in_words(limits: VerificationLimits) -> Message:
+    """Return the decision rule of verifications."""
+    rule = message(f"decision-rule.{limits.rule.name.lower().replace('_', '-')}")
+    if limits.rule is DecisionRule.RISK:
+        return message("decision-rule.by-risk", rule=rule, risk=limits.risk)
+    return message("decision-rule.by", rule=rule)

@@ -41,7 +41,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         # Widgets
         self._lead = text_label(TextSize.BODY)
         self._fields = {
-            limit.key: NumberField(limit.unit, limit.range, 4 if limit.unit else 0)
+            limit.key: ChoiceField(limit.choices) if limit.choices else _field(limit)
             for limit in LIMITS
         }
         self._labels = [text_label(TextSize.SMALL, Tone.QUIET) for _ in LIMITS]
@@ -149,9 +149,13 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
             field, text = self._fields[limit.key], worded(limit.label)
             label.setText(text)
             field.setAccessibleName(text)
-            if not limit.range[0]:
-                field.setSpecialValueText(no_limit)
-            usually = f"{limit.default:g}" if limit.default else no_limit
+            if isinstance(field, ChoiceField):
+                field.retranslate()
+                usually = field.itemText(round(limit.default))
+            else:
+                if not limit.range[0]:
+                    field.setSpecialValueText(no_limit)
+                usually = f"{limit.default:g}" if limit.default else no_limit
             field.setToolTip(self.tr("Default: {0}.").format(usually))
 
 

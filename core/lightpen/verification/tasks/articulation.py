@@ -23,12 +23,15 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.coverage import posture_spread
+from lightpen.model.decision_rules import Decision
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.posture import angles_between
 from lightpen.verification.tasks.assessment import (
     CALIBRATE_AGAIN,
+    MORE_POINTS,
+    RELEVANT,
     VerificationAssessment,
-    accepted,
+    check,
     refused,
 )
 from lightpen.verification.tasks.fixed_point import (
@@ -57,9 +60,21 @@ from lightpen.verification.tasks.task import (
     keep_all,
     without_last,
 )
+from lightpen.verification.tasks.tip_evidence import (
+    TipEvidence,
+    judged_tip,
+    not_the_tip,
+    points_evidence,
+    tip_entries,
+    with_power,
+)
 
 N_POSTURES, N_TOUCHES = 5, 5
 ASTRAY = 8.0  # times the median distance from the middle of all
+COVERAGE = 0.9545  # that k = 2 has of a normal distribution
+UNUSUAL = 0.001  # chance that a correct tip shows more
+N_TRIALS = 1000
+TINY = 1e-12  # mm
 SLACK = 1 + 1e-9  # of a sphere, for points that lie on it
 SAME_POSTURE = float(np.radians(12.0))  # within which a pen is held alike
 SIMULATED_TILT = 0.4  # rad
@@ -79,15 +94,22 @@ class Articulation(Found):
         Largest distance of a touch from the mean of its posture, mm.
     location_error : float
         Diameter of the smallest sphere about the locations, mm.
+    uncertainty : float
+        U (k = 2) of it, mm: 95 % of the location errors by what is known of the
+        touches stay within it.
     expected : float
-        The same by what is known of the touches: mean of simulated ones, mm.
+        Mean of these location errors, mm.
+    tip : TipEvidence
+        What the points tell of the tip.
     """
 
     names: tuple[str, ...]
     locations: FloatArray
     spreads: FloatArray
     location_error: float
+    uncertainty: float
     expected: float
+    tip: TipEvidence
 
 
 class ArticulationOptions(TaskOptions, frozen=True, tag="articulation"):
@@ -121,7 +143,10 @@ def measure_articulation(
         )
     own = [np.array([t.point_cam for t in touches]) for _, touches in postures]
     locations = np.array([each.mean(axis=0) for each in own])
-    error = smallest_diameter(locations)
+    error = float(smallest_diameters(locations[None])[0])
+    by_noise = _by_noise(postures, conditions)
+    touches = [touch for _, own in postures for touch in own]
+    tip = points_evidence(touches, conditions.instrument, conditions.drift)
     return Articulation(
         names=tuple(name for name, _ in postures),
         locations=locations,
@@ -132,8 +157,10 @@ def measure_articulation(
             ]
         ),
         location_error=error,
-        expected=_expected(postures, conditions.instrument),
-        assessment=_assessment(error, conditions.limits),
+        uncertainty=float(np.quantile(by_noise, COVERAGE)),
+        expected=float(by_noise.mean()),
+        tip=tip,
+        assessment=_assessment(error, by_noise, tip, conditions.limits),
     )
 
 
@@ -148,27 +175,37 @@ def by_posture(
     return [(f"posture {i + 1}", touches[n * i : n * i + n]) for i in range(n_postures)]
 
 
-def smallest_diameter(points: FloatArray) -> float:
-    """Return the diameter of the smallest sphere about a few points (N, 3), mm."""
-    best = np.inf
+def smallest_diameters(points: FloatArray) -> FloatArray:
+    """Return the diameters of the smallest spheres about a few points each.
+
+    Parameters
+    ----------
+    points : (K, N, 3) array
+        mm.
+
+    Returns
+    -------
+    (K,) array
+        mm. The smallest of the spheres through two to four points that hold all others.
+    """
+    best = np.full(len(points), np.inf)
     for size in (2, 3, 4):
-        for chosen in combinations(range(len(points)), size):
-            center, radius = _sphere_through(points[list(chosen)])
-            distances = np.linalg.norm(points - center, axis=1)
-            if distances.max() <= radius * SLACK + 1e-12:
-                best = min(best, radius)
-        if np.isfinite(best):
-            break
-    return 2 * float(best)
+        for chosen in combinations(range(points.shape[1]), size):
+            centers, radii = _spheres_through(points[:, list(chosen)])
+            farthest = np.linalg.norm(points - centers[:, None], axis=2).max(axis=1)
+            holds = farthest <= radii * SLACK + TINY
+            best = np.where(holds, np.minimum(best, radii), best)
+    return np.asarray(2 * best)
 
 
-def _sphere_through(points: FloatArray) -> tuple[FloatArray, float]:
-    """Return the smallest sphere with two to four points (k, 3) on it."""
-    base, others = points[0], points[1:] - points[0]
-    half = 0.5 * np.sum(others**2, axis=1)
+def _spheres_through(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the smallest spheres with two to four points (K, k, 3) on each."""
+    base, others = points[:, 0], points[:, 1:] - points[:, :1]
+    half = 0.5 * np.sum(others**2, axis=2)
     # The centre lies in the span of the points.
-    to_center = np.linalg.lstsq(others, half)[0]
-    return base + to_center, float(np.linalg.norm(to_center))
+    inverses = np.linalg.pinv(others @ np.swapaxes(others, 1, 2), hermitian=True)
+    to_center = np.einsum("kji,kjl,kl->ki", others, inverses, half)
+    return base + to_center, np.linalg.norm(to_center, axis=1)
 
 
 def _require_enough(postures: Sequence[tuple[str, Sequence[ProbedPoint]]]) -> None:
@@ -197,26 +234,37 @@ def _require_one_point(points: FloatArray, touches: Sequence[ProbedPoint]) -> No
         )
 
 
-def _expected(
-    postures: Sequence[tuple[str, Sequence[ProbedPoint]]], instrument: Instrument
-) -> float:
-    """Return the mean location error of points that scatter as is known of them."""
+def _by_noise(
+    postures: Sequence[tuple[str, Sequence[ProbedPoint]]], conditions: Conditions
+) -> FloatArray:
+    """Return location errors of points that scatter as is known of them, mm."""
     rng = np.random.default_rng(0)
     means = [mean_point(touches) for _, touches in postures]
-    covariance = joint_covariance(means, instrument)
+    covariance = joint_covariance(means, conditions.instrument)
+    covariance += np.diag(np.tile(conditions.drift**2, len(means)))
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    draws = (rng.standard_normal((100, len(root))) @ root.T).reshape(100, -1, 3)
-    return float(np.mean([smallest_diameter(each) for each in draws]))
+    draws = rng.standard_normal((N_TRIALS, len(root))) @ root.T
+    return smallest_diameters(draws.reshape(N_TRIALS, -1, 3))
 
 
-def _assessment(error: float, limits: VerificationLimits) -> VerificationAssessment:
-    if error > limits.location:
-        return refused(
-            message("articulation.off", error=error, limit=limits.location),
-            CALIBRATE_AGAIN,
-        )
-    return accepted(message("articulation.good", error=error, limit=limits.location))
+def _assessment(
+    error: float, by_noise: FloatArray, tip: TipEvidence, limits: VerificationLimits
+) -> VerificationAssessment:
+    usual, largest = np.quantile(by_noise, [COVERAGE, 1 - UNUSUAL]).tolist()
+    values = {"error": error, "uncertainty": usual, "limit": limits.location}
+    against = judged_tip(tip, limits)
+    if against is not None:
+        return against
+    if error > max(limits.location, largest):
+        return refused(message("articulation.off", **values), CALIBRATE_AGAIN)
+    if limits.decision(error, usual, limits.location) is not Decision.ACCEPTED:
+        return check(message("articulation.off", **values), MORE_POINTS)
+    if error > max(largest, RELEVANT * limits.location):
+        return check(message("articulation.off", **values), CALIBRATE_AGAIN)
+    if not tip.verifies_tip(limits):
+        return check(not_the_tip(tip, limits), MORE_POINTS)
+    return with_power(message("articulation.good", **values), tip, limits)
 
 
 def _screen(
@@ -240,6 +288,8 @@ def _entries(found: Articulation, instrument: Instrument) -> dict[str, Any]:
     return {
         "in_the_form_of": "ISO 10360-12, articulated location error",
         "location_error_mm": found.location_error,
+        "expanded_uncertainty_mm": found.uncertainty,
+        **tip_entries(found.tip),
         "expected_mm": found.expected,
         "postures": [
             {"name": name, "location_cam_mm": location, "spread_mm": spread}
@@ -255,7 +305,10 @@ def _entries(found: Articulation, instrument: Instrument) -> dict[str, Any]:
 
 def _tables(found: Articulation, conditions: Conditions) -> tuple[ResultTable, ...]:
     note = message(
-        "articulation.note", error=found.location_error, expected=found.expected
+        "articulation.note",
+        error=found.location_error,
+        uncertainty=found.uncertainty,
+        expected=found.expected,
     )
     rows = zip(
         found.names, found.locations.tolist(), found.spreads.tolist(), strict=True
@@ -299,7 +352,7 @@ ARTICULATION = VerificationTask(
     another=message("task.lift"),
     other_run=message("articulation.other-run"),
     known=ALIKE,
-    limits=("location",),
+    limits=("location", "tip"),
     options=ArticulationOptions,
     measure=measure_articulation,
     entries=_entries,
@@ -314,6 +367,5 @@ ARTICULATION = VerificationTask(
     screen=_screen,
     newness=lambda options: (0.0, 0.0),
     is_each_run_measured=False,
-    counts_drift=False,
     shows_postures=True,
 )

@@ -5,12 +5,19 @@ from dataclasses import dataclass
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import Message, message
+from lightpen.model.decision_rules import Decision
+from lightpen.model.limits import VerificationLimits
 
 USE_TIP = message("verification.use-tip")
 CALIBRATE_AGAIN = message("verification.calibrate-again")
 VERIFY_AGAIN = message("verification.verify-again")
 CHECK_FILES = message("verification.check-files")
+BETTER_POSTURES = message("verification.better-postures")
+MORE_POINTS = message("verification.more-points")
 
+
+SIGNIFICANT = 1.3  # times U (k = 2): 99 % of a normal distribution lies within
+RELEVANT = 0.25  # of a limit: a smaller difference does not matter, however certain
 
 WORST = (Grade.PASS, Grade.CHECK, Grade.REPEAT)  # last
 
@@ -19,8 +26,8 @@ WORST = (Grade.PASS, Grade.CHECK, Grade.REPEAT)  # last
 class VerificationAssessment:
     """What a verification found.
 
-    Accepted is what lies within its limit (simple acceptance); U is stated beside it
-    and may itself not be larger than the limit.
+    A value is compared with its limit by the decision rule of the limits. A difference
+    that is more than chance and relevant for the limit is never accepted in silence.
     """
 
     grade: Grade
@@ -51,3 +58,18 @@ def check(reason: Message, next_step: Message) -> VerificationAssessment:
 def refused(reason: Message, next_step: Message) -> VerificationAssessment:
     """Return an assessment for an exceeded limit."""
     return VerificationAssessment(Grade.REPEAT, reason, next_step)
+
+
+def graded(
+    value: float, uncertainty: float, limit: float, limits: VerificationLimits
+) -> Grade:
+    """Return the grade of an error with its U (k = 2), mm.
+
+    Rejected by the rule is to be repeated. Open by the rule is to be checked, and so is
+    an error that is more than chance and relevant for the limit.
+    """
+    decision = limits.decision(value, uncertainty, limit)
+    if decision is Decision.REJECTED:
+        return Grade.REPEAT
+    is_significant = abs(value) > max(SIGNIFICANT * uncertainty, RELEVANT * limit)
+    return Grade.CHECK if is_significant or decision is Decision.OPEN else Grade.PASS

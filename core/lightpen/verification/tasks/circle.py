@@ -1,25 +1,20 @@
 """A circle through touches, against its certified radius: the paper's Table 3.
 
-The points are projected on their best plane, and the circle there is that of least
-squares of the distances from it. The error of the radius is then, to first order,
-
-    dr = sum_i g_i . dX_i
-
-where ``g_i`` lies in the plane along the radius to point i. So the covariance of the
-points, with what they share, gives that of the radius.
+The covariance of the points, with what they share, gives that of the radius. A form is
+compared with what noise alone makes of an ideal ring.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from math import pi
 from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta
 
-from lightpen.arrays import BoolArray, FloatArray
+from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
@@ -29,11 +24,24 @@ from lightpen.verification.tasks.assessment import (
     CHECK_FILES,
     VERIFY_AGAIN,
     VerificationAssessment,
-    accepted,
     check,
+    graded,
     refused,
 )
-from lightpen.verification.tasks.probed_point import ProbedPoint, point_entries
+from lightpen.verification.tasks.circle_fit import (
+    CircleFit,
+    fit_circle,
+    gaps_of,
+    on_ring_of,
+    residuals_of,
+    ring_residuals,
+    ring_so_far,
+)
+from lightpen.verification.tasks.probed_point import (
+    ProbedPoint,
+    joint_covariance,
+    point_entries,
+)
 from lightpen.verification.tasks.task import (
     ANY,
     MOST_RUNS,
@@ -56,19 +64,21 @@ from lightpen.verification.tasks.task import (
     keep_all,
     without_last,
 )
+from lightpen.verification.tasks.tip_evidence import (
+    TipEvidence,
+    block_diagonal,
+    judged_tip,
+    tip_entries,
+    tip_evidence,
+    with_power,
+)
 
 MIN_TOUCHES = 6
-LEAST_POINTS = 3  # that determine a circle
-EDGE_ON = 0.9  # of the normal along u
 MIN_ANGLE = 270.0  # degrees
-SMALLEST = 0.5  # mm, of what can be a circle at all
-THIN = 0.02  # of the points' extent: less across is a line
+UNUSUAL = 0.001  # chance that an ideal ring shows more form
+N_TRIALS = 4000
 MAX_FORM = 0.05  # of the radius: what is further off is no circle
 MAX_LEFT_OUT = 0.25  # of the touches
-ASTRAY = 8.0  # times the median distance from the circle
-LIFTED = 0.1  # mm; nearer points count, farther ones may be of a lifted pen
-N_SAMPLES = 500  # of three points each
-ROUNDING = 1e-14  # relative, of centre and radius
 ANOTHER = 0.1  # of the certified radius: then it is another circle
 ENOUGH_POINTS = 10  # for a session
 NEW_PLACE = 3.0  # mm
@@ -83,50 +93,6 @@ SIMULATED_STEPS = 12
 
 
 @dataclass(frozen=True, eq=False)
-class CircleFit:
-    """A circle of least squares in its own plane.
-
-    Attributes
-    ----------
-    center_cam, normal_cam : (3,) array
-        mm; the normal points to the camera.
-    radius : float
-        mm.
-    radial, axial : (N,) array
-        Distances of the points from the circle in its plane, outwards, and from its
-        plane, mm.
-    angles : (N,) array
-        Where the points lie on it, rad: from the right of the camera against the
-        clock, as the camera sees them.
-    weights : (N, 3) array
-        Derivative of the radius by each point.
-    """
-
-    center_cam: FloatArray
-    normal_cam: FloatArray
-    radius: float
-    radial: FloatArray
-    axial: FloatArray
-    angles: FloatArray
-    weights: FloatArray
-
-    @property
-    def roundness(self) -> float:
-        """Range of the radial distances, mm."""
-        return float(np.ptp(self.radial))
-
-    @property
-    def flatness(self) -> float:
-        """Range of the distances from the plane, mm."""
-        return float(np.ptp(self.axial))
-
-    @property
-    def covered(self) -> float:
-        """All of the ring but its largest gap between touches, degrees."""
-        return 360.0 - float(np.degrees(_gaps(self.angles).max()))
-
-
-@dataclass(frozen=True, eq=False)
 class CircleRun:
     """One run round a ring.
 
@@ -138,6 +104,8 @@ class CircleRun:
         Of the ring, the ball compensated, mm.
     uncertainty : float
         U (k = 2) of it, mm.
+    form_by_noise : float
+        Largest form, mm, that an ideal ring shows by what is known of the points.
     """
 
     name: str
@@ -146,6 +114,12 @@ class CircleRun:
     fit: CircleFit
     radius: float
     uncertainty: float
+    form_by_noise: float
+
+    @property
+    def form(self) -> float:
+        """Roundness or out-of-plane deviation, the larger one, mm."""
+        return max(self.fit.roundness, self.fit.flatness)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,11 +132,14 @@ class Circle(Found):
         mm.
     uncertainty : float
         U (k = 2) of the mean radius and the certified one together, mm.
+    tip : TipEvidence
+        What the points tell of the tip.
     """
 
     runs: tuple[CircleRun, ...]
     certified: float
     uncertainty: float
+    tip: TipEvidence
 
     @property
     def radii(self) -> FloatArray:
@@ -220,88 +197,40 @@ def measure_circle(
     uncertainty = float(
         np.hypot(COVERAGE_FACTOR * np.sqrt(variance), options.radius_uncertainty)
     )
+    tip = _tip_evidence(measured, conditions, options)
     return Circle(
         runs=tuple(measured),
         certified=certified,
         uncertainty=uncertainty,
-        assessment=_assessment(measured, certified, uncertainty, conditions.limits),
+        tip=tip,
+        assessment=_assessment(
+            measured, certified, uncertainty, tip, conditions.limits
+        ),
     )
 
 
-def fit_circle(points_cam: FloatArray) -> CircleFit:
-    """Fit a circle to points (N, 3), mm, that lie on one.
-
-    Raises
-    ------
-    CalibrationError
-        They lie in one place or on a line.
-    """
-    from scipy.optimize import least_squares  # takes 0.3 s
-
-    middle = points_cam.mean(axis=0)
-    _, extents, axes = np.linalg.svd(points_cam - middle, full_matrices=False)
-    if extents[0] / np.sqrt(len(points_cam)) < SMALLEST or (
-        extents[1] < THIN * extents[0]
-    ):
-        raise CalibrationError("circle.line")
-    normal = axes[2] if axes[2][2] < 0 else -axes[2]
-    across = _across(normal)
-    up = np.cross(normal, across)
-    plane = np.stack([across, up])
-    flat = (points_cam - middle) @ plane.T
-    # Kasa's algebraic circle starts the iteration.
-    A = np.column_stack([2 * flat, np.ones(len(flat))])
-    x, y, rest = np.linalg.lstsq(A, np.sum(flat**2, axis=1))[0].tolist()
-    start = [x, y, np.sqrt(rest + x * x + y * y)]
-    found = least_squares(partial(_off_circle, flat), start, method="lm", xtol=ROUNDING)
-    center, radius = found.x[:2], float(found.x[2])
-    spokes = flat - center
-    outwards = spokes / np.linalg.norm(spokes, axis=1)[:, None]
-    J = np.column_stack([outwards, np.ones(len(flat))])
-    return CircleFit(
-        center_cam=middle + center @ plane,
-        normal_cam=normal,
-        radius=radius,
-        radial=np.linalg.norm(spokes, axis=1) - radius,
-        axial=(points_cam - middle) @ normal,
-        angles=np.arctan2(spokes[:, 1], spokes[:, 0]),
-        weights=np.linalg.pinv(J)[2][:, None] * (outwards @ plane),
+def _tip_evidence(
+    runs: Sequence[CircleRun], conditions: Conditions, options: CircleOptions
+) -> TipEvidence:
+    """Return what the points tell of the tip; each run has a ring of its own."""
+    points = [touch for run in runs for touch in run.touches]
+    rings = [ring_residuals(run.fit, len(run.touches)) for run in runs]
+    off = [
+        np.concatenate([run.fit.radial + run.radius - options.radius, run.fit.axial])
+        for run in runs
+    ]
+    is_radial = [np.repeat([1.0, 0.0], len(run.touches)) for run in runs]
+    by_radius = np.concatenate(is_radial) * options.radius_uncertainty / COVERAGE_FACTOR
+    by_points = block_diagonal([ring.by_points for ring in rings])
+    drift = np.diag(np.tile(conditions.drift**2, len(points)))
+    return tip_evidence(
+        points,
+        conditions.instrument,
+        np.concatenate(off),
+        by_points,
+        block_diagonal([ring.by_ring for ring in rings]),
+        np.outer(by_radius, by_radius) + by_points @ drift @ by_points.T,
     )
-
-
-def _off_circle(points: FloatArray, circle: FloatArray) -> FloatArray:
-    """Return the distances of points (N, 2) from a circle (x, y, radius), (N,)."""
-    return np.asarray(np.linalg.norm(points - circle[:2], axis=1) - circle[2])
-
-
-def ring_so_far(points_cam: FloatArray) -> CircleFit | None:
-    """Return the circle that most of the points (N, 3), mm, lie on, by these alone.
-
-    None before they determine one.
-    """
-    if len(points_cam) < LEAST_POINTS:
-        return None
-    try:
-        return fit_circle(points_cam[_on_ring(points_cam)])
-    except CalibrationError:
-        return None
-
-
-def residuals_of(
-    fit: CircleFit, points_cam: FloatArray | Sequence[FloatArray]
-) -> FloatArray:
-    """Return radial and out-of-plane deviations of points, (N, 2), mm."""
-    ways = np.reshape(points_cam, (-1, 3)) - fit.center_cam
-    axial = ways @ fit.normal_cam
-    spokes = ways - axial[:, None] * fit.normal_cam
-    return np.column_stack([np.linalg.norm(spokes, axis=1) - fit.radius, axial])
-
-
-def _across(normal: FloatArray) -> FloatArray:
-    """Return the unit vector in a plane nearest to u, or to v where u sticks out."""
-    axis = np.array([0.0, 1.0, 0.0] if abs(normal[0]) > EDGE_ON else [1.0, 0.0, 0.0])
-    across = axis - (axis @ normal) * normal
-    return np.asarray(across / np.linalg.norm(across))
 
 
 def _measure_run(
@@ -318,7 +247,7 @@ def _measure_run(
         )
     points = np.array([touch.point_cam for touch in touches])
     fit_circle(points)  # refuses what can be none
-    on_ring = _on_ring(points)
+    on_ring = on_ring_of(points)
     fit = fit_circle(points[on_ring])
     off = max(fit.roundness, fit.flatness)
     if np.mean(~on_ring) > MAX_LEFT_OUT or off > MAX_FORM * fit.radius:
@@ -344,46 +273,37 @@ def _measure_run(
         fit=fit,
         radius=fit.radius + ball_offset,
         uncertainty=COVERAGE_FACTOR * float(np.hypot(np.sqrt(variance), drift.max())),
+        form_by_noise=_form_by_noise(fit, kept, instrument, drift),
     )
     return run, row
 
 
-def _on_ring(points: FloatArray) -> BoolArray:
-    """Return which points (N, 3) lie on the circle that most of them lie on."""
-    rng = np.random.default_rng(0)  # the same points give the same circle
-    members = np.argsort(rng.random((N_SAMPLES, len(points))), axis=1)[:, :3]
-    a, b, c = (points[members[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    doubled = np.sum(normals**2, axis=1)
-    with np.errstate(all="ignore"):  # three points on a line make no circle
-        to_center = (
-            np.cross(normals, b - a) * np.sum((c - a) ** 2, axis=1)[:, None]
-            + np.cross(c - a, normals) * np.sum((b - a) ** 2, axis=1)[:, None]
-        ) / (2 * doubled[:, None])
-        radii = np.linalg.norm(to_center, axis=1)
-        normals = normals / np.sqrt(doubled)[:, None]
-        spokes = points[None] - (a + to_center)[:, None]
-        axial = np.einsum("sni,si->sn", spokes, normals)
-        in_plane = np.sqrt(np.maximum(np.sum(spokes**2, axis=2) - axial**2, 0))
-        distances = np.hypot(in_plane - radii[:, None], axial)
-    medians = np.nan_to_num(np.median(distances, axis=1), nan=np.inf)
-    best = distances[int(np.argmin(medians))]
-    near = best <= max(ASTRAY * float(np.median(best)), LIFTED)
-    again = np.linalg.norm(residuals_of(fit_circle(points[near]), points), axis=1)
-    return np.asarray(again <= max(ASTRAY * float(np.median(again)), LIFTED))
-
-
-def _gaps(angles: FloatArray) -> FloatArray:
-    """Return the angle from each point to the next round the ring, in order, rad."""
-    ordered = np.sort(angles)
-    return np.diff(ordered, append=ordered[0] + 2 * np.pi)
+def _form_by_noise(
+    fit: CircleFit,
+    touches: Sequence[ProbedPoint],
+    instrument: Instrument,
+    drift: FloatArray,
+) -> float:
+    """Return the quantile of the form that errors of the points make, mm."""
+    rng = np.random.default_rng(0)  # the same points give the same form
+    n = len(touches)
+    ring = ring_residuals(fit, n)
+    covariance = joint_covariance(touches, instrument) + np.diag(np.tile(drift**2, n))
+    by_radius = np.repeat([[1.0], [0.0]], n, axis=0)
+    unknowns, _ = np.linalg.qr(np.column_stack([ring.by_ring, by_radius]))
+    keeps = ring.by_points - unknowns @ (unknowns.T @ ring.by_points)
+    values, vectors = np.linalg.eigh(keeps @ covariance @ keeps.T)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    off = rng.standard_normal((N_TRIALS, 2 * n)) @ root.T
+    ranges = np.ptp(off.reshape(N_TRIALS, 2, n), axis=2).max(axis=1)
+    return float(np.quantile(ranges, 1 - UNUSUAL))
 
 
 def _require_closed(name: str, touches: Sequence[ProbedPoint], fit: CircleFit) -> None:
     if fit.covered >= MIN_ANGLE:
         return
     order = np.argsort(fit.angles)
-    widest = int(np.argmax(_gaps(fit.angles)))
+    widest = int(np.argmax(gaps_of(fit.angles)))
     raise CalibrationError(
         "circle.open",
         run=name,
@@ -398,6 +318,7 @@ def _assessment(
     runs: Sequence[CircleRun],
     certified: float,
     uncertainty: float,
+    tip: TipEvidence,
     limits: VerificationLimits,
 ) -> VerificationAssessment:
     mean = float(np.mean([run.radius for run in runs]))
@@ -406,8 +327,13 @@ def _assessment(
         return refused(
             message("circle.another", measured=mean, certified=certified), VERIFY_AGAIN
         )
-    if abs(error) > limits.radius:
-        return refused(
+    grade = graded(error, uncertainty, limits.radius, limits)
+    against = judged_tip(tip, limits)
+    if against is not None and against.grade is Grade.REPEAT:
+        return against
+    if grade is not Grade.PASS:
+        return VerificationAssessment(
+            grade,
             message(
                 "circle.radius-off",
                 error=error,
@@ -416,11 +342,13 @@ def _assessment(
             ),
             CALIBRATE_AGAIN,
         )
-    worst = max(runs, key=lambda run: max(run.fit.roundness, run.fit.flatness))
-    form = max(worst.fit.roundness, worst.fit.flatness)
-    if form > limits.form:
+    if against is not None:
+        return against
+    worst = max(runs, key=lambda run: run.form / max(limits.form, run.form_by_noise))
+    allowed = max(limits.form, worst.form_by_noise)
+    if worst.form > allowed:
         return refused(
-            message("circle.form", run=worst.name, form=form, limit=limits.form),
+            message("circle.form", run=worst.name, form=worst.form, limit=allowed),
             VERIFY_AGAIN,
         )
     lifted = [touch for run in runs for touch in run.left_out]
@@ -434,10 +362,12 @@ def _assessment(
             message("circle.uncertain", uncertainty=uncertainty, limit=limits.radius),
             CHECK_FILES,
         )
-    return accepted(
+    return with_power(
         message(
             "circle.good", error=error, uncertainty=uncertainty, limit=limits.radius
-        )
+        ),
+        tip,
+        limits,
     )
 
 
@@ -486,6 +416,7 @@ def _entries(found: Circle, instrument: Instrument) -> dict[str, Any]:
         "mean_relative_error": errors.mean() / found.certified,
         "std_mm": found.deviation,
         "expanded_uncertainty_mm": found.uncertainty,
+        **tip_entries(found.tip),
         "runs": [
             {
                 "name": run.name,
@@ -586,7 +517,7 @@ CIRCLE = VerificationTask(
     first=message("circle.first"),
     another=message("task.next-point"),
     known=message("session.same-place"),
-    limits=("radius", "form"),
+    limits=("radius", "form", "tip"),
     options=CircleOptions,
     fields=(
         NumberOption(

@@ -18,18 +18,20 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.posture import angles_between
+from lightpen.model.quantiles import chi_square_quantile
 from lightpen.verification.tasks.articulation import ALIKE, SAME_POSTURE
 from lightpen.verification.tasks.assessment import (
     VERIFY_AGAIN,
     VerificationAssessment,
     accepted,
     check,
-    refused,
+    graded,
 )
 from lightpen.verification.tasks.fixed_point import (
     ELSEWHERE,
@@ -53,6 +55,7 @@ from lightpen.verification.tasks.task import (
 
 MIN_VISITS = 2
 VISIT_POINTS = 3
+BY_CHANCE = 0.005  # that a reference seems to move that stands still
 ALONG = 3.0  # times the limit, that U may be along the view, as of a fixed point
 TOUCH_LONGER = message("drift.touch-longer")
 USE_TOUCHES = message("drift.use-touches")
@@ -98,61 +101,49 @@ def measure_drift(
         raise CalibrationError("drift.too-few")
     first, *others = [mean_point(touches) for _, touches in visits]
     moves = np.array([each.point_cam - first.point_cam for each in (first, *others)])
-    variances = np.zeros_like(moves)
+    covariances = np.zeros((len(visits), 3, 3))
     for i, each in enumerate(others, start=1):
         row = each.sensitivity - first.sensitivity
         shared = row @ conditions.instrument.covariance @ row.T
-        variances[i] = np.diag(shared + each.noise + first.noise)
-    uncertainties = COVERAGE_FACTOR * np.sqrt(variances)
+        covariances[i] = shared + each.noise + first.noise
+    variances = np.diagonal(covariances, axis1=1, axis2=2)
     names = tuple(name for name, _ in visits)
     return Drift(
         names=names,
         moves=moves,
-        uncertainties=uncertainties,
-        assessment=_assessment(names, moves, uncertainties, conditions.limits),
+        uncertainties=COVERAGE_FACTOR * np.sqrt(variances),
+        assessment=_assessment(names, moves, covariances, conditions.limits),
     )
 
 
 def _assessment(
     names: tuple[str, ...],
     moves: FloatArray,
-    uncertainties: FloatArray,
+    covariances: FloatArray,
     limits: VerificationLimits,
 ) -> VerificationAssessment:
-    lengths = np.linalg.norm(moves, axis=1)
+    """Judge the farthest move; along the view three times the limit is allowed."""
+    scales = np.array([1.0, 1.0, 1.0 / ALONG])
+    scaled = moves * scales
+    spreads = covariances * np.outer(scales, scales)
+    lengths = np.linalg.norm(scaled, axis=1)
     worst = int(np.argmax(lengths))
-    axis = int(np.argmax(np.abs(moves[worst])))
-    distance, uncertainty = float(lengths[worst]), float(uncertainties[worst, axis])
-    if distance > max(limits.drift, uncertainty):
-        return refused(
-            message(
-                "drift.moved",
-                first=names[0],
-                visit=names[worst],
-                distance=distance,
-                uncertainty=uncertainty,
-                limit=limits.drift,
-            ),
-            VERIFY_AGAIN,
-        )
-    across, along = uncertainties[:, :2].max(), uncertainties[:, 2].max()
-    largest = float(max(across, along / ALONG))
-    if max(largest, distance) > limits.drift:
-        return check(
-            message(
-                "drift.uncertain",
-                distance=distance,
-                uncertainty=float(uncertainties.max()),
-                limit=limits.drift,
-            ),
-            TOUCH_LONGER,
-        )
-    return accepted(
-        message(
-            "drift.good", distance=distance, uncertainty=uncertainty, limit=limits.drift
-        ),
-        USE_TOUCHES,
-    )
+    distance, spread = float(lengths[worst]), spreads[worst]
+    along = scaled[worst] / max(distance, np.finfo(float).tiny)
+    uncertainty = COVERAGE_FACTOR * float(np.sqrt(along @ spread @ along))
+    deviations = scaled[worst] @ np.linalg.pinv(spread) @ scaled[worst]
+    is_significant = deviations > chi_square_quantile(3, BY_CHANCE)
+    values = {"distance": float(np.linalg.norm(moves[worst])), "limit": limits.drift}
+    values["uncertainty"] = uncertainty
+    grade = graded(distance, uncertainty, limits.drift, limits)
+    if is_significant and grade is not Grade.PASS:
+        moved = message("drift.moved", first=names[0], visit=names[worst], **values)
+        return VerificationAssessment(grade, moved, VERIFY_AGAIN)
+    largest = COVERAGE_FACTOR * float(np.sqrt(np.linalg.eigvalsh(spreads).max()))
+    if largest > limits.drift:
+        values["uncertainty"] = largest
+        return check(message("drift.uncertain", **values), TOUCH_LONGER)
+    return accepted(message("drift.good", **values), USE_TOUCHES)
 
 
 def _screen(

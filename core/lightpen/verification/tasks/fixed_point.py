@@ -15,14 +15,15 @@ from msgspec import Meta
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.estimation.pivot.pivot import in_deviations
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.coverage import posture_spread
 from lightpen.model.limits import VerificationLimits
-from lightpen.model.quantiles import chi_quantile
+from lightpen.model.quantiles import chi_quantile, chi_square_quantile
 from lightpen.verification.tasks.assessment import (
-    CALIBRATE_AGAIN,
+    MORE_POINTS,
     VERIFY_AGAIN,
     VerificationAssessment,
     accepted,
@@ -50,19 +51,25 @@ from lightpen.verification.tasks.task import (
     count_option,
     keep_all,
 )
+from lightpen.verification.tasks.tip_evidence import (
+    TipEvidence,
+    judged_tip,
+    not_the_tip,
+    points_evidence,
+    tip_entries,
+    with_power,
+)
 
-USUAL_TOUCHES = 10
+USUAL_TOUCHES = 15
 MIN_TOUCHES, MAX_TOUCHES = 3, 50
 NEW_POSTURE = float(np.radians(8.0))
 ELSEWHERE = 5.0  # mm from the other points: the tip was not in the cone at all
-TILTS = 0.2, 0.4  # rad, of the simulated operator
+TILTS = 0.25, 0.5  # rad, of the simulated operator
 MIN_SPREAD = np.radians(3.0)  # rms turn of the best direction; less proves nothing
 ASTRAY = 8.0  # times the median distance from the middle
 LIFTED = 0.2  # mm; nearer points scatter, farther ones may be of a lifted pen
-TIP_SIGMA = 3.0  # mm, by which another tip may differ
-SEATING = 0.003  # mm, of a tip in a good cone
-TIP_GATE = 1e-3  # chance that the same tip looks like another
-WORTH_TELLING = 0.01  # mm, of another tip
+OUTLYING = 1e-6  # chance that the noise of a point puts it that far away
+UNUSUAL = 0.001  # chance that a coordinate scatters that much more than expected
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,12 +113,8 @@ class FixedPoint(Found):
         U (k = 2) of the mean, mm.
     expected_deviation : (3,) array
         Standard deviation of the touches by all that is known of them, mm.
-    tip_change : (3,) array
-        By which tip, less the given one, the points would scatter least, mm.
-    tip_change_uncertainty : (3,) array
-        U (k = 2) of it, mm.
-    wants_other_tip : bool
-        Whether that tip differs by more than chance.
+    tip : TipEvidence
+        By which tip the points would scatter least, and what error they would show.
     moved : (3,) array or None
         Mean less the cone of the calibration, mm; None before another camera.
     """
@@ -122,9 +125,7 @@ class FixedPoint(Found):
     nominal: Scatter | None
     uncertainty: FloatArray
     expected_deviation: FloatArray
-    tip_change: FloatArray
-    tip_change_uncertainty: FloatArray
-    wants_other_tip: bool
+    tip: TipEvidence
     moved: FloatArray | None
 
     @property
@@ -154,9 +155,6 @@ def measure_fixed_point(
     kept, left_out = _at_one_place(touches)
     calibrated = scatter_of(kept)
     covariance = joint_covariance(kept, instrument)
-    change, change_covariance = _other_tip(kept)
-    spread = change_covariance + instrument.covariance[:3, :3]
-    distance = float(np.sqrt(change @ np.linalg.solve(spread, change)))
     n = len(kept)
     blocks = covariance.reshape(n, 3, n, 3)
     of_mean = blocks.sum(axis=(0, 2)) / n**2
@@ -169,10 +167,7 @@ def measure_fixed_point(
         nominal=nominal_scatter(kept, instrument, conditions.nominal_tip),
         uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(of_mean) + conditions.drift**2),
         expected_deviation=expected,
-        tip_change=change,
-        tip_change_uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(change_covariance)),
-        wants_other_tip=distance > chi_quantile(3, TIP_GATE)
-        and float(np.linalg.norm(change)) > WORTH_TELLING,
+        tip=points_evidence(kept, instrument, conditions.drift),
         moved=None if cone_cam is None else calibrated.mean - cone_cam,
         assessment=accepted(_steady(calibrated)),
     )
@@ -208,8 +203,11 @@ def _at_one_place(
     points = scatter_of(touches).points
     distances = np.linalg.norm(points - np.median(points, axis=0), axis=1)
     limit = max(ASTRAY * float(np.median(distances)), LIFTED)
-    kept = tuple(t for t, d in zip(touches, distances, strict=True) if d <= limit)
-    left_out = tuple(t for t, d in zip(touches, distances, strict=True) if d > limit)
+    noises = np.array([touch.noise for touch in touches])
+    unlikely = in_deviations(points - np.median(points, axis=0), noises)
+    off = (distances > limit) & (unlikely > chi_quantile(3, OUTLYING))
+    kept = tuple(t for t, is_off in zip(touches, off, strict=True) if not is_off)
+    left_out = tuple(t for t, is_off in zip(touches, off, strict=True) if is_off)
     if len(kept) < MIN_TOUCHES:
         raise _too_few(len(kept))
     return kept, left_out
@@ -224,48 +222,20 @@ def _too_few(n_touches: int) -> CalibrationError:
     )
 
 
-def _other_tip(touches: Sequence[ProbedPoint]) -> tuple[FloatArray, FloatArray]:
-    """Return by which change of the tip the points meet best, and its covariance.
-
-    What all touches share moves the point as a whole, and hardly their scatter; where
-    the points scatter by more than their noise, so does the change.
-    """
-    prior = np.diag([TIP_SIGMA**-2] * 3 + [0.0] * 3)
-    middle = np.mean([touch.point_cam for touch in touches], axis=0)
-    A = np.array([np.hstack([touch.rotation, -np.eye(3)]) for touch in touches])
-    b = middle - np.array([touch.point_cam for touch in touches])
-    W = np.linalg.inv([touch.noise + SEATING**2 * np.eye(3) for touch in touches])
-    AtW = np.swapaxes(A, 1, 2) @ W
-    covariance = np.linalg.inv(prior + (AtW @ A).sum(axis=0))
-    step = covariance @ np.einsum("nij,nj->i", AtW, b)
-    left = b - A @ step
-    n_free = max(3 * len(touches) - len(step), 1)
-    excess = max(float(np.einsum("ni,nij,nj->", left, W, left)) / n_free, 1.0)
-    return np.asarray(step[:3]), np.asarray(excess * covariance[:3, :3])
-
-
 def _assessment(
     found: FixedPoint, limits: VerificationLimits
 ) -> VerificationAssessment:
+    """Judge the tip first, which explains a scatter; noise is nobody's fault."""
+    against = judged_tip(found.tip, limits)
+    if against is not None:
+        return against
     deviation = found.calibrated.deviation
+    n_free = len(found.touches) - 1
+    by_chance = np.sqrt(chi_square_quantile(n_free, UNUSUAL) / n_free)
     allowed = np.array([limits.across, limits.across, limits.along])
+    allowed = np.maximum(allowed, by_chance * found.expected_deviation)
     axis = int(np.argmax(deviation / allowed))
-    is_beyond = bool(deviation[axis] > allowed[axis])
-    if found.wants_other_tip and is_beyond:
-        x, y, z = found.tip_change.tolist()
-        return refused(
-            message(
-                "fixed-point.other-tip",
-                deviation=float(deviation[axis]),
-                axis="uvw"[axis],
-                limit=float(allowed[axis]),
-                x=x,
-                y=y,
-                z=z,
-            ),
-            CALIBRATE_AGAIN,
-        )
-    if is_beyond:
+    if deviation[axis] > allowed[axis]:
         return refused(
             message(
                 "fixed-point.scatters",
@@ -275,9 +245,8 @@ def _assessment(
             ),
             VERIFY_AGAIN,
         )
-    spread = float(
-        posture_spread(np.array([touch.rotation for touch in found.touches]))[0][-1]
-    )
+    rotations = np.array([touch.rotation for touch in found.touches])
+    spread = float(posture_spread(rotations)[0][-1])
     if spread < MIN_SPREAD:
         return check(
             message(
@@ -297,7 +266,9 @@ def _assessment(
             ),
             VERIFY_AGAIN,
         )
-    return found.assessment
+    if not found.tip.verifies_tip(limits):
+        return check(not_the_tip(found.tip, limits), MORE_POINTS)
+    return with_power(_steady(found.calibrated), found.tip, limits)
 
 
 def without_others(
@@ -330,9 +301,7 @@ def _entries(found: FixedPoint, instrument: Instrument) -> dict[str, Any]:
         "expanded_uncertainty_mm": found.uncertainty,
         "expected_std_mm": found.expected_deviation,
         "moved_mm": found.moved,
-        "tip_change_mm": found.tip_change,
-        "tip_change_expanded_uncertainty_mm": found.tip_change_uncertainty,
-        "wants_other_tip": found.wants_other_tip,
+        **tip_entries(found.tip),
         "touches": point_entries(found.touches, instrument),
         "left_out": point_entries(found.left_out, instrument),
     }
@@ -355,10 +324,10 @@ def _tables(found: FixedPoint, conditions: Conditions) -> tuple[ResultTable, ...
     if found.moved is not None:
         own.append(ResultRow(message("fixed-point.moved"), found.moved.tolist()))
     change = [
-        ResultRow(message("fixed-point.tip-change"), found.tip_change.tolist()),
+        ResultRow(message("fixed-point.tip-change"), found.tip.change.tolist()),
         ResultRow(
             message("fixed-point.tip-change-uncertainty"),
-            found.tip_change_uncertainty.tolist(),
+            found.tip.uncertainty.tolist(),
         ),
     ]
     tables = (
@@ -427,7 +396,7 @@ FIXED_POINT = VerificationTask(
     first=message("task.probe-cone"),
     another=message("fixed-point.another"),
     known=message("session.same-posture"),
-    limits=("across", "along"),
+    limits=("across", "along", "tip"),
     options=FixedPointOptions,
     fields=(
         count_option("n_touches", message("option.points"), MIN_TOUCHES, MAX_TOUCHES),

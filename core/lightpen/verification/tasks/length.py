@@ -13,6 +13,7 @@ from msgspec import Meta
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
@@ -21,9 +22,8 @@ from lightpen.verification.tasks.assessment import (
     CHECK_FILES,
     VERIFY_AGAIN,
     VerificationAssessment,
-    accepted,
     check,
-    refused,
+    graded,
 )
 from lightpen.verification.tasks.probed_point import (
     ProbedPoint,
@@ -50,6 +50,14 @@ from lightpen.verification.tasks.task import (
     certificate_option,
     count_option,
     keep_all,
+)
+from lightpen.verification.tasks.tip_evidence import (
+    TipEvidence,
+    block_diagonal,
+    judged_tip,
+    tip_entries,
+    tip_evidence,
+    with_power,
 )
 
 Ends: TypeAlias = tuple[tuple[ProbedPoint, ...], tuple[ProbedPoint, ...]]
@@ -112,6 +120,8 @@ class Length(Found):
         The length and U (k = 2) of it, mm.
     uncertainties : (N,) array
         U (k = 2) of each error, mm.
+    tip : TipEvidence
+        What the lengths tell of the tip.
     """
 
     runs: tuple[LengthRun, ...]
@@ -119,6 +129,7 @@ class Length(Found):
     certified_uncertainty: float
     uncertainties: FloatArray
     scale: Scale
+    tip: TipEvidence
 
     @property
     def errors(self) -> FloatArray:
@@ -151,7 +162,7 @@ def measure_length(
     instrument, drift = conditions.instrument, conditions.drift
     certified, certified_uncertainty = options.length, options.length_uncertainty
     offset = ball_offset(options.surface, conditions.ball_diameter)
-    measured, rows, noises = [], [], []
+    measured, rows, noises, ways, by_points = [], [], [], [], []
     for name, touches in runs:
         ends = _on_faces(_two_ends(name, touches, certified), offset)
         middles = [np.mean([t.point_cam for t in end], axis=0) for end in ends]
@@ -159,7 +170,8 @@ def measure_length(
         length = float(np.linalg.norm(span))
         along = span / length
         row, noise = np.zeros(len(instrument.covariance)), float(along**2 @ drift**2)
-        for end, sign in zip(ends, (-1.0, 1.0), strict=True):
+        signed = tuple(zip(ends, (-1.0, 1.0), strict=True))
+        for end, sign in signed:
             for touch in end:
                 row += sign / len(end) * along @ touch.sensitivity
                 noise += float(along @ touch.noise @ along) / len(end) ** 2
@@ -176,22 +188,34 @@ def measure_length(
         )
         rows.append(row)
         noises.append(noise)
+        ways.append(along)
+        by_points.append(
+            np.concatenate([np.tile(s / len(e) * along, len(e)) for e, s in signed])[
+                None
+            ]
+        )
     uncertainties = np.hypot(
         [run.uncertainty for run in measured], certified_uncertainty
     )
     errors = np.array([run.measured for run in measured]) - certified
+    certificate = (certified_uncertainty / COVERAGE_FACTOR) ** 2
+    own = np.diag([float(along**2 @ drift**2) for along in ways]) + certificate
+    tip = tip_evidence(
+        [touch for run in measured for end in run.ends for touch in end],
+        instrument,
+        errors,
+        block_diagonal(by_points),
+        np.zeros((len(errors), 0)),
+        own,
+    )
     return Length(
         runs=tuple(measured),
         certified=certified,
         certified_uncertainty=certified_uncertainty,
         uncertainties=uncertainties,
-        scale=_scale(
-            instrument,
-            np.array(rows),
-            np.diag(noises) + (certified_uncertainty / COVERAGE_FACTOR) ** 2,
-            errors,
-        ),
-        assessment=_assessment(measured, errors, uncertainties, conditions.limits),
+        scale=_scale(instrument, np.array(rows), np.diag(noises) + certificate, errors),
+        tip=tip,
+        assessment=_assessment(measured, errors, uncertainties, tip, conditions.limits),
     )
 
 
@@ -257,12 +281,18 @@ def _assessment(
     runs: Sequence[LengthRun],
     errors: FloatArray,
     uncertainties: FloatArray,
+    tip: TipEvidence,
     limits: VerificationLimits,
 ) -> VerificationAssessment:
     worst = int(np.argmax(np.abs(errors)))
     error, uncertainty = float(errors[worst]), float(uncertainties[worst])
-    if abs(error) > limits.length:
-        return refused(
+    grade = graded(error, uncertainty, limits.length, limits)
+    against = judged_tip(tip, limits)
+    if against is not None and against.grade is Grade.REPEAT:
+        return against
+    if grade is not Grade.PASS:
+        return VerificationAssessment(
+            grade,
             message(
                 "length.off",
                 run=runs[worst].name,
@@ -272,6 +302,8 @@ def _assessment(
             ),
             CHECK_FILES,
         )
+    if against is not None:
+        return against
     if uncertainty > limits.length:
         return check(
             message(
@@ -282,10 +314,12 @@ def _assessment(
             ),
             VERIFY_AGAIN,
         )
-    return accepted(
+    return with_power(
         message(
             "length.good", error=error, uncertainty=uncertainty, limit=limits.length
-        )
+        ),
+        tip,
+        limits,
     )
 
 
@@ -324,6 +358,7 @@ def _entries(found: Length, instrument: Instrument) -> dict[str, Any]:
             "expanded_uncertainty": found.scale.uncertainty,
             "expanded_uncertainty_before": found.scale.uncertainty_before,
         },
+        **tip_entries(found.tip),
         "runs": [
             {
                 "name": run.name,
@@ -379,7 +414,7 @@ LENGTH = VerificationTask(
     first=message("length.first"),
     another=message("length.another"),
     known=message("session.same-end"),
-    limits=("length",),
+    limits=("length", "tip"),
     options=LengthOptions,
     fields=(
         NumberOption(

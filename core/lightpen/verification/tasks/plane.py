@@ -25,13 +25,13 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
+from lightpen.model.decision_rules import Decision
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.tasks.assessment import (
     CALIBRATE_AGAIN,
-    CHECK_FILES,
+    MORE_POINTS,
     VERIFY_AGAIN,
     VerificationAssessment,
-    accepted,
     check,
     refused,
 )
@@ -57,6 +57,14 @@ from lightpen.verification.tasks.task import (
     VerificationTask,
     count_option,
 )
+from lightpen.verification.tasks.tip_evidence import (
+    TipEvidence,
+    block_diagonal,
+    judged_tip,
+    tip_entries,
+    tip_evidence,
+    with_power,
+)
 
 MIN_POINTS, USUAL_POINTS, MAX_POINTS = 9, 12, 50
 LEAST_POINTS = 4  # that can lie off a plane at all
@@ -70,6 +78,7 @@ MAX_FORM = 0.1  # of the extent: what is rougher is no plate
 N_SAMPLES = 500  # of three points each
 N_TRIALS = 4000
 COVERAGE = 0.9545  # that k = 2 has of a normal distribution
+UNUSUAL = 0.001  # chance that an ideal plate shows more
 LATEST = 6  # points whose residuals are shown
 
 # The plate of the simulated operator, from the bottom of its cone, mm
@@ -118,6 +127,8 @@ class Flatness(Found):
         Flatness of the plate, mm.
     uncertainty : float
         U (k = 2) of the measured flatness, mm.
+    tip : TipEvidence
+        What the points tell of the tip.
     """
 
     points: tuple[ProbedPoint, ...]
@@ -125,6 +136,7 @@ class Flatness(Found):
     fit: PlaneFit
     certified: float
     uncertainty: float
+    tip: TipEvidence
 
     @property
     def error(self) -> float:
@@ -166,15 +178,22 @@ def measure_plane(
         )
     kept = tuple(p for p, is_near in zip(points, near, strict=True) if is_near)
     left_out = tuple(p for p, is_near in zip(points, near, strict=True) if not is_near)
-    uncertainty = _uncertainty(fit, kept, conditions)
+    uncertainty, largest = _flatness_by_noise(fit, kept, conditions)
+    tip = _tip_evidence(fit, kept, conditions)
     return Flatness(
         points=kept,
         left_out=left_out,
         fit=fit,
         certified=options.flatness,
         uncertainty=uncertainty,
+        tip=tip,
         assessment=_assessment(
-            fit, left_out, options.flatness, uncertainty, conditions.limits
+            fit,
+            left_out,
+            options.flatness,
+            (uncertainty, largest),
+            tip,
+            conditions.limits,
         ),
     )
 
@@ -223,10 +242,27 @@ def _on_plane(places: FloatArray) -> BoolArray:
     return np.asarray(again <= max(ASTRAY * float(np.median(again)), LIFTED))
 
 
-def _uncertainty(
+def _tip_evidence(
     fit: PlaneFit, points: Sequence[ProbedPoint], conditions: Conditions
-) -> float:
-    """Return the quantile of the range that errors of the points make, mm."""
+) -> TipEvidence:
+    along = np.array([point.point_cam for point in points]) - fit.center_cam
+    across = along - np.outer(along @ fit.normal_cam, fit.normal_cam)
+    axes = np.linalg.svd(across, full_matrices=False)[2][:2]
+    drift = float(fit.normal_cam**2 @ conditions.drift**2)
+    return tip_evidence(
+        points,
+        conditions.instrument,
+        fit.residuals,
+        block_diagonal([fit.normal_cam[None]] * len(points)),
+        np.column_stack([np.ones(len(points)), across @ axes.T]),
+        drift * np.eye(len(points)),
+    )
+
+
+def _flatness_by_noise(
+    fit: PlaneFit, points: Sequence[ProbedPoint], conditions: Conditions
+) -> tuple[float, float]:
+    """Return U and the largest usual range that errors of the points make, mm."""
     rng = np.random.default_rng(0)  # the same points give the same uncertainty
     n = len(points)
     blocks = joint_covariance(points, conditions.instrument).reshape(n, 3, n, 3)
@@ -235,19 +271,24 @@ def _uncertainty(
     values, vectors = np.linalg.eigh(fit.weights @ along @ fit.weights)
     root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
     ranges = np.ptp(rng.standard_normal((N_TRIALS, n)) @ root, axis=1)
-    return float(np.quantile(ranges, COVERAGE))
+    usual, largest = np.quantile(ranges, [COVERAGE, 1 - UNUSUAL]).tolist()
+    return usual, largest
 
 
 def _assessment(
     fit: PlaneFit,
     left_out: Sequence[ProbedPoint],
     certified: float,
-    uncertainty: float,
+    by_noise: tuple[float, float],
+    tip: TipEvidence,
     limits: VerificationLimits,
 ) -> VerificationAssessment:
     flatness, limit = fit.flatness, limits.form
-    error = flatness - certified
-    if error > limit:
+    error, (uncertainty, largest) = flatness - certified, by_noise
+    against = judged_tip(tip, limits)
+    if against is not None:
+        return against
+    if error > max(limit, largest):
         said = message(
             "plane.off",
             flatness=flatness,
@@ -263,15 +304,26 @@ def _assessment(
         return check(said, VERIFY_AGAIN)
     if uncertainty > limit:
         said = message("plane.uncertain", uncertainty=uncertainty, limit=limit)
-        return check(said, CHECK_FILES)
-    return accepted(
+        return check(said, MORE_POINTS)
+    if limits.decision(error, uncertainty, limit) is not Decision.ACCEPTED:
+        said = message(
+            "plane.off",
+            flatness=flatness,
+            uncertainty=uncertainty,
+            certified=certified,
+            limit=limit,
+        )
+        return check(said, MORE_POINTS)
+    return with_power(
         message(
             "plane.good",
             flatness=flatness,
             uncertainty=uncertainty,
             certified=certified,
             limit=limit,
-        )
+        ),
+        tip,
+        limits,
     )
 
 
@@ -287,6 +339,7 @@ def _entries(found: Flatness, instrument: Instrument) -> dict[str, Any]:
         "expanded_uncertainty_mm": found.uncertainty,
         "certified_flatness_mm": found.certified,
         "error_mm": found.error,
+        **tip_entries(found.tip),
         "center_cam_mm": found.fit.center_cam,
         "normal_cam": found.fit.normal_cam,
         "residuals_mm": found.fit.residuals,
@@ -365,7 +418,7 @@ PLANE = VerificationTask(
     first=message("plane.first"),
     another=message("task.next-point"),
     known=message("plane.known"),
-    limits=("form",),
+    limits=("form", "tip"),
     options=PlaneOptions,
     fields=(
         NumberOption(

@@ -1,10 +1,10 @@
 """A touch: one point measured with the pen held still.
 
 Each image puts the tip at ``X = R tip_pen + t``. The mean over the images of a touch is
-its point. Two things make it uncertain: the noise of the images, which is its own, and
-what is not known of tip, LEDs and camera, which all touches share. The latter is kept
-as the derivative of the point by these parameters, so that it drops out of a difference
-of two points as far as it moves both alike.
+its point. Two things make it uncertain: the noise of the images and of the seat, which
+are its own, and what is not known of tip, LEDs and camera, which all touches share. The
+latter is kept as the derivative of the point by these parameters, so that it drops out
+of a difference of two points as far as it moves both alike.
 
 Several cameras make one pose of the pen by all their images together, in the frame of
 the first. With the derivative ``J`` of the LED centres by the pose and ``K`` by the
@@ -32,6 +32,7 @@ from lightpen.model.posture import UPRIGHT_AXIS
 from lightpen.model.rigid import nearest_rotation, skew
 
 KNOWN_FREEDOM = 30  # degrees, that the noise of the calibration counts for
+SEATING = 0.002  # mm, standard uncertainty of where a tip comes to rest in a good cone
 POSE_UNKNOWNS = 6
 NO_DRIFT = np.zeros(3)  # mm
 
@@ -167,7 +168,8 @@ def measure_touches(
         touches.append(
             ProbedPoint(
                 point_cam=points[own][agreeing].mean(axis=0),
-                noise=_mean_noise(points[own][agreeing], noises[own][agreeing]),
+                noise=_mean_noise(points[own][agreeing], noises[own][agreeing])
+                + SEATING**2 * np.eye(3),
                 sensitivity=sensitivities[own][agreeing].mean(axis=0),
                 rotation=nearest_rotation(poses.rotations[own][agreeing].mean(axis=0)),
                 names=tuple(still.frames[i].name for i in agreeing),

@@ -302,8 +302,8 @@ def test_another_tip_than_the_one_in_force_is_named(session: Session) -> None:
     found = found_by(session.state, FIXED_POINT)
     assert found is not None
     assert found.assessment.grade is Grade.REPEAT
-    assert found.assessment.reason.code == "fixed-point.other-tip"
-    np.testing.assert_allclose(found.tip_change, [0.3, 0.0, 0.0], atol=0.02)
+    assert found.assessment.reason.code == "tip.another"
+    np.testing.assert_allclose(found.tip.change, [0.3, 0.0, 0.0], atol=0.02)
 
 
 def test_a_task_done_anew_forgets_what_it_found(session: Session) -> None:

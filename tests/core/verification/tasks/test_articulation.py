@@ -12,7 +12,7 @@ from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
 from lightpen.verification.tasks.articulation import (
     measure_articulation,
-    smallest_diameter,
+    smallest_diameters,
 )
 from lightpen.verification.tasks.probed_point import ProbedPoint
 from lightpen.verification.tasks.task import Conditions
@@ -37,11 +37,13 @@ def test_the_smallest_sphere_holds_all_points_and_touches_some() -> None:
     octahedron = np.concatenate([np.eye(3), -np.eye(3)])
     triangle = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.8, 0]])
 
-    assert smallest_diameter(octahedron) == pytest.approx(2)
-    assert smallest_diameter(triangle) == pytest.approx(0.89 / 0.8)
+    assert smallest_diameters(octahedron[None])[0] == pytest.approx(2)
+    assert smallest_diameters(triangle[None])[0] == pytest.approx(0.89 / 0.8)
     points = rng.standard_normal((7, 3))
     span = np.linalg.norm(points[:, None] - points[None], axis=2).max()
-    assert span <= smallest_diameter(points) <= span * np.sqrt(1.5)  # Jung's theorem
+    assert (
+        span <= smallest_diameters(points[None])[0] <= span * np.sqrt(1.5)
+    )  # Jung's theorem
 
 
 def test_a_right_tip_stays_within_what_is_expected(

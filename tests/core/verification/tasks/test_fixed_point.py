@@ -28,7 +28,7 @@ def test_a_right_tip_is_accepted(instrument: Instrument, touching: Touching) -> 
     )
 
     assert found.assessment.grade is Grade.PASS
-    assert not found.wants_other_tip
+    assert not found.tip.is_significant
     assert found.nominal is not None
     # The nominal tip lies 1.8 mm off, and moves about the cone by as much.
     assert found.nominal.deviation.max() > 0.3
@@ -65,9 +65,9 @@ def test_an_exchanged_tip_is_told_with_how_far_off_it_is(
     found = measure_fixed_point([("", touches)], Conditions(instrument, LIMITS))
 
     assert found.assessment.grade is Grade.REPEAT
-    assert found.assessment.reason.code == "fixed-point.other-tip"
+    assert found.assessment.reason.code == "tip.another"
     np.testing.assert_allclose(
-        found.tip_change, moved, atol=1.5 * found.tip_change_uncertainty.max()
+        found.tip.change, moved, atol=1.5 * found.tip.uncertainty.max()
     )
 
 

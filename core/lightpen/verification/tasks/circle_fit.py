@@ -1,0 +1,208 @@
+"""A circle of least squares through points in space.
+
+The points are projected on their best plane, and the circle there is that of least
+squares of the distances from it. The error of the radius is then, to first order,
+
+    dr = sum_i g_i . dX_i
+
+where ``g_i`` lies in the plane along the radius to point i.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.errors import CalibrationError
+
+LEAST_POINTS = 3  # that determine a circle
+EDGE_ON = 0.9  # of the normal along u
+SMALLEST = 0.5  # mm, of what can be a circle at all
+THIN = 0.02  # of the points' extent: less across is a line
+ASTRAY = 8.0  # times the median distance from the circle
+LIFTED = 0.1  # mm; nearer points count, farther ones may be of a lifted pen
+N_SAMPLES = 500  # of three points each
+ROUNDING = 1e-14  # relative, of centre and radius
+
+
+@dataclass(frozen=True, eq=False)
+class CircleFit:
+    """A circle of least squares in its own plane.
+
+    Attributes
+    ----------
+    center_cam, normal_cam : (3,) array
+        mm; the normal points to the camera.
+    radius : float
+        mm.
+    radial, axial : (N,) array
+        Distances of the points from the circle in its plane, outwards, and from its
+        plane, mm.
+    angles : (N,) array
+        Where the points lie on it, rad: from the right of the camera against the
+        clock, as the camera sees them.
+    weights : (N, 3) array
+        Derivative of the radius by each point.
+    """
+
+    center_cam: FloatArray
+    normal_cam: FloatArray
+    radius: float
+    radial: FloatArray
+    axial: FloatArray
+    angles: FloatArray
+    weights: FloatArray
+
+    @property
+    def roundness(self) -> float:
+        """Range of the radial distances, mm."""
+        return float(np.ptp(self.radial))
+
+    @property
+    def flatness(self) -> float:
+        """Range of the distances from the plane, mm."""
+        return float(np.ptp(self.axial))
+
+    @property
+    def covered(self) -> float:
+        """All of the ring but its largest gap between touches, degrees."""
+        return 360.0 - float(np.degrees(gaps_of(self.angles).max()))
+
+
+def fit_circle(points_cam: FloatArray) -> CircleFit:
+    """Fit a circle to points (N, 3), mm, that lie on one.
+
+    Raises
+    ------
+    CalibrationError
+        They lie in one place or on a line.
+    """
+    from scipy.optimize import least_squares  # takes 0.3 s
+
+    middle = points_cam.mean(axis=0)
+    _, extents, axes = np.linalg.svd(points_cam - middle, full_matrices=False)
+    if extents[0] / np.sqrt(len(points_cam)) < SMALLEST or (
+        extents[1] < THIN * extents[0]
+    ):
+        raise CalibrationError("circle.line")
+    normal = axes[2] if axes[2][2] < 0 else -axes[2]
+    across = _across(normal)
+    up = np.cross(normal, across)
+    plane = np.stack([across, up])
+    flat = (points_cam - middle) @ plane.T
+    # Kasa's algebraic circle starts the iteration.
+    A = np.column_stack([2 * flat, np.ones(len(flat))])
+    x, y, rest = np.linalg.lstsq(A, np.sum(flat**2, axis=1))[0].tolist()
+    start = [x, y, np.sqrt(rest + x * x + y * y)]
+    found = least_squares(partial(_off_circle, flat), start, method="lm", xtol=ROUNDING)
+    center, radius = found.x[:2], float(found.x[2])
+    spokes = flat - center
+    outwards = spokes / np.linalg.norm(spokes, axis=1)[:, None]
+    J = np.column_stack([outwards, np.ones(len(flat))])
+    return CircleFit(
+        center_cam=middle + center @ plane,
+        normal_cam=normal,
+        radius=radius,
+        radial=np.linalg.norm(spokes, axis=1) - radius,
+        axial=(points_cam - middle) @ normal,
+        angles=np.arctan2(spokes[:, 1], spokes[:, 0]),
+        weights=np.linalg.pinv(J)[2][:, None] * (outwards @ plane),
+    )
+
+
+def _off_circle(points: FloatArray, circle: FloatArray) -> FloatArray:
+    """Return the distances of points (N, 2) from a circle (x, y, radius), (N,)."""
+    return np.asarray(np.linalg.norm(points - circle[:2], axis=1) - circle[2])
+
+
+def ring_so_far(points_cam: FloatArray) -> CircleFit | None:
+    """Return the circle that most of the points (N, 3), mm, lie on, by these alone.
+
+    None before they determine one.
+    """
+    if len(points_cam) < LEAST_POINTS:
+        return None
+    try:
+        return fit_circle(points_cam[on_ring_of(points_cam)])
+    except CalibrationError:
+        return None
+
+
+def residuals_of(
+    fit: CircleFit, points_cam: FloatArray | Sequence[FloatArray]
+) -> FloatArray:
+    """Return radial and out-of-plane deviations of points, (N, 2), mm."""
+    ways = np.reshape(points_cam, (-1, 3)) - fit.center_cam
+    axial = ways @ fit.normal_cam
+    spokes = ways - axial[:, None] * fit.normal_cam
+    return np.column_stack([np.linalg.norm(spokes, axis=1) - fit.radius, axial])
+
+
+def _across(normal: FloatArray) -> FloatArray:
+    """Return the unit vector in a plane nearest to u, or to v where u sticks out."""
+    axis = np.array([0.0, 1.0, 0.0] if abs(normal[0]) > EDGE_ON else [1.0, 0.0, 0.0])
+    across = axis - (axis @ normal) * normal
+    return np.asarray(across / np.linalg.norm(across))
+
+
+class RingResiduals(NamedTuple):
+    """Derivatives of how far points lie off a ring: outwards, then off its plane.
+
+    Attributes
+    ----------
+    by_points : (2 N, 3 N) array
+    by_ring : (2 N, 5) array
+        By its centre in its plane, by its height, and by two tilts.
+    """
+
+    by_points: FloatArray
+    by_ring: FloatArray
+
+
+def ring_residuals(fit: CircleFit, n: int) -> RingResiduals:
+    """Return the derivatives of the residuals of the n points of a fit."""
+    across = _across(fit.normal_cam)
+    plane = np.stack([across, np.cross(fit.normal_cam, across)])
+    outwards = np.column_stack([np.cos(fit.angles), np.sin(fit.angles)])
+    by_points = np.zeros((2, n, n, 3))
+    by_points[0, range(n), range(n)] = outwards @ plane
+    by_points[1, range(n), range(n)] = fit.normal_cam
+    by_ring = np.zeros((2, n, 5))
+    by_ring[0, :, :2] = -outwards
+    by_ring[1, :, 2] = -1.0
+    by_ring[1, :, 3:] = -fit.radius * outwards
+    return RingResiduals(by_points.reshape(2 * n, 3 * n), by_ring.reshape(2 * n, 5))
+
+
+def on_ring_of(points: FloatArray) -> BoolArray:
+    """Return which points (N, 3) lie on the circle that most of them lie on."""
+    rng = np.random.default_rng(0)  # the same points give the same circle
+    members = np.argsort(rng.random((N_SAMPLES, len(points))), axis=1)[:, :3]
+    a, b, c = (points[members[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    doubled = np.sum(normals**2, axis=1)
+    with np.errstate(all="ignore"):  # three points on a line make no circle
+        to_center = (
+            np.cross(normals, b - a) * np.sum((c - a) ** 2, axis=1)[:, None]
+            + np.cross(c - a, normals) * np.sum((b - a) ** 2, axis=1)[:, None]
+        ) / (2 * doubled[:, None])
+        radii = np.linalg.norm(to_center, axis=1)
+        normals = normals / np.sqrt(doubled)[:, None]
+        spokes = points[None] - (a + to_center)[:, None]
+        axial = np.einsum("sni,si->sn", spokes, normals)
+        in_plane = np.sqrt(np.maximum(np.sum(spokes**2, axis=2) - axial**2, 0))
+        distances = np.hypot(in_plane - radii[:, None], axial)
+    medians = np.nan_to_num(np.median(distances, axis=1), nan=np.inf)
+    best = distances[int(np.argmin(medians))]
+    near = best <= max(ASTRAY * float(np.median(best)), LIFTED)
+    again = np.linalg.norm(residuals_of(fit_circle(points[near]), points), axis=1)
+    return np.asarray(again <= max(ASTRAY * float(np.median(again)), LIFTED))
+
+
+def gaps_of(angles: FloatArray) -> FloatArray:
+    """Return the angle from each point to the next round the ring, in order, rad."""
+    ordered = np.sort(angles)
+    return np.diff(ordered, append=ordered[0] + 2 * np.pi)

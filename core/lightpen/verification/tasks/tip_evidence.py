@@ -1,0 +1,230 @@
+"""What the points of a task tell of the tip, and how large an error they would show.
+
+A point that is computed with a tip that is off by ``-d`` in the pen lies off by
+``-R d``. Let ``r`` be the residuals of the points from an artefact, linear in the
+points and in the ``k`` unknowns ``a`` of the artefact:
+
+    r = J e - J R d + B a,    cov(e) = covariance of all points with what they share
+
+Generalised least squares gives d with its covariance C, which contains the uncertainty
+of the calibrated tip. ``d^T C^-1 d`` is chi-square with three degrees of freedom if the
+tip is as calibrated. Its quantile is the gate, and the non-central distribution gives
+the error that exceeds the gate with 95 % probability along the worst direction [1]_.
+
+References
+----------
+.. [1] W. Baarda, "A testing procedure for use in geodetic networks", Netherlands
+   Geodetic Commission, 1968: minimal detectable bias by the power of a test.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.messages import Message, message
+from lightpen.model.decision_rules import Decision
+from lightpen.model.limits import VerificationLimits
+from lightpen.model.quantiles import chi_square_quantile
+from lightpen.verification.tasks.assessment import (
+    BETTER_POSTURES,
+    CALIBRATE_AGAIN,
+    RELEVANT,
+    VerificationAssessment,
+    accepted,
+    check,
+    refused,
+)
+from lightpen.verification.tasks.probed_point import ProbedPoint, joint_covariance
+
+BY_CHANCE = 0.015  # that a correct tip looks like another one
+MISSED = 0.05  # chance that an error as large as is stated goes unseen
+TIP_SIGMA = 3.0  # mm, by which another tip may differ
+LARGEST = 1.0  # mm: what shows no smaller error shows none
+
+
+@dataclass(frozen=True, eq=False)
+class TipEvidence:
+    """What points tell of the tip.
+
+    Attributes
+    ----------
+    change : (3,) array
+        The tip that the points require, less the given one, pen frame, mm.
+    covariance : (3, 3) array
+        Of the change of a correct tip, mm^2.
+    is_significant : bool
+        Whether it is more than chance.
+    detectable : float
+        Tip error that would be detected with 95 % probability along any direction, mm;
+        infinite where the postures show none.
+    """
+
+    change: FloatArray
+    covariance: FloatArray
+    is_significant: bool
+    detectable: float
+
+    @property
+    def uncertainty(self) -> FloatArray:
+        """U (k = 2) of the change, (3,), mm."""
+        return np.asarray(COVERAGE_FACTOR * np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def distance(self) -> float:
+        """Length of the change, mm."""
+        return float(np.linalg.norm(self.change))
+
+    @property
+    def distance_uncertainty(self) -> float:
+        """U (k = 2) of the change along itself, mm."""
+        along = self.change / max(self.distance, np.finfo(float).tiny)
+        return COVERAGE_FACTOR * float(np.sqrt(along @ self.covariance @ along))
+
+    def verifies_tip(self, limits: VerificationLimits) -> bool:
+        """Return whether an error as large as the limit would be found."""
+        return self.detectable <= limits.tip
+
+
+def tip_evidence(
+    points: Sequence[ProbedPoint],
+    instrument: Instrument,
+    residuals: FloatArray,
+    by_points: FloatArray,
+    by_artefact: FloatArray,
+    artefact_covariance: FloatArray | None = None,
+) -> TipEvidence:
+    """Return what residuals of points tell of the tip.
+
+    Parameters
+    ----------
+    residuals : (m,) array
+        mm.
+    by_points : (m, 3 N) array
+        Their derivative by the N points.
+    by_artefact : (m, k) array
+        Their derivative by the unknowns of the artefact.
+    artefact_covariance : (m, m) array, optional
+        Of the residuals, by what is certified of the artefact, mm^2.
+    """
+    turns = np.concatenate([point.rotation for point in points])
+    A = -by_points @ turns
+    spread = by_points @ joint_covariance(points, instrument) @ by_points.T
+    if artefact_covariance is not None:
+        spread = spread + artefact_covariance
+    W = np.linalg.inv(spread)
+    WB = W @ by_artefact
+    W = W - WB @ np.linalg.solve(by_artefact.T @ WB, WB.T)
+    prior = np.eye(3) / TIP_SIGMA**2
+    covariance = np.linalg.inv(A.T @ W @ A + prior)
+    change = covariance @ (A.T @ W @ residuals)
+    left = residuals - A @ change
+    n_free = max(len(residuals) - by_artefact.shape[1] - 3, 1)
+    excess = float(left @ W @ left) / n_free
+    if excess > chi_square_quantile(n_free, BY_CHANCE) / n_free:
+        covariance = covariance * excess
+    distance = float(change @ np.linalg.solve(covariance, change))
+    return TipEvidence(
+        change=change,
+        covariance=covariance,
+        is_significant=distance > chi_square_quantile(3, BY_CHANCE),
+        detectable=_detectable(covariance),
+    )
+
+
+def _detectable(covariance: FloatArray) -> float:
+    worst = float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+    found = worst * _detected_deviations()
+    return found if found < LARGEST else inf
+
+
+@cache
+def _detected_deviations() -> float:
+    """Return how many standard deviations off a tip has to be to be found."""
+    from scipy.special import chndtrinc
+
+    gate = chi_square_quantile(3, BY_CHANCE)
+    return float(np.sqrt(chndtrinc(gate, 3, MISSED)))
+
+
+def judged_tip(
+    found: TipEvidence, limits: VerificationLimits
+) -> VerificationAssessment | None:
+    """Return what is found against the tip; None if nothing is."""
+    distance, uncertainty = found.distance, found.distance_uncertainty
+    if not found.is_significant or distance <= RELEVANT * limits.tip:
+        return None
+    x, y, z = found.change.tolist()
+    values = {"x": x, "y": y, "z": z, "distance": distance}
+    values |= {"uncertainty": uncertainty, "limit": limits.tip}
+    decision = limits.decision(distance, uncertainty, limits.tip)
+    if decision is Decision.REJECTED:
+        return refused(message("tip.another", **values), CALIBRATE_AGAIN)
+    return check(message("tip.differs", **values), CALIBRATE_AGAIN)
+
+
+def with_power(
+    reason: Message, found: TipEvidence, limits: VerificationLimits
+) -> VerificationAssessment:
+    """Return a passed task with what it verifies of the tip."""
+    if found.verifies_tip(limits):
+        power = message("tip.verified", detectable=found.detectable)
+        return accepted(message("tip.with-power", reason=reason, power=power))
+    return accepted(
+        message("tip.with-power", reason=reason, power=not_the_tip(found, limits)),
+        BETTER_POSTURES,
+    )
+
+
+def not_the_tip(found: TipEvidence, limits: VerificationLimits) -> Message:
+    """Return that points show no tip error as small as the limit."""
+    if found.detectable < inf:
+        return message("tip.weak-power", detectable=found.detectable, limit=limits.tip)
+    return message("tip.no-power", limit=limits.tip)
+
+
+def points_evidence(
+    points: Sequence[ProbedPoint], instrument: Instrument, drift: FloatArray
+) -> TipEvidence:
+    """Return what points in one cone tell of the tip.
+
+    Parameters
+    ----------
+    drift : (3,) array
+        Standard uncertainty of a point by a camera that moved meanwhile, mm.
+    """
+    n = len(points)
+    places = np.array([point.point_cam for point in points])
+    return tip_evidence(
+        points,
+        instrument,
+        (places - places.mean(axis=0)).ravel(),
+        np.eye(3 * n),
+        np.tile(np.eye(3), (n, 1)),
+        np.diag(np.tile(drift**2, n)),
+    )
+
+
+def tip_entries(found: TipEvidence) -> dict[str, Any]:
+    """Return what points tell of the tip as it is recorded."""
+    return {
+        "tip_change_mm": found.change,
+        "tip_change_expanded_uncertainty_mm": found.uncertainty,
+        "wants_other_tip": found.is_significant,
+        "detectable_tip_error_mm": (
+            found.detectable if found.detectable < inf else None
+        ),
+    }
+
+
+def block_diagonal(blocks: Sequence[FloatArray]) -> FloatArray:
+    """Return a matrix with blocks along its diagonal."""
+    from scipy.linalg import block_diag
+
+    return np.asarray(block_diag(*blocks))

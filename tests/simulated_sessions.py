@@ -1,0 +1,276 @@
+"""Sessions of a simulated station, as tests and benchmarks of verifications need them.
+
+Camera and LEDs differ from their files as the files say they may. The tip is calibrated
+by a swing; then it may be exchanged for another one, and points are probed.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.formats.observation_files import Centers
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+from lightpen.simulator.postures import Postures
+from lightpen.simulator.swings import (
+    PAPER_CONE,
+    PAPER_TIP,
+    paper_camera,
+    paper_pen,
+    perturbed_pen,
+    simulate_centers,
+    swing_poses,
+)
+from lightpen.verification.tasks.articulation import (
+    ARTICULATION,
+    ArticulationOptions,
+    measure_articulation,
+)
+from lightpen.verification.tasks.circle import (
+    SIMULATED_AXES,
+    SIMULATED_CENTER,
+    CircleOptions,
+    measure_circle,
+)
+from lightpen.verification.tasks.circle import SIMULATED_RADIUS as RADIUS
+from lightpen.verification.tasks.drift import measure_drift
+from lightpen.verification.tasks.fixed_point import (
+    FIXED_POINT,
+    USUAL_TOUCHES,
+    FixedPointOptions,
+    measure_fixed_point,
+)
+from lightpen.verification.tasks.length import (
+    SIMULATED_ENDS,
+    SIMULATED_LENGTH,
+    LengthOptions,
+    measure_length,
+)
+from lightpen.verification.tasks.plane import PlaneOptions, measure_plane
+from lightpen.verification.tasks.probed_point import (
+    ProbedPoint,
+    ProbingFrame,
+    StillFrames,
+    measure_touches,
+)
+from lightpen.verification.tasks.task import Conditions, Found
+
+LED_SIGMA = SEAT_SIGMA = 0.002  # mm
+SIGMA = 0.03  # px
+N_IMAGES, N_FRAMES = 60, 5
+UNSTEADY = np.radians(3.0)  # of a hand that holds the pen as asked
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedStation:
+    """A camera and a pen as they are, and the instrument that a calibration left.
+
+    Attributes
+    ----------
+    tip_pen : (3,) array
+        Where the tip is, pen frame, mm.
+    """
+
+    camera: Camera
+    pen: Pen
+    tip_pen: FloatArray
+    instrument: Instrument
+
+    def with_tip_moved(self, by: FloatArray) -> "SimulatedStation":
+        """Return the station after its tip was moved in the pen, mm."""
+        return replace(self, tip_pen=self.tip_pen + by)
+
+    def probe(
+        self,
+        places: FloatArray,
+        postures: Postures,
+        rng: np.random.Generator,
+        *,
+        n_frames: int = N_FRAMES,
+        seat: float = SEAT_SIGMA,
+    ) -> tuple[ProbedPoint, ...]:
+        """Probe places (N, 3), camera frame, mm, in N postures."""
+        seats = places + seat * rng.standard_normal(places.shape)
+        rotations = postures.rotations
+        translations = seats - rotations @ self.tip_pen
+        R = np.repeat(rotations, n_frames, axis=0)
+        t = np.repeat(translations, n_frames, axis=0)
+        images = simulate_centers(self.camera, self.pen, R, t, SIGMA, rng)
+        frames = [
+            ProbingFrame(str(i), each[None], R[i], t[i])
+            for i, each in enumerate(images)
+        ]
+        held = [
+            StillFrames(tuple(frames[i : i + n_frames]))
+            for i in range(0, len(frames), n_frames)
+        ]
+        return measure_touches(self.instrument, held)
+
+
+def calibrated_station(
+    rng: np.random.Generator, n_images: int = N_IMAGES
+) -> SimulatedStation:
+    """Return a station whose tip was calibrated by a swing."""
+    file = replace(paper_pen(), led_sigma=LED_SIGMA)
+    camera, pen = true_camera(rng), true_pen(file, rng)
+    swing = swing_poses(n_images, rng, pen=pen, camera=camera)
+    poses = swing.rotations, swing.translations
+    pixels = simulate_centers(camera, pen, *poses, SIGMA, rng)
+    centers = Centers(np.arange(1, n_images + 1), pixels, Path("simulated.csv"))
+    seen = observe_centers(centers, paper_camera(), file)
+    instrument = calibrate(paper_camera(), file, seen).instrument
+    return SimulatedStation(camera, pen, PAPER_TIP, instrument)
+
+
+def true_camera(rng: np.random.Generator) -> Camera:
+    """Return the paper's camera as its covariance says that it may be."""
+    file = paper_camera()
+    assert file.covariance is not None
+    shift = rng.multivariate_normal(np.zeros(len(file.covariance)), file.covariance)
+    return file.with_intrinsics(file.intrinsics + shift)
+
+
+def true_pen(file: Pen, rng: np.random.Generator) -> Pen:
+    """Return a pen as its file says that it may be."""
+    pen = perturbed_pen(file, LED_SIGMA, rng)
+    middle = pen.leds.mean(axis=0)
+    scale = 1 + (file.scale_sigma or 0.0) * rng.standard_normal()
+    diameter = file.diameter + (file.diameter_sigma or 0.0) * rng.standard_normal()
+    return replace(pen, leds=middle + scale * (pen.leds - middle), diameter=diameter)
+
+
+def held(
+    tilts: Sequence[float] | FloatArray,
+    directions: Sequence[float] | FloatArray,
+    rng: np.random.Generator,
+) -> Postures:
+    """Return postures, rad, as an unsteady hand holds them."""
+    n = len(tilts)
+    shake = UNSTEADY * rng.standard_normal((3, n))
+    return Postures(np.asarray(tilts) + shake[0], directions + shake[1], shake[2])
+
+
+def any_direction(rng: np.random.Generator) -> FloatArray:
+    """Return a unit vector in any direction."""
+    way = rng.standard_normal(3)
+    return np.asarray(way / np.linalg.norm(way))
+
+
+def fixed_point_session(
+    station: SimulatedStation,
+    rng: np.random.Generator,
+    n: int = USUAL_TOUCHES,
+    n_frames: int = N_FRAMES,
+) -> Found:
+    """Verify by a cone, as the program asks for it."""
+    goals = [FIXED_POINT.hand(FixedPointOptions(n), 0, step) for step in range(n)]
+    postures = held([g.tilt for g in goals], [g.direction for g in goals], rng)
+    points = station.probe(
+        np.tile(PAPER_CONE, (n, 1)), postures, rng, n_frames=n_frames
+    )
+    return measure_fixed_point([("", points)], Conditions(station.instrument))
+
+
+def ring_session(
+    station: SimulatedStation,
+    rng: np.random.Generator,
+    n_runs: int = 3,
+    n: int = 20,
+    *,
+    covered: float = 2 * np.pi,
+    n_frames: int = N_FRAMES,
+    is_turned: bool = False,
+) -> Found:
+    """Verify by a ring with the pen upright, or in another posture at each point."""
+    runs = []
+    for i in range(n_runs):
+        closed = covered >= 2 * np.pi
+        angles = np.linspace(0, covered, n, endpoint=not closed)
+        angles += rng.uniform(0, 2 * np.pi)
+        places = _on_table(RADIUS * np.column_stack([np.cos(angles), np.sin(angles)]))
+        postures = held(np.zeros(n), np.zeros(n), rng)
+        if is_turned:
+            swing = swing_poses(n, rng, pen=station.pen, camera=station.camera)
+            postures = swing.postures
+        points = station.probe(places, postures, rng, n_frames=n_frames)
+        runs.append((str(i), points))
+    return measure_circle(
+        runs, Conditions(station.instrument), CircleOptions(radius=RADIUS)
+    )
+
+
+def length_session(station: SimulatedStation, rng: np.random.Generator) -> Found:
+    """Verify by a length at three places, the pen upright."""
+    runs = []
+    for i in range(3):
+        places = PAPER_CONE + SIMULATED_ENDS + [0.0, 15.0 * i, 0.0]
+        points = station.probe(places, held(np.zeros(2), np.zeros(2), rng), rng)
+        runs.append((str(i), points))
+    return measure_length(
+        runs, Conditions(station.instrument), LengthOptions(length=SIMULATED_LENGTH)
+    )
+
+
+def plane_session(
+    station: SimulatedStation, rng: np.random.Generator, n: int = 12
+) -> Found:
+    """Verify by a plate, the pen upright."""
+    angles = 2 * np.pi * np.arange(n) / n
+    spokes = np.column_stack([np.cos(angles), np.sin(angles)])
+    places = _on_table(np.tile([15.0, 30.0], n)[:n, None] * spokes)
+    points = station.probe(places, held(np.zeros(n), np.zeros(n), rng), rng)
+    return measure_plane([("", points)], Conditions(station.instrument), PlaneOptions())
+
+
+def articulation_session(station: SimulatedStation, rng: np.random.Generator) -> Found:
+    """Verify by five postures of five points."""
+    runs = []
+    for run in range(5):
+        goal = ARTICULATION.hand(ArticulationOptions(), run, 0)
+        postures = held([goal.tilt] * 5, np.full(5, goal.direction), rng)
+        points = station.probe(np.tile(PAPER_CONE, (5, 1)), postures, rng)
+        runs.append((str(run), points))
+    return measure_articulation(runs, Conditions(station.instrument))
+
+
+def drift_session(
+    station: SimulatedStation, rng: np.random.Generator, move: FloatArray | None = None
+) -> Found:
+    """Visit a drift reference three times, the cone moved by ``move`` in the end."""
+    visits = []
+    for i in range(3):
+        places = np.tile(PAPER_CONE, (3, 1))
+        if move is not None:
+            places = places + i / 2 * move
+        points = station.probe(places, held(np.zeros(3), np.zeros(3), rng), rng)
+        visits.append((str(i), points))
+    return measure_drift(visits, Conditions(station.instrument))
+
+
+def _on_table(flat: FloatArray) -> FloatArray:
+    """Return places (N, 2) of a table before the camera in its frame, (N, 3), mm."""
+    return np.asarray(PAPER_CONE + SIMULATED_CENTER + flat @ SIMULATED_AXES)
+
+
+Session: TypeAlias = Callable[[SimulatedStation, np.random.Generator], Found]
+
+SESSIONS: dict[str, Session] = {
+    "fixed point": fixed_point_session,
+    "articulation": articulation_session,
+    "ring, upright": ring_session,
+    "ring, turned": partial(ring_session, n_runs=1, is_turned=True),
+    "ring, 280 degrees, one image a point": partial(
+        ring_session, n_runs=1, n=30, covered=np.radians(280), n_frames=1
+    ),
+    "length": length_session,
+    "plane": plane_session,
+    "drift": drift_session,
+}
