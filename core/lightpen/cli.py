@@ -1,7 +1,7 @@
 """The command line: ``lightpen calibrate | simulate | pivot | pen | verify | ...``.
 
 Exit status: 0 done, 1 the data cannot give a tip or the archive was changed, 2 wrong
-usage or unreadable input.
+usage or unreadable input; with ``--exit-by-verdict`` 3 REPEAT and 4 CHECK.
 """
 
 import argparse

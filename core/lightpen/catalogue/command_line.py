@@ -11,6 +11,8 @@ MESSAGES = {
     "cli.one-of-each-camera": "The rig has {n_cameras} cameras: give one for each, in the order of its file ({names}), and a pattern in quotation marks.",
     "record.image-unacknowledged": "{image} is in the folder but not in the journal; it was not acknowledged and takes no part.",
     "cli.part-of-record-missing": "{option} FILE is missing. Only a record needs none, and {folder} is not a whole one: it lacks {missing}. Restore what it lacks from a copy, or give --camera FILE and --pen FILE.",
+    "cli.runs-or-centers": "Give either RUN or --centers FILE.csv, one for each run.",
+    "cli.centers-of-rig": "LED centres are of one camera. Give the camera file with --camera, or the images of the rig.",
     "cli.images-or-centers": "Give either IMAGES, --centers FILE.csv or --from-record FILE.",
     "cli.record-brings-its-own": "{folder} is the record of a swing, which brings its own. Leave out {options}.",
     "record.images-unacknowledged": "{images} are in the folder but not in the journal; they were not acknowledged and take no part.",

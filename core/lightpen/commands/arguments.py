@@ -3,13 +3,21 @@
 import argparse
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from lightpen.formats.pen_content import UNITS
-from lightpen.model.limits import LIMITS
+from lightpen.model.decision_rules import DecisionRule
+from lightpen.model.limits import LIMITS, VerificationLimits
 
 # Of any number, whatever it counts: beyond, its square may be none.
 SMALLEST, LARGEST = 1e-9, 1e6
+RULE_WORDS = {
+    "simple": DecisionRule.SIMPLE,
+    "guard-band": DecisionRule.GUARD_BAND,
+    "risk": DecisionRule.RISK,
+}
 
 
 def whole_number(text: str) -> int:
@@ -94,7 +102,7 @@ def add_limits(parser: argparse.ArgumentParser, *names: str) -> None:
             )
 
 
-def chosen_limits(options: argparse.Namespace) -> dict[str, float]:
+def chosen_limits(options: argparse.Namespace) -> dict[str, Any]:
     """Return the limits that were added to the options, by their names."""
     prefix = "limit_"
     return {
@@ -102,6 +110,41 @@ def chosen_limits(options: argparse.Namespace) -> dict[str, float]:
         for name, value in vars(options).items()
         if name.startswith(prefix)
     }
+
+
+def add_verdict(parser: argparse.ArgumentParser) -> None:
+    """Add how a verdict is made and told; `limits_by` reads the rule."""
+    parser.add_argument(
+        "--decision-rule",
+        choices=tuple(RULE_WORDS),
+        default="simple",
+        help="how a value with U is compared with its limit: simple acceptance, guard "
+        "band (ISO 14253-1), or risk (JCGM 106)",
+    )
+    parser.add_argument(
+        "--max-risk",
+        type=number_from(0.1, 50.0, "risk", "%"),
+        default=VerificationLimits().risk,
+        metavar="PERCENT",
+        help="risk of a wrong decision by --decision-rule risk (5)",
+    )
+    add_exit_by_verdict(parser)
+
+
+def add_exit_by_verdict(parser: argparse.ArgumentParser) -> None:
+    """Add the exit status by the verdict; `verdict_status` returns it."""
+    parser.add_argument(
+        "--exit-by-verdict",
+        action="store_true",
+        help="exit status 3 if the verdict is REPEAT, 4 if it is CHECK",
+    )
+
+
+def limits_by(options: argparse.Namespace) -> VerificationLimits:
+    """Return the limits that were added to the options, with the decision rule."""
+    rule = RULE_WORDS[options.decision_rule]
+    chosen = VerificationLimits(rule=rule, risk=options.max_risk)
+    return replace(chosen, **chosen_limits(options))
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

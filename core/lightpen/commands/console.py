@@ -12,10 +12,11 @@ from typing import Any, TypeAlias
 from msgspec import Struct
 
 from lightpen.errors import UsageError
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import A_FILE, printable, unreadable, write_whole
 from lightpen.formats.json_records import record_bytes
 
-DONE, NO_TIP, BAD_INPUT = 0, 1, 2
+DONE, NO_TIP, BAD_INPUT, TO_REPEAT, TO_CHECK = 0, 1, 2, 3, 4
 BAR_WIDTH = 72  # characters
 
 Command: TypeAlias = Callable[[argparse.Namespace], int]
@@ -26,8 +27,10 @@ def shown(text: str) -> str:
     return "\n".join(map(printable, text.split("\n")))
 
 
-def printing(command: Callable[[argparse.Namespace], None]) -> Command:
+def printing(command: Callable[[argparse.Namespace], int | None]) -> Command:
     """Give a command an exit status also where its output cannot be written.
+
+    A command that returns none is done.
 
     Raises
     ------
@@ -38,11 +41,12 @@ def printing(command: Callable[[argparse.Namespace], None]) -> Command:
     @wraps(command)
     def run(options: argparse.Namespace) -> int:
         try:
-            command(options)
+            status = command(options)
             if sys.stdout is not None:
                 sys.stdout.flush()
         except BrokenPipeError:  # its reader has seen enough
             _drop_output()
+            return DONE
         except OSError as error:
             if error.filename is not None:
                 raise unreadable(Path(error.filename), A_FILE, error) from error
@@ -53,9 +57,18 @@ def printing(command: Callable[[argparse.Namespace], None]) -> Command:
                 file=sys.stderr,
             )
             return BAD_INPUT
-        return DONE
+        return DONE if status is None else status
 
     return run
+
+
+def verdict_status(options: argparse.Namespace, grade: Grade | None) -> int:
+    """Return the exit status of a verdict, if it is asked for."""
+    if not options.exit_by_verdict:
+        return DONE
+    if grade is Grade.REPEAT:
+        return TO_REPEAT
+    return TO_CHECK if grade is Grade.CHECK else DONE
 
 
 def require_other_file(record: Path | None, *inputs: Path | None) -> None:

@@ -3,12 +3,13 @@
 import argparse
 from pathlib import Path
 
-from lightpen.commands.arguments import add_json, add_pen_options
+from lightpen.commands.arguments import add_exit_by_verdict, add_json, add_pen_options
 from lightpen.commands.console import (
     are_same,
     printing,
     require_other_file,
     shown,
+    verdict_status,
     write_record,
 )
 from lightpen.errors import UsageError
@@ -32,6 +33,7 @@ def add_verify_pen(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen verify pen``."""
     parser.set_defaults(run=_verify_pen)
     _add_swings(parser)
+    add_exit_by_verdict(parser)
     add_json(parser)
 
 
@@ -68,7 +70,7 @@ def _add_swings(parser: argparse.ArgumentParser) -> None:
 
 
 @printing
-def _verify_pen(options: argparse.Namespace) -> None:
+def _verify_pen(options: argparse.Namespace) -> int:
     files = [*options.results, options.camera, options.pen]
     require_other_file(options.json, *files)
     swings = _swings(options)
@@ -84,6 +86,7 @@ def _verify_pen(options: argparse.Namespace) -> None:
             {"files": [file_entry(file) for file in all_hashed(files)]},
         )
         write_record(options.json, record)
+    return verdict_status(options, found.assessment.grade)
 
 
 @printing

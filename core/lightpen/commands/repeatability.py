@@ -5,12 +5,19 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpen.commands.arguments import above_zero, add_json, add_pen_options, finite
+from lightpen.commands.arguments import (
+    above_zero,
+    add_exit_by_verdict,
+    add_json,
+    add_pen_options,
+    finite,
+)
 from lightpen.commands.console import (
     printing,
     progress,
     require_other_file,
     shown,
+    verdict_status,
     write_record,
 )
 from lightpen.detection.observations import observe_centers
@@ -91,11 +98,12 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--chart", type=Path, metavar="FILE", help="control chart, .csv or .svg"
     )
+    add_exit_by_verdict(parser)
     add_json(parser)
 
 
 @printing
-def _repeatability(options: argparse.Namespace) -> None:
+def _repeatability(options: argparse.Namespace) -> int:
     inputs = [*options.results, options.fixed_point, options.camera, options.pen]
     require_other_file(options.json, *inputs)
     require_other_file(options.chart, *inputs)
@@ -125,6 +133,7 @@ def _repeatability(options: argparse.Namespace) -> None:
             {"files": [file_entry(file) for file in all_hashed(files)]},
         )
         write_record(options.json, record)
+    return verdict_status(options, found.assessment.grade)
 
 
 def _tips(options: argparse.Namespace) -> list[TipEstimate]:

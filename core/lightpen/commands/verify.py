@@ -13,8 +13,10 @@ from lightpen.commands.arguments import (
     add_json,
     add_limits,
     add_pen_options,
+    add_verdict,
     chosen_limits,
     finite,
+    limits_by,
     not_negative,
 )
 from lightpen.commands.console import (
@@ -23,14 +25,18 @@ from lightpen.commands.console import (
     progress,
     require_other_file,
     shown,
+    verdict_status,
     write_record,
 )
 from lightpen.commands.pen_health import add_verify_pen
+from lightpen.detection.observations import Observations, observe_centers
+from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.hashes import all_hashed, hashed
 from lightpen.formats.json_records import file_entry
+from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
-from lightpen.model.limits import VerificationLimits
+from lightpen.model.limits import rule_in_words
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.verification.history.recorded_tasks import read_drift
@@ -46,12 +52,19 @@ from lightpen.verification.probing.image_locations import (
     read_viewers,
     touch_place,
 )
-from lightpen.verification.probing.probing import FAST, PRECISE, SETTLING, ProbingRules
+from lightpen.verification.probing.probing import (
+    FAST,
+    ONE_IMAGE,
+    PRECISE,
+    SETTLING,
+    ProbingRules,
+)
 from lightpen.verification.probing.sources import (
     ProbingRun,
     instrument_of,
     lamp_drift_of,
-    touch_run,
+    observe_place,
+    touches_of,
 )
 from lightpen.verification.reports.records import verification_record
 from lightpen.verification.reports.summaries import found_text, touches_text
@@ -121,6 +134,7 @@ def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
             help="record of verify drift of the same session, included in U",
         )
     _add_common(parser, *task.limits)
+    add_verdict(parser)
 
 
 def _add_ball(parser: argparse.ArgumentParser, what: str) -> None:
@@ -128,7 +142,7 @@ def _add_ball(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def _add_touches(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(run=_touches)
+    parser.set_defaults(run=_touches, decision_rule="simple", max_risk=5.0)
     _add_runs(parser, "points that were touched")
     _add_ball(
         parser, "of the probe, to give the surface that it touched, not its centre"
@@ -148,9 +162,18 @@ def _add_touches(parser: argparse.ArgumentParser) -> None:
 def _add_runs(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument(
         "runs",
-        nargs="+",
+        nargs="*",
         metavar="RUN",
         help=f"image folder, file name pattern, video or record: {what}",
+    )
+    parser.add_argument(
+        "--centers",
+        nargs="+",
+        type=Path,
+        default=(),
+        metavar="FILE.csv",
+        help="LED centres in place of images, a file for each RUN (frame, led, x_px, "
+        "y_px)",
     )
 
 
@@ -179,10 +202,10 @@ def _add_common(parser: argparse.ArgumentParser, *limits: str) -> None:
         "--frames",
         type=int,
         choices=range(1, 101),
-        default=1,
         metavar="N",
         help="images of a touch, through which the pen is held still, such as "
-        f"{FAST} or for a precise one {PRECISE}; 1 unless said: each image is a touch",
+        f"{FAST} or for a precise one {PRECISE}; 1 takes each image for a touch. "
+        f"Unless said {FAST}, or 1 where the pen was held still for none",
     )
     add_limits(parser, *limits)
     add_json(parser)
@@ -220,18 +243,21 @@ class _Measured:
 
 
 @printing
-def _verify_task(given: argparse.Namespace) -> None:
+def _verify_task(given: argparse.Namespace) -> int:
     task: AnyTask = given.task
     runs = [tuple(given.runs)] if task.is_pooled else [(run,) for run in given.runs]
     measured = _measure(given, runs)
     conditions = measured.conditions
     found = task.measure(measured.touches, conditions, _task_options(task, given))
     judged = judged_with(found.assessment, measured.lamp_drift)
-    print(shown(found_text(task.tables(found, conditions), judged, measured.rejected)))
+    rule = rule_in_words(conditions.limits)
+    tables = task.tables(found, conditions)
+    print(shown(found_text(tables, judged, measured.rejected, rule)))
     _print_lamp_drift(measured, judged)
     if given.json is not None:
         entries = task.entries(found, measured.instrument)
         _write(given, measured, task.kind, entries, judged)
+    return verdict_status(given, judged.grade)
 
 
 def _task_options(task: AnyTask, given: argparse.Namespace) -> TaskOptions:
@@ -272,25 +298,23 @@ def _measure(
     calibration = read_calibration(options.tip)
     given = read_viewers(options.camera, options.rig)
     rig = None if given is None else given.rig
-    found = [touch_place(each, rig) for each in places]
-    viewers = given or found[0].viewers
+    if bool(options.centers) == any(places):
+        raise UsageError("cli.runs-or-centers")
+    found = [touch_place(each, rig) for each in places if each]
+    viewers = given or (found[0].viewers if found else None)
     if viewers is None:
         raise lacking("--camera or --rig")
-    pen, pen_file = _pen(options, found[0])
-    for place in found:
-        require_other_file(options.json, *place.files)
+    pen, pen_file = _pen(options, found)
+    files = tuple(file for place in found for file in place.files)
+    files += tuple(options.centers)
+    require_other_file(options.json, *files)
     instrument = instrument_of(calibration, viewers, pen, pen_file)
-    settling = 0 if options.frames == 1 else SETTLING
-    rules = ProbingRules(options.frames, settling)
-    runs = []
-    with progress("Finding LEDs") as report:
-        for place in found:
-            runs.append(touch_run(place, instrument, rules))
-            report(len(runs) / len(found))
+    seen = _seen(options, found, instrument)
+    runs = _runs_of(seen, instrument, options.frames)
     nominal = getattr(options, "nominal_tip", None)
     for known in (pen.nominal_tip, calibration.nominal_tip):
         nominal = known if nominal is None else nominal
-    limits = VerificationLimits(**chosen_limits(options))
+    limits = limits_by(options)
     lamp_drift = lamp_drift_of(runs, instrument, limits)
     moved = NO_DRIFT if drift is None else read_drift(drift)
     return _Measured(
@@ -304,18 +328,73 @@ def _measure(
             drift=moved if lamp_drift is None else np.maximum(moved, lamp_drift.share),
         ),
         runs=tuple(runs),
-        files=tuple(file for place in found for file in place.files),
+        files=files,
         viewers=viewers,
         pen_file=pen_file,
         lamp_drift=lamp_drift,
     )
 
 
-def _pen(options: argparse.Namespace, place: ImageLocation) -> tuple[Pen, Path]:
+@dataclass(frozen=True, eq=False)
+class _SeenRun:
+    """What the images of a run, or its centres, show in each camera."""
+
+    name: str
+    views: tuple[Observations, ...]
+    touches: tuple[int, ...] | None = None
+
+
+def _seen(
+    options: argparse.Namespace, places: Sequence[ImageLocation], instrument: Instrument
+) -> list[_SeenRun]:
+    if options.centers and instrument.rig.n_cameras > 1:
+        raise UsageError("cli.centers-of-rig")
+    seen = []
+    for path in options.centers:
+        centers = read_centers(path, instrument.pen.n_leds)
+        view = observe_centers(centers, instrument.camera, instrument.pen)
+        seen.append(_SeenRun(path.name, (view,)))
+    with progress("Finding LEDs") as report:
+        for i, place in enumerate(places, start=1):
+            views = observe_place(place, instrument)
+            seen.append(_SeenRun(place.name, views, place.touches))
+            report(i / len(places))
+    return seen
+
+
+def _runs_of(
+    seen: Sequence[_SeenRun], instrument: Instrument, n_frames: int | None
+) -> list[ProbingRun]:
+    """Return the touches of all runs.
+
+    Unless a number of images is given, the pen was held still for the usual one; where
+    it was not, each image is a touch.
+    """
+
+    def by(rules: ProbingRules) -> list[ProbingRun]:
+        return [
+            touches_of(run.name, run.views, instrument, rules, run.touches)
+            for run in seen
+        ]
+
+    if n_frames is not None:
+        return by(ProbingRules(n_frames, SETTLING) if n_frames > 1 else ONE_IMAGE)
+    try:
+        return by(ProbingRules())
+    except CalibrationError as error:
+        if error.message.code != "verification.never-still":
+            raise
+    return by(ONE_IMAGE)
+
+
+def _pen(
+    options: argparse.Namespace, places: Sequence[ImageLocation]
+) -> tuple[Pen, Path]:
     if options.pen is not None:
         pen = read_pen(options.pen, options.units, options.led_diameter, None)
         return pen, options.pen
-    if place.pen is None or place.pen_file is None:
+    place = places[0] if places else None
+    if place is None or place.pen is None or place.pen_file is None:
         raise lacking("--pen")
     return place.pen, place.pen_file
 
@@ -353,5 +432,6 @@ def _write(
             "images": [file_entry(file) for file in all_hashed(measured.files)],
             **({} if drift is None else {"drift": file_entry(hashed(drift))}),
         },
+        rule_in_words(measured.conditions.limits),
     )
     write_record(options.json, record)

@@ -63,19 +63,21 @@ def _limit(
 RULES = tuple(DecisionRule)
 
 
-def _rule() -> Any:
-    choices = tuple(
-        message(f"decision-rule.{each.name.lower().replace('_', '-')}")
-        for each in RULES
-    )
-    described = {
+def rule_name(rule: DecisionRule) -> Message:
+    """Return the name of a decision rule with its standard."""
+    return message(f"decision-rule.{rule.name.lower().replace('_', '-')}")
+
+
+_RULE: Any = field(
+    default=DecisionRule.SIMPLE,
+    metadata={
         "default": 0.0,
         "label": message("limit.rule"),
         "unit": "",
         "range": (0.0, len(RULES) - 1.0),
-        "choices": choices,
-    }
-    return field(default=DecisionRule.SIMPLE, metadata=described)
+        "choices": tuple(map(rule_name, RULES)),
+    },
+)
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,7 @@ class VerificationLimits:
     location: float = _limit(0.1, message("limit.location"))
     repeatability: float = _limit(0.01, message("limit.repeatability"))
     drift: float = _limit(0.02, message("limit.drift"))
-    rule: DecisionRule = _rule()
+    rule: DecisionRule = _RULE
     risk: float = _limit(5.0, message("limit.risk"), "%", (0.1, 50.0))
 
     def __post_init__(self) -> None:
@@ -230,7 +232,7 @@ LIMITS = tuple(
 
 def rule_in_words(limits: VerificationLimits) -> Message:
     """Return the decision rule of verifications."""
-    rule = message(f"decision-rule.{limits.rule.name.lower().replace('_', '-')}")
+    rule = rule_name(limits.rule)
     if limits.rule is DecisionRule.RISK:
         return message("decision-rule.by-risk", rule=rule, risk=limits.risk)
     return message("decision-rule.by", rule=rule)

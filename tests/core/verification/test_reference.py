@@ -14,7 +14,7 @@ from tests.reference import assert_as_before, text_figures
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.model.limits import VerificationLimits
+from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
 from lightpen.verification.reports.charts import write_chart
 from lightpen.verification.reports.records import (
@@ -162,7 +162,12 @@ def test_what_a_task_finds_is_as_before(
             "record": record,
             "tables": shown(task.tables(found, conditions)),
             "text": text_figures(
-                found_text(task.tables(found, conditions), found.assessment, ())
+                found_text(
+                    task.tables(found, conditions),
+                    found.assessment,
+                    (),
+                    rule_in_words(limits),
+                )
             ),
         },
     )

@@ -4,13 +4,14 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLineEdit, QWidget
 from typing_extensions import override
 
-from lightpen.model.limits import LIMITS, StationLimits
+from lightpen.model.limits import LIMITS, Limit, StationLimits
 from lightpen.record.library.supervision import Signature, Supervision, read_supervision
 from lightpen.record.library.supervision_changes import save_limits
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.page_scroll import DialogScroll
@@ -41,7 +42,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         # Widgets
         self._lead = text_label(TextSize.BODY)
         self._fields = {
-            limit.key: ChoiceField(limit.choices) if limit.choices else _field(limit)
+            limit.key: _RuleField(limit) if limit.choices else _number_field(limit)
             for limit in LIMITS
         }
         self._labels = [text_label(TextSize.SMALL, Tone.QUIET) for _ in LIMITS]
@@ -149,14 +150,41 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
             field, text = self._fields[limit.key], worded(limit.label)
             label.setText(text)
             field.setAccessibleName(text)
-            if isinstance(field, ChoiceField):
-                field.retranslate()
-                usually = field.itemText(round(limit.default))
+            if isinstance(field, _RuleField):
+                usually = field.retranslate()
             else:
                 if not limit.range[0]:
                     field.setSpecialValueText(no_limit)
                 usually = f"{limit.default:g}" if limit.default else no_limit
             field.setToolTip(self.tr("Default: {0}.").format(usually))
+
+
+class _RuleField(ChoiceField):
+    """A choice of a limit by its index, as `Limit` has it."""
+
+    def __init__(self, limit: Limit) -> None:
+        super().__init__()
+        self._limit = limit
+        self.addItems([str(each) for each in limit.choices])
+
+    def value(self) -> float:
+        """Return the index of the choice."""
+        return float(self.currentIndex())
+
+    def setValue(self, value: float) -> None:  # noqa: N802, as of a number field
+        """Show the choice of an index."""
+        self.setCurrentIndex(round(value))
+
+    def retranslate(self) -> str:
+        """Word all choices, and return the usual one."""
+        for i, each in enumerate(self._limit.choices):
+            self.setItemText(i, worded(each))
+        return self.itemText(round(self._limit.default))
+
+
+def _number_field(limit: Limit) -> NumberField:
+    n_decimals = {"": 0, "%": 1}.get(limit.unit, 4)
+    return NumberField(limit.unit, limit.range, n_decimals)
 
 
 class LimitsControl(QObject):

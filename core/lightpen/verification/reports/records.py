@@ -6,9 +6,13 @@ from typing import Any
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.formats.json_records import plain, record_heading
 from lightpen.local_time import local_now
+from lightpen.messages import Message
+from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.verification.history.pen_health import PenHealth
 from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.repeatability import Repeatability
+
+BY_SIMPLE_ACCEPTANCE = rule_in_words(VerificationLimits())
 
 
 def verification_record(
@@ -17,6 +21,7 @@ def verification_record(
     assessment: VerificationAssessment | None,
     limits: Mapping[str, float],
     inputs: Mapping[str, Any],
+    rule: Message = BY_SIMPLE_ACCEPTANCE,
 ) -> dict[str, Any]:
     """Return the record of a verification.
 
@@ -30,6 +35,8 @@ def verification_record(
         None of what is measured and not judged.
     limits : mapping of str to float
         That it was judged by, mm.
+    rule : Message
+        By which it was judged.
     inputs : mapping
         Input files.
     """
@@ -43,7 +50,7 @@ def verification_record(
             "grade": assessment.grade.value,
             **plain(assessment.reason),
             "next_step": assessment.next_step,
-            "decision_rule": "simple acceptance: within the limit, U stated beside it",
+            "decision_rule": str(rule),
             "limits_mm": limits,
         },
         **entries,

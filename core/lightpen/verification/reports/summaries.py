@@ -11,7 +11,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.messages import message
+from lightpen.messages import Message, message
 from lightpen.verification.history.led_file import ImprovedPen
 from lightpen.verification.history.pen_health import PenHealth
 from lightpen.verification.tasks.assessment import VerificationAssessment
@@ -33,10 +33,11 @@ def found_text(
     tables: Sequence[ResultTable],
     assessment: VerificationAssessment,
     rejected: Sequence[RejectedFrame],
+    rule: Message,
 ) -> str:
     """Return the result of a task as text."""
     lines = [line for table in tables for line in _table(table)]
-    return "\n".join([*lines, *_left_out(rejected), "", *_verdict(assessment)])
+    return "\n".join([*lines, *_left_out(rejected), "", *_verdict(assessment, rule)])
 
 
 def touches_text(
@@ -80,11 +81,14 @@ def _left_out(rejected: Sequence[RejectedFrame]) -> list[str]:
     return [f"{len(rejected)} images left out: {named}{more}"]
 
 
-def _verdict(assessment: VerificationAssessment) -> list[str]:
-    return [
+def _verdict(
+    assessment: VerificationAssessment, rule: Message | None = None
+) -> list[str]:
+    lines = [
         f"Verdict      {assessment.grade.upper()}: {assessment.reason}",
         f"             {assessment.next_step}",
     ]
+    return lines if rule is None else [*lines, f"             {rule}"]
 
 
 def repeatability_text(found: Repeatability) -> str:

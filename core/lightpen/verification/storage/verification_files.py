@@ -12,6 +12,7 @@ from typing import Any
 
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import file_entry, record_bytes
+from lightpen.model.limits import rule_in_words
 from lightpen.model.origin import Origin
 from lightpen.record.folder.verifications import VERIFICATIONS
 from lightpen.record.library.numbered_files import add_numbered
@@ -113,6 +114,7 @@ def task_record(
                 for each in images.records
             ],
         },
+        rule_in_words(choices.limits),
     )
 
 

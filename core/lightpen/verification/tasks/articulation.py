@@ -190,11 +190,15 @@ def smallest_diameters(points: FloatArray) -> FloatArray:
     """
     best = np.full(len(points), np.inf)
     for size in (2, 3, 4):
+        left = np.isinf(best)
+        own = points[left]
+        radii_of_size = np.full(len(own), np.inf)
         for chosen in combinations(range(points.shape[1]), size):
-            centers, radii = _spheres_through(points[:, list(chosen)])
-            farthest = np.linalg.norm(points - centers[:, None], axis=2).max(axis=1)
-            holds = farthest <= radii * SLACK + TINY
-            best = np.where(holds, np.minimum(best, radii), best)
+            centers, radii = _spheres_through(own[:, list(chosen)])
+            farthest = np.linalg.norm(own - centers[:, None], axis=2).max(axis=1)
+            radii[farthest > radii * SLACK + TINY] = np.inf
+            radii_of_size = np.minimum(radii_of_size, radii)
+        best[left] = radii_of_size
     return np.asarray(2 * best)
 
 

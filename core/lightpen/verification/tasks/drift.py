@@ -139,7 +139,8 @@ def _assessment(
     if is_significant and grade is not Grade.PASS:
         moved = message("drift.moved", first=names[0], visit=names[worst], **values)
         return VerificationAssessment(grade, moved, VERIFY_AGAIN)
-    largest = COVERAGE_FACTOR * float(np.sqrt(np.linalg.eigvalsh(spreads).max()))
+    variances = np.diagonal(spreads, axis1=1, axis2=2)
+    largest = COVERAGE_FACTOR * float(np.sqrt(variances.max()))
     if largest > limits.drift:
         values["uncertainty"] = largest
         return check(message("drift.uncertain", **values), TOUCH_LONGER)

@@ -11,13 +11,8 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.limits import VerificationLimits
-from lightpen.verification.tasks.circle import (
-    Circle,
-    CircleOptions,
-    fit_circle,
-    measure_circle,
-    residuals_of,
-)
+from lightpen.verification.tasks.circle import Circle, CircleOptions, measure_circle
+from lightpen.verification.tasks.circle_fit import fit_circle, residuals_of
 from lightpen.verification.tasks.probed_point import ProbedPoint
 from lightpen.verification.tasks.task import Conditions, Surface
 

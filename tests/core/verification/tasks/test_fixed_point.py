@@ -116,13 +116,67 @@ def test_two_touches_are_refused(instrument: Instrument, touching: Touching) -> 
         measure_fixed_point([("", touches)], Conditions(instrument, LIMITS))
 
 
-def test_the_limit_decides(instrument: Instrument, touching: Touching) -> None:
+def test_the_limit_decides_on_a_scatter_beyond_noise(
+    instrument: Instrument, touching: Touching
+) -> None:
+    rng = np.random.default_rng(3)
+    touches = touching(PAPER_CONE + 0.03 * rng.standard_normal((10, 3)))
+    codes = [
+        measure_fixed_point(
+            [("", touches)], Conditions(instrument, limits)
+        ).assessment.reason.code
+        for limits in (
+            VerificationLimits(across=0.01, along=0.01),
+            VerificationLimits(across=0.1, along=0.1),
+        )
+    ]
+
+    assert codes[0] == "fixed-point.scatters"
+    assert codes[1] != "fixed-point.scatters"
+
+
+def test_noise_is_never_blamed_for_a_scatter(
+    instrument: Instrument, touching: Touching
+) -> None:
     touches = touching(np.tile(PAPER_CONE, (10, 1)))
     strict = VerificationLimits(across=1e-5, along=1e-5)
 
     found = measure_fixed_point([("", touches)], Conditions(instrument, strict))
 
-    assert found.assessment.grade is Grade.REPEAT
+    assert found.assessment.grade is Grade.PASS
+
+
+def test_fewer_postures_detect_only_larger_errors_and_do_not_verify_the_tip(
+    instrument: Instrument, touching: Touching
+) -> None:
+    places = np.tile(PAPER_CONE, (10, 1))
+    steep, upright = (
+        measure_fixed_point(
+            [("", touching(places, tilt=tilt, n_frames=5))], Conditions(instrument)
+        )
+        for tilt in (0.4, 0.1)
+    )
+
+    assert steep.tip.detectable < 0.5 * upright.tip.detectable
+    assert steep.assessment.grade is Grade.PASS
+    assert "would be found with 95 % probability" in str(steep.assessment.reason)
+    assert upright.assessment.reason.code == "tip.weak-power"
+
+
+def test_u_of_the_tip_change_is_what_its_errors_scatter_by(
+    instrument: Instrument, touching: Touching
+) -> None:
+    places = np.tile(PAPER_CONE, (10, 1))
+    found = [
+        measure_fixed_point([("", touching(places, seed=i))], Conditions(instrument))
+        for i in range(60)
+    ]
+
+    scatter = np.std([each.tip.change for each in found], axis=0)
+    # The scatter lacks what the instrument has in common, and the seat.
+    expected = np.mean([each.tip.uncertainty for each in found], axis=0) / 2
+    assert (scatter < 1.2 * expected).all()
+    assert (scatter > 0.5 * expected).all()
 
 
 def test_touches_alike_are_expected_to_scatter_by_their_noise(
