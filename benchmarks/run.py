@@ -34,6 +34,7 @@ from benchmarks.speed import speed_rows
 from benchmarks.tips import repeat_rows, tip_rows
 from benchmarks.tracker import tracker_rows
 from benchmarks.verification import verification_rows
+from benchmarks.verification_sessions import session_rows
 from benchmarks.whole_program import program_rows
 from benchmarks.wizard import idle_rows, link_rows, soak_rows, start_rows
 from benchmarks.workers import Workers, one_core_workers
@@ -54,6 +55,7 @@ SECTIONS: dict[str, Section] = {
     "labels": lambda workers, data: labelling_rows(workers),
     "tracker": tracker_rows,
     "verify": verification_rows,
+    "power": lambda workers, data: session_rows(workers),
     "speed": lambda workers, data: speed_rows(workers),
     "program": lambda workers, data: program_rows(data),
     "guided": lambda workers, data: guided_rows(workers),

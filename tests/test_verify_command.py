@@ -95,7 +95,9 @@ def test_the_points_of_a_ring_lie_on_a_plane(
     assert found["flatness_mm"] == pytest.approx(of_ring["flatness_mm"], abs=1e-9)
     assert found["normal_cam"] == pytest.approx(of_ring["normal_cam"], abs=1e-9)
     assert 0 < found["expanded_uncertainty_mm"] < 0.1
-    assert list(found["verdict"]["limits_mm"]) == ["form"]
+    assert set(found["verdict"]["limits_mm"]) == {"form", "tip"}
+    assert "Decision rule: simple acceptance" in plane.stdout
+    assert "not the tip" in plane.stdout
 
 
 def test_table_1_is_reproduced_from_led_centres_by_one_command(

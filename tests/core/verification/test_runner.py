@@ -63,12 +63,10 @@ def test_a_tip_is_verified_from_the_first_touch_to_the_verdict(at_it: Verifier) 
     assert [each["verification"] for each in at_it.records] == list(CHOICES.kinds)
     assert {each["session"] for each in at_it.records} == {NOON.isoformat()}
     for record in at_it.records:
+        assert record["verdict"]["grade"] == "pass"
         assert (record["operator"], record["origin"]) == ("Ann", "simulated")
         assert record["inputs"]["tip"]["file"] == "000001.json"
     assert point["verdict"]["limits_mm"] == {"across": 0.01, "along": 0.03, "tip": 0.04}
-    # Four points do not verify a tip; neither do points with the pen upright.
-    assert point["verdict"]["code"] == "tip.weak-power"
-    assert circle["verdict"]["grade"] == length["verdict"]["grade"] == "pass"
     assert "not the tip" in length["verdict"]["text"]
     assert abs(circle["mean_error_mm"]) < 0.01
     assert abs(length["runs"][0]["error_mm"]) < 0.02
@@ -495,7 +493,8 @@ def test_a_rendered_lamp_tells_whether_the_camera_turns_slowly(
         assert again["verdict"]["code"] == "witness.moved"
         assert 0.02 < witness.moved < 0.3
     else:
-        assert status.assessment.reason.code == "fixed-point.steady"
+        # Its few points may not verify the tip, but nothing moved.
+        assert status.assessment.reason.code in {"tip.weak-power", "tip.with-power"}
         assert witness.assessment.grade is Grade.PASS
         assert witness.moved < 0.006
 

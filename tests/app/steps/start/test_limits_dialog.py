@@ -19,6 +19,7 @@ from lightpen.model.limits import (
 )
 from lightpen.record.library.supervision import Signature, Supervision
 from lightpen_app.steps.start.limits_dialog import LimitsDialog
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
@@ -65,7 +66,8 @@ def test_the_limits_that_are_shown_are_those_that_were_given(
 
 
 def test_every_limit_is_in_the_dialog(dialog: LimitsDialog) -> None:
-    shown = {each.accessibleName() for each in dialog.findChildren(NumberField)}
+    fields = [*dialog.findChildren(NumberField), *dialog.findChildren(ChoiceField)]
+    shown = {each.accessibleName() for each in fields}
 
     assert shown == {str(limit.label) for limit in LIMITS}
 
