@@ -6,8 +6,10 @@ from PySide6.QtCore import QObject, Qt, Signal
 
 from lightpen.cameras.clock import Clock
 from lightpen.errors import LightpenError
+from lightpen.local_time import local_now
+from lightpen.record.exports.export_status import with_status
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen.streaming.messages import StreamedTip
+from lightpen.streaming.messages import StreamedTip, tip_metadata
 from lightpen.streaming.server import PoseStream, StreamPlace, StreamStatus
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.probing.current_tip import read_tip_in_force
@@ -157,4 +159,5 @@ def _tip(archive: FolderArchive, preparation: Preparation) -> StreamedTip | None
         tip = read_tip_in_force(archive, preparation)
     except LightpenError:  # the step Verify says why
         return None
-    return StreamedTip(tip.names, tip.instrument)
+    told = tip_metadata(with_status(tip.calibration, local_now()))
+    return StreamedTip(tip.names, tip.instrument, told)

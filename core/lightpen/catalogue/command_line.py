@@ -29,6 +29,7 @@ MESSAGES = {
     "cli.report-over-result": "{out} would replace the result that it is made from. Give the PDF another name.",
     "cli.laboratory-missing": "A Digital Calibration Certificate names who calibrated: {options} are missing. Give each.",
     "cli.no-country": "{country} is no code of a country. Give two capital letters as in ISO 3166-1, such as DE.",
+    "cli.export-without-status": "The tip is {status}, which a file for {format} cannot state. Choose another format, or add --anyway.",
     "cli.export-over-result": "{out} would replace the result that it is made from. Give the file another name.",
     "cli.camera-names": "The cameras cannot be called {one} and {other}: two names of letters, digits, dots and dashes are needed. Give each such a name of its own.",
     "cli.cameras-over-input": "--out {out} would replace the input file of that name. Give another name.",

@@ -6,8 +6,10 @@ from pathlib import Path
 from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
 from lightpen.formats.files import printable, write_whole
+from lightpen.local_time import local_now
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.exports.dcc import Laboratory, is_country
+from lightpen.record.exports.export_status import with_status
 from lightpen.record.exports.formats import FORMATS
 
 LABORATORY = {
@@ -36,6 +38,11 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="; ".join(f"{each.name}: {each.description}" for each in FORMATS),
     )
+    parser.add_argument(
+        "--anyway",
+        action="store_true",
+        help="export a retired or overdue tip in a format that cannot state it, too",
+    )
     for name, told in LABORATORY.items():
         parser.add_argument(
             f"--{name}", default="", metavar="TEXT", help=f"for dcc: {told}"
@@ -58,6 +65,12 @@ def _export(options: argparse.Namespace) -> None:
         raise UsageError("cli.export-over-result", out=str(options.out))
     written = BY_NAME[options.format]
     laboratory = _laboratory(options) if written.needs_laboratory else None
-    content = written.content(read_calibration(options.result), laboratory)
+    file = with_status(read_calibration(options.result), local_now())
+    if file.library_status and not (written.has_status or options.anyway):
+        status = ", ".join(file.library_status)
+        raise UsageError(
+            "cli.export-without-status", status=status, format=written.name
+        )
+    content = written.content(file, laboratory)
     write_whole(options.out, content)
     print(shown(f"The tip is in {options.out}."))

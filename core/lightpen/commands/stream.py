@@ -27,11 +27,13 @@ from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.errors import LightpenError, UsageError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
+from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.record.calibrations.calibrations import read_calibration
+from lightpen.record.exports.export_status import with_status
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.recordings import FilesBeside, files_beside
-from lightpen.streaming.messages import StreamedTip
+from lightpen.streaming.messages import StreamedTip, tip_metadata
 from lightpen.streaming.server import (
     LOOPBACK,
     PORT,
@@ -158,11 +160,13 @@ def _listened(options: argparse.Namespace) -> _Listened:
     pen = read_pen(pen_file, options.units, options.led_diameter, None)
     if options.tip is None:
         return _Listened(images, RegionOfInterest(camera, pen, mask), None)
-    calibration = read_calibration(options.tip)
+    calibration = with_status(read_calibration(options.tip), local_now())
     viewers = viewers_of_camera(camera, camera_file)
     instrument = instrument_of(calibration, viewers, pen, pen_file)
     tip = StreamedTip(
-        Names(pen=calibration.names.pen, tip=calibration.names.tip), instrument
+        Names(pen=calibration.names.pen, tip=calibration.names.tip),
+        instrument,
+        tip_metadata(calibration),
     )
     return _Listened(
         images, RegionOfInterest(instrument.camera, instrument.pen, mask), tip

@@ -10,13 +10,15 @@ References
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.record.calibrations.calibrations import CalibrationFile
+from lightpen.record.exports.export_status import status_of
 from lightpen.record.swings.names import Names
 from lightpen.verification.tasks.probed_point import (
     ProbingFrame,
@@ -36,10 +38,24 @@ class StreamedTip:
     ----------
     instrument : Instrument
         Camera, pen and tip, with their covariance.
+    metadata : mapping of str to str
+        Further metadata of the tip, see `tip_metadata`.
     """
 
     names: Names
     instrument: Instrument
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+
+def tip_metadata(file: CalibrationFile) -> dict[str, str]:
+    """Return origin, verdict, due date and status of a tip, as far as known."""
+    told = {
+        "Origin": file.origin or "",
+        "Verdict": file.grade.value,
+        "Due": "" if file.due is None else file.due.isoformat(),
+        "Status": ", ".join(status_of(file)),
+    }
+    return {key: words for key, words in told.items() if words}
 
 
 def pose_messages(
@@ -70,7 +86,7 @@ def pose_messages(
     if tip is None:
         return sent
     place, spread = _place_of_tip(detection, tip.instrument)
-    named = {"Pen": tip.names.pen, "Tip": tip.names.tip}
+    named = {"Pen": tip.names.pen, "Tip": tip.names.tip, **tip.metadata}
     return sent + _transform(
         TIP, R, place, at, {**told, **named, **_covariance(spread, "x y z")}
     )

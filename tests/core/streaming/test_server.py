@@ -6,9 +6,12 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from datetime import date
+from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.small_records import SMALL
 from pyigtl import OpenIGTLinkClient, TransformMessage
 
 from lightpen.arrays import FloatArray
@@ -18,7 +21,10 @@ from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.errors import StreamError
 from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
+from lightpen.formats.json_records import record_bytes
+from lightpen.model.origin import Origin
 from lightpen.model.rig import rig_of
+from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.swings.names import Names
 from lightpen.simulator.swings import (
     PAPER_CONE,
@@ -27,7 +33,7 @@ from lightpen.simulator.swings import (
     paper_pen,
     simulate_centers,
 )
-from lightpen.streaming.messages import StreamedTip, pose_messages
+from lightpen.streaming.messages import StreamedTip, pose_messages, tip_metadata
 from lightpen.streaming.server import (
     LOOPBACK,
     MOST_CLIENTS,
@@ -183,6 +189,29 @@ def test_a_name_that_is_not_ascii_arrives_escaped(
     stream.take(frame(), detection)
 
     assert received(client, "TipToCamera").metadata["Pen"] == r"\u5149\u7b14-04"
+
+
+def test_origin_verdict_due_date_and_status_of_the_tip_are_in_the_metadata(
+    stream: PoseStream,
+    client: OpenIGTLinkClient,
+    detection: PenDetection,
+    instrument: Instrument,
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "tip.json"
+    file.write_bytes(record_bytes(dict(SMALL)))
+    calibration = replace(
+        read_calibration(file), origin=Origin.SIMULATED, due=date(2027, 1, 31)
+    )
+    told = tip_metadata(calibration)
+    stream.set_tip(StreamedTip(Names(), instrument, told))
+    stream.take(frame(), detection)
+
+    metadata = received(client, "TipToCamera").metadata
+    assert metadata["Origin"] == "simulated"
+    assert metadata["Verdict"] == "pass"
+    assert metadata["Due"] == "2027-01-31"
+    assert metadata["Status"] == "SIMULATED"
 
 
 def test_without_a_tip_in_force_the_pose_goes_out_alone(

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, TypeAlias
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
+from lightpen.local_time import local_now
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.exports.dcc import Laboratory
+from lightpen.record.exports.export_status import with_status
 from lightpen.record.exports.exports import copied_tip, exported_solution, save_new
 from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog
@@ -127,7 +129,7 @@ class ResultExport(QObject):
             found = (
                 exported_solution(solution, names)
                 if result is None
-                else read_calibration(archive.file_of(result))
+                else with_status(read_calibration(archive.file_of(result)), local_now())
             )
             for each in export.formats:
                 save_new(folder, stem + each.suffix, each.content(found, laboratory))

@@ -5,7 +5,7 @@ file alone is read; nothing that a running program knows besides comes into it.
 """
 
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import date, datetime
 from hashlib import sha256
 from pathlib import Path
 
@@ -57,6 +57,10 @@ class CalibrationFile:
         Since the tip that was in force before.
     restores : str or None
         Hash of the entry of the archive whose tip is in force again by it.
+    library_status : tuple of str
+        Whether pen or tip are retired or overdue, where that was looked up.
+    due : date or None
+        Next due date of the tip by its age, likewise.
     """
 
     path: Path
@@ -71,6 +75,8 @@ class CalibrationFile:
     reason: str = ""
     change: TipChange | None = None
     restores: str | None = None
+    library_status: tuple[str, ...] = ()
+    due: date | None = None
 
     @property
     def when(self) -> datetime:

@@ -20,6 +20,7 @@ from lightpen.estimation.reports.verdict import AXES
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.decision_rule import decision_rule
+from lightpen.record.exports.export_status import status_of
 
 VERSION = "3.2.1"
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
@@ -130,7 +131,8 @@ def _add_result(result: Element, file: CalibrationFile) -> None:
     _text(data, "name", "Centre of the tip")
     verdict = f"Verdict: {file.grade.value}. {file.why.text}"
     listed = _sub(data, "data")
-    _rich(listed, "text", *filter(None, (verdict, file.reason)))
+    status = f"Status: {', '.join(status_of(file))}" if status_of(file) else ""
+    _rich(listed, "text", *filter(None, (verdict, status, file.reason)))
     tip, spread = calibration.tip_pen_mm, calibration.expanded_uncertainty_mm
     for axis, value, uncertainty in zip(AXES, tip, spread, strict=True):
         real = _quantity(listed, f"Tip {axis}", value, MILLIMETRE, calibration.created)

@@ -2,8 +2,10 @@
 
 Another format is a function from `CalibrationFile` to text and an entry of `FORMATS`,
 which the command ``lightpen export`` and the menu of the wizard offer. All state the
-tip, its origin (live, recorded, simulated) and its grade. Transforms keep the axes of
-the pen: the tip is the origin of a frame parallel to the pen frame.
+tip, its origin (live, recorded, simulated), its grade and its status, see
+`lightpen.record.exports.export_status`; the record as JSON has no place for a status of
+the library. Transforms keep the axes of the pen: the tip is the origin of a frame
+parallel to the pen frame.
 """
 
 from collections import Counter
@@ -21,6 +23,7 @@ from lightpen.local_time import local_time
 from lightpen.messages import Message, message
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.exports.dcc import Laboratory, dcc_text
+from lightpen.record.exports.export_status import status_of
 
 MILLIMETRES = 1000.0  # in a metre, the unit of ROS
 N_DECIMALS = 6  # of a length in mm in a file for statistics
@@ -42,6 +45,8 @@ class ExportFormat:
         covariance, origin, grade, names and acceptance.
     needs_laboratory : bool
         Whether `text` takes a `Laboratory`, too.
+    has_status : bool
+        Whether its files state what the library says of pen and tip.
     """
 
     name: str
@@ -50,6 +55,7 @@ class ExportFormat:
     text: Callable[..., str]
     description: Message
     needs_laboratory: bool = False
+    has_status: bool = True
 
     def content(
         self, file: CalibrationFile, laboratory: Laboratory | None = None
@@ -65,12 +71,13 @@ class ExportFormat:
 
 
 def _remark(file: CalibrationFile) -> str:
-    """Return origin, grade and acceptance, for a comment."""
-    accepted = file.accepted
+    """Return origin, grade, acceptance and status, for a comment."""
+    accepted, status = file.accepted, status_of(file)
     return (
         f"origin: {file.origin or 'not stated'}; "
         f"grade: {file.grade.value}; "
         f"accepted: {'no' if accepted is None else accepted.isoformat()}"
+        + (f"; status: {', '.join(status)}" if status else "")
     )
 
 
@@ -97,6 +104,7 @@ def _tip(file: CalibrationFile) -> str:
     row["calibrated"] = calibration.created.isoformat()
     row["accepted"] = "" if accepted is None else accepted.isoformat()
     row["grade"] = file.grade.value
+    row["status"] = ", ".join(status_of(file))
     return csv_table([list(row), list(row.values())])
 
 
@@ -104,12 +112,13 @@ def _images(file: CalibrationFile) -> str:
     """Return a row for each image with its state and residual."""
     head = ["image", "file", "used", "reason", "rms_px"]
     head += [*(f"tip_{axis}_cam_mm" for axis in "uvw"), "camera", "origin", "grade"]
+    head.append("status")
     rows: list[Sequence[object]] = [head]
-    numbers = Counter[str]()
+    numbers, status = Counter[str](), ", ".join(status_of(file))
     for image in file.calibration.frames:
         numbers[image.camera] += 1
         fit = (image.reason, image.rms_px, *image.tip_cam_mm)
-        of_all = (image.camera, file.origin or "", file.grade.value)
+        of_all = (image.camera, file.origin or "", file.grade.value, status)
         rows.append([numbers[image.camera], image.file, image.used, *fit, *of_all])
     return csv_table(rows)
 
@@ -120,31 +129,49 @@ def _text(file: CalibrationFile) -> str:
     return _lines(tip, f"# {_remark(file)}")
 
 
-def _itk(file: CalibrationFile) -> str:
+def _slicer(file: CalibrationFile) -> str:
     """Return an ITK transform that 3D Slicer opens as that of the tip to the pen.
 
     ITK's axes point left and to the back where Slicer's point right and to the front,
-    and its transforms go from the parent: of a shift only the last entry changes sign.
+    and Slicer takes its transforms to go from the parent: of a shift only the last
+    entry changes sign.
     """
     x, y, z = file.calibration.tip_pen_mm
+    return _itk_shift((x, y, -z), "for 3D Slicer alone", _remark(file))
+
+
+def _itk(file: CalibrationFile) -> str:
+    """Return an ITK transform that maps points from the tip frame to the pen frame."""
+    words = "TransformPoint maps from the tip frame to the pen frame, mm"
+    return _itk_shift(file.calibration.tip_pen_mm, words, _remark(file))
+
+
+def _itk_shift(shift: Sequence[float], *remarks: str) -> str:
     return _lines(
         "#Insight Transform File V1.0",
-        f"# {_remark(file)}",
+        *(f"# {remark}" for remark in remarks),
         "#Transform 0",
         "Transform: AffineTransform_double_3_3",
-        f"Parameters: 1 0 0 0 1 0 0 0 1 {x!r} {y!r} {-z!r}",
+        f"Parameters: 1 0 0 0 1 0 0 0 1 {' '.join(map(repr, shift))}",
         "FixedParameters: 0 0 0",
     )
 
 
 def _plus(file: CalibrationFile) -> str:
-    """Return the line of a device set of PLUS, for its ``CoordinateDefinitions``."""
+    """Return the ``CoordinateDefinitions`` of a device set of PLUS.
+
+    ``Error`` is the residual of the pivot calibration, mm, as fCal writes it.
+    """
     x, y, z = file.calibration.tip_pen_mm
     when = file.when.strftime("%m%d%y_%H%M%S")
     matrix = f"1 0 0 {x!r} 0 1 0 {y!r} 0 0 1 {z!r} 0 0 0 1"
+    error = f"{file.calibration.rms_mm:.{N_DECIMALS}f}"
     return _lines(
-        f'<Transform From="StylusTip" To="Stylus" Matrix="{matrix}" Date="{when}" />',
         f"<!-- {_remark(file)} -->",
+        "<CoordinateDefinitions>",
+        f'  <Transform From="StylusTip" To="Stylus" Matrix="{matrix}"',
+        f'    Error="{error}" Date="{when}" />',
+        "</CoordinateDefinitions>",
     )
 
 
@@ -203,6 +230,7 @@ FORMATS = (
         "_calibration.json",
         _json,
         message("content.json"),
+        has_status=False,
     ),
     ExportFormat(
         "csv", message("export.csv"), "_tip.csv", _tip, message("content.csv")
@@ -218,7 +246,14 @@ FORMATS = (
         "text", message("export.text"), "_tip.txt", _text, message("content.text")
     ),
     ExportFormat(
-        "slicer", message("export.slicer"), "_tip.tfm", _itk, message("content.slicer")
+        "slicer",
+        message("export.slicer"),
+        "_tip.tfm",
+        _slicer,
+        message("content.slicer"),
+    ),
+    ExportFormat(
+        "itk", message("export.itk"), "_itk.tfm", _itk, message("content.itk")
     ),
     ExportFormat(
         "plus", message("export.plus"), "_plus.xml", _plus, message("content.plus")

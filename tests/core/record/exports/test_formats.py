@@ -5,6 +5,7 @@ import io
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -12,10 +13,22 @@ import numpy as np
 import pytest
 import yaml
 
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.json_records import record_bytes
+from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.record.exports.dcc import Laboratory
+from lightpen.record.exports.export_status import (
+    OVERDUE,
+    RETIRED,
+    status_of,
+    with_status,
+)
 from lightpen.record.exports.formats import FORMATS
+from lightpen.record.library.library_changes import Author, add_item, retire_item
+from lightpen.record.library.tip_library import ItemKind, ListedTip
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
 
 ACCEPTED = datetime(2026, 8, 14, 9, 30, tzinfo=UTC)
@@ -62,8 +75,22 @@ def test_slicer_finds_the_tip_where_it_is(exported: CalibrationFile) -> None:
     np.testing.assert_array_equal(to_parent[:3, 3], TIP)
 
 
+def test_itk_maps_the_origin_of_the_tip_to_the_pen(exported: CalibrationFile) -> None:
+    lines = text("itk", exported).splitlines()
+    (parameters,) = [each for each in lines if each.startswith("Parameters: ")]
+    numbers = np.array(parameters.split()[1:], dtype=float)
+
+    np.testing.assert_array_equal(numbers[:9].reshape(3, 3), np.eye(3))
+    np.testing.assert_array_equal(numbers[9:], TIP)
+
+
 def test_plus_reads_a_transform_of_tip_to_stylus(exported: CalibrationFile) -> None:
-    element = ElementTree.fromstring(text("plus", exported))
+    definitions = ElementTree.fromstring(text("plus", exported))
+    assert definitions.tag == "CoordinateDefinitions"
+    (element,) = definitions
+    assert float(element.attrib["Error"]) == pytest.approx(
+        exported.calibration.rms_mm, abs=5e-7
+    )
     matrix = np.array(element.attrib["Matrix"].split(), dtype=float).reshape(4, 4)
 
     assert (element.attrib["From"], element.attrib["To"]) == ("StylusTip", "Stylus")
@@ -122,6 +149,50 @@ def test_every_format_states_origin_and_grade(
     assert written.endswith("\n")
     assert stated["origin"] in written
     assert stated["verdict"]["grade"] in written
+
+
+@pytest.mark.parametrize("name", [each.name for each in FORMATS if each.has_status])
+def test_every_format_states_that_a_tip_is_not_valid(
+    exported: CalibrationFile, name: str
+) -> None:
+    laboratory = Laboratory("Hall 2", "hall2@example.com", "Berlin", "DE")
+    bad = replace(
+        exported,
+        origin=Origin.SIMULATED,
+        grade=Grade.CHECK,
+        library_status=(RETIRED, OVERDUE),
+    )
+    good = replace(exported, origin=Origin.LIVE, grade=Grade.PASS)
+
+    assert "SIMULATED, CHECK, RETIRED, OVERDUE" in text(name, bad, laboratory)
+    for word in ("SIMULATED", RETIRED, OVERDUE):
+        assert word not in text(name, good, laboratory)
+
+
+def test_retired_and_overdue_tips_are_known_by_their_data_folder(
+    stated: Mapping[str, Any], tmp_path: Path
+) -> None:
+    from benchmarks.small_records import small_record
+
+    names = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1")
+    results = FolderArchive(tmp_path)
+    calibration = small_record()
+    results.store(
+        Result(
+            *(names, ACCEPTED, Grade.PASS, tmp_path / "records" / "swing", ()),
+            calibration=calibration,
+            origin=Origin.LIVE,
+        )
+    )
+    (path,) = results.all_files()
+    file, now = read_calibration(path), calibration.created + timedelta(days=1)
+
+    assert status_of(with_status(file, now)) == ()
+    assert status_of(with_status(file, now + timedelta(days=5000))) == (OVERDUE,)
+    by = Author("Hall 2", "Ann")
+    add_item(tmp_path, ListedTip(id="T-10"), by, now)
+    retire_item(tmp_path, ItemKind.TIP, "T-10", by, now)
+    assert status_of(with_status(file, now)) == (RETIRED,)
 
 
 def test_images_are_a_table_with_a_row_each(

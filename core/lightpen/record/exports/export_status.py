@@ -1,0 +1,53 @@
+"""What an exported tip is besides valid: simulated, not passed, retired or overdue."""
+
+from dataclasses import replace
+from datetime import datetime
+
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.local_time import local_time
+from lightpen.model.limits import StationLimits
+from lightpen.model.origin import Origin
+from lightpen.record.calibrations.calibrations import CalibrationFile
+from lightpen.record.library.tip_library import ItemKind
+from lightpen.record.results.opening import data_folder_of
+from lightpen.record.results.result_folder import FolderArchive
+
+RETIRED, OVERDUE = "RETIRED", "OVERDUE"
+
+
+def with_status(file: CalibrationFile, now: datetime) -> CalibrationFile:
+    """Return a calibration with what its data folder says of its pen and tip.
+
+    Raises
+    ------
+    FileError
+        The library or the limits of the data folder cannot be read.
+    """
+    data = data_folder_of(file.path)
+    if data is None:
+        return file
+    results, names = FolderArchive(data), file.names
+    library, today = results.library(), local_time(now).date()
+    listed = (
+        library.item(ItemKind.PEN, names.pen),
+        library.item(ItemKind.TIP, names.tip),
+    )
+    items = [item for item in listed if item is not None]
+    usual = results.supervision().limits_at(names.station, StationLimits()).due
+    due = library.rule_of(names.tip, usual).due(file.calibration.created)
+    found = []
+    if any(item.is_retired for item in items):
+        found.append(RETIRED)
+    if now > due or any(item.is_overdue(today) for item in items):
+        found.append(OVERDUE)
+    return replace(file, library_status=tuple(found), due=local_time(due).date())
+
+
+def status_of(file: CalibrationFile) -> tuple[str, ...]:
+    """Return why a tip is not simply valid; nothing of one that is."""
+    own = []
+    if file.origin is Origin.SIMULATED:
+        own.append(Origin.SIMULATED.upper())
+    if file.grade is not Grade.PASS:
+        own.append(file.grade.value.upper())
+    return (*own, *file.library_status)
