@@ -64,12 +64,15 @@ from lightpen.record.library.supervision import (
     Signature,
     Supervision,
     approval_of_change,
+    read_supervision,
 )
+from lightpen.record.library.supervision_changes import renew_station_key
 from lightpen.record.library.tip_library import LIBRARY, library_files
 from lightpen.record.results.acceptance import require_in_use
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import Result
+from lightpen.record.signing.keys import chain_of, station_key
 from lightpen.record.swings.journal import JOURNAL, last_verdict
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
@@ -126,6 +129,7 @@ class Logbook:
         except ArchiveError:
             self.database.close()
             raise
+        self._renew_lost_key()
         self._entered = ArchivedFiles(self.database, self.chain)
         self._replicator = (
             Replicator(self.database, self.chain, server) if server else None
@@ -295,6 +299,16 @@ class Logbook:
             if self._replicator is not None:
                 self._replicator.close(LONGEST_FAREWELL_S)
             close_sealed(self.database)
+
+    def _renew_lost_key(self) -> None:
+        """Go on with a new key in a folder that was moved here, without a password."""
+        with suppress(FileError):  # which every acceptance tells
+            guard = read_supervision(self._data)
+            name = (
+                chain_of(guard.station_keys[-1]) if guard.station_keys else self.chain
+            )
+            if not guard.is_guarded and station_key(name) is None:
+                renew_station_key(self._data, self.chain, None, local_now())
 
     def _owed(self) -> Iterator[Path]:
         """Yield the files, and then the swings, that have no entry."""

@@ -56,7 +56,16 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         metavar="NAME",
         help="start of the chain to restore, where the server has several",
     )
-    for action in (check, listed, export, taken, delivered, fetched):
+    renewed = actions.add_parser(
+        "new-key", help="introduce another station key, if the present one was lost"
+    )
+    renewed.add_argument(
+        "--supervisor",
+        metavar="NAME",
+        help="supervisor who approves it, if the data folder has a supervisor "
+        "password; the password is requested, or read from LIGHTPEN_PASSWORD",
+    )
+    for action in (check, listed, export, taken, delivered, fetched, renewed):
         action.add_argument(
             "--data",
             type=Path,

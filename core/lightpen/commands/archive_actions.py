@@ -17,15 +17,17 @@ from lightpen.archive.fetching import fetch
 from lightpen.archive.history import Line, lines
 from lightpen.archive.lazy_logbook import SERVER
 from lightpen.archive.listing import entries_csv
-from lightpen.archive.logbook import ARCHIVE
+from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.archive.queries import EntryFilter, newest
 from lightpen.archive.seal import close_sealed
 from lightpen.archive.server import open_server
 from lightpen.archive.server_setup import server_sql
 from lightpen.commands.console import Command, printing, progress, shown
+from lightpen.commands.supervisor import supervisor_signature
 from lightpen.errors import UsageError
 from lightpen.formats.files import printable
-from lightpen.local_time import local_time
+from lightpen.local_time import local_now, local_time
+from lightpen.record.library.supervision_changes import renew_station_key
 
 CHANGED = 1  # exit status of a check that found something
 
@@ -116,12 +118,24 @@ def _server_sql(options: argparse.Namespace) -> None:
     print(server_sql(), end="")
 
 
+@printing
+def _new_key(options: argparse.Namespace) -> None:
+    data = _data(options)
+    with closing(Logbook(data)) as logbook:
+        signature = supervisor_signature(options.supervisor)
+        public = renew_station_key(data, logbook.chain, signature, local_now())
+        for trouble in logbook.enter_owed():
+            print(shown(str(trouble)))
+    print(f"The station key is {public} from now on.")
+
+
 ACTIONS: dict[str, Command] = {
     "check": _check,
     "list": _list,
     "export": _export,
     "import": _import,
     "deliver": _deliver,
+    "new-key": _new_key,
     "fetch": _fetch,
     "server-sql": _server_sql,
 }

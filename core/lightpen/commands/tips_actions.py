@@ -1,9 +1,7 @@
 """What each ``lightpen tips ...`` does."""
 
 import argparse
-import getpass
 import json
-import os
 from collections.abc import Iterator
 from contextlib import closing
 from datetime import datetime
@@ -17,6 +15,7 @@ from lightpen.archive.database import look_into
 from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.archive.tip_status import statuses
 from lightpen.commands.console import Command, printing, progress, shown
+from lightpen.commands.supervisor import supervisor_signature
 from lightpen.commands.tips import FORGOTTEN
 from lightpen.detection.observations import observe_images
 from lightpen.errors import ArchiveError, NoArchiveError, UsageError
@@ -35,7 +34,6 @@ from lightpen.record.library.library_changes import (
     known_item,
     retire_item,
 )
-from lightpen.record.library.supervision import Signature
 from lightpen.record.library.tip_library import (
     AnyItem,
     AxisOrigin,
@@ -47,7 +45,6 @@ from lightpen.record.library.tip_library import (
     read_library,
 )
 
-PASSWORD = "LIGHTPEN_PASSWORD"  # names the variable with the password of a supervisor
 OF_TIPS = {  # options, by what they say of a tip
     "ball_diameter_mm": "ball_diameter",
     "nominal_tip_mm": "nominal",
@@ -199,12 +196,7 @@ def _point(option: str, words: list[Any]) -> Any:
 
 
 def _author(options: argparse.Namespace) -> Author:
-    signature = None
-    if options.supervisor is not None:
-        password = os.environ.get(PASSWORD)
-        if password is None:
-            password = getpass.getpass("Supervisor's password: ")
-        signature = Signature(options.supervisor, password)
+    signature = supervisor_signature(options.supervisor)
     return Author(options.station, options.operator, options.reason, signature)
 
 

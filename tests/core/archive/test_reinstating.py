@@ -24,10 +24,11 @@ from lightpen.model.limits import DueRule
 from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.library_changes import Author, add_item, retire_item
 from lightpen.record.library.supervision import Signature
-from lightpen.record.library.supervision_changes import set_password
+from lightpen.record.library.supervision_changes import renew_station_key, set_password
 from lightpen.record.library.tip_library import ItemKind, ListedTip
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import result_bytes
+from lightpen.record.signing.keys import key_folder
 from lightpen.record.signing.station import memory_file
 from lightpen.record.swings.names import Names
 
@@ -273,3 +274,33 @@ def test_a_result_that_was_written_by_hand_is_neither_in_force_nor_entered(
     (archive.folder / "000004.json").write_bytes(signed)  # once more, at the end
     with pytest.raises(FileError, match="not signed"):
         archive.in_force("LP-04", "T-10")
+
+
+def lost_key(logbook: Logbook) -> None:
+    (key_folder() / f"{logbook.chain}.key").unlink()
+
+
+def test_a_key_that_a_supervisor_approves_continues_the_chain(
+    data: Path, logbook: Logbook
+) -> None:
+    set_password(data, EVE, EVE.password, local_now())
+    logbook.enter_owed()
+    lost_key(logbook)
+    with closing(Logbook(data)) as moved:
+        with pytest.raises(ArchiveError, match="not in this user account"):
+            moved.enter_note(entries(moved)[0], "Moved.", "Bea")
+        renew_station_key(data, moved.chain, EVE, local_now())
+        assert moved.enter_owed() == ()
+        moved.enter_note(entries(moved)[0], "Moved.", "Bea")
+    assert checked(data).findings == ()
+
+
+def test_without_a_password_a_moved_folder_goes_on_with_a_new_key_and_a_finding(
+    data: Path, logbook: Logbook
+) -> None:
+    lost_key(logbook)
+    with closing(Logbook(data)) as moved:
+        assert moved.enter_owed() == ()
+        moved.enter_note(entries(moved)[0], "Moved.", "Bea")
+    (finding,) = checked(data).findings
+    assert finding.code == "archive.key-unapproved"
