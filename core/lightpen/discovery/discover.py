@@ -18,7 +18,7 @@ from lightpen.detection.pose import MIN_POSE_LEDS
 from lightpen.detection.reasons import Reason
 from lightpen.discovery.hypotheses import Hypothesis, camera_prior, solve_seed
 from lightpen.discovery.labelling import Labelled, label, pixels_of
-from lightpen.discovery.normals import covariance_by_normal, towards_camera
+from lightpen.discovery.normals import FACING, towards_camera
 from lightpen.discovery.numbering import framed, number_by_place, number_by_sketch
 from lightpen.discovery.scale import (
     EXACT_SCALE,
@@ -41,6 +41,7 @@ from lightpen.estimation.bundle.consistency_findings import DIAMETER
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.estimation.uncertainty.disc_normals import effect_of_normals
 from lightpen.estimation.uncertainty.instrument import Parameters
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
@@ -178,7 +179,7 @@ def discover(
     numbers = _in_sightings(found.spots, kept)
     observations = _observations(sightings, start, found.images, numbers)
     camera = _camera_to_adjust(start, request)
-    pen = with_lengths_known(start.pen, lengths)
+    pen = replace(with_lengths_known(start.pen, lengths), normal_sigma=FACING)
     calibration = calibrate(camera, pen, observations)
     _require_length(calibration, request, lengths)
     report(0.95)
@@ -396,7 +397,7 @@ def _discovery_of(
 ) -> Discovery:
     bundle, instrument = calibration.bundle, calibration.instrument
     state, tip = bundle.state, calibration.joint.tip_pen
-    covariance = instrument.covariance + covariance_by_normal(bundle)
+    covariance = instrument.covariance.copy()
     at = instrument.parameters
     budget = calibration.budget.covariance[:3, :3] - instrument.covariance[:3, :3]
     values, vectors = np.linalg.eigh(budget)
@@ -416,6 +417,7 @@ def _discovery_of(
         led_covariance=covariance[at.leds, at.leds],
         scale_sigma=EXACT_SCALE,
         diameter_sigma=diameter_sigma,
+        normal_sigma=effect_of_normals(bundle, FACING).sigma,
         nominal_tip=None,
         expansion=None,
     )

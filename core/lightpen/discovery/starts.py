@@ -14,7 +14,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.pose import CAUCHY_WIDTH, NOISE_FLOOR, robust_sigma
 from lightpen.discovery.factorisation import WeakShape
-from lightpen.discovery.normals import FACING, off_sight, turned_normals, with_normal
+from lightpen.discovery.normals import FACING, off_sight
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     BundleState,
@@ -22,6 +22,7 @@ from lightpen.estimation.bundle.linearised import (
     eliminate,
     views_at,
 )
+from lightpen.estimation.uncertainty.disc_normals import turned_normals, with_normal
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of

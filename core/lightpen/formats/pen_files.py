@@ -19,6 +19,7 @@ A JSON file has
 ``led_sigma``   standard uncertainty of one LED coordinate, optional
 ``scale_sigma`` of all coordinates together, relative, optional
 ``diameter_sigma`` of the diameter, optional
+``normal_sigma`` of a turn common to all normals, rad, optional
 ``expansion``   of the pen by warmth, 1/K, optional
 ``expansion_sigma`` standard uncertainty of that, 1/K, optional
 ``temperature_c`` at which the LEDs were measured, degrees C, optional

@@ -28,6 +28,7 @@ _LED_KEYS = {"led", "x", "y", "z", "normal"}
 _FILE_KEYS = {
     *("units", "leds", "diameter", "nominal_tip", "name", "comment"),
     *("led_sigma", "scale_sigma", "diameter_sigma", "led_covariance"),
+    "normal_sigma",
     *("expansion", "expansion_sigma", "temperature_c"),
     "parent_sha256",
 }

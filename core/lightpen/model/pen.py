@@ -76,6 +76,9 @@ class Pen:
         Its standard uncertainty, 1/K; None if not stated.
     temperature_c : float or None
         Temperature of the LED measurement, degrees Celsius; None if not stated.
+    normal_sigma : float or None
+        Standard uncertainty of a turn common to all normals about each axis across
+        them, rad; None if not stated: they are taken as exact.
     led_covariance : (3 L, 3 L) array or None
         Of all LED coordinates but for the scale that they share, mm^2; None if no more
         than ``led_sigma`` is known.
@@ -93,6 +96,7 @@ class Pen:
     expansion_sigma: float | None = None
     temperature_c: float | None = None
     led_covariance: FloatArray | None = None
+    normal_sigma: float | None = None
 
     @property
     def n_leds(self) -> int:

@@ -16,6 +16,7 @@ from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.priors import Priors, priors_of
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.uncertainty.budget import Budget, ContributionName
+from lightpen.estimation.uncertainty.disc_normals import effect_of_normals
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -95,7 +96,10 @@ def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
     shrinkage_shift = unshrunk.values - bundle.values
     shrinkage_shift[:6] = adjustment.shrinkage_shift
     spread = spread + np.outer(shrinkage_shift, shrinkage_shift)
-    mixing = instrument_mixing(bundle)
+    facing = state.pen.normal_sigma
+    if facing is not None and state.rig.n_cameras == 1:
+        spread = spread + effect_of_normals(unshrunk, facing).covariance
+    mixing = _mixing(bundle)
     return Instrument(
         rig=state.rig,
         pen=state.pen,
@@ -177,7 +181,7 @@ def _with_budget_noise(bundle: Bundle, budget: Budget) -> FloatArray:
     return np.asarray(covariance + (by_tip - 1) * images)
 
 
-def instrument_mixing(bundle: Bundle) -> FloatArray:
+def _mixing(bundle: Bundle) -> FloatArray:
     """Return the parameters of an instrument by the unknowns of a bundle, (q, p)."""
     unknowns, state = bundle.unknowns, bundle.state
     at = parameters_of(state.rig, state.pen)
