@@ -193,6 +193,8 @@ MESSAGES = {
     "length.uncertain": "U (k = 2) of the length at {run} is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not verify the tip. Probe each end more often, and lay the length across the view.",
     "length.no-end": "The points of {run} lie at more than two places: {touch} is {distance:.2f} mm from the others of its end. Was the pen lifted there? Probe only the two ends.",
     "repeatability.tighten": "Next: tighten the tip, inspect the LEDs, calibrate again, and verify the new result.",
+    "repeatability.widen": "Next: average more calibrations, reduce the noise of the images, or use the tip for wider tolerances only.",
+    "repeatability.not-capable": "Not capable: the least of Cg and Cgk is {least:.2f}, {needed:.2f} are needed for a tolerance of {tolerance:g} mm.",
     "repeatability.use-newest": "Next: use the tip of the latest calibration.",
     "repeatability.rode-with-pen": "The tip scatters by {of_tip:.4f} mm over the calibrations, a fixed point probed with it by only {of_point:.4f} mm. A calibration error would move both alike, so something moved with the pen between the calibrations. Look for a tip that is not screwed in firmly, a loose or knocked LED, or LEDs that were measured too coarsely.",
     "repeatability.point-moved": "A fixed point scatters by {of_point:.4f} mm, the tip by only {of_tip:.4f} mm over the calibrations. The tip is stable: the cone or the camera moved between the points, or the tip did not rest in the cone.",

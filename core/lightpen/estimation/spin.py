@@ -25,6 +25,7 @@ from lightpen.model.posture import UPRIGHT_AXIS
 
 MIN_POSES = 10
 MIN_TURN = np.radians(40.0)  # less, and the tilt of the hand hides the axis
+TURN_NOISE = np.radians(1.0)  # by which a turn is measured too small
 MAX_UNCERTAINTY = np.radians(2.0)  # puts the surface of a 10 mm ball 0.003 mm off
 COVERAGE_FACTOR = 2.0
 MOST_ALIKE = 0.98  # lag-1 autocorrelation that can be told from a drift
@@ -84,7 +85,7 @@ def fit_spin(rotations: FloatArray, upwards: FloatArray = UPRIGHT_AXIS) -> SpinF
         turns[:, 1, 0] - turns[:, 0, 1], turns[:, 0, 0] + turns[:, 1, 1]
     )
     turn = float(np.ptp(np.unwrap(angles)))
-    if turn < MIN_TURN:
+    if turn < MIN_TURN - TURN_NOISE:
         raise CalibrationError(
             "spin.little-turn",
             turn=float(np.degrees(turn)),

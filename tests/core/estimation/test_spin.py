@@ -55,6 +55,13 @@ def test_a_pen_that_is_hardly_turned_is_refused() -> None:
         fit_spin(spun(20.0))
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_turn_of_the_stated_angle_suffices(seed: int) -> None:
+    found = fit_spin(spun(40.0, n=40, wobble=np.radians(0.2), seed=seed))
+
+    assert np.degrees(found.turn) == pytest.approx(40, abs=1)
+
+
 def test_too_few_images_are_refused() -> None:
     with pytest.raises(CalibrationError, match="detected in 5 images of the rotation"):
         fit_spin(spun(90.0, n=5))

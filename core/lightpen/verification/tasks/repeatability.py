@@ -36,6 +36,7 @@ BY_CHANCE = 0.01  # that equal variances differ as much, either way
 SHARE_OF_TOLERANCE = 0.2
 CAPABLE = 1.33
 TIGHTEN = message("repeatability.tighten")
+WIDEN = message("repeatability.widen")
 USE_NEWEST = message("repeatability.use-newest")
 
 
@@ -100,10 +101,15 @@ class Capability:
     cgk: FloatArray | None
 
     @property
+    def least(self) -> float:
+        """The least of all."""
+        least = self.cg if self.cgk is None else np.minimum(self.cg, self.cgk)
+        return float(least.min())
+
+    @property
     def is_capable(self) -> bool:
         """Whether all are 1.33 or more."""
-        least = self.cg if self.cgk is None else np.minimum(self.cg, self.cgk)
-        return bool(least.min() >= CAPABLE)
+        return self.least >= CAPABLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,15 +182,14 @@ def measure_repeatability(
     scatter = Scatter(np.array([tip.tip_pen for tip in tips]))
     values, deviation = scatter.points, scatter.deviation
     points_to = None if touched is None else _points_to(deviation, len(tips), touched)
+    study = None if tolerance is None else _capability(values, tolerance, reference)
     return Repeatability(
         tips=tuple(tips),
         control=_control(values),
-        capability=(
-            None if tolerance is None else _capability(values, tolerance, reference)
-        ),
+        capability=study,
         touched=touched,
         points_to=points_to,
-        assessment=_assessment(tips, deviation, points_to, limits),
+        assessment=_assessment(tips, deviation, points_to, study, limits),
     )
 
 
@@ -242,6 +247,7 @@ def _assessment(
     tips: Sequence[TipEstimate],
     deviation: FloatArray,
     points_to: Message | None,
+    study: Capability | None,
     limits: VerificationLimits,
 ) -> VerificationAssessment:
     axis = int(np.argmax(deviation))
@@ -263,6 +269,16 @@ def _assessment(
         )
     if points_to is not None:
         return check(points_to, TIGHTEN if has_ridden else VERIFY_AGAIN)
+    if study is not None and not study.is_capable:
+        return check(
+            message(
+                "repeatability.not-capable",
+                least=study.least,
+                needed=CAPABLE,
+                tolerance=study.tolerance,
+            ),
+            WIDEN,
+        )
     return accepted(
         message(
             "repeatability.good",

@@ -152,6 +152,18 @@ def test_capability_is_that_of_a_type_1_study() -> None:
     assert study.is_capable
 
 
+def test_what_is_not_capable_never_passes() -> None:
+    rng = np.random.default_rng(1)
+    values = PAPER_TIP + 0.001 * rng.standard_normal((50, 3))
+
+    found = measure_repeatability(estimates(values), LIMITS, tolerance=0.02)
+
+    assert found.capability is not None
+    assert not found.capability.is_capable
+    assert found.assessment.grade is Grade.CHECK
+    assert found.assessment.reason.code == "repeatability.not-capable"
+
+
 def test_one_calibration_is_refused() -> None:
     with pytest.raises(CalibrationError, match="does not show repeatability"):
         measure_repeatability(estimates(TABLE_1[:1]), LIMITS)
