@@ -10,6 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.pen_files import read_pen
+from lightpen.simulator.swings import simulate_centers, swing_poses
+
 Run = Callable[..., CompletedProcess[str]]
 N_RUNS = 8
 
@@ -125,6 +129,51 @@ def test_table_1_is_reproduced_from_led_centres_by_one_command(
     ]
     assert max(read(tmp_path / "repeat.json")["std_mm"]) < 0.003
     assert (tmp_path / "chart.svg").read_text().startswith("<svg")
+
+
+def write_touches(path: Path, files: list[str | Path], moved: float) -> None:
+    """Write LED centres of 15 touches, 8 images each, of a tip moved along x, mm."""
+    rng = np.random.default_rng(1)
+    camera, pen = read_camera(Path(files[1])), read_pen(Path(files[3]))
+    tip = np.array(read(Path(files[5]))["tip_pen_mm"]) + np.array([moved, 0, 0])
+    swing = swing_poses(15, rng, pen=pen, camera=camera, tip_pen=tip)
+    R = np.repeat(swing.rotations, 8, axis=0)
+    t = np.repeat(swing.translations, 8, axis=0)
+    images = simulate_centers(camera, pen, R, t, 0.02, rng)
+    lines = ["frame,led,x_px,y_px"]
+    for i, centers in enumerate(images, start=1):
+        lines += [f"{i},{j},{x},{y}" for j, (x, y) in enumerate(centers, start=1)]
+    path.write_text("\n".join(lines), encoding="utf-8")
+
+
+@pytest.mark.parametrize(("moved", "status"), [(0.0, 0), (0.02, 4), (0.3, 3)])
+def test_led_centres_are_verified_and_the_exit_status_tells_the_verdict(
+    *, lightpen: Run, files: list[str | Path], tmp_path: Path, moved: float, status: int
+) -> None:
+    centers = tmp_path / "touches.csv"
+    write_touches(centers, files, moved)
+    verify = ("verify", "fixed-point", "--centers", centers, *files)
+
+    outcome = lightpen(
+        *(*verify, "--exit-by-verdict", "--json", tmp_path / "point.json")
+    )
+
+    assert outcome.returncode == status, outcome.stdout
+    assert "Decision rule: simple acceptance" in outcome.stdout
+    record = read(tmp_path / "point.json")
+    assert len(record["touches"]) == 15  # five images each, three to settle
+    assert {len(each["images"]) for each in record["touches"]} == {5}
+    assert record["tip_change_mm"][0] == pytest.approx(moved, abs=0.015)
+    assert record["inputs"]["images"][0]["file"] == "touches.csv"
+
+
+def test_a_verification_needs_images_or_led_centres(
+    lightpen: Run, files: list[str | Path]
+) -> None:
+    outcome = lightpen("verify", "plane", *files)
+
+    assert outcome.returncode == 2
+    assert "--centers" in outcome.stderr
 
 
 @pytest.fixture

@@ -139,6 +139,13 @@ def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
 
 def _add_ball(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument("--ball-diameter", type=above_zero, metavar="MM", help=what)
+    parser.add_argument(
+        "--ball-uncertainty",
+        type=not_negative,
+        default=0.0,
+        metavar="MM",
+        help="U (k = 2) of the diameter of the ball",
+    )
 
 
 def _add_touches(parser: argparse.ArgumentParser) -> None:
@@ -323,6 +330,7 @@ def _measure(
             instrument=instrument,
             limits=limits,
             ball_diameter=options.ball_diameter,
+            ball_uncertainty=getattr(options, "ball_uncertainty", 0.0),
             nominal_tip=None if nominal is None else np.array(nominal, dtype=float),
             cone_cam=cone_before(calibration, viewers),
             drift=moved if lamp_drift is None else np.maximum(moved, lamp_drift.share),

@@ -195,7 +195,9 @@ def measure_circle(
     variance = float(row @ instrument.covariance @ row) + noise / len(runs) ** 2
     variance += float(drift.max()) ** 2
     uncertainty = float(
-        np.hypot(COVERAGE_FACTOR * np.sqrt(variance), options.radius_uncertainty)
+        np.hypot(
+            COVERAGE_FACTOR * np.sqrt(variance), _known_uncertainty(conditions, options)
+        )
     )
     tip = _tip_evidence(measured, conditions, options)
     return Circle(
@@ -209,6 +211,13 @@ def measure_circle(
     )
 
 
+def _known_uncertainty(conditions: Conditions, options: CircleOptions) -> float:
+    """Return U (k = 2) of the radius by certificate and ball, mm."""
+    is_groove = options.surface is Surface.GROOVE
+    ball = 0.0 if is_groove else conditions.ball_uncertainty / 2
+    return float(np.hypot(options.radius_uncertainty, ball))
+
+
 def _tip_evidence(
     runs: Sequence[CircleRun], conditions: Conditions, options: CircleOptions
 ) -> TipEvidence:
@@ -220,7 +229,8 @@ def _tip_evidence(
         for run in runs
     ]
     is_radial = [np.repeat([1.0, 0.0], len(run.touches)) for run in runs]
-    by_radius = np.concatenate(is_radial) * options.radius_uncertainty / COVERAGE_FACTOR
+    known = _known_uncertainty(conditions, options)
+    by_radius = np.concatenate(is_radial) * known / COVERAGE_FACTOR
     by_points = block_diagonal([ring.by_points for ring in rings])
     drift = np.diag(np.tile(conditions.drift**2, len(points)))
     return tip_evidence(

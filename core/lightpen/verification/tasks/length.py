@@ -160,7 +160,10 @@ def measure_length(
         The points of a place are not of two ends.
     """
     instrument, drift = conditions.instrument, conditions.drift
-    certified, certified_uncertainty = options.length, options.length_uncertainty
+    # Inner and outer faces are off by the radius of the ball at both ends.
+    ball = conditions.ball_uncertainty * (options.surface is not Surface.GROOVE)
+    certified = options.length
+    certified_uncertainty = float(np.hypot(options.length_uncertainty, ball))
     offset = ball_offset(options.surface, conditions.ball_diameter)
     measured, rows, noises, ways, by_points = [], [], [], [], []
     for name, touches in runs:

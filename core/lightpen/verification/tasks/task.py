@@ -140,6 +140,8 @@ class Conditions:
         Where the calibration had the same cone before the same camera, mm.
     drift : (3,) array
         Standard uncertainty of a point by a camera that moved meanwhile, mm.
+    ball_uncertainty : float
+        U (k = 2) of the diameter of the ball, mm.
     """
 
     instrument: Instrument
@@ -148,6 +150,7 @@ class Conditions:
     nominal_tip: FloatArray | None = None
     cone_cam: FloatArray | None = None
     drift: FloatArray = field(default_factory=NO_DRIFT.copy)
+    ball_uncertainty: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,3 +162,22 @@ def test_touches_of_an_end_shrink_the_noise_and_not_what_they_share(
     shared = uncertainty(once, instrument) ** 2 - noise**2
     assert uncertainty(often, exact) == pytest.approx(noise / 2)
     assert uncertainty(often, instrument) ** 2 == pytest.approx(shared + noise**2 / 4)
+
+
+def test_u_of_the_ball_counts_where_faces_are_touched(
+    instrument: Instrument, touching: Touching
+) -> None:
+    touches = touching(np.array([START, END]))
+    known = Conditions(instrument, LIMITS, ball_diameter=3.0)
+
+    def uncertainty(surface: Surface, conditions: Conditions) -> float:
+        beyond = 3.0 * (surface is Surface.BORE)
+        options = LengthOptions(length=LENGTH + beyond, surface=surface)
+        found = measure_length([("here", touches)], conditions, options)
+        return float(found.uncertainties[0])
+
+    by_ball = replace(known, ball_uncertainty=0.02)
+    assert uncertainty(Surface.BORE, by_ball) == pytest.approx(
+        np.hypot(uncertainty(Surface.BORE, known), 0.02)
+    )
+    assert uncertainty(Surface.GROOVE, by_ball) == uncertainty(Surface.GROOVE, known)
