@@ -29,7 +29,8 @@ from benchmarks.mutations import mutated
 from benchmarks.rows import Row
 
 from lightpen.errors import FileError, LightpenError
-from lightpen.formats.camera_files import read_camera, write_camera
+from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.camera_files import read_camera
 from lightpen.formats.decoding import read_image
 from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pen_files import read_pen, read_raw_pen, write_pen

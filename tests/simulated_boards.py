@@ -9,6 +9,7 @@ from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
 from lightpen.intrinsics.boards import Board, BoardKind, marker_dictionary
 from lightpen.intrinsics.start import BoardPoses
 from lightpen.model.camera import Camera
+from lightpen.model.lens_field import LensField
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.sensor import Sensor
 
@@ -29,6 +30,8 @@ def render_board(
     translation: FloatArray,
     blur: float = 0.8,
     bend: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    field: LensField | None = None,
+    uneven: FloatArray | None = None,
 ) -> FloatArray:
     """Return the light of a board on the sensor, (H, W), fraction of full scale.
 
@@ -40,9 +43,16 @@ def render_board(
         Standard deviation of the optics' blur, px.
     bend : tuple of float
         By how much its corners lie away from the camera along x^2, xy and y^2, mm.
+    field : LensField, optional
+        What the lens does beside the camera's distortion.
+    uneven : (N, 2) array, optional
+        By how much the corners of a chessboard are off in its plane, mm.
     """
-    directions = _directions(camera)
-    light = _light(board, _on_board(board, directions, rotation, translation, bend))
+    directions = _directions(camera, field)
+    places = _on_board(board, directions, rotation, translation, bend)
+    if uneven is not None:
+        places = places - _moved(board, places, uneven)
+    light = _light(board, places)
     sigma = blur * SAMPLES
     blurred = cv2.GaussianBlur(light, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)
     size = (camera.width, camera.height)
@@ -59,13 +69,15 @@ def expose_board(light: FloatArray, sensor: Sensor, rng: np.random.Generator) ->
 
 
 @lru_cache(maxsize=2)
-def _directions(camera: Camera) -> FloatArray:
+def _directions(camera: Camera, field: LensField | None = None) -> FloatArray:
     """Return where each sample looks, (S H, S W, 3); a camera is asked many times."""
     x, y = (
         (np.arange(SAMPLES * side) + 0.5) / SAMPLES - 0.5
         for side in (camera.width, camera.height)
     )
     pixels = np.stack(np.meshgrid(x, y), axis=-1)
+    if field is not None:
+        pixels = pixels - field.at(pixels)
     normalised = camera.unproject(pixels)
     return np.concatenate([normalised, np.ones((*normalised.shape[:-1], 1))], axis=-1)
 
@@ -88,6 +100,17 @@ def _on_board(
         u, v = places[..., 0] / half[0], places[..., 1] / half[1]
         height = bend[0] * u * u + bend[1] * u * v + bend[2] * v * v
     return np.asarray(places)
+
+
+def _moved(board: Board, places: FloatArray, uneven: FloatArray) -> FloatArray:
+    """Return how the corners about places are off, linear between them, (..., 2)."""
+    grid = uneven.reshape(board.rows, board.columns, 2).astype(np.float32)
+    at = (places - board.points[0, :2]) / board.pitch
+    x, y = np.moveaxis(at.astype(np.float32), -1, 0)
+    return np.asarray(
+        cv2.remap(grid, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
+        dtype=np.float64,
+    )
 
 
 def _light(board: Board, places: FloatArray) -> FloatArray:

@@ -21,7 +21,8 @@ import cv2
 import numpy as np
 import pytest
 
-from lightpen.formats.camera_files import read_camera, write_camera
+from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.camera_files import read_camera
 
 Run = Callable[..., CompletedProcess[str]]
 Scene = Callable[..., Path]

@@ -15,7 +15,6 @@ from lightpen.commands.console import (
 )
 from lightpen.detection.observations import observe_images
 from lightpen.errors import CalibrationError
-from lightpen.estimation.bundle.consistency_findings import COEFFICIENTS
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report import adjusted_intrinsics
 from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
@@ -90,7 +89,7 @@ def _text(calibration: Calibration, stated: list[float]) -> str:
     lines += [
         f"  {name:<6}{of_file:14.6g}{known:12.2g}{value:16.6g}{now:12.2g}"
         for name, of_file, known, value, now in zip(
-            ("fx", "fy", "cx", "cy", *COEFFICIENTS),
+            ("fx", "fy", "cx", "cy", *camera.distortion_names),
             stated,
             before.tolist(),
             camera.intrinsics.tolist(),

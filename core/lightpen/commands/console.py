@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import wraps
 from pathlib import Path
+from time import monotonic
 from typing import Any, TypeAlias
 
 from msgspec import Struct
@@ -17,6 +18,7 @@ from lightpen.formats.files import A_FILE, printable, unreadable, write_whole
 from lightpen.formats.json_records import record_bytes
 
 DONE, NO_TIP, BAD_INPUT, TO_REPEAT, TO_CHECK = 0, 1, 2, 3, 4
+LINE_INTERVAL = 15.0  # s, of lines of progress
 BAR_WIDTH = 72  # characters
 
 Command: TypeAlias = Callable[[argparse.Namespace], int]
@@ -99,9 +101,17 @@ def are_same(one: Path, other: Path) -> bool:
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar on a terminal, and nothing elsewhere."""
+    """Show a progress bar on a terminal, and elsewhere a line now and then."""
     if not sys.stderr.isatty():
-        yield lambda fraction: None
+        told = monotonic()
+
+        def tell(fraction: float) -> None:
+            nonlocal told
+            if monotonic() - told > LINE_INTERVAL and sys.stderr is not None:
+                told = monotonic()
+                print(f"{title}: {fraction:.0%}", file=sys.stderr, flush=True)
+
+        yield tell
         return
     from tqdm import tqdm
 

@@ -17,7 +17,8 @@ from lightpen.discovery.sightings import (
     sightings_of_centers,
 )
 from lightpen.errors import UsageError
-from lightpen.formats.camera_files import read_camera, write_camera
+from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_unlabelled_centers
 from lightpen.formats.pen_files import read_unchecked_pen, write_pen

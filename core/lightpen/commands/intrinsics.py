@@ -18,13 +18,14 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.errors import UsageError
-from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera, write_camera
+from lightpen.formats.camera_file_writing import CameraForm, write_camera
+from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
 from lightpen.formats.files import printable
 from lightpen.formats.images import find_images
 from lightpen.formats.json_records import plain
 from lightpen.formats.pairing import pair_images
 from lightpen.formats.rig_files import write_rig
-from lightpen.intrinsics.boards import parse_board
+from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.calibration import calibrate_camera
 from lightpen.intrinsics.observing import observe_board, observe_board_of_rig
 from lightpen.intrinsics.pair import calibrate_pair
@@ -34,6 +35,7 @@ from lightpen.intrinsics.report import (
     pair_record,
     pair_text,
 )
+from lightpen.intrinsics.scale_check import ScaleCheck
 from lightpen.intrinsics.views import BoardTolerances
 from lightpen.local_time import local_now
 
@@ -60,6 +62,12 @@ def add_intrinsics(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--serial", default="", metavar="TEXT", help="serial number of the camera"
+    )
+    parser.add_argument(
+        "--form",
+        choices=[form.value for form in CameraForm],
+        default=CameraForm.OPENCV.value,
+        help="layout of the camera file (opencv)",
     )
     _add_temperature(parser)
     parser.add_argument(
@@ -160,13 +168,19 @@ def _add_temperature(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _tolerances(options: argparse.Namespace) -> BoardTolerances:
-    return BoardTolerances(options.flatness, options.squareness, options.scale_sigma)
+def _board(options: argparse.Namespace) -> tuple[Board, BoardTolerances]:
+    """Return the board in mm, as far as it was measured, and its tolerances."""
+    board, scale = parse_board(options.board), options.scale_sigma
+    checked = options.measured or (options.pixel_pitch and (1.0, *options.pixel_pitch))
+    if checked:
+        check = ScaleCheck(*checked)
+        board, scale = check.scaled(board), check.sigma
+    return board, BoardTolerances(options.flatness, options.squareness, scale)
 
 
 @printing
 def _intrinsics(options: argparse.Namespace) -> None:
-    board, tolerances = parse_board(options.board), _tolerances(options)
+    board, tolerances = _board(options)
     source = find_images(*options.images)
     require_other_file(options.json, *source.files, options.out)
     _require_new_file(options.out, *source.files)
@@ -181,7 +195,7 @@ def _intrinsics(options: argparse.Namespace) -> None:
     camera = replace(
         calibration.camera, serial=options.serial, temperature_c=options.temperature
     )
-    write_camera(camera, options.out)
+    write_camera(camera, options.out, CameraForm(options.form))
     print(shown(intrinsics_text(calibration, observed)))
     print(shown(f"\nThe camera file is {options.out}."))
     if options.json is not None:
@@ -191,7 +205,7 @@ def _intrinsics(options: argparse.Namespace) -> None:
 
 @printing
 def _extrinsics(options: argparse.Namespace) -> None:
-    board, tolerances = parse_board(options.board), _tolerances(options)
+    board, tolerances = _board(options)
     names = (options.names[0], options.names[1])
     _require_names(names)
     sources = [find_images(options.left), find_images(options.right)]

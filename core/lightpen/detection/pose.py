@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen.model.camera import Camera
+from lightpen.model.camera import Camera, LensModel
 from lightpen.model.ellipse import ellipse_centers_with_jacobian
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import nearest_rotation, rotation_from_vector
@@ -178,7 +178,7 @@ def fit_paper_poses(
     R, t, solved = _linear_poses(pen.leds, normalised)
     R = np.where(solved[:, None, None], R, rotations)
     t = np.where(solved[:, None], t, translations)
-    ideal = replace(camera, distortion=np.zeros(5))
+    ideal = replace(camera, distortion=np.zeros(5), lens=LensModel.BROWN)
     undistorted = ideal.pixels(normalised)
     problem = CameraReprojection(ideal, pen.leds, pen.normals, 0.0, undistorted)
     R, t = _descend(problem, R, t, robust=False)

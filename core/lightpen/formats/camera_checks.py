@@ -6,7 +6,8 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError, FileError
 from lightpen.formats.entries import Entries
 from lightpen.messages import Message, message
-from lightpen.model.camera import Camera
+from lightpen.model.camera import Camera, LensModel
+from lightpen.model.fisheye import N_COEFFICIENTS
 
 LARGEST_IMAGE = 100_000  # px, along a side
 SMALLEST_FOCAL_LENGTH = 0.02  # of the image's longer side: 175 degrees are seen
@@ -82,8 +83,10 @@ def check_skew(skew: float, entries: Entries) -> None:
         raise FileError("camera-file.skew", name=entries.name, skew=skew)
 
 
-def checked_distortion(coefficients: FloatArray, entries: Entries) -> FloatArray:
-    """Return 5 or 8 coefficients.
+def checked_distortion(
+    coefficients: FloatArray, entries: Entries, lens: LensModel = LensModel.BROWN
+) -> FloatArray:
+    """Return 5 or 8 coefficients, or the 4 of a fisheye.
 
     Raises
     ------
@@ -93,15 +96,17 @@ def checked_distortion(coefficients: FloatArray, entries: Entries) -> FloatArray
     count = len(coefficients)
     if count == 0 and entries.word("distortion_model").casefold() == "none":
         return np.zeros(5)
-    if count not in (4, 5, 8, 12, 14):
+    is_fisheye = lens is LensModel.KANNALA_BRANDT
+    if is_fisheye and count == N_COEFFICIENTS:
+        return coefficients
+    if is_fisheye or count not in (4, 5, 8, 12, 14):
         counted = (
             message("count.one-distortion-coefficient")
             if count == 1
             else message("count.distortion-coefficients", count=count)
         )
-        raise FileError(
-            "camera-file.distortion-count", name=entries.name, counted=counted
-        )
+        code = "fisheye-count" if is_fisheye else "distortion-count"
+        raise FileError(f"camera-file.{code}", name=entries.name, counted=counted)
     if np.any(coefficients[8:]):
         raise FileError("camera-file.distortion-terms", name=entries.name, count=count)
     return np.append(coefficients, 0.0) if count == 4 else coefficients[:8]
@@ -120,7 +125,8 @@ def check_fold(camera: Camera, entries: Entries) -> None:
         np.linspace(0, camera.height - 1, FOLD_SAMPLES),
     )
     try:
-        camera.unproject(np.stack(grid, axis=-1))
+        pixels = np.stack(grid, axis=-1)
+        camera.unproject(pixels[camera.sees(pixels)])
     except CalibrationError as error:
         raise FileError(
             "camera-file.fold",

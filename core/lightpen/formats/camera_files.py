@@ -7,15 +7,19 @@ the same.
 ============ ==========================================================================
 OpenCV       FileStorage as YAML, XML or JSON: ``image_width``, ``image_height`` (or
              ``image_size``), ``camera_matrix``, ``distortion_coefficients``
-ROS          camera_info: the same names, ``distortion_model`` ``plumb_bob`` or
-             ``rational_polynomial``
+ROS          camera_info: the same names, ``distortion_model`` ``plumb_bob``,
+             ``rational_polynomial`` or ``equidistant``
 Kalibr       camchain with one camera: ``intrinsics`` [fx fy cx cy], ``resolution``,
-             ``distortion_model`` ``radtan``, ``distortion_coeffs``
+             ``distortion_model`` ``radtan`` or ``equidistant``, ``distortion_coeffs``
 MATLAB       cameraParameters or cameraIntrinsics by ``jsonencode``:
              ``FocalLength`` and ``PrincipalPoint``, ``K`` or ``IntrinsicMatrix``;
              ``RadialDistortion``, ``TangentialDistortion``, ``ImageSize``. Its first
              pixel is (1, 1).
 ============ ==========================================================================
+
+A fisheye has ``distortion_model`` ``equidistant`` (or ``fisheye``, ``kannala_brandt``)
+and the 4 coefficients of OpenCV's module ``fisheye``, in the layouts of OpenCV, ROS and
+Kalibr.
 
 Optional in all: ``intrinsics_covariance``, square, of fx fy cx cy and the distortion
 coefficients; or their standard deviations ``std_deviations_intrinsics``, in the order
@@ -28,7 +32,6 @@ serial number of the camera, ``camera_serial``; how warm it was,
 (a row u v for each node) and ``covariance``.
 """
 
-import json
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -38,7 +41,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.errors import FileError, UsageError
+from lightpen.errors import FileError
 from lightpen.formats.camera_checks import (
     check_fold,
     check_pinhole,
@@ -48,9 +51,9 @@ from lightpen.formats.camera_checks import (
 )
 from lightpen.formats.documents import parse_document
 from lightpen.formats.entries import Entries, counted_numbers, is_covariance
-from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
+from lightpen.formats.files import MEGABYTE, printable, quoted, read_text
 from lightpen.messages import Message, message
-from lightpen.model.camera import Camera
+from lightpen.model.camera import Camera, LensModel
 from lightpen.model.lens_field import MOST, LensField
 
 CAMERA_FILE = message("file.camera")
@@ -82,7 +85,7 @@ _FIELD_ENTRIES = (
     *("amplitude", "correlation_length", "columns", "rows", "values", "covariance"),
 )
 _MODELS = {"plumb_bob", "rational_polynomial", "radtan", "none"}
-_FISHEYE = {"equidistant", "fisheye", "kannala_brandt", "kannala_brandt4", "fov"}
+_FISHEYE = {"equidistant", "fisheye", "kannala_brandt", "kannala_brandt4"}
 _MONTHS = [
     *("Jan", "Feb", "Mar", "Apr", "May", "Jun"),
     *("Jul", "Aug", "Sep", "Oct", "Nov", "Dec"),
@@ -124,26 +127,6 @@ def read_camera(path: Path) -> Camera:
     return _from_opencv(entries)
 
 
-def write_camera(camera: Camera, path: Path) -> None:
-    """Write the intrinsics of a camera as FileStorage of OpenCV, to the last digit.
-
-    Parameters
-    ----------
-    path : Path
-        Name ending in .yaml or .yml.
-
-    Raises
-    ------
-    UsageError
-        The name has another suffix.
-    FileError
-        The file cannot be written.
-    """
-    if path.suffix.lower() not in (".yaml", ".yml"):
-        raise UsageError("camera-file.suffix", name=printable(path.name))
-    write_whole(path, "".join(f"{line}\n" for line in _opencv_lines(camera)).encode())
-
-
 def _only_camera(entries: Entries, chain: Sequence[str]) -> Entries:
     if len(chain) > 1:
         raise FileError(
@@ -153,13 +136,14 @@ def _only_camera(entries: Entries, chain: Sequence[str]) -> Entries:
 
 
 def _from_opencv(entries: Entries) -> Camera:
-    _check_model(entries, "distortion_model")
+    lens = _lens(entries)
     matrix = entries.counted(9, *_MATRIX).reshape(3, 3)
     return _camera(
         entries,
         _size(entries),
         _pinhole(matrix, entries),
         entries.numbers(*_DISTORTION),
+        lens,
     )
 
 
@@ -169,9 +153,10 @@ def _from_kalibr(entries: Entries) -> Camera:
         raise FileError(
             "camera-file.not-pinhole", name=entries.name, model=quoted(model)
         )
-    _check_model(entries, "distortion_model")
+    lens = _lens(entries)
     pinhole = entries.counted(4, "intrinsics")
-    return _camera(entries, _size(entries), pinhole, entries.numbers(*_DISTORTION))
+    coefficients = entries.numbers(*_DISTORTION)
+    return _camera(entries, _size(entries), pinhole, coefficients, lens)
 
 
 def _from_matlab(entries: Entries) -> Camera:
@@ -200,14 +185,17 @@ def _from_matlab(entries: Entries) -> Camera:
     return _camera(entries, (width, height), pinhole, coefficients)
 
 
-def _check_model(entries: Entries, key: str) -> None:
-    model = entries.word(key).casefold()
+def _lens(entries: Entries) -> LensModel:
+    model = entries.word("distortion_model").casefold().replace("-", "_")
     if model in _FISHEYE:
+        return LensModel.KANNALA_BRANDT
+    if model == "fov":
         raise _fisheye(entries.name, model)
     if model and model not in _MODELS:
         raise FileError(
             "camera-file.distortion-model", name=entries.name, model=quoted(model)
         )
+    return LensModel.BROWN
 
 
 def _fisheye(name: str | Message, model: str) -> FileError:
@@ -236,10 +224,11 @@ def _camera(
     size: tuple[float, float],
     pinhole: FloatArray,
     coefficients: FloatArray,
+    lens: LensModel = LensModel.BROWN,
 ) -> Camera:
     width, height = checked_size(size, entries.name)
     check_pinhole(pinhole, width, height, entries.name)
-    distortion = checked_distortion(coefficients, entries)
+    distortion = checked_distortion(coefficients, entries, lens)
     fx, fy, cx, cy = map(float, pinhole)
     camera = Camera(
         width=width,
@@ -254,6 +243,7 @@ def _camera(
         serial=_serial(entries),
         temperature_c=_temperature(entries),
         lens_field=_lens_field(entries, width, height),
+        lens=lens,
     )
     check_fold(camera, entries)
     return camera
@@ -369,58 +359,3 @@ def _lens_field(entries: Entries, width: int, height: int) -> LensField | None:
     return replace(
         prior, columns=columns, rows=rows, values=values, covariance=covariance
     )
-
-
-def _opencv_lines(camera: Camera) -> list[str]:
-    """Return the lines of a FileStorage of OpenCV."""
-    lines = [
-        "%YAML:1.0",
-        "---",
-        f"image_width: {camera.width}",
-        f"image_height: {camera.height}",
-        *_matrix_lines("camera_matrix", camera.matrix),
-        *_matrix_lines("distortion_coefficients", camera.distortion[None]),
-    ]
-    if camera.covariance is not None:
-        lines += _matrix_lines("intrinsics_covariance", camera.covariance)
-    if camera.calibrated_on is not None:
-        lines.append(f'calibration_date: "{camera.calibrated_on.isoformat()}"')
-    if camera.serial:
-        lines.append(f"camera_serial: {json.dumps(camera.serial, ensure_ascii=False)}")
-    if camera.temperature_c is not None:
-        lines.append(f"calibration_temperature: {_decimal(camera.temperature_c)}")
-    if camera.lens_field is not None:
-        lines += ["lens_field:", *_field_lines(camera.lens_field)]
-    return lines
-
-
-def _field_lines(field: LensField) -> list[str]:
-    """Return the lines below ``lens_field``."""
-    lines = [
-        f"amplitude: {_decimal(field.amplitude)}",
-        f"correlation_length: {_decimal(field.length)}",
-        f"columns: {field.columns}",
-        f"rows: {field.rows}",
-        *_matrix_lines("values", field.values),
-        *_matrix_lines("covariance", field.covariance),
-    ]
-    return ["   " + line.replace("\n", "\n   ") for line in lines]
-
-
-def _matrix_lines(name: str, matrix: FloatArray) -> list[str]:
-    rows = ",\n      ".join(", ".join(map(_decimal, row)) for row in matrix)
-    return [
-        f"{name}: !!opencv-matrix",
-        f"   rows: {len(matrix)}",
-        f"   cols: {matrix.shape[1]}",
-        "   dt: d",
-        f"   data: [ {rows} ]",
-    ]
-
-
-def _decimal(value: float) -> str:
-    """Return the shortest round-trip text of a float in YAML 1.1."""
-    text = repr(float(value))
-    if "e" in text and "." not in text:
-        return text.replace("e", ".0e")
-    return text

@@ -33,10 +33,10 @@ from lightpen.intrinsics.distortion import (
 )
 from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
 from lightpen.intrinsics.start import start_board_poses, start_camera
-from lightpen.intrinsics.uncertainty_map import error_fields
+from lightpen.intrinsics.uncertainty_map import error_fields, map_uncertainty
 from lightpen.intrinsics.variance_components import MixedFit, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
-from lightpen.messages import Message
+from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.quantiles import normal_quantile
 
@@ -47,6 +47,10 @@ OFF_VIEW = 4.0  # times the median rms of the views
 FINEST = 1e-3  # px; exact points are off by rounding alone
 MOST_OFF = 0.2  # of the points
 WORST_RMS = 0.004  # of the image's longer side: no flat board of these squares
+# Uncertainty of projections over the image, of its longer side.
+UNCERTAIN, MOST_UNCERTAIN = 0.005, 0.02
+FARTHEST = np.tan(np.radians(84.0))  # in the normalised plane
+MIN_POINTS = 6  # of a view
 LARGEST_FOCAL_SIGMA = 0.02  # relative
 LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
 CLUSTERED = 2.0  # times the variance that views of one camera scatter by
@@ -140,6 +144,7 @@ def calibrate_camera(
     """
     require_views(views)
     start = start_camera(views, FEW)
+    views = _before(views, start)
     placed = np.isfinite(start_board_poses(start, views).translations[:, 0])
     views, unplaced = _parted(views, placed)
     views, duplicates = without_duplicates(views)
@@ -169,8 +174,8 @@ def calibrate_camera(
         remarks.append(message_on_duplicates(views.n_views, duplicates))
     if change is not None:
         remarks.append(message_on_change(change))
-    if found.choice.remark is not None:
-        remarks.append(found.choice.remark)
+    open_lens = _message_on_projection(found.adjustment)
+    remarks += [each for each in (found.choice.remark, open_lens) if each is not None]
     at = found.adjustment.of_intrinsics(0)
     camera = replace(
         found.adjustment.state.cameras[0],
@@ -237,7 +242,20 @@ def _calibrated(
     choice, fitted, held_out = choose_distortion(kept, tolerances, fitted, report)
     _require_determined(fitted)
     _require_no_fold(fitted.state.cameras[0])
+    _message_on_projection(fitted)
     return _Found(kept, left_out, denied, choice, held_out, fit_effects(kept, fitted))
+
+
+def _before(views: Views, camera: Camera) -> Views:
+    """Return the views without points so far off the axis that they may be behind."""
+    with np.errstate(invalid="ignore"):
+        off = np.linalg.norm(camera.unproject(views.pixels[:, 0]), axis=-1)
+    is_far = off > FARTHEST
+    if not is_far.any():
+        return views
+    pixels = np.where(is_far[:, None, :, None], np.nan, views.pixels)
+    left = replace(views, pixels=pixels)
+    return left.chosen(left.seen.sum(axis=(1, 2)) >= MIN_POINTS)
 
 
 def require_views(views: Views) -> None:
@@ -300,6 +318,22 @@ def _n_points_left_out(views: Views, kept: Views) -> int:
 def _require_no_fold(camera: Camera) -> None:
     if folds(camera):
         raise CalibrationError("intrinsics.folds")
+
+
+def _message_on_projection(fitted: BoardFit) -> Message | None:
+    """Return the message on a lens that the views leave open.
+
+    Raises
+    ------
+    CalibrationError
+        They do so over most of the image.
+    """
+    camera, at = fitted.state.cameras[0], fitted.of_intrinsics(0)
+    px = map_uncertainty(camera, fitted.covariance[at, at]).typical
+    share = px / max(camera.image_size)
+    if share > MOST_UNCERTAIN:
+        raise CalibrationError("intrinsics.uncertain", px=px)
+    return message("intrinsics.uncertain", px=px) if share > UNCERTAIN else None
 
 
 def _require_determined(fitted: BoardFit) -> None:

@@ -1,4 +1,4 @@
-"""Choice of the number of distortion coefficients by cross-validation.
+"""Choice of the lens model by cross-validation: 5 or 8 coefficients, or a fisheye.
 
 The gain by more coefficients is that in views which they were not fitted to. Where no
 view reaches the corners of the image, the coefficients may fold it there; then a prior
@@ -15,13 +15,25 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import FINEST, adjust_board, fit_board_poses
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
+from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.uncertainty_map import error_fields
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.messages import Message, message
-from lightpen.model.camera import Camera
+from lightpen.model.camera import Camera, LensModel
 
-FEW, MANY = 5, 8  # distortion coefficients
+FEW, MANY, FISHEYE = 5, 8, 4  # distortion coefficients
+CODES = {
+    FEW: "intrinsics.five",
+    MANY: "intrinsics.eight",
+    FISHEYE: "intrinsics.fisheye",
+}
+OTHER_CODES = {
+    FEW: "held-out.five",
+    MANY: "held-out.eight",
+    FISHEYE: "held-out.fisheye",
+}
+WIDE = 0.6  # distance in the normalised plane: 31 degrees off the axis
 FOLDING = {FEW: [4], MANY: [5, 6, 7]}  # which of them fold: k3, and the denominator's
 PULLS = (0.1, 0.03, 0.01, 0.003, 0.001, 1e-4, 1e-10)  # the weakest first
 N_FOLDS = 5
@@ -32,39 +44,36 @@ SIGMAS = 2.0  # of the mean gain of a view
 
 @dataclass(frozen=True)
 class Choice:
-    """Why so many distortion coefficients.
+    """Why this lens model.
 
     Attributes
     ----------
-    held_out : float
-        Distance of points in views that were not fitted to, with 5 coefficients, px
-        rms.
-    held_out_more : float or None
-        The same with 8; None where the views do not tell so many.
+    n_coefficients : int
+        5 or 8, or 4 of a fisheye.
+    held_out : dict of int to float
+        Distance of points in views that were not fitted to, px rms, with each number of
+        coefficients that the views tell.
     pull : float or None
         Standard deviation about 0 that was assumed of k3, or of k4 k5 k6, as they
         folded the image; None where they did not.
     """
 
     n_coefficients: int
-    held_out: float
-    held_out_more: float | None
+    held_out: dict[int, float]
     pull: float | None = None
 
     @property
     def message(self) -> Message:
         """It in words."""
-        if self.held_out_more is None:
-            return message("intrinsics.five-only", held_out=self.held_out)
-        if self.n_coefficients == MANY:
-            return message(
-                "intrinsics.eight",
-                held_out=self.held_out,
-                held_out_more=self.held_out_more,
-            )
-        return message(
-            "intrinsics.five", held_out=self.held_out, held_out_more=self.held_out_more
+        own = self.held_out[self.n_coefficients]
+        others = tuple(
+            message(OTHER_CODES[n], held_out=rms)
+            for n, rms in self.held_out.items()
+            if n != self.n_coefficients
         )
+        if not others:
+            return message(f"{CODES[self.n_coefficients]}-only", held_out=own)
+        return message(CODES[self.n_coefficients], held_out=own, others=others)
 
     @property
     def remark(self) -> Message | None:
@@ -83,25 +92,66 @@ def choose_distortion(
     fitted: BoardFit,
     report: Callable[[float], None],
 ) -> tuple[Choice, BoardFit, FloatArray]:
-    """Return the number of coefficients, their fit, and the cross-validation errors."""
-    few = _Drawn(fitted, None)
-    if folds(few.camera):
-        few = _unfolded(views, tolerances, few.camera) or few
-    errors = _held_out(views, tolerances, few)
+    """Return the lens model, its fit, and the cross-validation errors.
+
+    A model that has more coefficients, or that the fit is not of, must be better.
+    """
+    first = _Drawn(fitted, None)
+    others: list[Callable[[], _Drawn | None]]
+    if first.camera.lens is LensModel.BROWN:
+        if folds(first.camera):
+            first = _unfolded(views, tolerances, first.camera) or first
+        others = [lambda: _richer(views, tolerances, first)]
+        if _is_wide(first.camera, views):
+            others.append(lambda: _converted(views, tolerances, first.camera, FISHEYE))
+    else:
+        others = [
+            lambda: _converted(views, tolerances, first.camera, FEW),
+            lambda: _converted(views, tolerances, first.camera, MANY),
+        ]
+    best, errors = first, _held_out(views, tolerances, first)
+    held_out = {best.n_coefficients: rms_together(errors, views)}
     report(0.5)
-    rms, rms_more = rms_together(errors, views), None
-    many = _richer(views, tolerances, few)
-    if many is not None:
+    for other in others:
         with suppress(CalibrationError):  # a part of the views does not tell so many
-            errors_more = _held_out(views, tolerances, many)
-            rms_more = rms_together(errors_more, views)
+            trial = other()
+            if trial is None:
+                continue
+            trial_errors = _held_out(views, tolerances, trial)
+            rms = rms_together(trial_errors, views)
+            held_out[trial.n_coefficients] = rms
             # By how many times, so that no one view decides alone.
-            gains = np.log(np.maximum(errors, FINEST) / np.maximum(errors_more, FINEST))
+            gains = np.log(
+                np.maximum(errors, FINEST) / np.maximum(trial_errors, FINEST)
+            )
             chance = float(gains.std(ddof=1)) / len(gains) ** 0.5
-            if rms_more < (1 - WORTH) * rms and gains.mean() > SIGMAS * chance:
-                return Choice(MANY, rms, rms_more, many.pull), many.fitted, errors_more
+            is_better = rms < (1 - WORTH) * held_out[best.n_coefficients]
+            if is_better and gains.mean() > SIGMAS * chance:
+                best, errors = trial, trial_errors
     report(0.8)
-    return Choice(FEW, rms, rms_more, few.pull), few.fitted, errors
+    return Choice(best.n_coefficients, held_out, best.pull), best.fitted, errors
+
+
+def _is_wide(camera: Camera, views: Views) -> bool:
+    """Tell whether points were seen so far off the axis that a fisheye differs."""
+    pixels = views.pixels[:, 0][views.seen[:, 0]]
+    off = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
+    return bool(np.linalg.norm(off, axis=-1).max() > WIDE)
+
+
+def _converted(
+    views: Views, tolerances: BoardTolerances, camera: Camera, n_coefficients: int
+) -> "_Drawn | None":
+    """Return the fit of another lens model."""
+    near = convert_lens(camera, n_coefficients)
+    if near is None:
+        return None
+    found = _Drawn(fit_camera(views, tolerances, near), None)
+    if not folds(found.camera):
+        return found
+    if n_coefficients == FISHEYE:
+        return None
+    return _unfolded(views, tolerances, near)
 
 
 def fit_camera(
@@ -160,6 +210,10 @@ class _Drawn:
     def camera(self) -> Camera:
         return self.fitted.state.cameras[0]
 
+    @property
+    def n_coefficients(self) -> int:
+        return len(self.camera.distortion)
+
 
 def _unfolded(views: Views, tolerances: BoardTolerances, near: Camera) -> _Drawn | None:
     """Return the fit with the weakest regularisation that does not fold the image."""
@@ -208,5 +262,5 @@ def rough_poses(near: Camera, views: Views) -> BoardPoses:
     try:
         return start_board_poses(near, views)
     except CalibrationError:
-        straight = replace(near, distortion=np.zeros_like(near.distortion))
+        straight = replace(near, distortion=np.zeros(FEW), lens=LensModel.BROWN)
         return start_board_poses(straight, views)

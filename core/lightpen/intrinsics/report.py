@@ -61,7 +61,7 @@ def measure_regions(fitted: BoardFit, camera: Camera) -> Regions:
     return Regions(n_points, np.sqrt(squares / counts), sums / counts[..., None])
 
 
-NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+PINHOLE = ("fx", "fy", "cx", "cy")
 SHAPE_NAMES = (
     "stretch",
     "shear",
@@ -85,7 +85,10 @@ def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> 
     lines += [
         f"  {name:<{TITLE - 2}}{value:>18.6g}{of:>14.2g}"
         for name, value, of in zip(
-            NAMES, camera.intrinsics.tolist(), u.tolist(), strict=False
+            (*PINHOLE, *camera.distortion_names),
+            camera.intrinsics.tolist(),
+            u.tolist(),
+            strict=False,
         )
     ]
     lines += [
@@ -151,8 +154,9 @@ def intrinsics_record(
         "held_out_rms_px": calibration.held_out_rms,
         "distortion_choice": {
             "coefficients": calibration.choice.n_coefficients,
-            "held_out_rms_px_5": calibration.choice.held_out,
-            "held_out_rms_px_8": calibration.choice.held_out_more,
+            "held_out_rms_px_5": calibration.choice.held_out.get(5),
+            "held_out_rms_px_8": calibration.choice.held_out.get(8),
+            "held_out_rms_px_fisheye": calibration.choice.held_out.get(4),
             "reason": calibration.choice.message,
         },
         "effects": _effects_record(calibration.effects),
@@ -298,7 +302,7 @@ def _halves_lines(calibration: CameraCalibration) -> list[str]:
     differences = ", ".join(
         f"{name} {value:+.2f} \u00b1 {u:.2f}"
         for name, value, u in zip(
-            NAMES,
+            PINHOLE,
             halves.difference.tolist(),
             halves.expanded_uncertainty.tolist(),
             strict=False,
@@ -380,12 +384,14 @@ def _effects_record(effects: MixedFit) -> dict[str, Any]:
 
 def _camera_record(camera: Camera) -> dict[str, Any]:
     assert camera.covariance is not None
+    names = (*PINHOLE, *camera.distortion_names)
     return {
         "image_size": camera.image_size,
-        "intrinsics": dict(zip(NAMES, camera.intrinsics.tolist(), strict=False)),
+        "lens_model": camera.lens.value,
+        "intrinsics": dict(zip(names, camera.intrinsics.tolist(), strict=True)),
         "expanded_uncertainty": dict(
             zip(
-                NAMES,
+                names,
                 (COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))).tolist(),
                 strict=False,
             )

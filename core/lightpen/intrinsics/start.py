@@ -17,9 +17,14 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.intrinsics.views import Views
-from lightpen.model.camera import Camera
+from lightpen.model.camera import Camera, LensModel
+from lightpen.model.fisheye import N_COEFFICIENTS
 
 USUAL_FOCAL_LENGTH = 1.5  # of the longer side of the image, where the views tell none
+FISHEYE_FOCALS = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)  # of the longer side
+STRAIGHTER = 0.5  # times the bend of rows by a pinhole
+FARTHEST = np.tan(np.radians(75.0))  # in the normalised plane, for a first pose
+MIN_POINTS = 6
 SHORTEST, LONGEST = 0.2, 50.0  # of the longer side
 
 
@@ -31,7 +36,51 @@ class BoardPoses(NamedTuple):
 
 
 def start_camera(views: Views, n_coefficients: int) -> Camera:
-    """Return a camera without distortion that the views of one camera are near to."""
+    """Return a camera that the views of one camera are near to.
+
+    It has no distortion, or that of an equidistant fisheye, in which straight rows of
+    points are straighter.
+    """
+    pinhole = _start_pinhole(views, n_coefficients)
+    fisheye = _start_fisheye(views)
+    is_straighter = _bend(fisheye, views) < STRAIGHTER * _bend(pinhole, views)
+    return fisheye if is_straighter else pinhole
+
+
+def _start_fisheye(views: Views) -> Camera:
+    """Return the equidistant camera in which the board is flattest."""
+    width, height = views.image_sizes[0]
+    cameras = [
+        Camera(
+            *(width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)),
+            distortion=np.zeros(N_COEFFICIENTS),
+            lens=LensModel.KANNALA_BRANDT,
+        )
+        for focal in np.array(FISHEYE_FOCALS) * max(width, height)
+    ]
+    return min(cameras, key=lambda camera: _bend(camera, views))
+
+
+def _bend(camera: Camera, views: Views) -> float:
+    """Return how far points lie from homographies of the board, px rms."""
+    squares, count = 0.0, 0
+    for pixels, seen in zip(views.pixels[:, 0], views.seen[:, 0], strict=True):
+        normalised = camera.unproject(pixels[seen])
+        near = np.linalg.norm(normalised, axis=-1) < FARTHEST
+        if near.sum() < MIN_POINTS:
+            continue
+        flat = views.board.points[seen, :2][near]
+        H, _ = cv2.findHomography(flat, normalised[near])
+        if H is None:
+            continue
+        lifted = np.concatenate([flat, np.ones((len(flat), 1))], axis=1) @ H.T
+        there = camera.pixels(lifted[:, :2] / lifted[:, 2:])
+        squares += float(np.sum(np.square(there - pixels[seen][near])))
+        count += 2 * len(flat)
+    return float(np.sqrt(squares / count)) if count else np.inf
+
+
+def _start_pinhole(views: Views, n_coefficients: int) -> Camera:
     width, height = views.image_sizes[0]
     middle = 0.5 * np.array([width - 1, height - 1])
     longer = max(width, height)
@@ -83,9 +132,13 @@ def start_board_poses(camera: Camera, views: Views, which: int = 0) -> BoardPose
     ):
         if not seen.any():
             continue
+        rays = camera.unproject(pixels[seen])
+        near = np.linalg.norm(rays, axis=-1) < FARTHEST
+        if near.sum() < MIN_POINTS:
+            near[:] = True
         found, turns, shifts, _ = cv2.solvePnPGeneric(
-            points[seen],
-            camera.unproject(pixels[seen])[:, None],
+            points[seen][near],
+            rays[near][:, None],
             np.eye(3),
             np.zeros(5),
             flags=cv2.SOLVEPNP_IPPE,

@@ -29,7 +29,7 @@ class UncertaintyMap:
     pixels : (7, 9, 2) array
         Where in the image, px.
     sigmas : (7, 9) array
-        Along the worst direction there, px.
+        Along the worst direction there, px; NaN where a fisheye sees nothing.
     """
 
     pixels: FloatArray
@@ -43,12 +43,12 @@ class UncertaintyMap:
     @property
     def typical(self) -> float:
         """Root mean square over the image, px."""
-        return float(np.sqrt(np.mean(self.sigmas**2)))
+        return float(np.sqrt(np.nanmean(self.sigmas**2)))
 
     @property
     def worst(self) -> float:
         """The largest, px."""
-        return float(self.sigmas.max())
+        return float(np.nanmax(self.sigmas))
 
 
 def map_uncertainty(camera: Camera, covariance: FloatArray) -> UncertaintyMap:
@@ -56,19 +56,25 @@ def map_uncertainty(camera: Camera, covariance: FloatArray) -> UncertaintyMap:
     fields = error_fields(camera)
     by_place = fields @ covariance @ np.swapaxes(fields, -1, -2)
     sigmas = np.sqrt(np.maximum(np.linalg.eigvalsh(by_place)[..., -1], 0.0))
+    sigmas[~camera.sees(_pixels(camera).reshape(-1, 2))] = np.nan
     return UncertaintyMap(_pixels(camera), sigmas.reshape(ROWS, COLUMNS))
 
 
 def error_fields(camera: Camera) -> FloatArray:
     """Return how errors of the intrinsics move the image, (63, 2, 4 + n), px.
 
-    The turn that explains most of each is left out.
+    The turn that explains most of each is left out; 0 where a fisheye sees nothing.
     """
-    directions = camera.unproject(_pixels(camera).reshape(-1, 2))
+    pixels = _pixels(camera).reshape(-1, 2)
+    seen = camera.sees(pixels)
+    directions = camera.unproject(pixels)
+    directions[~seen] = 0.0
     points = np.concatenate([directions, np.ones((len(directions), 1))], axis=1)
     by_point = camera.project_with_jacobian(points).jacobian
+    by_point[~seen] = 0.0
     turns = (-by_point @ skew(points)).reshape(-1, 3)
     fields = camera.intrinsics_jacobian(directions)
+    fields[~seen] = 0.0
     flat = fields.reshape(len(turns), -1)
     explained = turns @ np.linalg.lstsq(turns, flat, rcond=None)[0]
     return np.asarray((flat - explained).reshape(fields.shape))

@@ -45,6 +45,12 @@ class LensModel(StrEnum):
     KANNALA_BRANDT = "kannala-brandt"
 
 
+def lens_model_of(n_coefficients: int) -> LensModel:
+    """Return the model that has as many distortion coefficients."""
+    is_fisheye = n_coefficients == fisheye.N_COEFFICIENTS
+    return LensModel.KANNALA_BRANDT if is_fisheye else LensModel.BROWN
+
+
 class PointMap(NamedTuple):
     """Image of points under a map, with the Jacobian at each.
 

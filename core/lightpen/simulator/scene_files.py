@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.formats.camera_files import write_camera
+from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import why_unwritten, write_whole
 from lightpen.formats.pen_files import write_pen
@@ -36,7 +36,6 @@ from lightpen.simulator.swings import leds_in_camera, rim_gaps
 
 Json: TypeAlias = dict[str, Any]
 
-DISTORTION_NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 N_THREADS = 2  # one renders while another compresses
 NOTES = (
     "u = R x + T. proj: projected LED centre; ellipse_center: centre of the exact "
@@ -223,7 +222,9 @@ def scene_truth(plan: ScenePlan, folder: str = "images/") -> Json:
             "fy": camera.fy,
             "cx": camera.cx,
             "cy": camera.cy,
-            **dict(zip(DISTORTION_NAMES, camera.distortion.tolist(), strict=False)),
+            **dict(
+                zip(camera.distortion_names, camera.distortion.tolist(), strict=True)
+            ),
         },
         "pen": _pen_truth(plan),
         "cone_point": scene.cone_cam.tolist(),

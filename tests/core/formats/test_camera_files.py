@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, LightpenError, UsageError
-from lightpen.formats.camera_files import FOCAL_CORRELATION, read_camera, write_camera
-from lightpen.model.camera import Camera
+from lightpen.formats.camera_file_writing import CameraForm, write_camera
+from lightpen.formats.camera_files import FOCAL_CORRELATION, read_camera
+from lightpen.model.camera import Camera, LensModel
 from lightpen.model.lens_field import LensField
 
 DISTORTION = np.array([-0.082, 0.105, 3e-4, -2e-4, 1 / 3])
@@ -399,7 +400,6 @@ def test_a_flaw_of_a_camera_file_is_named(
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("radtan", "equidistant", r"fisheye lens \(equidistant\)"),
         ("radtan", "fov", "fisheye lens"),
         ("radtan", "thin_prism", 'model "thin_prism", which is not supported'),
         ("pinhole", "omni", 'model "omni"; the model pinhole is needed'),
@@ -417,8 +417,50 @@ def test_a_flaw_of_a_chain_is_named(
         read_camera(saved(tmp_path, KALIBR.replace(old, new, 1)))
 
 
-def test_an_equidistant_file_of_ros_is_refused(tmp_path: Path) -> None:
-    assert "fisheye lens" in refusal(tmp_path, ROS.replace("plumb_bob", "equidistant"))
+@pytest.mark.parametrize("form", [*CameraForm])
+def test_a_fisheye_is_read_back_as_written(tmp_path: Path, form: CameraForm) -> None:
+    camera = Camera(
+        *(1280, 800, 380.0, 381.0, 645.0, 396.0),
+        distortion=np.array([-0.02, 0.01, -0.006, 0.001]),
+        covariance=np.diag(np.arange(1.0, 9.0)),
+        serial="7",
+        lens=LensModel.KANNALA_BRANDT,
+    )
+    write_camera(camera, tmp_path / "camera.yaml", form)
+    found = read_camera(tmp_path / "camera.yaml")
+
+    assert found.lens is LensModel.KANNALA_BRANDT
+    np.testing.assert_array_equal(found.intrinsics, camera.intrinsics)
+    assert camera.covariance is not None and found.covariance is not None
+    np.testing.assert_array_equal(found.covariance, camera.covariance)
+    assert (found.image_size, found.serial) == (camera.image_size, "7")
+
+
+def test_a_pinhole_camera_is_read_back_from_the_form_of_kalibr(tmp_path: Path) -> None:
+    camera = Camera(
+        *(640, 480, 900.0, 899.0, 320.0, 240.0),
+        distortion=np.array([-0.1, 0.05, 1e-3, 2e-3, 0.0]),
+    )
+    write_camera(camera, tmp_path / "camera.yaml", CameraForm.KALIBR)
+
+    found = read_camera(tmp_path / "camera.yaml")
+    np.testing.assert_array_equal(found.intrinsics, camera.intrinsics)
+
+
+def test_what_kalibr_has_no_coefficient_for_is_not_written_so(tmp_path: Path) -> None:
+    camera = Camera(
+        *(640, 480, 900.0, 899.0, 320.0, 240.0),
+        distortion=np.array([-0.1, 0.05, 1e-3, 2e-3, 0.3]),
+    )
+
+    with pytest.raises(UsageError, match="Kalibr"):
+        write_camera(camera, tmp_path / "camera.yaml", CameraForm.KALIBR)
+
+
+def test_an_equidistant_file_of_ros_needs_four_coefficients(tmp_path: Path) -> None:
+    text = refusal(tmp_path, ROS.replace("plumb_bob", "equidistant"))
+
+    assert "the fisheye model needs 4" in text
 
 
 @pytest.mark.parametrize(

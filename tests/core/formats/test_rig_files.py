@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from lightpen.errors import FileError
-from lightpen.formats.camera_files import write_camera
+from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.rig_files import RigFile, read_rig, write_rig
 from lightpen.model.rig import from_first
 from lightpen.simulator.samples import row_of_cameras

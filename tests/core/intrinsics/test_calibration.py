@@ -57,7 +57,7 @@ def test_eight_coefficients_are_taken_where_the_lens_needs_them(
 ) -> None:
     lens = Camera(
         *(640, 480, 420.0, 420.0, 320.0, 240.0),
-        distortion=np.array([1.2, 0.6, 0, 0, 0.05, 1.6, 1.1, 0.35]),
+        distortion=np.array([1.2, 0.6, 2e-3, -1e-3, 0.05, 1.6, 1.1, 0.35]),
     )
     found = calibrate_camera(make_views(of=lens, n_views=24), BoardTolerances())
 
@@ -134,7 +134,7 @@ def test_views_that_are_alike_are_refused(make_views: MakeViews) -> None:
     one = one + rng.uniform(-4, 4, (8, 1, 1, 2))
     alike = replace(views, pixels=one + rng.normal(0, 0.03, one.shape))
 
-    with pytest.raises(CalibrationError, match="too alike"):
+    with pytest.raises(CalibrationError, match=r"too (alike|similar)"):
         calibrate_camera(alike, BoardTolerances())
 
 
@@ -210,7 +210,7 @@ def test_residuals_are_told_by_region(found: CameraCalibration) -> None:
 def test_a_wide_lens_is_fitted_though_no_view_reaches_the_corners(
     make_views: MakeViews,
 ) -> None:
-    """A polynomial that fits the middle folds the corners; the image stays whole."""
+    """A polynomial that fits the middle folds the corners; a fisheye does not."""
     lens = Camera(
         *(640, 480, 282.0, 282.0, 325.0, 249.0),
         distortion=np.array([-0.23, 0.052, 0, 0, 0.0156, 0.033, -0.051, 0.045]),
@@ -221,5 +221,5 @@ def test_a_wide_lens_is_fitted_though_no_view_reaches_the_corners(
     found = calibrate_camera(inner, BoardTolerances())
 
     assert found.adjustment.rms < 1.1 * NOISE * 2**0.5
-    assert np.isfinite(map_uncertainty(found.camera, np.eye(12)).worst)
-    assert any("the corners are extrapolated" in str(each) for each in found.remarks)
+    assert found.camera.covariance is not None
+    assert np.isfinite(map_uncertainty(found.camera, found.camera.covariance).worst)

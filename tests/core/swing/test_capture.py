@@ -18,7 +18,8 @@ from lightpen.detection.reasons import Reason
 from lightpen.errors import FileError
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report import calibration_record
-from lightpen.formats.camera_files import CAMERA_FILE, write_camera
+from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.pen_files import PEN_FILE, write_pen
 from lightpen.messages import message

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from PySide6.QtCore import QCoreApplication, QObject, Signal
 
-from lightpen.formats.camera_files import write_camera
+from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.hashes import InputFile, all_hashed, hashed
 from lightpen.formats.images import find_images
 from lightpen.intrinsics.boards import Board

@@ -21,7 +21,6 @@ from lightpen_app.widgets.translated import Translated
 
 FILES = "*.yaml *.yml *.json *.xml"
 N_FACTS = 5
-COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
 
 class IntrinsicsPanel(Translated, QGroupBox):
@@ -217,7 +216,9 @@ class IntrinsicsPanel(Translated, QGroupBox):
         )
         distortion = ", ".join(
             f"{name}\u00a0{value:.4g}"
-            for name, value in zip(COEFFICIENTS, camera.distortion, strict=False)
+            for name, value in zip(
+                camera.distortion_names, camera.distortion, strict=True
+            )
         )
         day = camera.calibrated_on
         if day is None:

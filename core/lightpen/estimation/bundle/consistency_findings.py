@@ -26,7 +26,6 @@ ASPECT = message("file.aspect")
 PRINCIPAL_POINT = (message("file.cx"), message("file.cy"))
 DIAMETER = message("file.diameter")
 SCALE = message("file.scale")
-COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
 
 @dataclass(frozen=True)
@@ -346,7 +345,7 @@ def _of_camera(camera: Camera, fitted: Camera) -> list[FileNumber]:
     ]
     numbers += [
         FileNumber(
-            message("file.distortion", name=COEFFICIENTS[k]),
+            message("file.distortion", name=camera.distortion_names[k]),
             "",
             float(camera.distortion[k]),
             unit[4 + k],

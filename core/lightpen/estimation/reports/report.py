@@ -6,7 +6,6 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
-from lightpen.estimation.bundle.consistency_findings import COEFFICIENTS
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.reports.calibration_record import (
     AdjustedParameter,
@@ -347,7 +346,7 @@ def adjusted_intrinsics(
     place = calibration.bundle.layout.cameras[c]
     deviations = np.sqrt(np.diag(calibration.bundle.covariance)[place])
     before = np.sqrt(np.diag(calibration.stated.cameras[c].covariance))
-    names = ("fx", "fy", "cx", "cy", *COEFFICIENTS)
+    names = ("fx", "fy", "cx", "cy", *camera.distortion_names)
     columns = map(plain, (camera.intrinsics, deviations, before))
     return {
         name: AdjustedParameter(*values)

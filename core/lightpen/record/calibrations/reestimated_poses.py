@@ -18,12 +18,12 @@ from lightpen.estimation.reports.calibration_record import (
 )
 from lightpen.estimation.running_tip import RunningTip, fit_running_tip
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR, ContributionName
-from lightpen.model.camera import Camera
+from lightpen.model.camera import Camera, lens_model_of
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
 from lightpen.model.pen import Pen
 from lightpen.model.posture import directions_of, tilts_of
 
-N_COEFFICIENTS = (5, 8)  # of distortion that a camera may have
+N_COEFFICIENTS = (4, 5, 8)  # of distortion that a camera may have; 4 a fisheye
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,11 @@ def _camera(fitted: InstrumentRecord, pixels: FloatArray) -> Camera:
     """Return the camera; of its images no more is known than where LEDs were."""
     fx, fy, cx, cy, *distortion = fitted.intrinsics
     width, height = np.ceil(np.nanmax(pixels, axis=(0, 1))).astype(int).tolist()
-    return Camera(width + 1, height + 1, fx, fy, cx, cy, np.array(distortion))
+    return Camera(
+        *(width + 1, height + 1, fx, fy, cx, cy),
+        distortion=np.array(distortion),
+        lens=lens_model_of(len(distortion)),
+    )
 
 
 def _pen(fitted: InstrumentRecord) -> Pen:

@@ -40,7 +40,7 @@ from lightpen.cameras.source import FoundDevice
 from lightpen.cameras.worker_events import Connection
 from lightpen.detection.inspection import SEARCHED_IMAGES
 from lightpen.detection.spots import detect_spots
-from lightpen.formats.camera_files import write_camera
+from lightpen.formats.camera_file_writing import write_camera
 from lightpen.live.pipeline import LiveImage
 from lightpen.record.swings.names import Names
 from lightpen.simulator.hand import HandActivity

@@ -17,7 +17,8 @@ from msgspec import structs
 
 from lightpen.arrays import Image
 from lightpen.errors import FileError
-from lightpen.formats.camera_files import CAMERA_FILE, write_camera
+from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.pen_files import PEN_FILE, write_pen
 from lightpen.formats.upgrades import SWING, UPGRADES, newest_format

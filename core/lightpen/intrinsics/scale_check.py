@@ -1,0 +1,56 @@
+"""Scale of a board, by a caliper on a print or by the pixel pitch of a screen."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.errors import UsageError
+from lightpen.intrinsics.boards import Board
+
+COVERAGE_FACTOR = 2.0
+LARGEST_U = 0.05  # of the length
+
+
+@dataclass(frozen=True)
+class ScaleCheck:
+    """A length that was measured.
+
+    Attributes
+    ----------
+    stated : float
+        As the description of the board has it: mm, or pixels of a screen.
+    measured : float
+        mm.
+    expanded_uncertainty : float
+        U (k = 2), mm.
+
+    Raises
+    ------
+    UsageError
+        The lengths are not above 0, or U is more than a twentieth of the length.
+    """
+
+    stated: float
+    measured: float
+    expanded_uncertainty: float
+
+    def __post_init__(self) -> None:
+        values = (self.stated, self.measured, self.expanded_uncertainty)
+        is_plain = bool(np.isfinite(values).all()) and min(values) > 0
+        if not is_plain or self.expanded_uncertainty > LARGEST_U * self.measured:
+            raise UsageError(
+                "board.scale-check",
+                stated=self.stated,
+                measured=self.measured,
+                u=self.expanded_uncertainty,
+            )
+
+    @property
+    def sigma(self) -> float:
+        """Relative standard uncertainty of all lengths of the board."""
+        return self.expanded_uncertainty / COVERAGE_FACTOR / self.measured
+
+    def scaled(self, board: Board) -> Board:
+        """Return the board with its lengths as they were measured, mm."""
+        factor = self.measured / self.stated
+        return replace(board, pitch=factor * board.pitch, detail=factor * board.detail)

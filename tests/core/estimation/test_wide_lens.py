@@ -1,0 +1,39 @@
+"""Tests of a tip before a fisheye."""
+
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.calibrate import calibrate
+from lightpen.formats.observation_files import Centers
+from lightpen.model.assumptions import Assumptions
+from lightpen.model.camera import Camera, LensModel
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.swings import paper_pen, simulate_centers, swing_poses
+
+FISHEYE = Camera(
+    *(2448, 2048, 1300.0, 1299.0, 1219.6, 1031.3),
+    distortion=np.array([-0.02, 0.012, -0.004, 0.001]),
+    covariance=np.diag(np.array([0.02] * 4 + [1e-5] * 4) ** 2),
+    lens=LensModel.KANNALA_BRANDT,
+)
+N_IMAGES, NOISE = 60, 0.02  # px
+OFF_AXIS = rotation_from_vector(np.radians([15.0, 35.0, 0.0]))
+
+
+def test_a_pen_far_off_the_axis_of_a_fisheye_has_its_tip_within_u() -> None:
+    rng = np.random.default_rng(1)
+    pen, swing = paper_pen(), swing_poses(N_IMAGES, rng)
+    R, t = OFF_AXIS @ swing.rotations, swing.translations @ OFF_AXIS.T
+    pixels = simulate_centers(FISHEYE, pen, R, t, NOISE, rng)
+    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
+    observations = observe_centers(centers, FISHEYE, pen)
+    found = calibrate(FISHEYE, pen, observations, Assumptions())
+
+    errors = found.joint.tip_pen - swing.tip_pen
+    sigmas = np.sqrt(
+        sum(share.standard_uncertainty**2 for share in found.budget.shares)
+    )
+    assert np.all(np.abs(errors) < 3 * sigmas)
+    assert found.joint.rms < 2 * NOISE

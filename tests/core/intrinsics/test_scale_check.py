@@ -1,0 +1,32 @@
+"""Tests of the scale of a board."""
+
+import pytest
+
+from lightpen.errors import UsageError
+from lightpen.intrinsics.boards import parse_board
+from lightpen.intrinsics.scale_check import ScaleCheck
+
+BOARD = parse_board("circles:9x7:20:10")
+
+
+def test_a_board_is_as_large_as_the_caliper_says() -> None:
+    check = ScaleCheck(stated=160.0, measured=160.8, expanded_uncertainty=0.04)
+    board = check.scaled(BOARD)
+
+    assert board.pitch == pytest.approx(20.1)
+    assert board.detail == pytest.approx(10.05)
+    assert check.sigma == pytest.approx(0.02 / 160.8)
+
+
+def test_a_board_on_a_screen_is_scaled_by_its_pixel_pitch() -> None:
+    board = ScaleCheck(1.0, 0.2331, 0.0002).scaled(parse_board("chessboard:9x6:100"))
+
+    assert board.pitch == pytest.approx(23.31)
+
+
+@pytest.mark.parametrize(
+    "values", [(0, 1, 0.01), (1, -1, 0.01), (1, 1, 0.2), (1, 1, 0)]
+)
+def test_impossible_lengths_are_refused(values: tuple[float, float, float]) -> None:
+    with pytest.raises(UsageError, match="is not valid"):
+        ScaleCheck(*values)

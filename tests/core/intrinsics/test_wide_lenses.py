@@ -1,0 +1,104 @@
+"""Tests of fisheyes and other wide lenses by views of a board."""
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.intrinsics.boards import parse_board
+from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
+from lightpen.intrinsics.lens_conversion import convert_lens
+from lightpen.intrinsics.start import start_camera
+from lightpen.intrinsics.uncertainty_map import map_uncertainty
+from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.model.camera import Camera, LensModel
+from lightpen.model.rigid import rotation_from_vector
+
+NOISE = 0.04  # px
+WIDE = Camera(
+    *(1280, 800, 480.0, 481.0, 645.0, 396.0),
+    distortion=np.array([-0.02, 0.01, -0.006, 0.001]),
+    lens=LensModel.KANNALA_BRANDT,
+)
+ROUND = Camera(  # whose corners lie beyond 90 degrees
+    *(512, 512, 190.9, 190.8, 254.9, 256.9),
+    distortion=np.array([0.0034, 0.0007, -0.002, 0.0002]),
+    lens=LensModel.KANNALA_BRANDT,
+)
+
+
+def held_before(camera: Camera, n_views: int, seed: int) -> Views:
+    """Return views of a board that faces the camera wherever it is held."""
+    board = parse_board("chessboard:9x6:20")
+    rng, size = np.random.default_rng(seed), np.array(camera.image_size)
+    longer = 2 * float(np.abs(board.points[:, :2]).max())
+    seen: list[FloatArray] = []
+    while len(seen) < n_views:
+        place = rng.uniform(0.12, 0.88, 2) * size
+        ray = np.append(camera.unproject(place), 1.0)
+        ray /= np.linalg.norm(ray)
+        axis = np.array([-ray[1], ray[0], 0.0]) / np.hypot(*ray[:2])
+        facing = rotation_from_vector(axis * np.arccos(ray[2]))
+        tilt = rotation_from_vector(np.append(rng.uniform(-0.6, 0.6, 2), 0.0))
+        roll = rotation_from_vector(np.array([0, 0, rng.choice([0, np.pi / 2, 0.2])]))
+        depth = camera.fx * longer / (rng.uniform(0.3, 0.7) * size.min())
+        points = board.points @ (facing @ tilt @ roll).T + depth * ray
+        if np.any(points[:, 2] < 0.06 * np.linalg.norm(points, axis=1)):
+            continue
+        pixels = camera.project(points)
+        if np.all((pixels > 5) & (pixels < size - 6)):
+            seen.append(pixels + rng.normal(0, NOISE, pixels.shape))
+    names = tuple(map(str, range(n_views)))
+    return Views(board, names, np.array(seen)[:, None], (camera.image_size,))
+
+
+@pytest.fixture(scope="module")
+def found() -> CameraCalibration:
+    return calibrate_camera(held_before(WIDE, 24, 1), BoardTolerances())
+
+
+def test_a_fisheye_is_taken_for_one(found: CameraCalibration) -> None:
+    assert found.camera.lens is LensModel.KANNALA_BRANDT
+    assert found.held_out_rms < 1.1 * NOISE * 2**0.5
+    assert "Fisheye model" in str(found.choice.message)
+    assert not found.remarks
+
+
+def test_the_truth_of_a_fisheye_lies_within_the_intervals(
+    found: CameraCalibration,
+) -> None:
+    assert found.camera.covariance is not None
+    sigmas = np.sqrt(np.diag(found.camera.covariance))
+
+    assert np.all(np.abs(found.camera.intrinsics - WIDE.intrinsics) < 3.5 * sigmas)
+    assert map_uncertainty(found.camera, found.camera.covariance).worst < 0.5
+
+
+def test_a_round_image_is_uncertain_only_where_it_shows_something() -> None:
+    found = calibrate_camera(held_before(ROUND, 24, 2), BoardTolerances())
+    assert found.camera.covariance is not None
+    uncertain = map_uncertainty(found.camera, found.camera.covariance)
+
+    assert found.camera.lens is LensModel.KANNALA_BRANDT
+    assert np.isnan(uncertain.sigmas[0, 0])
+    assert uncertain.worst < 1.0
+
+
+def test_a_fisheye_is_begun_with_where_rows_are_straighter_by_it() -> None:
+    start = start_camera(held_before(WIDE, 12, 3), 5)
+
+    assert start.lens is LensModel.KANNALA_BRANDT
+    assert start.fx == pytest.approx(WIDE.fx, rel=0.3)
+
+
+def test_another_lens_model_images_nearly_the_same() -> None:
+    mild = Camera(
+        *(640, 480, 420.0, 421.0, 322.0, 238.0),
+        distortion=np.array([-0.2, 0.05, 3e-4, -2e-4, 0.0]),
+    )
+    fisheye = convert_lens(mild, 4)
+    assert fisheye is not None
+    directions = mild.unproject(np.array([[100.0, 80.0], [320, 240], [500, 400]]))
+
+    np.testing.assert_allclose(
+        fisheye.pixels(directions), mild.pixels(directions), atol=1.0
+    )
