@@ -5,13 +5,12 @@ from typing import Any
 import numpy as np
 
 from lightpen.discovery.discover import Discovery
-from lightpen.estimation.bundle.consistency_findings import COEFFICIENTS
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.formats.json_records import plain, record_heading
 from lightpen.local_time import local_now
 from lightpen.messages import Message, message
 
-INTRINSICS = ("fx", "fy", "cx", "cy", *COEFFICIENTS)
+PINHOLE = ("fx", "fy", "cx", "cy")
 TO_MICROMETRES = 1000.0
 
 
@@ -23,7 +22,7 @@ def discovery_record(discovery: Discovery) -> dict[str, Any]:
     """
     calibration, at = discovery.calibration, discovery.parameters
     values = discovery.camera.intrinsics
-    names = INTRINSICS[: len(values)]
+    names = (*PINHOLE, *discovery.camera.distortion_names)
     n_leds = discovery.pen.n_leds
     record = {
         **record_heading(local_now()),
@@ -101,9 +100,10 @@ def discovery_text(discovery: Discovery) -> str:
         ),
     ]
     values, sigmas = discovery.camera.intrinsics, discovery.intrinsics_sigma
+    names = (*PINHOLE, *discovery.camera.distortion_names)
     lines += [
         f"  {name:<10}{value:14.6g}{COVERAGE_FACTOR * sigma:12.2g}"
-        for name, value, sigma in zip(INTRINSICS, values, sigmas, strict=False)
+        for name, value, sigma in zip(names, values, sigmas, strict=True)
     ]
     lines += [
         f"  LED {j:<6}{x:10.4f}{y:11.4f}{z:11.4f}   U {u.max() * um:.1f} um"

@@ -31,6 +31,7 @@ from lightpen.model.quantiles import chi_square_quantile
 FEWEST = 3  # views of a group
 MAX_ROUNDS = 8
 LESSENED = 0.97  # of the rms without it, or an alternative is no explanation
+HALVED = 0.5  # the same, of views that no single camera fits
 CHANCE = 1e-3  # of a change, by chance
 LEAST_KNOWN = 1e-10  # least eigenvalue of an information matrix scaled to ones
 USELESS = 0.001  # of the image's longer side, by which a change moves the image
@@ -130,6 +131,7 @@ def explain(
     change: CameraChange | None,
     released: BoardFit | None = None,
     offsets: FloatArray | None = None,
+    lessened: float = LESSENED,
 ) -> CalibrationError | None:
     """Return why views do not fit one camera, if an alternative does explain it.
 
@@ -143,6 +145,8 @@ def explain(
         With another board than it is said to be; that explains the views, too.
     offsets : (N, 3) array, optional
         Of the points of the board as one camera has them, mm.
+    lessened : float
+        Share of the residuals by one camera, below which an alternative explains them.
     """
     board = _BoardKnown(
         tolerances, fitted.state.offsets if offsets is None else offsets
@@ -165,7 +169,7 @@ def explain(
     if change is not None and change.name:
         after = np.arange(views.n_views) >= views.names.index(change.name)
         parted = _two_cameras(views, board, near, after, rounds=0)
-        if parted is not None:
+        if parted is not None and _differ(parted[2]):
             which, rms, cameras = parted
             consider(
                 rms,
@@ -175,7 +179,7 @@ def explain(
             if change.in_image > USELESS * max(views.image_sizes[0]):
                 useless = _change_error(views, which, cameras)
     groups = _best_groups(views, board, near)
-    if groups is not None:
+    if groups is not None and _differ(groups[2]):
         which, rms, cameras = groups
         error = _named(
             "intrinsics.two-cameras",
@@ -197,8 +201,19 @@ def explain(
         consider(_rms(released.residuals), N_SHAPE * np.log(n), None)
     n_digits = n * np.log(max(nothing, FINEST) ** 2)
     best = min(found, key=lambda each: each[0], default=(np.inf, np.inf, None))
-    is_better = best[0] < n_digits and best[1] < LESSENED * nothing
+    is_better = best[0] < n_digits and best[1] < lessened * nothing
     return best[2] if is_better else useless
+
+
+def _differ(cameras: tuple[Camera, Camera]) -> bool:
+    """Tell whether two cameras image a point at places that matter."""
+    one, other = cameras
+    try:
+        moves = error_fields(one) @ (other.intrinsics - one.intrinsics)
+    except CalibrationError:  # one of them folds the image
+        return False
+    in_image = float(np.sqrt(np.mean(np.square(moves).sum(axis=-1))))
+    return in_image > USELESS * max(one.image_size)
 
 
 def _change_error(

@@ -14,7 +14,12 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.alternatives import explain, find_change, message_on_change
+from lightpen.intrinsics.alternatives import (
+    HALVED,
+    explain,
+    find_change,
+    message_on_change,
+)
 from lightpen.intrinsics.board_findings import (
     board_contradictions,
     messages_on_board,
@@ -157,12 +162,14 @@ def calibrate_camera(
     try:
         found = _calibrated(views, tolerances, first, report)
     except CalibrationError as error:
-        raise explain(views, tolerances, first, None) or error from error
+        raise (
+            explain(views, tolerances, first, None, lessened=HALVED) or error
+        ) from error
     change = find_change(found.effects, found.views.names)
     if change is not None or found.is_suspicious:
         released = found.adjustment if found.denied.any() else None
         offsets = found.adjustment.state.offsets
-        better = explain(views, tolerances, first, change, released, offsets)
+        better = explain(views, tolerances, found.adjustment, change, released, offsets)
         if better is not None:
             raise better
     require_plausible_bend(found.adjustment)

@@ -14,8 +14,10 @@ from lightpen.intrinsics.calibration import (
     calibrate_camera,
 )
 from lightpen.intrinsics.coverage import cover
+from lightpen.intrinsics.distortion import choose_distortion, fit_camera
 from lightpen.intrinsics.next_view import choose_next_view
 from lightpen.intrinsics.report import measure_regions
+from lightpen.intrinsics.start import start_camera
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
@@ -59,10 +61,23 @@ def test_eight_coefficients_are_taken_where_the_lens_needs_them(
         *(640, 480, 420.0, 420.0, 320.0, 240.0),
         distortion=np.array([1.2, 0.6, 2e-3, -1e-3, 0.05, 1.6, 1.1, 0.35]),
     )
-    found = calibrate_camera(make_views(of=lens, n_views=24), BoardTolerances())
+    views, tolerances = make_views(of=lens, n_views=24), BoardTolerances()
+    fitted = fit_camera(views, tolerances, start_camera(views, 5))
+    choice, *_ = choose_distortion(views, tolerances, fitted, lambda fraction: None)
 
-    assert found.choice.n_coefficients == 8
-    assert "they reduce the cross-validated error" in str(found.choice.message)
+    assert choice.n_coefficients == 8
+    assert "they reduce the cross-validated error" in str(choice.message)
+
+
+def test_a_lens_that_the_views_leave_open_is_refused(make_views: MakeViews) -> None:
+    """The corners, which no view reaches, are extrapolated by a rational function."""
+    lens = Camera(
+        *(640, 480, 420.0, 420.0, 320.0, 240.0),
+        distortion=np.array([1.2, 0.6, 2e-3, -1e-3, 0.05, 1.6, 1.1, 0.35]),
+    )
+
+    with pytest.raises(CalibrationError, match="projection is uncertain by"):
+        calibrate_camera(make_views(of=lens, n_views=24), BoardTolerances())
 
 
 def test_halves_agree_within_what_their_difference_may_be(
