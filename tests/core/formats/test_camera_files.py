@@ -431,7 +431,8 @@ def test_a_fisheye_is_read_back_as_written(tmp_path: Path, form: CameraForm) -> 
 
     assert found.lens is LensModel.KANNALA_BRANDT
     np.testing.assert_array_equal(found.intrinsics, camera.intrinsics)
-    assert camera.covariance is not None and found.covariance is not None
+    assert camera.covariance is not None
+    assert found.covariance is not None
     np.testing.assert_array_equal(found.covariance, camera.covariance)
     assert (found.image_size, found.serial) == (camera.image_size, "7")
 
