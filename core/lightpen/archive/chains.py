@@ -34,7 +34,7 @@ from lightpen.archive.entries import (
     since_us,
     text_sha256,
 )
-from lightpen.archive.signatures import ChainKeys, entry_signature, key_in
+from lightpen.archive.signatures import UNAPPROVED, ChainKeys, entry_signature, key_in
 from lightpen.archive.tables import CHAIN_WRITERS, CHAINS, ENTRIES, RECORDS
 from lightpen.errors import ArchiveError, FileError
 from lightpen.formats.own_json import DamagedError
@@ -48,7 +48,6 @@ _AT_HOME = select(CHAINS.c.chain).where(CHAINS.c.is_own)
 READ: tuple[Column[Any], ...] = (
     *(ENTRIES.c.number, ENTRIES.c.sha256, ENTRIES.c.text, ENTRIES.c.signature),
 )
-UNAPPROVED = "archive.key-unapproved"  # of a station without a supervisor
 BATCH = 200  # entries that are copied in one transaction
 
 

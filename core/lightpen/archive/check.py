@@ -9,6 +9,7 @@ from typing import Any
 from sqlalchemy import Row, exists, select, text
 
 from lightpen.archive.chains import chain_at_home, heads, searchable, sound_entry
+from lightpen.archive.check_notes import check_notes
 from lightpen.archive.database import Database, is_open, look_into
 from lightpen.archive.entries import (
     NOTHING_BEFORE,
@@ -19,7 +20,7 @@ from lightpen.archive.entries import (
 )
 from lightpen.archive.files_check import FilesCheck
 from lightpen.archive.seal import is_sealed_otherwise, lost_heads, read_seal
-from lightpen.archive.signatures import ChainKeys
+from lightpen.archive.signatures import UNAPPROVED, ChainKeys
 from lightpen.archive.tables import CHAINS, ENTRIES, RECORDS
 from lightpen.errors import LightpenError
 from lightpen.messages import Message, message
@@ -40,11 +41,14 @@ class ArchiveCheckResult:
         Number of files checked, images included.
     findings : tuple of Message
         Differences from the entries; empty if there are none.
+    notes : tuple of Message
+        What may be honest and is to be known, see `lightpen.archive.check_notes`.
     """
 
     n_entries: int
     n_files: int
     findings: tuple[Message, ...]
+    notes: tuple[Message, ...] = ()
 
 
 def check_archive(
@@ -80,7 +84,8 @@ def check_archive(
         n_before += head.number
     stages += [_strays(database), _changed_records(database), _lost_records(database)]
     findings = tuple(each for stage in stages for each in _told(stage))
-    return ArchiveCheckResult(n_before, files.n_files, findings)
+    notes = () if data is None else tuple(_told(check_notes(database, data)))
+    return ArchiveCheckResult(n_before, files.n_files, findings, notes)
 
 
 def check_file(archive: Path, data: Path, report: Report) -> ArchiveCheckResult:
@@ -175,7 +180,7 @@ def _walked(
             else:
                 sound.append(entry)
                 unsigned = keys.finding(entry)
-                if unsigned is not None:
+                if unsigned is not None and unsigned.code != UNAPPROVED:
                     yield unsigned
             number, previous = row.number, row.sha256
         if files is not None:

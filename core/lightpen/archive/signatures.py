@@ -25,6 +25,7 @@ from lightpen.record.library.key_changes import (
 )
 from lightpen.record.signing.keys import chain_of, is_signed, station_key
 
+UNAPPROVED = "archive.key-unapproved"  # of a station without a supervisor
 _KEY_LENGTH = 64
 _LENGTH = 192
 

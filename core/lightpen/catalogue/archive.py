@@ -52,5 +52,9 @@ MESSAGES = {
     "archive.signature-wrong": "The signature of entry {number} of chain {chain} is missing or wrong: the entry or its signature was changed.",
     "archive.signature-foreign": "Entry {number} of chain {chain} is signed by a key that is not the station's: it was forged, or entered by a copy of the data folder on another computer.",
     "archive.key-unapproved": "Entry {number} of chain {chain} introduces a station key that neither the key before nor a supervisor approved. Ask the station whether its data folder was moved to another computer.",
+    "archive.no-seal": "The seal {file} is missing: entries that were removed from the end of the archive are not found by it.",
+    "archive.file-not-entered": "The file {file} has no entry in the archive yet. Start the program to enter it.",
+    "archive.clock-back": "The tip of entry {number} was accepted earlier than the one before: the clock of the station was set back.",
+    "archive.accepted-too-early": "The tip of entry {number} was accepted before it was computed: the clock of the station was set back, or the entry is not what happened.",
     "archive.closed": "The archive is closed: the program ends.",
 }

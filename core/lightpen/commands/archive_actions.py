@@ -50,6 +50,8 @@ def _check(options: argparse.Namespace) -> int:
             told += f", {there.n_waiting} not delivered yet."
         for finding in findings:
             print(shown(str(finding)))
+        for note in checked.notes:
+            print(shown(f"Note: {note}"))
         has_findings = bool(findings)
         outcome = "Something was changed" if has_findings else "No change was found"
         n_files = checked.n_files

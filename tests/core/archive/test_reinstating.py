@@ -302,5 +302,5 @@ def test_without_a_password_a_moved_folder_goes_on_with_a_new_key_and_a_finding(
     with closing(Logbook(data)) as moved:
         assert moved.enter_owed() == ()
         moved.enter_note(entries(moved)[0], "Moved.", "Bea")
-    (finding,) = checked(data).findings
-    assert finding.code == "archive.key-unapproved"
+    assert checked(data).findings == ()
+    assert "archive.key-unapproved" in {each.code for each in checked(data).notes}

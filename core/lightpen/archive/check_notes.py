@@ -1,0 +1,117 @@
+"""What a check of an archive notes besides changes: it may be honest, and is to be known.
+
+A power cut leaves files that are not entered yet, a clock may be set back, a data folder
+may move to another computer. None of it proves a change.
+"""
+
+from collections.abc import Iterator
+from datetime import datetime
+from pathlib import Path
+
+from msgspec import Struct
+from sqlalchemy import select
+
+from lightpen.archive.chains import (
+    READ,
+    ArchivedFiles,
+    batch_of,
+    chain_at_home,
+    heads,
+    read_row,
+    records_of,
+)
+from lightpen.archive.database import Database, is_open
+from lightpen.archive.entries import IN_FORCE_BY, Kind, StoredEntry
+from lightpen.archive.seal import seal_of
+from lightpen.archive.signatures import UNAPPROVED, ChainKeys
+from lightpen.archive.station_events import station_files
+from lightpen.archive.tables import ENTRIES
+from lightpen.errors import FileError
+from lightpen.formats.files import printable
+from lightpen.formats.own_json import DamagedError, ZonedTime, parse_own_json
+from lightpen.messages import Message, message
+from lightpen.record.library.tip_library import library_files
+from lightpen.record.results.result_folder import FolderArchive
+
+
+class _Created(Struct):
+    created: ZonedTime
+
+
+def check_notes(database: Database, data: Path) -> Iterator[Message]:
+    """Yield what is to be known of the archive of a data folder.
+
+    Files without entries, a missing seal, keys that nobody approved, clocks that were
+    set back, and tips that were accepted before they were computed.
+
+    Raises
+    ------
+    ArchiveError, FileError
+        The archive, or a folder, cannot be read.
+    """
+    home = chain_at_home(database)
+    yield from _missing_seal(database)
+    for head in heads(database):
+        yield from _unapproved_keys(database, head.chain)
+    if home is not None:
+        yield from _not_entered(database, data, home)
+        yield from _impossible_times(database, home)
+
+
+def _missing_seal(database: Database) -> Iterator[Message]:
+    file = database.file
+    has_entries = any(head.number for head in heads(database))
+    if file is not None and has_entries and not is_open(file):
+        if not seal_of(file).exists():
+            yield message("archive.no-seal", file=printable(str(seal_of(file))))
+
+
+def _unapproved_keys(database: Database, chain: str) -> Iterator[Message]:
+    keys = ChainKeys(chain)
+    for entry in _limits(database, chain):
+        finding = keys.finding(entry)
+        if finding is not None and finding.code == UNAPPROVED:
+            yield finding
+
+
+def _limits(database: Database, chain: str) -> list[StoredEntry]:
+    wanted = (
+        select(*READ)
+        .where(ENTRIES.c.chain == chain, ENTRIES.c.kind == Kind.LIMITS.value)
+        .order_by(ENTRIES.c.number)
+    )
+    with database.reading() as connection:
+        rows = connection.execute(wanted).all()
+    return [read_row(database, row) for row in rows]
+
+
+def _not_entered(database: Database, data: Path, home: str) -> Iterator[Message]:
+    entered, results = ArchivedFiles(database, home), FolderArchive(data)
+    entered.read()
+    files = (*results.all_files(), *library_files(data), *station_files(data))
+    for file in files:
+        place = results.place_of(file)
+        if place not in entered:
+            yield message("archive.file-not-entered", file=printable(place))
+
+
+def _impossible_times(database: Database, home: str) -> Iterator[Message]:
+    """Compare the times of acceptances with each other, and with their computation."""
+    before: datetime | None = None
+    number = 0
+    while batch := batch_of(database, home, number):
+        records = records_of(database, batch)
+        for each in batch:
+            number, event = each.entry.number, each.entry.event
+            if event.kind not in IN_FORCE_BY:
+                continue
+            if before is not None and event.at < before:
+                yield message("archive.clock-back", number=number)
+            before = event.at
+            record = records.get(event.record_sha256 or "", "")
+            try:
+                created = parse_own_json(record.encode(), _Created).created
+            except (DamagedError, FileError, UnicodeEncodeError):
+                continue
+            if event.at < created.replace(microsecond=0):
+                yield message("archive.accepted-too-early", number=number)
