@@ -1,7 +1,7 @@
-"""What a check of an archive notes besides changes: it may be honest, and is to be known.
+"""What a check of an archive notes besides changes: it may be honest.
 
-A power cut leaves files that are not entered yet, a clock may be set back, a data folder
-may move to another computer. None of it proves a change.
+A power cut leaves files that are not entered yet, a clock may be set back, a data
+folder may move to another computer. None of it proves a change.
 """
 
 from collections.abc import Iterator
@@ -61,9 +61,10 @@ def check_notes(database: Database, data: Path) -> Iterator[Message]:
 def _missing_seal(database: Database) -> Iterator[Message]:
     file = database.file
     has_entries = any(head.number for head in heads(database))
-    if file is not None and has_entries and not is_open(file):
-        if not seal_of(file).exists():
-            yield message("archive.no-seal", file=printable(str(seal_of(file))))
+    if file is None or not has_entries or is_open(file):
+        return
+    if not seal_of(file).exists():
+        yield message("archive.no-seal", file=printable(str(seal_of(file))))
 
 
 def _unapproved_keys(database: Database, chain: str) -> Iterator[Message]:
