@@ -1,0 +1,96 @@
+"""``lightpen discover`` as it is called."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated_stations import random_station
+
+from lightpen.cli import main
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.pen_files import read_pen
+
+STATION = random_station(6, n_images=160)
+SIZE = f"{STATION.camera.width}x{STATION.camera.height}"
+OUTPUTS = ("pen.json", "camera.yaml", "found.json")
+
+
+@pytest.fixture
+def centers(tmp_path: Path) -> Path:
+    """Return a file of unlabelled centres, in any order within a frame."""
+    rows = ["frame,x_px,y_px"]
+    for frame, spots in enumerate(STATION.sightings.centers):
+        rows += [f"{frame},{x:.5f},{y:.5f}" for x, y in spots.tolist()]
+    path = tmp_path / "centers.csv"
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def arguments(centers: Path, *more: str) -> list[str]:
+    folder = centers.parent
+    pen, camera, record = (str(folder / name) for name in OUTPUTS)
+    given = ["discover", "--centers", str(centers), "--image-size", SIZE]
+    given += ["--led-diameter", str(STATION.pen.diameter)]
+    return [*given, *more, "--out-pen", pen, "--out-camera", camera, "--json", record]
+
+
+def test_a_swing_of_centres_and_a_length_give_pen_camera_and_record(
+    centers: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    length = ("--length", "longest", f"{STATION.longest}", "--length-sigma", "0.001")
+
+    assert main(arguments(centers, *length)) == 0
+
+    folder = centers.parent
+    pen = read_pen(folder / "pen.json")
+    camera = read_camera(folder / "camera.yaml")
+    record = json.loads((folder / "found.json").read_text())
+    np.testing.assert_allclose(record["leds_mm"], pen.leds)
+    assert len(record["tip_pen_mm"]) == len(record["expanded_uncertainty_mm"]) == 3
+    focal = record["intrinsics"]["fx"]
+    assert focal["value"] == camera.fx
+    assert abs(camera.fx - STATION.camera.fx) < 4 * focal["standard_uncertainty"]
+    assert camera.covariance is not None
+    assert focal["standard_uncertainty"] == pytest.approx(
+        camera.covariance[0, 0] ** 0.5
+    )
+    matrix = np.array(record["covariance"]["matrix"])
+    assert matrix.shape == (len(record["covariance"]["parameters"]),) * 2
+    np.testing.assert_allclose(
+        np.diag(matrix)[:3] ** 0.5 * 2, record["expanded_uncertainty_mm"]
+    )
+    assert np.linalg.eigvalsh(matrix).min() > -1e-12
+    assert {"mirrored", "focal_length_px", "misfit_px"} <= set(record["hypotheses"][0])
+    assert record["scale"] == "measured"
+    assert pen.normal_sigma is not None
+    assert "tip x" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        ([], "one known length"),
+        (["--length", "1", "180"], "is no length"),
+        (["--length", "1", "99", "180"], "no LED 99"),
+        (["--length", "2", "2", "180"], "to itself"),
+    ],
+)
+def test_what_cannot_be_done_is_told_and_nothing_is_written(
+    centers: Path, more: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments(centers, *more)) != 0
+
+    assert told in capsys.readouterr().err
+    assert not any((centers.parent / name).exists() for name in OUTPUTS)
+
+
+def test_a_length_between_the_wrong_leds_is_told(
+    centers: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    length = ("--length", "longest", f"{0.5 * STATION.longest}")
+
+    assert main(arguments(centers, *length)) == 1
+
+    assert "discs would be" in capsys.readouterr().err
+    assert not any((centers.parent / name).exists() for name in OUTPUTS)
