@@ -157,6 +157,23 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
         metavar="SHARE",
         help=f"standard uncertainty of its scale, relative ({USUAL.scale:g})",
     )
+    check = parser.add_mutually_exclusive_group()
+    check.add_argument(
+        "--measured",
+        type=float,
+        nargs=3,
+        metavar=("STATED", "MEASURED", "U"),
+        help="a length of the board as stated by BOARD, as measured, and U (k = 2) of "
+        "the measurement, mm: scales the board and replaces --scale-sigma",
+    )
+    check.add_argument(
+        "--pixel-pitch",
+        type=float,
+        nargs=2,
+        metavar=("PITCH", "U"),
+        help="pixel pitch of a screen that shows the board, and its U (k = 2), mm; "
+        "BOARD then states lengths in pixels",
+    )
 
 
 def _add_temperature(parser: argparse.ArgumentParser) -> None:

@@ -25,6 +25,7 @@ FISHEYE_FOCALS = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)  # of the longe
 STRAIGHTER = 0.5  # times the bend of rows by a pinhole
 FARTHEST = np.tan(np.radians(75.0))  # in the normalised plane, for a first pose
 MIN_POINTS = 6
+SOME = 8  # views that tell a fisheye
 SHORTEST, LONGEST = 0.2, 50.0  # of the longer side
 
 
@@ -64,7 +65,8 @@ def _start_fisheye(views: Views) -> Camera:
 def _bend(camera: Camera, views: Views) -> float:
     """Return how far points lie from homographies of the board, px rms."""
     squares, count = 0.0, 0
-    for pixels, seen in zip(views.pixels[:, 0], views.seen[:, 0], strict=True):
+    some = slice(None, None, max(views.n_views // SOME, 1))
+    for pixels, seen in zip(views.pixels[some, 0], views.seen[some, 0], strict=True):
         normalised = camera.unproject(pixels[seen])
         near = np.linalg.norm(normalised, axis=-1) < FARTHEST
         if near.sum() < MIN_POINTS:
