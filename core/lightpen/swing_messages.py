@@ -37,6 +37,7 @@ class Code(StrEnum):
     UNCERTAIN = "verdict.uncertain"
     HALVES_DIFFER = "verdict.halves-differ"
     MANY_DROPPED = "verdict.many-dropped"
+    MANY_EXCLUDED = "verdict.many-excluded"
     LEDS_OFF = "verdict.leds-off"
     LED_DISPLACED = "verdict.led-displaced"
     LEDS_MISFIT = "verdict.leds-misfit"
@@ -238,6 +239,11 @@ def last_unknown(why: Message) -> Message:
 def halves_differ(difference: float, usual: float) -> Message:
     """Message: difference between odd and even images, and its U (k = 2), mm."""
     return message(Code.HALVES_DIFFER, difference=difference, usual=usual)
+
+
+def many_excluded(n_excluded: int) -> Message:
+    """Tell how many images the user has excluded."""
+    return message(Code.MANY_EXCLUDED, n_excluded=n_excluded)
 
 
 def many_dropped(n_dropped: int, n_images: int) -> Message:

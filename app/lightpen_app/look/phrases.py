@@ -67,6 +67,7 @@ _SHORTS: dict[Code, str] = {
     Code.UNCERTAIN: QT_TRANSLATE_NOOP("phrases", "Uncertainty too large"),
     Code.HALVES_DIFFER: QT_TRANSLATE_NOOP("phrases", "Odd and even differ"),
     Code.MANY_DROPPED: QT_TRANSLATE_NOOP("phrases", "Many images rejected"),
+    Code.MANY_EXCLUDED: QT_TRANSLATE_NOOP("phrases", "Many images excluded"),
     Code.LEDS_OFF: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
     Code.LED_DISPLACED: QT_TRANSLATE_NOOP("phrases", "LED displaced"),
     Code.LEDS_MISFIT: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),

@@ -2,17 +2,8 @@
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QCoreApplication, QPoint, QRect, Qt, Signal
-from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import (
-    QApplication,
-    QBoxLayout,
-    QFrame,
-    QSizePolicy,
-    QStackedWidget,
-    QWidget,
-)
-from typing_extensions import override
+from PySide6.QtCore import QCoreApplication, Qt, Signal
+from PySide6.QtWidgets import QBoxLayout, QFrame, QSizePolicy, QStackedWidget, QWidget
 
 from lightpen_app.look.announcements import announce
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
@@ -112,8 +103,7 @@ class NoticeBar(Translated, QFrame):
 class PageArea(QFrame):
     """Shows one page of several.
 
-    A notice lies over it and moves nothing, so that a key pressed meanwhile reaches
-    what it was meant for.
+    A notice stands above it and covers nothing; it takes no focus.
 
     Parameters
     ----------
@@ -127,7 +117,7 @@ class PageArea(QFrame):
         self._pages = tuple(pages)
 
         # Widgets: the order of making them is the order of the Tab key
-        self._notice = NoticeBar(self)
+        self._notice = NoticeBar()
         self._title = text_label(TextSize.TITLE)
         self._title.setWordWrap(False)
         self._lead = text_label(TextSize.BODY, Tone.QUIET)
@@ -137,7 +127,7 @@ class PageArea(QFrame):
             self._stack.addWidget(page)
 
         # Layout
-        self._layout = layout = vertical_layout(self, margins=None)
+        self._layout = layout = vertical_layout(self, self._notice, margins=None)
         layout.addSpacing(GRID)
         self._heading = vertical_layout(
             layout, self._title, (self._lead, 1), spacing=-1
@@ -145,19 +135,11 @@ class PageArea(QFrame):
         layout.addSpacing(GRID)
         layout.addWidget(self._stack, 1)
 
-        # Connections
-        self._notice.value_changed.connect(self._place_notice)
-
         self.show_page(self._pages[0])
 
     def notice(self) -> NoticeBar:
         """Return the bar of the notice."""
         return self._notice
-
-    @override
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._place_notice()
 
     def words(self) -> tuple[str, ...]:
         """Return the texts about the page."""
@@ -189,16 +171,3 @@ class PageArea(QFrame):
             self._layout.setContentsMargins(side, 2 * GRID, side, 3 * GRID)
             self._heading.setDirection(QBoxLayout.Direction.TopToBottom)
             self._heading.setSpacing(GRID)
-
-    def _place_notice(self) -> None:
-        """Place the notice over title and lead, but not over input fields."""
-        notice = self._notice
-        width = self.width() - 2 * GRID
-        place = QRect(GRID, GRID // 2, width, notice.heightForWidth(width))
-        focused = QApplication.focusWidget()
-        if focused is not None and self._stack.isAncestorOf(focused):
-            corner = focused.mapTo(self, QPoint(0, 0))
-            if place.intersects(QRect(corner, focused.size())):
-                place.moveBottom(self.height() - GRID)
-        notice.setGeometry(place)
-        notice.raise_()

@@ -752,28 +752,23 @@ def test_the_present_step_is_always_in_view(qtbot: QtBot, settings: Settings) ->
         assert present.visibleRegion().boundingRect().height() == present.height()
 
 
-def test_a_notice_moves_nothing_on_the_page(shell: Shell) -> None:
-    window, controls = shell.window, (shell.pages[0].field, shell.pages[0].button)
-    places = [each.mapTo(window, QPoint()) for each in controls]
+def test_a_notice_pushes_the_page_down_and_covers_nothing(shell: Shell) -> None:
+    page, window = shell.pages[0], shell.window
+    window.activateWindow()
+    page.field.setFocus()
+    before = page.mapTo(window, QPoint()).y()
 
-    shell.notifications.tell("a disk", "The disk is full. " * 8)
-
-    assert [each.mapTo(window, QPoint()) for each in controls] == places
-    window.resize(940, 500)
-    notice = notice_of(window)
-    corners = notice.mapTo(window, QPoint()), notice.size()
-    assert window.rect().contains(QRect(*corners))
-
-
-def test_a_notice_leaves_the_field_that_is_typed_in_to_be_seen(shell: Shell) -> None:
-    window, field = shell.window, shell.pages[0].field
-    assert QApplication.focusWidget() is field
-
-    shell.notifications.tell("a disk", "The disk is full. " * 60)
+    shell.notifications.tell("cause", "The disk is full. " * 12)
+    QApplication.processEvents()
 
     notice = notice_of(window)
-    seen = QRect(field.mapTo(window, QPoint()), field.size())
-    assert not seen.intersects(QRect(notice.mapTo(window, QPoint()), notice.size()))
+    bottom = notice.mapTo(window, QPoint(0, notice.height())).y()
+    assert page.mapTo(window, QPoint()).y() >= max(bottom, before)
+    assert page.field.hasFocus()
+
+    shell.notifications.withdraw("cause")
+    QApplication.processEvents()
+    assert page.mapTo(window, QPoint()).y() == before
 
 
 def notice_of(window: MainWindow) -> QWidget:

@@ -1,6 +1,6 @@
 """Whether a task is done, and its options: a row of fields made from the task."""
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSize, Signal
 from PySide6.QtWidgets import QCheckBox, QWidget
 from typing_extensions import override
 
@@ -13,7 +13,7 @@ from lightpen.verification.tasks.task import (
     SurfaceOption,
     TaskOptions,
 )
-from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.choice_field import ChoiceField
@@ -95,8 +95,8 @@ class TaskForm(Translated, QWidget):
         )
 
         # Layout
-        layout = horizontal_layout(self, spacing=2 * GRID)
-        fill(layout, (self._is_chosen, 0, Qt.AlignmentFlag.AlignBottom))
+        rows = vertical_layout(self, self._is_chosen)
+        layout = horizontal_layout(rows, spacing=2 * GRID)
         for label, field in zip(self._labels, self._fields.values(), strict=True):
             label.setWordWrap(False)
             label.setBuddy(field)

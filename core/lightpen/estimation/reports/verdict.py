@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.led_quality import DISPLACED
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
@@ -31,6 +32,7 @@ from lightpen.swing_messages import (
     leds_misfit,
     leds_off,
     many_dropped,
+    many_excluded,
     tip_changed,
     tip_is_good,
     too_few_images,
@@ -145,6 +147,7 @@ _NEXT_STEPS = {
     Code.TOO_LITTLE_TILT: NextStep.CAPTURE_MORE,
     Code.HALVES_DIFFER: NextStep.REPEAT,
     Code.MANY_DROPPED: NextStep.REPEAT,
+    Code.MANY_EXCLUDED: NextStep.REPEAT,
     Code.LEDS_OFF: NextStep.CHECK_LEDS,
     Code.LED_DISPLACED: NextStep.CHECK_LEDS,
     Code.LEDS_MISFIT: NextStep.CHECK_FILES,
@@ -279,7 +282,8 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     budget = calibration.budget
     largest = budget.largest_share
     by_largest = budget.weakest_share(largest)
-    n_images = sum(reason.shows_pen for reason in calibration.reasons)
+    reasons = list(calibration.reasons)
+    n_images = sum(reason.shows_pen for reason in reasons)
     n_used = int(calibration.used.sum())
     is_same_in_more = largest.name is ContributionName.CENTERS and n_used >= POSTURES
     if largest.name in IMAGES_SHRINK and not is_same_in_more:
@@ -315,8 +319,13 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
         lengths = np.linalg.norm(calibration.leds.displacement, axis=1)
         led = max(calibration.leds.displaced, key=lambda each: lengths[each - 1])
         return Verdict(Grade.CHECK, led_displaced(led, float(lengths[led - 1])))
-    if n_images - n_used > MANY_DROPPED * n_images:
-        return Verdict(Grade.CHECK, many_dropped(n_images - n_used, n_images))
+    n_dropped, n_excluded = n_images - n_used, reasons.count(Reason.TAKEN_OUT)
+    if n_dropped > MANY_DROPPED * n_images:
+        is_by_user = 2 * n_excluded > n_dropped
+        dropped = many_dropped(n_dropped, n_images)
+        return Verdict(
+            Grade.CHECK, many_excluded(n_excluded) if is_by_user else dropped
+        )
     if uncertainty > limit:
         return Verdict(Grade.CHECK, reason)
     if n_images < limits.min_images:

@@ -53,6 +53,7 @@ from lightpen.swing_messages import (
     led_displaced,
     leds_off,
     many_dropped,
+    many_excluded,
     tip_is_good,
     too_few_images,
     too_little_tilt,
@@ -309,7 +310,9 @@ def test_images_of_the_pen_that_are_left_out_count(
     reasons = (reason,) * 31 + good.reasons[31:]
     limits = SwingLimits(max_uncertainty=0.01, min_images=150)
     verdict = judge(replace(good, used=used, reasons=reasons), limits)
-    assert verdict.reason == many_dropped(31, 150)
+    is_by_user = reason is Reason.TAKEN_OUT
+    told = many_excluded(31) if is_by_user else many_dropped(31, 150)
+    assert verdict.reason == told
 
 
 def test_fewer_images_than_asked_for_are_checked_also_if_they_suffice(
@@ -353,6 +356,7 @@ def test_sides_that_the_pen_never_leant_to_are_named() -> None:
         (Code.TOO_FEW_IMAGES, NextStep.CAPTURE_MORE),
         (Code.HALVES_DIFFER, NextStep.REPEAT),
         (Code.MANY_DROPPED, NextStep.REPEAT),
+        (Code.MANY_EXCLUDED, NextStep.REPEAT),
         (Code.LEDS_MISFIT, NextStep.CHECK_FILES),
         (Code.LEDS_OFF, NextStep.CHECK_LEDS),
         (Code.LED_DISPLACED, NextStep.CHECK_LEDS),
