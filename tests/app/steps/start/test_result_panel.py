@@ -4,27 +4,58 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from benchmarks.small_records import small_record
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLineEdit
 from pytestqt.qtbot import QtBot
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import DueRule
+from lightpen.record.library.supervision import Signature
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
 from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.supervisor_fields import SupervisorFields
+from lightpen_app.widgets.withdrawal_bar import WithdrawalBar
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 
 
-def test_that_a_tip_is_too_old_is_said_by_the_rule_that_holds_now(
+def test_where_there_is_a_password_revoking_asks_for_a_supervisor(
     qtbot: QtBot, tmp_path: Path
 ) -> None:
-    panel = LastResultPanel(lambda: NOON + timedelta(days=40))
+    panel = LastResultPanel(lambda: NOON)
     qtbot.addWidget(panel)
-    result = Result(
+    panel.set_value(LastResult(accepted(tmp_path)))
+    panel.set_guarded(True)
+    panel.show()
+    revoke = next(
+        each
+        for each in panel.findChildren(PushButton)
+        if each.text() == "Revoke acceptance..."
+    )
+    qtbot.mouseClick(revoke, Qt.MouseButton.LeftButton)
+    (bar,) = panel.findChildren(WithdrawalBar)
+    assert bar.isVisible()
+
+    name, password = bar.findChildren(SupervisorFields)[0].findChildren(QLineEdit)
+    reason = next(
+        each for each in bar.findChildren(QLineEdit) if each not in (name, password)
+    )
+    for field, text in ((reason, "Bent."), (name, "Eve"), (password, "correct horse")):
+        qtbot.keyClicks(field, text)
+    with qtbot.waitSignal(panel.take_back_requested) as blocker:
+        qtbot.keyClick(password, Qt.Key.Key_Return)
+    assert blocker.args is not None
+    assert blocker.args[1:] == ["Bent.", Signature("Eve", "correct horse")]
+
+
+def accepted(folder: Path) -> Result:
+    return Result(
         names=Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0),
         accepted=NOON,
         grade=Grade.PASS,
-        record=tmp_path,
+        record=folder,
         images=None,
         calibration=small_record(
             {
@@ -33,7 +64,14 @@ def test_that_a_tip_is_too_old_is_said_by_the_rule_that_holds_now(
             }
         ),
     )
-    panel.set_value(LastResult(result))
+
+
+def test_that_a_tip_is_too_old_is_said_by_the_rule_that_holds_now(
+    qtbot: QtBot, tmp_path: Path
+) -> None:
+    panel = LastResultPanel(lambda: NOON + timedelta(days=40))
+    qtbot.addWidget(panel)
+    panel.set_value(LastResult(accepted(tmp_path)))
     assert (
         "Calibration is older than 30 days. Calibrate before you measure."
         in panel.words()
