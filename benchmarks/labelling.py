@@ -141,4 +141,5 @@ def spots_at(centers: FloatArray, shapes: FloatArray) -> Spots:
         contrasts=np.full(n, 0.8),
         edge_widths=np.full(n, 2.0),
         flaws=np.zeros(n, dtype=np.int64),
+        sigmas=np.full(n, 0.01),
     )

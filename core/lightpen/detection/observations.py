@@ -47,8 +47,11 @@ class Observations:
     seen_pixels : (N, L, 2) array
         Centres of all labelled LEDs, also of merged and cut ones, px; NaN elsewhere.
     areas : (N, L) array
-        Areas of the LEDs that are fit for use and not saturated, px^2; NaN elsewhere,
-        or where only centres are given.
+        Areas of the LEDs that are fit for use, not saturated and larger than their
+        blur, px^2; NaN elsewhere, or where only centres are given.
+    sigmas : (N, L) array
+        Standard deviation of one coordinate of each centre by its estimator, px, which
+        tells how LEDs of one image compare; NaN where an LED is not fit for use.
     rotations, translations : (N, 3, 3) and (N, 3) array
         Rough cam_from_pen, mm; NaN where there is none.
     edge_widths : (N,) array
@@ -69,6 +72,7 @@ class Observations:
     pixels: FloatArray
     seen_pixels: FloatArray
     areas: FloatArray
+    sigmas: FloatArray
     rotations: FloatArray
     translations: FloatArray
     edge_widths: FloatArray
@@ -235,6 +239,7 @@ def _observations(
         pixels=np.array([detection.pixels for detection in detections]),
         seen_pixels=np.array([detection.seen_pixels for detection in detections]),
         areas=np.array([detection.areas for detection in detections]),
+        sigmas=np.array([detection.sigmas for detection in detections]),
         rotations=np.array([detection.rotation for detection in detections]),
         translations=np.array([detection.translation for detection in detections]),
         edge_widths=np.array([detection.edge_width for detection in detections]),

@@ -23,7 +23,7 @@ from lightpen.detection.labelling.labels import (
 )
 from lightpen.detection.pose import MIN_POSE_LEDS, fit_poses
 from lightpen.detection.reasons import MISHAPS, Reason
-from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
+from lightpen.detection.spots import EXACT_SIGMA, SpotFlaw, Spots, detect_spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen
@@ -106,16 +106,32 @@ class PenDetection:
     def areas(self) -> FloatArray:
         """Areas of the LEDs fit for use, (L,), px^2; NaN elsewhere.
 
-        So it is of saturated ones, which look larger than they are.
+        So it is of saturated ones, which look larger than they are, and of those that
+        blur alone makes large.
         """
         areas = np.full(len(self.pixels), np.nan)
         if self.spots is None or self.labels is None:
             return areas
         spot = self.labels.spot
         known = np.isfinite(self.pixels[:, 0])
-        known[known] = (self.spots.flaws[spot[known]] & SpotFlaw.SATURATED) == 0
+        there = spot[known]
+        saturated = (self.spots.flaws[there] & SpotFlaw.SATURATED) > 0
+        known[known] = ~(saturated | self.spots.are_small[there])
         areas[known] = self.spots.areas[spot[known]]
         return areas
+
+    @property
+    def sigmas(self) -> FloatArray:
+        """Standard deviation of each centre by its estimator, (L,), px.
+
+        NaN where an LED is not fit for use; the same for all where only centres are
+        given.
+        """
+        known = np.isfinite(self.pixels[:, 0])
+        sigmas = np.where(known, EXACT_SIGMA, np.nan)
+        if self.spots is not None and self.labels is not None:
+            sigmas[known] = self.spots.sigmas[self.labels.spot[known]]
+        return sigmas
 
     @property
     def edge_width(self) -> float:
@@ -301,6 +317,7 @@ def _fitted(
         detection.pixels[None],
         detection.rotation[None],
         detection.translation[None],
+        sigmas=detection.sigmas[None],
         is_near=is_near,
     )
     return replace(

@@ -62,7 +62,8 @@ class Poses:
     weights : (N, L) array
         Weight of each LED under the robust loss, 0 to 1; 0 where not seen.
     sigma : float
-        Standard deviation of one image coordinate, px, estimated over all images.
+        Standard deviation of one image coordinate, px, estimated over all images; of
+        the most exact LEDs, where they differ.
     """
 
     rotations: FloatArray
@@ -112,6 +113,7 @@ def fit_poses(
     rotations: FloatArray,
     translations: FloatArray,
     *,
+    sigmas: FloatArray | None = None,
     is_near: bool = False,
 ) -> Poses:
     """Fit poses by maximum likelihood on ellipse centres.
@@ -126,13 +128,52 @@ def fit_poses(
         needs four LEDs.
     rotations, translations : (N, 3, 3) and (N, 3) array
         Start, cam_from_pen, mm.
+    sigmas : (N, L) array, optional
+        How exact the centres are compared with each other, px; all alike if not given.
     is_near : bool
         Whether that is by least squares on most of these LEDs already.
     """
-    problem = CameraReprojection(
+    problem: Reprojection = CameraReprojection(
         camera, pen.leds, pen.normals, pen.diameter / 2, pixels
     )
-    return fit_reprojection(problem, rotations, translations, is_near=is_near)
+    scales = None if sigmas is None else relative_sigmas(sigmas)
+    if scales is None:
+        return fit_reprojection(problem, rotations, translations, is_near=is_near)
+    problem = _Scaled(problem, scales)
+    poses = fit_reprojection(problem, rotations, translations, is_near=is_near)
+    return replace(poses, residuals=poses.residuals * scales[..., None])
+
+
+def relative_sigmas(sigmas: FloatArray) -> FloatArray | None:
+    """Return standard deviations over the least of all, 1 or more; None if all alike.
+
+    Parameters
+    ----------
+    sigmas : (N, L) array
+        px; NaN where an LED was not seen, whose ratio is 1.
+    """
+    seen = sigmas[np.isfinite(sigmas)]
+    if not len(seen) or seen.max() == seen.min():
+        return None
+    return np.where(np.isfinite(sigmas), sigmas / seen.min(), 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Scaled:
+    """Reprojection errors in units of how exact each centre is, (N, L)."""
+
+    of: Reprojection
+    scales: FloatArray
+
+    @property
+    def pixels(self) -> FloatArray:
+        return self.of.pixels
+
+    def residuals_with_jacobian(
+        self, R: FloatArray, t: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        residuals, J = self.of.residuals_with_jacobian(R, t)
+        return residuals / self.scales[..., None], J / self.scales[..., None, None]
 
 
 def fit_reprojection(

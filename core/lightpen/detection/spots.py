@@ -18,8 +18,11 @@ import cv2
 import numpy as np
 from cv2.typing import MatLike
 
-from lightpen.arrays import FloatArray, Image, IntArray
+from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
 from lightpen.detection.disc_moments import (
+    FLAT,
+    HIGH,
+    LOW,
     MIN_SIZE,
     Disc,
     PixelBox,
@@ -27,6 +30,7 @@ from lightpen.detection.disc_moments import (
     measure_disc,
 )
 from lightpen.detection.pose import MIN_POSE_LEDS
+from lightpen.detection.small_spots import LARGEST_RADIUS, measure_small
 from lightpen.formats.decoding import bits_of
 from lightpen.model.quantiles import normal_quantile
 
@@ -58,10 +62,12 @@ MIN_RELATIVE_CONTRAST = 0.15  # less is the texture of something bright
 
 SMEARED_FRACTIONS = (2e-4, 0.2)  # of the image: more than hot pixels, less than a wall
 
+RAISED = 0.35  # height of the outline above which the foot of a disc is not its own
 MERGED_LEVEL = 0.5  # parted only above half its height, a disc holds foreign light
 SATURATED_LEVEL = 0.99  # of the full scale
 BLURRED_EDGE = 5.0  # px; a sharp image has 2 to 3
 DIM_SIGMAS = 16.0
+EXACT_SIGMA = 0.01  # px: better ones are outdone by what the lens leaves
 
 
 class SpotFlaw(IntFlag):
@@ -94,6 +100,9 @@ class Spots:
         Width of the rim from dark to bright, px; blur widens it.
     flaws : (N,) array
         `SpotFlaw` of each spot.
+    sigmas : (N,) array
+        Standard deviation of one coordinate of each centre, px, by the estimator that
+        found it; `EXACT_SIGMA` for discs that are wide enough to have a rim.
     has_smears : bool
         Whether there is light, but no spot: discs moved by many times their size during
         the exposure leave streaks, a dark image leaves nothing.
@@ -105,6 +114,7 @@ class Spots:
     contrasts: FloatArray
     edge_widths: FloatArray
     flaws: IntArray
+    sigmas: FloatArray
     has_smears: bool = False
 
     @classmethod
@@ -118,10 +128,18 @@ class Spots:
             contrasts=nothing,
             edge_widths=nothing,
             flaws=np.zeros(0, dtype=np.int64),
+            sigmas=nothing,
         )
 
     def __len__(self) -> int:
         return len(self.centers)
+
+    @property
+    def are_small(self) -> BoolArray:
+        """Whether a spot is so small that blur leaves it no even inside."""
+        radii = np.sqrt(self.areas / np.pi)
+        rims = self.edge_widths / (HIGH - LOW)
+        return np.asarray((radii < LARGEST_RADIUS) & (rims > FLAT * radii))
 
     @property
     def are_blurred(self) -> bool:
@@ -189,7 +207,7 @@ def detect_spots(
             f"got shape {image.shape} of {image.dtype}."
         )
     if min(image.shape) < MIN_SIZE:
-        return _as_spots([], 1.0, MIN_NOISE)
+        return Spots.none()
     if full_scale is None:
         full_scale = 2 ** bits_of(image) - 1
     stride = 4 if min(image.shape) >= 1024 else 2 if min(image.shape) >= 512 else 1
@@ -220,7 +238,11 @@ def _spots_of(
         if len(flat_discs) > len(discs):
             scene, discs = flat, flat_discs
         has_smears = not discs and _has_smears(flat)
+    discs = sorted(discs, key=lambda disc: disc.levels.contrast, reverse=True)
+    discs = discs[:MAX_SPOTS]
     spots = _as_spots(discs, full_scale, scene.noise)
+    if len(spots) and np.median(spots.areas) < np.pi * LARGEST_RADIUS**2:
+        spots = _with_small(spots, discs, image, scene.noise, full_scale)
     return replace(spots, has_smears=has_smears)
 
 
@@ -439,8 +461,6 @@ def _resembles_disc(disc: Disc) -> bool:
 
 
 def _as_spots(discs: list[Disc], full_scale: float, noise: float) -> Spots:
-    discs = sorted(discs, key=lambda disc: disc.levels.contrast, reverse=True)
-    discs = discs[:MAX_SPOTS]
     whole = [disc.moments.area for disc in discs if disc.is_whole]
     usual_area = median(whole) if whole else None
     moments = [disc.moments for disc in discs]
@@ -455,6 +475,50 @@ def _as_spots(discs: list[Disc], full_scale: float, noise: float) -> Spots:
         np.array(
             [_flaws(disc, usual_area, full_scale, noise) for disc in discs], np.int64
         ),
+        np.full(len(discs), EXACT_SIGMA),
+    )
+
+
+def _with_small(
+    spots: Spots, discs: list[Disc], image: Image, noise: float, full_scale: float
+) -> Spots:
+    """Return spots with the small ones measured anew.
+
+    These are the ones that blur leaves without an even inside, or foreign light without
+    a foot.
+    """
+    raised = [not disc.is_whole or disc.cut_height > RAISED for disc in discs]
+    radii = np.sqrt(spots.areas / np.pi)
+    small = np.flatnonzero(spots.are_small | (raised & (radii < LARGEST_RADIUS)))
+    if not len(small):
+        return spots
+    found = measure_small(
+        image, spots.centers[small], radii[small], full_scale
+    )
+    kept = spots.flaws[small] & (SpotFlaw.BLURRED | SpotFlaw.CUT)
+    # What was parted at high levels and is whole in a window of its own is not cut.
+    reach = found.radii[:, None]
+    height, width = image.shape
+    inside = (found.centers > reach - 0.5) & (found.centers < [width, height] - reach)
+    kept &= ~np.where(inside.all(axis=1) & found.are_whole, int(SpotFlaw.CUT), 0)
+    flaws = kept | np.where(found.are_whole, 0, int(SpotFlaw.MERGED))
+    flaws |= np.where(found.saturated, int(SpotFlaw.SATURATED), 0)
+    noises = np.minimum(np.maximum(found.noises, MIN_NOISE), noise)
+    flaws |= np.where(found.peaks < DIM_SIGMAS * noises, int(SpotFlaw.DIM), 0)
+
+    def replaced(old: FloatArray, new: FloatArray) -> FloatArray:
+        values = old.copy()
+        values[small] = new
+        return values
+
+    return replace(
+        spots,
+        centers=replaced(spots.centers, found.centers),
+        shapes=replaced(spots.shapes, found.shapes),
+        areas=replaced(spots.areas, np.pi * found.radii**2),
+        contrasts=replaced(spots.contrasts, found.peaks / full_scale),
+        flaws=replaced(spots.flaws, flaws),
+        sigmas=replaced(spots.sigmas, np.maximum(found.sigmas, EXACT_SIGMA)),
     )
 
 

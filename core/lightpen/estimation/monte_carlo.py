@@ -21,6 +21,7 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.observations import Observations
 from lightpen.detection.reasons import Reason
+from lightpen.detection.spots import EXACT_SIGMA
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.components import NONE
 from lightpen.estimation.bundle.disc_diameter import modelled_areas
@@ -285,6 +286,7 @@ def _observed(trials: Trials, pixels: FloatArray, areas: FloatArray) -> Observat
         rotations=trials.rotations,
         translations=trials.cone_cam - shifts,
         areas=areas,
+        sigmas=np.where(np.isfinite(pixels[..., 0]), EXACT_SIGMA, np.nan),
         edge_widths=trials.edge_widths,
         lamps=np.zeros((n_images, 0, 2)),
         reasons=(Reason.NONE,) * n_images,

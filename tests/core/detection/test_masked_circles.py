@@ -14,6 +14,7 @@ SPOTS = Spots(
     contrasts=np.full(2, 0.6),
     edge_widths=np.full(2, 2.0),
     flaws=np.zeros(2, dtype=np.int64),
+    sigmas=np.full(2, 0.01),
 )
 
 

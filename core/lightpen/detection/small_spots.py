@@ -1,0 +1,325 @@
+"""Centres of LEDs of a few pixels, of which blur leaves no even inside.
+
+A disc less than some 20 px wide with a blur of 1.5 px is a bell, not a plateau with a
+rim. Reflections on the board and bloom reach into its foot, so its outline near the
+background tells neither its centre nor whether it is whole. Three estimators measure it
+in a window of its own:
+
+* the **grey centroid** in a Gaussian window 0.75 half-level radii wide, iterated until
+  it stays in the middle of its window [1]_, for light with nothing beside it;
+* the **Gaussian fit**, the same in a window 0.45 radii wide: the place of the Gaussian
+  that correlates most with the light. It hardly sees what lies beside the LED;
+* the **edge**, the centroid of the soft-thresholded disc, between levels that lie the
+  higher the more foreign light there is; for saturated LEDs in the upper half, the only
+  light that is steep.
+
+How far the first two differ tells the foreign light of an image. On rendered panels with
+and without it (`benchmarks/led_looks.py`) size, saturation and this difference decide
+which estimator errs least.
+
+The part of the window that is odd under a point reflection about the centre holds all
+noise and none of a symmetric LED: it gives the standard deviation of the centre, and
+tells LEDs that are partly hidden or merge with something.
+
+References
+----------
+.. [1] E. Bertin, S. Arnouts, "SExtractor: software for source extraction", Astronomy and
+   Astrophysics Supplement 117 (1996) 393-404; windowed centroids are those of its manual.
+"""
+
+from dataclasses import dataclass
+from math import ceil
+
+import cv2
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
+
+LARGEST_RADIUS = 12.0  # px, half-level, of a spot that is measured here
+REACH = 2.2  # half-level radii, and
+MORE_REACH = 2.0  # px, from the centre to the border of a window
+BACKGROUND_QUANTILE = 0.1
+FOOT, HEAD = 0.25, 0.75  # heights between which the half-level area is counted
+
+WIDE, MIDDLE, NARROW = 0.75, 0.55, 0.45  # half-level radii, standard deviation
+LEAST_WINDOW = 1.1  # px
+ROUNDS = 10
+FARTHEST = 0.5  # half-level radii, of a centre from its start
+
+LITTLE, MUCH = 0.012, 0.03  # px, median difference of two windows: foreign light
+LEAST_EDGE = 3.7  # px, half-level radius from which the edge is better than windows
+EDGES = ((0.1, 0.9), (0.2, 0.9), (0.3, 0.9))  # heights, by little or much foreign light
+SATURATED_EDGE = (0.5, 0.95)
+SATURATED_PEAK = 0.985  # of the full scale, mean of nine pixels
+
+SHARE_OF_DIFFERENCE = 0.3  # of a difference by foreign light that the centre errs by
+SPREAD = 1.3  # half-level radii in a standard deviation of the light
+INTERPOLATED = 1.4  # noise of a pixel over that between pixels, by bilinear weights
+LONGEST = 4.0  # times as long as wide, of a spot
+NEAR = 0.5  # radii, of a place that may be brighter than the middle of a region
+LARGER = 1.5  # times the usual radius of the spots that are measured together
+BRIGHTER = 1.05  # than the middle, of a place that is the LED's rather
+LOPSIDED = 0.25  # odd part over the light, of an LED that is not whole
+
+
+@dataclass(frozen=True, eq=False)
+class SmallSpots:
+    """LEDs of a few pixels.
+
+    Attributes
+    ----------
+    centers : (N, 2) array
+        px.
+    shapes : (N, 2, 2) array
+        Covariance of the area at half level, px^2.
+    radii : (N,) array
+        At half level, px.
+    peaks : (N,) array
+        Above the local background, digital numbers.
+    sigmas : (N,) array
+        Standard deviation of one coordinate of each centre, px.
+    noises : (N,) array
+        Standard deviation of a pixel beside the centre, digital numbers.
+    lopsided : (N,) array
+        Odd part of the light over all of it: noise only for a whole LED.
+    saturated : (N,) array
+        Whether the light is clipped.
+    """
+
+    centers: FloatArray
+    shapes: FloatArray
+    radii: FloatArray
+    peaks: FloatArray
+    sigmas: FloatArray
+    noises: FloatArray
+    lopsided: FloatArray
+    saturated: BoolArray
+
+    @property
+    def are_whole(self) -> BoolArray:
+        """Whether nothing hides the LED, nor merges with it."""
+        return np.asarray(self.lopsided < LOPSIDED)
+
+
+@dataclass(frozen=True, eq=False)
+class _Windows:
+    """Light in square windows of side 2 r + 1 about pixels, above the background."""
+
+    light: FloatArray  # (N, S, S)
+    middles: IntArray  # (N, 2)
+    radii: FloatArray  # (N,), half-level
+    tops: FloatArray  # (N,), of the light
+    peaks: FloatArray  # (N,), the same with the background, digital numbers
+
+    @property
+    def places(self) -> FloatArray:
+        """Pixels from the middle, (S,)."""
+        half = self.light.shape[1] // 2
+        return np.arange(-half, half + 1.0)
+
+
+def measure_small(
+    image: Image, centers: FloatArray, radii: FloatArray, full_scale: float
+) -> SmallSpots:
+    """Measure spots of a few pixels.
+
+    Parameters
+    ----------
+    image : (H, W) array
+        Grey image, 8 or 16 bit.
+    centers : (N, 2) array
+        To within 2 px, px.
+    radii : (N,) array
+        Rough half-level radii, px.
+    full_scale : float
+        Brightest value a pixel can have.
+    """
+    radii = np.minimum(radii, LARGER * np.median(radii))
+    windows = _windows(image, _brightest(image, centers, radii), radii)
+    saturated = windows.peaks >= SATURATED_PEAK * full_scale
+    narrow = _windowed(windows, np.zeros_like(centers), NARROW)
+    wide = _windowed(windows, narrow, WIDE)
+    unclipped = ~saturated if (~saturated).any() else np.ones(len(centers), bool)
+    gaps = np.linalg.norm(wide - narrow, axis=1)
+    foreign = float(np.median(gaps[unclipped]))
+    grade = 0 if foreign < LITTLE else 1 if foreign < MUCH else 2
+    found = (wide, _windowed(windows, narrow, MIDDLE), narrow)[grade].copy()
+    share = SHARE_OF_DIFFERENCE * (foreign if grade else 0.0)
+    width = (WIDE, MIDDLE, NARROW)[grade]
+    odd = _odd_parts(windows, narrow)
+    sigmas = _window_sigmas(windows, odd, width)
+    edges = saturated | (windows.radii > LEAST_EDGE)
+    for i in np.flatnonzero(edges).tolist():
+        heights = SATURATED_EDGE if saturated[i] else EDGES[grade]
+        edge = _edge(windows, i, narrow[i], odd[i], heights)
+        if edge is None:
+            continue
+        if np.hypot(*(edge[0] - narrow[i])) < FARTHEST * windows.radii[i]:
+            found[i], sigmas[i] = edge
+    sigmas = np.sqrt((sigmas**2 + np.median(sigmas) ** 2) / 2 + share**2)
+    noises, lopsided = _asymmetry(windows, odd)
+    return SmallSpots(
+        centers=windows.middles + found,
+        shapes=_shapes(windows, narrow),
+        radii=windows.radii,
+        peaks=windows.tops,
+        sigmas=sigmas,
+        noises=noises,
+        lopsided=lopsided,
+        saturated=saturated,
+    )
+
+
+def _brightest(image: Image, centers: FloatArray, radii: FloatArray) -> FloatArray:
+    """Return the brightest places near centres that are not bright themselves."""
+    half = round(NEAR * float(np.median(radii)))
+    _, _, light = _cut_out(image, centers, half)
+    places = np.arange(-half, half + 1)
+    smooth = np.stack([cv2.GaussianBlur(each, (0, 0), LEAST_WINDOW) for each in light])
+    flat = smooth.reshape(len(smooth), -1)
+    row, column = np.divmod(flat.argmax(axis=1), 2 * half + 1)
+    there = np.rint(centers) + np.stack([places[column], places[row]], axis=-1)
+    is_brighter = flat.max(axis=1) > BRIGHTER * smooth[:, half, half]
+    return np.where(is_brighter[:, None], there, centers)
+
+
+def _cut_out(
+    image: Image, centers: FloatArray, half: int
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    middles = np.rint(centers).astype(np.int64)
+    places = np.arange(-half, half + 1)
+    rows = np.clip(middles[:, 1, None] + places, 0, image.shape[0] - 1)
+    columns = np.clip(middles[:, 0, None] + places, 0, image.shape[1] - 1)
+    light = image[rows[:, :, None], columns[:, None, :]].astype(np.float64)
+    return middles, places, light
+
+
+def _windows(image: Image, centers: FloatArray, radii: FloatArray) -> _Windows:
+    half = ceil(REACH * float(radii.max()) + MORE_REACH)
+    middles, _, light = _cut_out(image, centers, half)
+    flat = np.sort(light.reshape(len(light), -1), axis=1)
+    background = flat[:, int(BACKGROUND_QUANTILE * flat.shape[1])]
+    peaks = light[:, half - 1 : half + 2, half - 1 : half + 2].mean(axis=(1, 2))
+    light -= background[:, None, None]
+    tops = np.maximum(peaks - background, 1.0)
+    heights = light / tops[:, None, None]
+    soft = np.clip((heights - FOOT) / (HEAD - FOOT), 0, 1)
+    areas = [_about_the_middle(each).sum() for each in soft]
+    radii = np.sqrt(np.array(areas) / np.pi)
+    # What is larger by far has a neighbour in its half-level area.
+    radii = np.minimum(radii, LARGER * np.median(radii))
+    return _Windows(light, middles, radii, tops, peaks)
+
+
+def _about_the_middle(soft: FloatArray) -> FloatArray:
+    """Return a soft-thresholded window without the regions beside the middle one."""
+    _, regions = cv2.connectedComponents((soft > 0).astype(np.uint8))
+    half = len(soft) // 2
+    middle = regions[half, half]
+    if middle == 0:
+        return np.zeros_like(soft)
+    return np.asarray(np.where(regions == middle, soft, 0.0))
+
+
+def _weights(
+    windows: _Windows, at: FloatArray, width: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return places from the centres, (N, 2, S), Gaussian weights there, variances."""
+    variances = np.maximum(width * windows.radii, LEAST_WINDOW) ** 2
+    away = windows.places - at[:, :, None]
+    return away, np.exp(-0.5 * away**2 / variances[:, None, None]), variances
+
+
+def _windowed(windows: _Windows, starts: FloatArray, width: float) -> FloatArray:
+    """Return the centroids that lie in the middle of their Gaussian windows, (N, 2)."""
+    at, farthest = starts, FARTHEST * windows.radii[:, None]
+    for _ in range(ROUNDS):
+        away, weights, _ = _weights(windows, at, width)
+        over_rows = np.einsum("nyx,ny->nx", windows.light, weights[:, 1])
+        over_columns = np.einsum("nyx,nx->ny", windows.light, weights[:, 0])
+        weighted = np.stack([over_rows, over_columns], axis=1) * weights
+        amounts = np.maximum(weighted.sum(axis=2), 1e-9)
+        # For a bell as wide as its window the centroid lags by half.
+        at = at + 2 * (weighted * away).sum(axis=2) / amounts
+        at = np.clip(at, starts - farthest, starts + farthest)
+    return at
+
+
+def _shapes(windows: _Windows, at: FloatArray) -> FloatArray:
+    """Return covariances of half-level areas, as long as the light is, (N, 2, 2)."""
+    away, weights, variances = _weights(windows, at, NARROW)
+    over_rows, over_columns = weights[:, 1], weights[:, 0]
+    x, y = away[:, 0], away[:, 1]
+    light = windows.light
+    amount = np.maximum(
+        np.einsum("nyx,ny,nx->n", light, over_rows, over_columns), 1e-9
+    )
+    xx = np.einsum("nyx,ny,nx->n", light, over_rows, over_columns * x**2) / amount
+    yy = np.einsum("nyx,ny,nx->n", light, over_rows * y**2, over_columns) / amount
+    xy = np.einsum("nyx,ny,nx->n", light, over_rows * y, over_columns * x) / amount
+    # A bell of covariance V in a window of variance s has 1 / (1 / V + 1 / s).
+    seen = np.stack([xx, xy, xy, yy], axis=-1).reshape(-1, 2, 2)
+    eye = np.eye(2)
+    sharpness = np.linalg.inv(seen + 1e-3 * eye) - eye / variances[:, None, None]
+    values, vectors = np.linalg.eigh(sharpness)
+    values = np.maximum(values, values[:, -1:] / LONGEST**2)
+    values = np.maximum(values, 1e-6)
+    round_values = np.sqrt(values.prod(axis=1, keepdims=True)) / values
+    scaled = round_values * (windows.radii**2 / 4)[:, None]
+    return np.asarray((vectors * scaled[:, None, :]) @ np.swapaxes(vectors, 1, 2))
+
+
+def _odd_parts(windows: _Windows, at: FloatArray) -> FloatArray:
+    """Return the odd part of the light about centres, with the noise of a pixel."""
+    half = windows.light.shape[1] // 2
+    size = (2 * half + 1, 2 * half + 1)
+    odd = np.empty_like(windows.light)
+    for i, (light, (x, y)) in enumerate(zip(windows.light, at.tolist(), strict=True)):
+        there = cv2.getRectSubPix(light.astype(np.float32), size, (half + x, half + y))
+        odd[i] = INTERPOLATED * (there - there[::-1, ::-1]) / np.sqrt(2)
+    return odd
+
+
+def _window_sigmas(windows: _Windows, odd: FloatArray, width: float) -> FloatArray:
+    """Return the standard deviations of centres in Gaussian windows, (N,), px."""
+    away, weights, variances = _weights(windows, np.zeros((len(odd), 2)), width)
+    both = weights[:, 1, :, None] * weights[:, 0, None, :]
+    lever = away[:, 1, :, None] ** 2 + away[:, 0, None, :] ** 2
+    squares = 0.5 * np.einsum("nyx,nyx,nyx->n", both**2, lever, odd**2)
+    amounts = np.maximum(np.einsum("nyx,nyx->n", both, windows.light), 1e-9)
+    spread = (windows.radii / SPREAD) ** 2
+    return np.asarray(np.sqrt(squares) / amounts * (1 + spread / variances))
+
+
+def _edge(
+    windows: _Windows,
+    i: int,
+    at: FloatArray,
+    odd: FloatArray,
+    heights: tuple[float, float],
+) -> tuple[FloatArray, float] | None:
+    """Return the centre by an edge, px from the middle, and its standard deviation."""
+    low, high = heights
+    top = windows.tops[i]
+    soft = np.clip((windows.light[i] / top - low) / (high - low), 0, 1)
+    soft = _about_the_middle(soft)
+    area = soft.sum()
+    if area < 1:
+        return None
+    x = soft.sum(axis=0) @ windows.places / area
+    y = soft.sum(axis=1) @ windows.places / area
+    away = windows.places
+    lever = (away[:, None] - at[1]) ** 2 + (away - at[0]) ** 2
+    grey = (soft > 0) & (soft < 1)
+    squares = 0.5 * (lever * odd**2)[grey].sum()
+    return np.array([x, y]), float(np.sqrt(squares) / ((high - low) * top * area))
+
+
+def _asymmetry(windows: _Windows, odd: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the noise of a pixel, and the odd part over the light, near the centres."""
+    _, weights, _ = _weights(windows, np.zeros((len(odd), 2)), MIDDLE)
+    both = weights[:, 1, :, None] * weights[:, 0, None, :]
+    odd_squares = np.einsum("nyx,nyx->n", both, odd**2)
+    squares = np.einsum("nyx,nyx->n", both, windows.light**2)
+    noises = np.sqrt(odd_squares / both.sum(axis=(1, 2)))
+    return noises, np.sqrt(odd_squares / np.maximum(squares, 1e-9))
