@@ -14,6 +14,8 @@ BLOB_AREAS = (100.0, 10_000.0)  # px^2
 BLOB_CIRCULARITY = 0.8  # keeps out discs that merge at low thresholds
 CENTROID_LEVEL = 30  # grey value
 CENTROID_MARGIN = 4  # px
+PITCH = 2.5  # of LEDs on a panel, in widths
+UNCLIPPED = 250  # grey value
 REACH = 10.0  # px, of a found centre from the true one
 
 
@@ -61,6 +63,70 @@ def grey_centroids(image: Image) -> FloatArray:
             )
         )
     return np.array(centers).reshape(-1, 2)
+
+
+def grey_centroids_at(image: Image, places: FloatArray, width: float) -> FloatArray:
+    """Return the centroids of light above an eighth of its height, (N, 2), px.
+
+    Parameters
+    ----------
+    places : (N, 2) array
+        Of the LEDs, roughly, px.
+    width : float
+        Of an LED, px.
+    """
+    half = int(np.ceil(0.5 * PITCH * width))
+    centers = []
+    for x, y in np.rint(places).astype(int).tolist():
+        left, top = max(x - half, 0), max(y - half, 0)
+        window = image[top : y + half + 1, left : x + half + 1].astype(float)
+        window -= window.min()
+        light = np.maximum(window - window.max() / 8, 0)
+        _, parts = cv2.connectedComponents((light > 0).astype(np.uint8))
+        light[parts != parts[y - top, x - left]] = 0
+        rows, columns = np.mgrid[: light.shape[0], : light.shape[1]]
+        amount = max(light.sum(), 1e-9)
+        centers.append(
+            (
+                left + (light * columns).sum() / amount,
+                top + (light * rows).sum() / amount,
+            )
+        )
+    return np.array(centers)
+
+
+def gaussian_fits(
+    image: Image, places: FloatArray, width: float, blur: float
+) -> FloatArray:
+    """Return the centres of elliptic Gaussians by least squares, (N, 2), px.
+
+    Clipped pixels are left out; else as of `grey_centroids_at`.
+    """
+    from scipy.optimize import least_squares  # takes 0.2 s
+
+    half = int(np.ceil(width / 2 + 1.5 * blur))
+    variance = (width / 4) ** 2 + blur**2
+    centers = []
+    for x0, y0 in places.tolist():
+        x, y = round(x0), round(y0)
+        rows, columns = np.mgrid[
+            max(y - half, 0) : min(y + half + 1, image.shape[0]),
+            max(x - half, 0) : min(x + half + 1, image.shape[1]),
+        ]
+        light = image[rows, columns].astype(float)
+        used = light < UNCLIPPED
+
+        def misfit(p: FloatArray) -> FloatArray:
+            u, v = columns - p[0], rows - p[1]
+            power = p[4] * u**2 + 2 * p[5] * u * v + p[6] * v**2
+            bell = p[2] * np.exp(-0.5 * np.minimum(power, 80)) + p[3]
+            return np.asarray((bell - light)[used])
+
+        start = [x0, y0, np.ptp(light), light.min(), 1 / variance, 0, 1 / variance]
+        fit = least_squares(misfit, start, max_nfev=60)
+        near = np.hypot(fit.x[0] - x0, fit.x[1] - y0) < width / 2
+        centers.append(fit.x[:2] if near else (x0, y0))
+    return np.array(centers)
 
 
 def nearest(found: FloatArray, true: FloatArray) -> FloatArray:

@@ -30,6 +30,7 @@ from benchmarks.labelling import labelling_rows
 from benchmarks.machine import description
 from benchmarks.published import with_section
 from benchmarks.rows import NEEDS_DATA, Row, table
+from benchmarks.small_leds import small_led_rows
 from benchmarks.speed import speed_rows
 from benchmarks.tips import repeat_rows, tip_rows
 from benchmarks.tracker import tracker_rows
@@ -53,6 +54,7 @@ SECTIONS: dict[str, Section] = {
     "discover": lambda workers, data: discovery_rows(workers),
     "hard": lambda workers, data: hard_scene_rows(workers),
     "labels": lambda workers, data: labelling_rows(workers),
+    "leds": lambda workers, data: small_led_rows(workers),
     "tracker": tracker_rows,
     "verify": verification_rows,
     "power": lambda workers, data: session_rows(workers),

@@ -19,6 +19,7 @@ from lightpen.detection.pen_detection import (
 )
 from lightpen.detection.pose import MIN_POSE_LEDS, start_poses
 from lightpen.detection.reasons import MISHAPS, Reason, mishap_detail
+from lightpen.detection.small_spots import MIN_WIDTH
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import CalibrationError, FileError
 from lightpen.formats.decoding import bits_of
@@ -297,6 +298,9 @@ def _advice(
 ) -> Message | None:
     if 2 * reasons.count(Reason.AMBIGUOUS) > len(reasons):
         return message("images.ambiguous")
+    if 2 * reasons.count(Reason.TOO_SMALL) > len(reasons):
+        width = float(np.nanmedian([found.tiny_width for found in spots]))
+        return message("images.too-small", width=width, needed=MIN_WIDTH)
     return diagnose(spots, camera, pen)
 
 

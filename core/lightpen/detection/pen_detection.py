@@ -199,6 +199,7 @@ def detections_of(
     An image is of use if its LEDs are labelled and four of them or more are whole. If
     not, the reason is the first that holds:
 
+    * too small, where hardly any but tiny spots are seen;
     * blurred, where most spots are or where there is light but no spot, since stillness
       comes first: it may part merged LEDs, and tell alike ones apart;
     * empty, without any spot;
@@ -298,6 +299,8 @@ def _detection_of(spots: Spots, labels: Labels, seen: FloatArray) -> PenDetectio
     is_labelled = labels.reason is LabelStatus.LABELLED
     if is_labelled and _n_seen(pixels) >= MIN_POSE_LEDS:
         return detection(Reason.NONE, labels.R, labels.t)
+    if np.isfinite(spots.tiny_width):
+        return detection(Reason.TOO_SMALL)
     return detection(Reason.BLURRED if spots.are_blurred else _REASONS[labels.reason])
 
 

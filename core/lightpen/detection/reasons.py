@@ -21,6 +21,7 @@ class Reason(StrEnum):
     EMPTY = "empty"
     BLURRED = "blurred"
     TOO_FEW_LEDS = "too few LEDs"
+    TOO_SMALL = "LEDs too small"
     NOT_THE_PEN = "spots do not fit the pen"
     AMBIGUOUS = "ambiguous"
     MISFIT = "LEDs do not fit"
@@ -55,6 +56,7 @@ _WORDS = {
     Reason.EMPTY: message("reason.empty"),
     Reason.BLURRED: message("reason.blurred"),
     Reason.TOO_FEW_LEDS: message("reason.too-few-leds"),
+    Reason.TOO_SMALL: message("reason.too-small"),
     Reason.NOT_THE_PEN: message("reason.not-the-pen"),
     Reason.AMBIGUOUS: message("reason.ambiguous"),
     Reason.MISFIT: message("reason.misfit"),

@@ -7,15 +7,15 @@ in a window of its own:
 
 * the **grey centroid** in a Gaussian window 0.75 half-level radii wide, iterated until
   it stays in the middle of its window [1]_, for light with nothing beside it;
-* the **Gaussian fit**, the same in a window 0.45 radii wide: the place of the Gaussian
-  that correlates most with the light. It hardly sees what lies beside the LED;
+* the **Gaussian fit**, the same in a window of 0.4 to 0.55 radii: the place of the
+  Gaussian that correlates most with the light. It hardly sees what lies beside the LED;
 * the **edge**, the centroid of the soft-thresholded disc, between levels that lie the
   higher the more foreign light there is; for saturated LEDs in the upper half, the only
   light that is steep.
 
-How far the first two differ tells the foreign light of an image. On rendered panels with
-and without it (`benchmarks/led_looks.py`) size, saturation and this difference decide
-which estimator errs least.
+How far the first two differ tells the foreign light of an image. Size, saturation and
+this difference decide which of them is taken: the one that errs least on rendered
+panels with and without foreign light (`benchmarks/small_leds.py`).
 
 The part of the window that is odd under a point reflection about the centre holds all
 noise and none of a symmetric LED: it gives the standard deviation of the centre, and
@@ -23,8 +23,8 @@ tells LEDs that are partly hidden or merge with something.
 
 References
 ----------
-.. [1] E. Bertin, S. Arnouts, "SExtractor: software for source extraction", Astronomy and
-   Astrophysics Supplement 117 (1996) 393-404; windowed centroids are those of its manual.
+.. [1] E. Bertin, S. Arnouts, "SExtractor: software for source extraction", Astronomy
+   and Astrophysics Supplement 117 (1996) 393-404; its manual has windowed centroids.
 """
 
 from dataclasses import dataclass
@@ -36,12 +36,17 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
 
 LARGEST_RADIUS = 12.0  # px, half-level, of a spot that is measured here
-REACH = 2.2  # half-level radii, and
-MORE_REACH = 2.0  # px, from the centre to the border of a window
+REACH = 2.5  # half-level radii, and
+MORE_REACH = 1.0  # px, from the centre to the border of a window
 BACKGROUND_QUANTILE = 0.1
 FOOT, HEAD = 0.25, 0.75  # heights between which the half-level area is counted
 
-WIDE, MIDDLE, NARROW = 0.75, 0.55, 0.45  # half-level radii, standard deviation
+WIDE, MIDDLE, NARROW, TIGHT = (
+    0.75,
+    0.55,
+    0.45,
+    0.4,
+)  # half-level radii, standard deviation
 LEAST_WINDOW = 1.1  # px
 ROUNDS = 10
 FARTHEST = 0.5  # half-level radii, of a centre from its start
@@ -49,6 +54,7 @@ FARTHEST = 0.5  # half-level radii, of a centre from its start
 LITTLE, MUCH = 0.012, 0.03  # px, median difference of two windows: foreign light
 LEAST_EDGE = 3.7  # px, half-level radius from which the edge is better than windows
 EDGES = ((0.1, 0.9), (0.2, 0.9), (0.3, 0.9))  # heights, by little or much foreign light
+MOST_BESIDE = 0.15  # radii, of an edge from the windowed centre
 SATURATED_EDGE = (0.5, 0.95)
 SATURATED_PEAK = 0.985  # of the full scale, mean of nine pixels
 
@@ -59,6 +65,14 @@ LONGEST = 4.0  # times as long as wide, of a spot
 NEAR = 0.5  # radii, of a place that may be brighter than the middle of a region
 LARGER = 1.5  # times the usual radius of the spots that are measured together
 BRIGHTER = 1.05  # than the middle, of a place that is the LED's rather
+RING = (2.0, 2.5)  # half-level radii, round a spot
+LIT_SHARE = 0.2  # of a ring, and
+DARK = 0.08  # of the light, round a spot that is alone
+MIN_WIDTH = 4.0  # px, at half level; less tells no centre
+LEAST_TINY = 1.2  # px; what is smaller is a hot pixel
+LARGEST_TINY = 12  # px, of the box at the foot
+FEWEST_TINY = 4
+MAX_TINY = 4000  # contours looked at
 LOPSIDED = 0.25  # odd part over the light, of an LED that is not whole
 
 
@@ -84,6 +98,8 @@ class SmallSpots:
         Odd part of the light over all of it: noise only for a whole LED.
     saturated : (N,) array
         Whether the light is clipped.
+    alone : (N,) array
+        Whether it is dark all round, so that the outline tells a whole LED.
     """
 
     centers: FloatArray
@@ -94,10 +110,11 @@ class SmallSpots:
     noises: FloatArray
     lopsided: FloatArray
     saturated: BoolArray
+    alone: BoolArray
 
     @property
     def are_whole(self) -> BoolArray:
-        """Whether nothing hides the LED, nor merges with it."""
+        """Whether nothing hides the LED, nor merges with it, as far as windows tell."""
         return np.asarray(self.lopsided < LOPSIDED)
 
 
@@ -143,9 +160,9 @@ def measure_small(
     gaps = np.linalg.norm(wide - narrow, axis=1)
     foreign = float(np.median(gaps[unclipped]))
     grade = 0 if foreign < LITTLE else 1 if foreign < MUCH else 2
-    found = (wide, _windowed(windows, narrow, MIDDLE), narrow)[grade].copy()
+    width = (WIDE, MIDDLE, TIGHT)[grade]
+    found = _windowed(windows, narrow, width)
     share = SHARE_OF_DIFFERENCE * (foreign if grade else 0.0)
-    width = (WIDE, MIDDLE, NARROW)[grade]
     odd = _odd_parts(windows, narrow)
     sigmas = _window_sigmas(windows, odd, width)
     edges = saturated | (windows.radii > LEAST_EDGE)
@@ -154,7 +171,7 @@ def measure_small(
         edge = _edge(windows, i, narrow[i], odd[i], heights)
         if edge is None:
             continue
-        if np.hypot(*(edge[0] - narrow[i])) < FARTHEST * windows.radii[i]:
+        if np.hypot(*(edge[0] - narrow[i])) < MOST_BESIDE * windows.radii[i]:
             found[i], sigmas[i] = edge
     sigmas = np.sqrt((sigmas**2 + np.median(sigmas) ** 2) / 2 + share**2)
     noises, lopsided = _asymmetry(windows, odd)
@@ -167,7 +184,33 @@ def measure_small(
         noises=noises,
         lopsided=lopsided,
         saturated=saturated,
+        alone=_are_alone(windows, narrow),
     )
+
+
+def width_of_tiny(image: Image, level: float, background: float) -> float:
+    """Return the width of spots too small for a centre, px; NaN of fewer than 4.
+
+    Parameters
+    ----------
+    level : float
+        An intensity that spots exceed and the background does not, digital numbers.
+    background : float
+        Digital numbers.
+    """
+    bright = (image > level).view(np.uint8)
+    contours, _ = cv2.findContours(bright, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    widths = []
+    for contour in contours[:MAX_TINY]:
+        x, y, width, height = cv2.boundingRect(contour)
+        if max(width, height) > LARGEST_TINY:
+            continue
+        light = image[y : y + height, x : x + width] - background
+        soft = np.clip((light / light.max() - FOOT) / (HEAD - FOOT), 0, 1)
+        widths.append(2 * np.sqrt(soft.sum() / np.pi))
+    # One pixel is a hot one.
+    tiny = [width for width in widths if LEAST_TINY < width < MIN_WIDTH]
+    return float(np.median(tiny)) if len(tiny) >= FEWEST_TINY else float("nan")
 
 
 def _brightest(image: Image, centers: FloatArray, radii: FloatArray) -> FloatArray:
@@ -207,7 +250,7 @@ def _windows(image: Image, centers: FloatArray, radii: FloatArray) -> _Windows:
     areas = [_about_the_middle(each).sum() for each in soft]
     radii = np.sqrt(np.array(areas) / np.pi)
     # What is larger by far has a neighbour in its half-level area.
-    radii = np.minimum(radii, LARGER * np.median(radii))
+    radii = np.clip(radii, LEAST_WINDOW, LARGER * max(np.median(radii), LEAST_WINDOW))
     return _Windows(light, middles, radii, tops, peaks)
 
 
@@ -245,15 +288,25 @@ def _windowed(windows: _Windows, starts: FloatArray, width: float) -> FloatArray
     return at
 
 
+def _are_alone(windows: _Windows, at: FloatArray) -> BoolArray:
+    """Return whether rings about spots are dark."""
+    away = windows.places - at[:, :, None]
+    distances = np.hypot(away[:, 1, :, None], away[:, 0, None, :])
+    distances /= windows.radii[:, None, None]
+    low, high = RING
+    ring = (low < distances) & (distances < high)
+    lit = ring & (windows.light > DARK * windows.tops[:, None, None])
+    n_ring, n_lit = ring.sum(axis=(1, 2)), lit.sum(axis=(1, 2))
+    return np.asarray((n_ring > 0) & (n_lit < LIT_SHARE * n_ring))
+
+
 def _shapes(windows: _Windows, at: FloatArray) -> FloatArray:
     """Return covariances of half-level areas, as long as the light is, (N, 2, 2)."""
     away, weights, variances = _weights(windows, at, NARROW)
     over_rows, over_columns = weights[:, 1], weights[:, 0]
     x, y = away[:, 0], away[:, 1]
     light = windows.light
-    amount = np.maximum(
-        np.einsum("nyx,ny,nx->n", light, over_rows, over_columns), 1e-9
-    )
+    amount = np.maximum(np.einsum("nyx,ny,nx->n", light, over_rows, over_columns), 1e-9)
     xx = np.einsum("nyx,ny,nx->n", light, over_rows, over_columns * x**2) / amount
     yy = np.einsum("nyx,ny,nx->n", light, over_rows * y**2, over_columns) / amount
     xy = np.einsum("nyx,ny,nx->n", light, over_rows * y, over_columns * x) / amount
@@ -316,7 +369,7 @@ def _edge(
 
 
 def _asymmetry(windows: _Windows, odd: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the noise of a pixel, and the odd part over the light, near the centres."""
+    """Return the noise of a pixel and the odd part over the light, near centres."""
     _, weights, _ = _weights(windows, np.zeros((len(odd), 2)), MIDDLE)
     both = weights[:, 1, :, None] * weights[:, 0, None, :]
     odd_squares = np.einsum("nyx,nyx->n", both, odd**2)

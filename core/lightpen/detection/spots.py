@@ -30,7 +30,7 @@ from lightpen.detection.disc_moments import (
     measure_disc,
 )
 from lightpen.detection.pose import MIN_POSE_LEDS
-from lightpen.detection.small_spots import LARGEST_RADIUS, measure_small
+from lightpen.detection.small_spots import LARGEST_RADIUS, measure_small, width_of_tiny
 from lightpen.formats.decoding import bits_of
 from lightpen.model.quantiles import normal_quantile
 
@@ -106,6 +106,9 @@ class Spots:
     has_smears : bool
         Whether there is light, but no spot: discs moved by many times their size during
         the exposure leave streaks, a dark image leaves nothing.
+    tiny_width : float
+        Usual width of spots that are too small for a centre, px, where there are too
+        few others for a pose; else NaN.
     """
 
     centers: FloatArray
@@ -116,6 +119,7 @@ class Spots:
     flaws: IntArray
     sigmas: FloatArray
     has_smears: bool = False
+    tiny_width: float = float("nan")
 
     @classmethod
     def none(cls) -> Self:
@@ -241,6 +245,10 @@ def _spots_of(
     discs = sorted(discs, key=lambda disc: disc.levels.contrast, reverse=True)
     discs = discs[:MAX_SPOTS]
     spots = _as_spots(discs, full_scale, scene.noise)
+    if len(spots) < MIN_POSE_LEDS:
+        rise = max(LEVEL_SIGMAS * scene.noise, LEVEL_OF_PEAK * full_scale)
+        width = width_of_tiny(image, scene.background + rise, scene.background)
+        spots = replace(spots, tiny_width=width)
     if len(spots) and np.median(spots.areas) < np.pi * LARGEST_RADIUS**2:
         spots = _with_small(spots, discs, image, scene.noise, full_scale)
     return replace(spots, has_smears=has_smears)
@@ -492,15 +500,15 @@ def _with_small(
     small = np.flatnonzero(spots.are_small | (raised & (radii < LARGEST_RADIUS)))
     if not len(small):
         return spots
-    found = measure_small(
-        image, spots.centers[small], radii[small], full_scale
-    )
-    kept = spots.flaws[small] & (SpotFlaw.BLURRED | SpotFlaw.CUT)
+    found = measure_small(image, spots.centers[small], radii[small], full_scale)
+    unwhole = SpotFlaw.CUT | SpotFlaw.MERGED
+    kept = spots.flaws[small] & (SpotFlaw.BLURRED | unwhole)
     # What was parted at high levels and is whole in a window of its own is not cut.
     reach = found.radii[:, None]
     height, width = image.shape
     inside = (found.centers > reach - 0.5) & (found.centers < [width, height] - reach)
-    kept &= ~np.where(inside.all(axis=1) & found.are_whole, int(SpotFlaw.CUT), 0)
+    is_whole = inside.all(axis=1) & found.are_whole & ~found.alone
+    kept &= ~np.where(is_whole, int(unwhole), 0)
     flaws = kept | np.where(found.are_whole, 0, int(SpotFlaw.MERGED))
     flaws |= np.where(found.saturated, int(SpotFlaw.SATURATED), 0)
     noises = np.minimum(np.maximum(found.noises, MIN_NOISE), noise)

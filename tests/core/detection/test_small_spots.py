@@ -1,0 +1,149 @@
+"""LEDs of a few pixels have centres, standard deviations and flaws of their own."""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+import pytest
+from tests.simulated_panels import Panel, panel_image
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.pen_detection import detect_pen
+from lightpen.detection.reasons import Reason
+from lightpen.detection.small_spots import measure_small
+from lightpen.detection.spots import EXACT_SIGMA, SpotFlaw, detect_spots
+from lightpen.simulator.image_plans import plan_scene, render_plan
+from lightpen.simulator.scenes import Scene
+
+EASY = Panel(6.0)
+HARD = Panel(
+    6.0, reflections=(0.1, 0.5), bloom=0.3, background=0.08, quality=80
+)  # as photographs of boards are
+CLEAN = Panel(6.0, reflections=(0.0, 0.0), bloom=0.0, quality=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    errors: FloatArray  # (N, 2), px
+    sigmas: FloatArray
+    flaws: FloatArray
+    n_leds: int
+
+    @property
+    def rms(self) -> float:
+        return float(np.sqrt(np.mean(self.errors**2)))
+
+
+def found_on(panel: Panel, n_images: int = 3) -> Found:
+    rng = np.random.default_rng(1)
+    errors, sigmas, flaws, n_leds = [], [], [], 0
+    for _ in range(n_images):
+        shown = panel_image(panel, rng)
+        spots = detect_spots(shown.image)
+        gaps = np.linalg.norm(spots.centers - shown.centers[:, None], axis=2)
+        near = gaps.min(axis=1) < panel.width / 2 + 1
+        which = gaps.argmin(axis=1)[near]
+        errors.append(spots.centers[which] - shown.centers[near])
+        sigmas.append(spots.sigmas[which])
+        flaws.append(spots.flaws[which])
+        n_leds += len(shown.centers)
+    return Found(*map(np.concatenate, (errors, sigmas, flaws)), n_leds)
+
+
+@pytest.mark.parametrize("width", [5.0, 6.0, 7.0])
+@pytest.mark.parametrize("panel", [EASY, HARD])
+def test_at_most_one_in_ten_small_leds_on_a_reflecting_board_is_flagged(
+    panel: Panel, width: float
+) -> None:
+    found = found_on(replace(panel, width=width))
+    flaws = found.flaws[(found.flaws & SpotFlaw.SATURATED) == 0]
+    assert len(found.flaws) > 0.98 * found.n_leds
+    assert np.mean(flaws > 0) <= 0.1
+
+
+@pytest.mark.parametrize(
+    ("panel", "limit"),
+    # Some 1.2 times what a Gaussian fit from the true place reaches on them.
+    [
+        (CLEAN, 0.011),
+        (replace(CLEAN, width=4.0), 0.017),
+        (replace(CLEAN, width=10.0), 0.009),
+        (EASY, 0.021),
+        (replace(EASY, width=10.0), 0.015),
+        (replace(HARD, width=8.0), 0.07),
+        (replace(HARD, width=8.0, darkening=0.75), 0.14),
+    ],
+)
+def test_centers_are_as_good_as_by_a_gaussian_fit(panel: Panel, limit: float) -> None:
+    assert found_on(panel).rms < limit
+
+
+@pytest.mark.parametrize("width", [5.0, 7.0])
+def test_clipped_leds_that_bloom_have_centers(width: float) -> None:
+    found = found_on(replace(EASY, gains=(2.0, 6.0), width=width))
+    assert np.mean((found.flaws & SpotFlaw.SATURATED) > 0) > 0.9
+    assert found.rms < 0.06
+
+
+@pytest.mark.parametrize("panel", [EASY, HARD, replace(HARD, width=8.0)])
+def test_the_stated_standard_deviation_is_about_the_error(panel: Panel) -> None:
+    found = found_on(panel, 6)
+    typical = 1.2 * np.median(np.linalg.norm(found.errors, axis=1)) / np.sqrt(2)
+    assert 0.5 < np.median(found.sigmas) / typical < 2.0
+
+
+def test_leds_among_foreign_light_count_less_than_such_in_the_dark() -> None:
+    assert np.median(found_on(HARD).sigmas) > 2 * np.median(found_on(CLEAN).sigmas)
+
+
+def test_a_hidden_half_is_told() -> None:
+    y, x = np.mgrid[:40, :40]
+    light = np.where(np.hypot(x - 20, y - 20) < 3.5, 200.0, 0.0)
+    light += np.where(np.hypot(x - 27, y - 20) < 3.5, 90.0, 0.0)  # keeps it from alone
+    half = np.where(x < 20, 0.0, light)
+    for shown, is_whole in ((light, True), (half, False)):
+        image = cv2.GaussianBlur(shown, (0, 0), 1.0).astype(np.uint8)
+        found = measure_small(image, np.array([[20.0, 20.0]]), np.array([3.0]), 255.0)
+        assert found.are_whole[0] == is_whole
+
+
+def small_pen(diameter: float, blur: float) -> Scene:
+    usual = Scene(n_images=3, seed=3)
+    return replace(
+        usual,
+        pen=replace(usual.pen, diameter=diameter),
+        optics=replace(usual.optics, psf_sigma=blur),
+    )
+
+
+@pytest.mark.parametrize("diameter", [1.0, 1.4, 2.3])  # 4 to 10 px
+def test_a_pen_of_small_leds_is_found(diameter: float) -> None:
+    scene = small_pen(diameter, 1.5)
+    plan = plan_scene(scene)
+    for image_plan in plan.image_plans:
+        image = render_plan(scene, image_plan)
+        detection = detect_pen(image, scene.camera, plan.measured_pen)
+        assert detection.has_pose
+        assert detection.n_leds == scene.pen.n_leds
+        # Blur makes their size, which so tells no diameter.
+        assert np.isnan(detection.areas).all()
+        assert (detection.sigmas >= EXACT_SIGMA).all()
+
+
+@pytest.mark.parametrize(("diameter", "width"), [(0.3, 1.9), (0.6, 2.7)])
+def test_spots_of_one_to_three_pixels_are_refused_as_too_small(
+    diameter: float, width: float
+) -> None:
+    scene = small_pen(diameter, 0.6)
+    plan = plan_scene(scene)
+    image = render_plan(scene, plan.image_plans[0])
+    detection = detect_pen(image, scene.camera, plan.measured_pen)
+    assert detection.reason is Reason.TOO_SMALL
+    assert detection.spots is not None
+    assert detection.spots.tiny_width == pytest.approx(width, abs=0.5)
+
+
+def test_hot_pixels_are_no_leds_that_are_too_small() -> None:
+    image = np.zeros((600, 800), np.uint8)
+    image[np.arange(20, 580, 40), np.arange(20, 580, 40)] = 200
+    assert np.isnan(detect_spots(image).tiny_width)
