@@ -102,31 +102,36 @@ def gaussian_fits(
 
     Clipped pixels are left out; else as of `grey_centroids_at`.
     """
-    from scipy.optimize import least_squares  # takes 0.2 s
-
     half = int(np.ceil(width / 2 + 1.5 * blur))
     variance = (width / 4) ** 2 + blur**2
     centers = []
-    for x0, y0 in places.tolist():
-        x, y = round(x0), round(y0)
+    for place in places:
+        x, y = np.rint(place).astype(int).tolist()
         rows, columns = np.mgrid[
             max(y - half, 0) : min(y + half + 1, image.shape[0]),
             max(x - half, 0) : min(x + half + 1, image.shape[1]),
         ]
         light = image[rows, columns].astype(float)
         used = light < UNCLIPPED
-
-        def misfit(p: FloatArray) -> FloatArray:
-            u, v = columns - p[0], rows - p[1]
-            power = p[4] * u**2 + 2 * p[5] * u * v + p[6] * v**2
-            bell = p[2] * np.exp(-0.5 * np.minimum(power, 80)) + p[3]
-            return np.asarray((bell - light)[used])
-
-        start = [x0, y0, np.ptp(light), light.min(), 1 / variance, 0, 1 / variance]
-        fit = least_squares(misfit, start, max_nfev=60)
-        near = np.hypot(fit.x[0] - x0, fit.x[1] - y0) < width / 2
-        centers.append(fit.x[:2] if near else (x0, y0))
+        found = _gaussian(columns[used], rows[used], light[used], place, variance)
+        is_near = np.linalg.norm(found - place) < width / 2
+        centers.append(found if is_near else place)
     return np.array(centers)
+
+
+def _gaussian(
+    x: FloatArray, y: FloatArray, light: FloatArray, place: FloatArray, variance: float
+) -> FloatArray:
+    from scipy.optimize import least_squares  # takes 0.2 s
+
+    def misfit(p: FloatArray) -> FloatArray:
+        u, v = x - p[0], y - p[1]
+        power = p[4] * u**2 + 2 * p[5] * u * v + p[6] * v**2
+        return np.asarray(p[2] * np.exp(-0.5 * np.minimum(power, 80)) + p[3] - light)
+
+    shape = [np.ptp(light), light.min(), 1 / variance, 0, 1 / variance]
+    fit = least_squares(misfit, [*place, *shape], max_nfev=60)
+    return np.asarray(fit.x[:2])
 
 
 def nearest(found: FloatArray, true: FloatArray) -> FloatArray:

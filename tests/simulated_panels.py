@@ -70,7 +70,7 @@ class PanelImage:
 def panel_image(panel: Panel, rng: np.random.Generator) -> PanelImage:
     """Return an image of a panel at a random place."""
     centers, (width, height) = _places(panel, rng)
-    light = np.zeros((height * FINE, width * FINE), np.float32)
+    light: npt.NDArray[np.float32] = np.zeros((height * FINE, width * FINE), np.float32)
     tilt, direction = rng.uniform(0.8, 1.0), rng.uniform(0, np.pi)
     for center in centers:
         gain = rng.uniform(*panel.gains)
@@ -81,8 +81,8 @@ def panel_image(panel: Panel, rng: np.random.Generator) -> PanelImage:
             light, there, panel.width, gain * rng.uniform(*panel.reflections)
         )
     size = (width, height)
-    light = cv2.GaussianBlur(light, (0, 0), panel.psf * FINE)
-    pixels = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
+    blurred = cv2.GaussianBlur(light, (0, 0), panel.psf * FINE)
+    pixels = cv2.resize(blurred, size, interpolation=cv2.INTER_AREA)
     bloom = cv2.GaussianBlur(pixels, (0, 0), 4 * panel.psf)
     pixels = (1 - panel.bloom) * pixels + panel.bloom * bloom
     y, x = np.mgrid[:height, :width]

@@ -7,6 +7,7 @@ is then as precise as a fit of the rim, at the cost of one pass over a small win
 moments of f up to the third order also tell whether the region is a whole ellipse.
 """
 
+from collections.abc import Sequence
 from math import hypot, pi, sqrt
 from typing import NamedTuple
 
@@ -15,7 +16,7 @@ import numpy as np
 from cv2.typing import MatLike
 
 from lightpen.arrays import Image
-from lightpen.detection.edge_fit import EdgeFit, fit_edge
+from lightpen.detection.edge_fit import EdgeFit, EdgeStart, fit_edges
 
 # Narrower than this samples the rim too coarsely: 20 to 80 % doubles the error.
 LOW = 0.1
@@ -52,6 +53,9 @@ FLAT = 0.5  # width of the rim over the radius up to which a disc has a plateau
 UNEVEN_CENTER = 0.002  # of the radius: the outline is 0.01 px off at a sharp rim
 CORRECTED_CENTER = 0.007  # of the radius, where shading is corrected to first order
 NOISE_SIGMAS = 3.0
+WIDE_EDGE = 4.5  # px; sharp discs have 2 to 3
+SHARPER = 0.7  # times as wide is a rim that light of the inside widens
+FULLY = 250  # of 255, the crest of a ring
 MIN_OUTLINE = 0.97  # of the area of an ellipse with the same second moments
 
 # How far a whole ellipse strays from roundness 1 and skewness 0 by sampling, blur and
@@ -172,7 +176,10 @@ class Disc(NamedTuple):
     `cut_level` is the intensity at its outline. `is_whole` tells that sampling, blur
     and noise explain how it differs from an ellipse; a sliver of 1 px off a disc of
     42 px, which shifts the centre by 0.13 px, is beyond that. `others` are further
-    regions in the box that was asked for.
+    regions in the box that was asked for. `is_even` tells that its light is as even as
+    its outline supposes. `rim` is where the fit of its rim may begin,
+    by which `with_rims` measures a disc that is not evenly lit; `filled`
+    has the moments of a ring with its dark middle filled, if that makes it whole.
     """
 
     moments: DiscMoments
@@ -183,6 +190,9 @@ class Disc(NamedTuple):
     leaves_window: bool
     is_whole: bool
     others: tuple[PixelBox, ...]
+    is_even: bool = True
+    rim: EdgeStart | None = None
+    filled: DiscMoments | None = None
 
     @property
     def cut_height(self) -> float:
@@ -268,13 +278,18 @@ def _measure_window(
     )
     is_inside = not (leaves_image or leaves_window)
     is_whole = is_inside and _is_ellipse(moments, noise / contrast)
-    if is_inside and not (
-        is_whole and _is_even(moments, window, soft, around, levels, noise / contrast)
-    ):
-        rim = _rim(image, soft, around)
-        if rim is not None and rim.is_whole:
-            is_whole = True
-            moments = _moments_of(rim)
+    rim, filled = None, None
+    is_even = (
+        is_inside
+        and is_whole
+        and _is_even(moments, window, soft, around, levels, noise / contrast)
+    )
+    if is_inside and not (is_even and moments.edge_width < WIDE_EDGE):
+        rim = _rim_start(soft, around)
+        if not is_whole:
+            filled = _moments(_without_hole(soft), around, (high - low) / contrast)
+            if filled is not None and not _is_ellipse(filled, noise / contrast):
+                filled = None
     return Disc(
         moments,
         levels,
@@ -284,6 +299,53 @@ def _measure_window(
         leaves_window,
         is_whole,
         tuple(others),
+        is_even,
+        rim,
+        filled,
+    )
+
+
+def with_rims(
+    image: Image, discs: Sequence[Disc], before: Sequence[EdgeStart] = ()
+) -> list[Disc]:
+    """Return discs with those measured by their rims that need it and have one.
+
+    Parameters
+    ----------
+    before : sequence of EdgeStart
+        Discs of the image before, where the fits begin.
+    """
+    found = [
+        disc._replace(is_whole=True, moments=disc.filled) if disc.filled else disc
+        for disc in discs
+    ]
+    unclear = [i for i, disc in enumerate(discs) if disc.rim is not None]
+    if not unclear:
+        return found
+    starts = [_known(disc, before) for disc in discs if disc.rim is not None]
+    for i, rim in zip(unclear, fit_edges(image, starts), strict=True):
+        # What looks blurred may be a dome without light at its rim, which is sharp.
+        wide = discs[i].moments.edge_width if discs[i].is_even else float("inf")
+        if rim is None or not rim.is_whole:
+            continue
+        if GAUSSIAN_RISE * rim.sigma < SHARPER * wide:
+            found[i] = discs[i]._replace(is_whole=True, moments=_moments_of(rim))
+    return found
+
+
+def _known(disc: Disc, before: Sequence[EdgeStart]) -> EdgeStart:
+    """Return where the fit of a rim begins: with the nearest shape before, if any."""
+    assert disc.rim is not None
+    if not before:
+        return disc.rim
+    x, y = disc.rim.center.tolist()
+    near = min(before, key=lambda one: hypot(one.center[0] - x, one.center[1] - y))
+    size = sqrt(float(np.trace(near.shape)))
+    gap = hypot(near.center[0] - x, near.center[1] - y)
+    return (
+        disc.rim._replace(shape=near.shape, sigma=near.sigma)
+        if gap < 2 * size
+        else disc.rim
     )
 
 
@@ -343,8 +405,16 @@ def _corrects_shading(moments: DiscMoments) -> bool:
     return moments.radius >= LEAST_SHADED * moments.rim_width
 
 
-def _rim(image: Image, soft: MatLike, frame: PixelBox) -> EdgeFit | None:
-    """Return the rim of a region, if its outline is somewhat like an ellipse."""
+def _without_hole(soft: MatLike) -> MatLike:
+    """Return a soft-thresholded region with all filled that is bright all round."""
+    _, crest = cv2.threshold(soft, FULLY, 255, cv2.THRESH_BINARY)
+    contours, _ = cv2.findContours(crest, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    cv2.drawContours(crest, contours, -1, 255, cv2.FILLED)
+    return cv2.max(soft, crest)
+
+
+def _rim_start(soft: MatLike, frame: PixelBox) -> EdgeStart | None:
+    """Return where to look for the rim of a region, if it is like an ellipse."""
     contours, _ = cv2.findContours(soft, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     m = cv2.moments(contours[0])
     if m["m00"] < MIN_AREA:
@@ -356,7 +426,7 @@ def _rim(image: Image, soft: MatLike, frame: PixelBox) -> EdgeFit | None:
     center = np.array(
         [frame.left + m["m10"] / m["m00"], frame.top + m["m01"] / m["m00"]]
     )
-    return fit_edge(image, center, shape)
+    return EdgeStart(center, shape)
 
 
 def _moments_of(rim: EdgeFit) -> DiscMoments:

@@ -23,23 +23,28 @@ References
    edge of an even plateau.
 """
 
+from collections.abc import Sequence
 from functools import lru_cache
-from math import hypot, log, pi, sqrt
+from math import ceil, log, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from lightpen.arrays import FloatArray, Image
+from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.model.quantiles import normal_quantile
 
 STEP = 0.5  # px between samples of a ray
 RAY_SPACING = 2.0  # px along the rim
+COARSE_SPACING = 4.0  # px, as long as the blur is sought
 BESIDE = 0.5  # px from a ray to the lines that are read for it
-MIN_RAYS, MAX_RAYS = 32, 128
+MIN_RAYS, MAX_RAYS = 24, 128
 # The unknowns of a ray are b, p0, p1, p0 d, p0 dsigma and p2. From afar p2 would lead
 # astray; in the end the blur is held.
 SHARPNESS = 4
 ROUNDS = 3 * [[0, 1, 2, 3, 4]] + 2 * [[0, 1, 2, 3, 4, 5]] + 2 * [[0, 1, 2, 3, 5]]
+# From the image before, whose shape and blur a disc still has nearly.
+KNOWN_ROUNDS = ROUNDS[2:]
+RIDGE = 1e-12  # of the normal matrix, which no disc of many may spoil
 LONGEST_STEP = 1.5  # px, of the rim in one round
 CONVERGED = 0.05  # px
 INSIDE, OUTSIDE = 3.0, 3.0  # reach of a ray in standard deviations of the blur
@@ -84,29 +89,51 @@ class EdgeFit(NamedTuple):
     is_whole: bool
 
 
-class _Ellipse(NamedTuple):
-    """The points ``center + root u`` for unit vectors u; an array each."""
-
-    center: FloatArray
-    root: FloatArray
-
-    @property
-    def semi_axes(self) -> tuple[float, float]:
-        """Semi-axes, the longer first, px."""
-        (a, b), (c, d) = self.root.tolist()
-        sum_of_both = hypot(a + d, b - c)
-        difference = hypot(a - d, b + c)
-        return (sum_of_both + difference) / 2, abs(sum_of_both - difference) / 2
-
-
-class _Rays(NamedTuple):
-    """Where rays cross an ellipse, and how its parameters move the crossings.
+class EdgeStart(NamedTuple):
+    """Where the fit of a rim begins.
 
     Attributes
     ----------
-    feet, normals : (N, 2) array
+    center : (2,) array
+        Of the region, px.
+    shape : (2, 2) array
+        Covariance of its area, px^2.
+    sigma : float or None
+        Blur of the same disc in the image before, px, whose shape this is then; None
+        for a disc seen for the first time.
+    """
+
+    center: FloatArray
+    shape: FloatArray
+    sigma: float | None = None
+
+
+class _Ellipses(NamedTuple):
+    """The points ``center + root u`` for unit vectors u, of D discs."""
+
+    centers: FloatArray  # (D, 2)
+    roots: FloatArray  # (D, 2, 2)
+
+    @property
+    def semi_axes(self) -> tuple[FloatArray, FloatArray]:
+        """Semi-axes, the longer first, px, (D,) each."""
+        a, b, c, d = np.moveaxis(self.roots.reshape(-1, 4), -1, 0)
+        sums, differences = np.hypot(a + d, b - c), np.hypot(a - d, b + c)
+        return (sums + differences) / 2, np.abs(sums - differences) / 2
+
+    def of(self, chosen: BoolArray) -> "_Ellipses":
+        """Return those of some discs."""
+        return _Ellipses(self.centers[chosen], self.roots[chosen])
+
+
+class _Rays(NamedTuple):
+    """Where rays cross ellipses, and how their parameters move the crossings.
+
+    Attributes
+    ----------
+    feet, normals : (D, N, 2) array
         Crossings, px, and the unit normals there, outwards.
-    moves : (N, 5) array
+    moves : (D, N, 5) array
         Movement along the normal, px, by the centre, px, and by relative changes of the
         size and of the two ways to stretch it.
     """
@@ -121,82 +148,120 @@ class _Edges(NamedTuple):
 
     Attributes
     ----------
-    places : (N,) array
+    places : (D, N) array
         Of the edge along the ray, px from its foot.
-    weights : (N,) array
-    blur : float
+    weights : (D, N) array
+    blurs : (D,) array
         By how much the blur is wider than supposed, px.
-    is_dark : bool
+    are_dark : (D,) array
         Whether rays meet no light inside the rim.
+    are_lit : (D,) array
+        Whether there is light inside at all.
     """
 
     places: FloatArray
     weights: FloatArray
-    blur: float
-    is_dark: bool
+    blurs: FloatArray
+    are_dark: BoolArray
+    are_lit: BoolArray
 
 
 def fit_edge(image: Image, center: FloatArray, shape: FloatArray) -> EdgeFit | None:
-    """Fit the rim of a disc by its edge alone.
+    """Fit the rim of one disc, see `fit_edges`."""
+    return fit_edges(image, [EdgeStart(center, shape)])[0]
+
+
+def fit_edges(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
+    """Fit the rims of discs by their edges alone, all at once.
 
     Parameters
     ----------
     image : (H, W) array
         The whole image.
-    center : (2,) array
-        Of the region to begin with, px.
-    shape : (2, 2) array
-        Covariance of its area, px^2.
 
     Returns
     -------
-    Rim or None
+    list of EdgeFit or None
         None where no sharp enough rim is found. The area is that of the rim, not
-        lessened by blur.
+        lessened by blur. A disc that is not found from the image before is looked for
+        anew.
     """
-    if np.linalg.eigvalsh(4 * shape)[0] < MIN_SEMI_AXIS**2:
-        return None
-    ellipse = _Ellipse(center, np.asarray(np.linalg.cholesky(4 * shape)))
-    ellipse, sigma = _onto_steepest(image, ellipse)
-    for n, unknowns in enumerate(ROUNDS, start=1):
-        _, shorter = ellipse.semi_axes
-        if not shorter > MIN_SEMI_AXIS:
-            return None
-        sigma = min(max(sigma, MIN_SIGMA), MAX_SIGMA * shorter)
-        rays = _rays(ellipse)
-        edges = _edges(image, rays, sigma, shorter, unknowns)
-        if edges is None:
-            return None
-        step = _step(rays, edges.places, edges.weights)
-        moves = rays.moves @ step
-        longest = float(np.abs(moves).max())
-        if n == len(ROUNDS) and sigma < MAX_SIGMA * shorter:
-            is_even = not edges.is_dark and _is_even(edges.places - moves, shorter)
-            return _rim(ellipse, sigma, is_even and longest < CONVERGED)
-        ellipse = _moved(ellipse, step * min(1.0, LONGEST_STEP / max(longest, 1e-9)))
-        sigma += edges.blur
-    return None
+    found: list[EdgeFit | None] = [None] * len(starts)
+    known = [i for i, start in enumerate(starts) if start.sigma is not None]
+    if known:
+        for i, fit in zip(
+            known, _fitted(image, [starts[i] for i in known]), strict=True
+        ):
+            found[i] = fit if fit is not None and fit.is_whole else None
+    anew = [i for i, fit in enumerate(found) if fit is None]
+    if anew:
+        cold = [starts[i]._replace(sigma=None) for i in anew]
+        for i, fit in zip(anew, _fitted(image, cold), strict=True):
+            found[i] = fit
+    return found
 
 
-def _rim(ellipse: _Ellipse, sigma: float, is_whole: bool) -> EdgeFit:
-    shape = ellipse.root @ ellipse.root.T / 4
+def _fitted(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
+    """Return the fits of discs that are all new, or all known."""
+    found: list[EdgeFit | None] = [None] * len(starts)
+    centers = np.array([start.center for start in starts])
+    shapes = np.array([start.shape for start in starts])
+    left = np.flatnonzero(np.linalg.eigvalsh(4 * shapes)[:, 0] >= MIN_SEMI_AXIS**2)
+    if not len(left):
+        return found
+    ellipses = _Ellipses(centers[left], np.linalg.cholesky(4 * shapes[left]))
+    if starts[0].sigma is None:
+        rounds = ROUNDS
+        ellipses, sigmas = _onto_steepest(image, ellipses)
+    else:
+        rounds = KNOWN_ROUNDS
+        sigmas = np.array([starts[i].sigma for i in left], dtype=np.float64)
+    for n, unknowns in enumerate(rounds, start=1):
+        shorter = ellipses.semi_axes[1]
+        sigmas = np.minimum(np.maximum(sigmas, MIN_SIGMA), MAX_SIGMA * shorter)
+        spacing = COARSE_SPACING if SHARPNESS in unknowns else RAY_SPACING
+        rays = _rays(ellipses, spacing)
+        edges = _edges(image, rays, sigmas, shorter, unknowns)
+        steps = _steps(rays, edges.places, edges.weights)
+        moves = np.einsum("dnk,dk->dn", rays.moves, steps)
+        longest = np.abs(moves).max(axis=1)
+        alive = edges.are_lit & (shorter > MIN_SEMI_AXIS) & np.isfinite(longest)
+        if n == len(rounds):
+            are_even = _are_even(edges.places - moves, shorter) & ~edges.are_dark
+            are_whole = are_even & (longest < CONVERGED)
+            for d in np.flatnonzero(alive & (sigmas < MAX_SIGMA * shorter)).tolist():
+                found[left[d]] = _rim(ellipses, sigmas, d, bool(are_whole[d]))
+            break
+        shares = np.minimum(1.0, LONGEST_STEP / np.maximum(longest, 1e-9))
+        ellipses = _moved(ellipses, steps * shares[:, None])
+        sigmas = sigmas + edges.blurs
+        if not alive.all():
+            left, ellipses, sigmas = left[alive], ellipses.of(alive), sigmas[alive]
+            if not len(left):
+                break
+    return found
+
+
+def _rim(ellipses: _Ellipses, sigmas: FloatArray, d: int, is_whole: bool) -> EdgeFit:
+    root, sigma = ellipses.roots[d], float(sigmas[d])
+    shape = root @ root.T / 4
     # Blur pulls the half level of a convex rim inwards, by sigma^2 over its diameter.
     growth = sigma**2 / (4 * sqrt(np.linalg.det(shape)))
-    return EdgeFit(ellipse.center, shape * (1 + growth), sigma, is_whole)
+    return EdgeFit(ellipses.centers[d], shape * (1 + growth), sigma, is_whole)
 
 
-def _rays(ellipse: _Ellipse) -> _Rays:
-    longer, _ = ellipse.semi_axes
-    n_rays = 4 * round(min(max(2 * pi * longer / RAY_SPACING, MIN_RAYS), MAX_RAYS) / 4)
+def _rays(ellipses: _Ellipses, spacing: float) -> _Rays:
+    longest = float(ellipses.semi_axes[0].max())
+    n_rays = 4 * round(min(max(2 * pi * longest / spacing, MIN_RAYS), MAX_RAYS) / 4)
     arms, stretching = _arms(n_rays)
-    spokes = arms @ ellipse.root.T
-    normals = arms @ np.linalg.inv(ellipse.root)
-    normals /= np.sqrt(np.einsum("ri,ri->r", normals, normals))[:, None]
-    lengths = np.einsum("ri,ri->r", spokes, normals)
-    moves = np.empty((n_rays, 5))
-    moves[:, :2] = normals
-    moves[:, 2:] = lengths[:, None] * stretching
-    return _Rays(ellipse.center + spokes, normals, moves)
+    spokes = arms @ np.swapaxes(ellipses.roots, 1, 2)
+    normals = arms @ np.linalg.inv(ellipses.roots)
+    normals /= np.hypot(normals[..., 0], normals[..., 1])[..., None]
+    lengths = np.einsum("dni,dni->dn", spokes, normals)
+    moves = np.empty((*lengths.shape, 5))
+    moves[..., :2] = normals
+    moves[..., 2:] = lengths[..., None] * stretching
+    return _Rays(ellipses.centers[:, None] + spokes, normals, moves)
 
 
 @lru_cache(maxsize=MAX_RAYS // 4)
@@ -208,109 +273,137 @@ def _arms(n_rays: int) -> tuple[FloatArray, FloatArray]:
     return arms, np.stack(ways, axis=-1)
 
 
-def _moved(ellipse: _Ellipse, step: FloatArray) -> _Ellipse:
-    x, y, size, along, across = step.tolist()
+def _moved(ellipses: _Ellipses, steps: FloatArray) -> _Ellipses:
+    size, along, across = steps[:, 2], steps[:, 3], steps[:, 4]
     stretch = np.array([[1 + size + along, across], [across, 1 + size - along]])
-    return _Ellipse(ellipse.center + np.array([x, y]), ellipse.root @ stretch)
+    roots = ellipses.roots @ np.moveaxis(stretch, -1, 0)
+    return _Ellipses(ellipses.centers + steps[:, :2], roots)
 
 
-def _step(rays: _Rays, places: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return the change of an ellipse that follows places along its rays best."""
-    weighted = rays.moves * weights[:, None]
-    normal, right = weighted.T @ rays.moves, weighted.T @ places
-    return np.asarray(np.linalg.solve(normal, right))
+def _steps(rays: _Rays, places: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the changes of ellipses that follow places along rays best, (D, 5)."""
+    weighted = np.swapaxes(rays.moves * weights[..., None], 1, 2)
+    normal, right = weighted @ rays.moves, weighted @ places[..., None]
+    diagonal = np.einsum("dii->di", normal)
+    diagonal *= 1 + RIDGE
+    diagonal += RIDGE
+    return np.asarray(np.linalg.solve(normal, right)[..., 0])
 
 
 def _edges(
-    image: Image, rays: _Rays, sigma: float, shorter_axis: float, unknowns: list[int]
-) -> _Edges | None:
-    """Return the edges along rays, None without light inside."""
-    deepest = max(MAX_INSIDE * shorter_axis, MIN_INSIDE * sigma)
-    inside = min(INSIDE * sigma + MORE_INSIDE, deepest, DEEPEST * shorter_axis)
-    s = np.arange(-inside, OUTSIDE * sigma + MORE_OUTSIDE, STEP)
-    functions = _functions(s, sigma, shorter_axis)[:, unknowns]
-    inverse = functions @ np.linalg.inv(functions.T @ functions)
+    image: Image,
+    rays: _Rays,
+    sigmas: FloatArray,
+    shorter_axes: FloatArray,
+    unknowns: list[int],
+) -> _Edges:
+    """Return the edges along rays."""
+    deepest = np.maximum(MAX_INSIDE * shorter_axes, MIN_INSIDE * sigmas)
+    inside = np.minimum(INSIDE * sigmas + MORE_INSIDE, deepest)
+    inside = np.minimum(inside, DEEPEST * shorter_axes)
+    reach = inside + OUTSIDE * sigmas + MORE_OUTSIDE
+    s = -inside[:, None] + STEP * np.arange(ceil(float(reach.max()) / STEP))
+    functions = _functions(s, sigmas, shorter_axes)[..., unknowns]
+    functions *= (s < (reach - inside)[:, None])[..., None]
+    squares = np.swapaxes(functions, 1, 2) @ functions
+    inverse = functions @ np.linalg.inv(squares)
     fitted = _profiles(image, rays, s) @ inverse
-    brightness = _smooth(fitted[:, 1], SMOOTHED)
-    usual = float(brightness.mean())
-    if not usual > 0:
-        return None
+    brightness = _smooth(fitted[..., 1], SMOOTHED)
+    usual = brightness.mean(axis=1, keepdims=True)
+    are_lit = usual[:, 0] > 0
+    usual = np.where(usual > 0, usual, 1.0)
     lit = brightness > DARK * usual
     divisor = np.where(lit, brightness, usual)
-    places = np.clip(np.where(lit, fitted[:, 3] / divisor, 0.0), -inside, inside)
+    bound = inside[:, None]
+    places = np.clip(np.where(lit, fitted[..., 3] / divisor, 0.0), -bound, bound)
     weights = np.minimum(np.maximum(brightness / usual, DARK), BRIGHTEST) ** 2
-    blur = 0.0
+    blurs = np.zeros(len(s))
     if SHARPNESS in unknowns:
-        blurs = np.clip(fitted[:, 4] / divisor, -1, 1)
-        blur = float(weights @ blurs / weights.sum())
-        blur = max(blur, -LARGEST_SHARPENING * sigma)
-    return _Edges(places, weights, blur, is_dark=not lit.all())
+        each = np.clip(fitted[..., 4] / divisor, -1, 1)
+        blurs = (weights * each).sum(axis=1) / weights.sum(axis=1)
+        blurs = np.maximum(blurs, -LARGEST_SHARPENING * sigmas)
+    return _Edges(places, weights, blurs, ~lit.all(axis=1), are_lit)
 
 
 def _smooth(values: FloatArray, n_rays: int) -> FloatArray:
-    """Return the means of so many neighbouring rays round the rim."""
+    """Return the means of so many neighbouring rays round each rim."""
     reach = n_rays // 2
-    wrapped = np.concatenate([values[-reach:], values, values[:reach]])
-    return np.convolve(wrapped, np.full(n_rays, 1 / n_rays), mode="valid")
+    wrapped = np.concatenate([values[:, -reach:], values, values[:, :reach]], axis=1)
+    n = values.shape[1]
+    return np.asarray(sum(wrapped[:, k : k + n] for k in range(n_rays)) / n_rays)
 
 
 def _profiles(image: Image, rays: _Rays, s: FloatArray) -> FloatArray:
-    """Return the light along the rays at distances s from their feet, (N, S).
+    """Return the light along the rays at distances s (D, S) from their feet, (D, N, S).
 
     It is the mean of two lines, so that hardly a pixel is passed over.
     """
     height, width = image.shape
-    beside = BESIDE * rays.normals[:, ::-1] * np.array([-1.0, 1.0])
-    feet = np.stack([rays.feet - beside, rays.feet + beside])
-    x, y = (feet[..., k, None] + rays.normals[:, k, None] * s for k in range(2))
-    x = np.minimum(np.maximum(x, 0.0), width - 1.001)
-    y = np.minimum(np.maximum(y, 0.0), height - 1.001)
-    column, row = x.astype(np.int64), y.astype(np.int64)
+    beside = BESIDE * rays.normals[..., ::-1] * np.array([-1.0, 1.0])
+    feet = np.stack([rays.feet - beside, rays.feet + beside]).astype(np.float32)
+    away = s[:, None].astype(np.float32)
+    normals = rays.normals.astype(np.float32)
+    x, y = (feet[..., k, None] + normals[..., k, None] * away for k in range(2))
+    np.clip(x, 0.0, width - 1.001, out=x)
+    np.clip(y, 0.0, height - 1.001, out=y)
+    column, row = x.astype(np.int32), y.astype(np.int32)
     x -= column
     y -= row
-    left = 1 - x
-    flat, at = image.reshape(-1), row * width + column
-    above = flat.take(at) * left + flat.take(at + 1) * x
+    flat, at = image.reshape(-1), row.astype(np.intp) * width + column
+    above, right = flat.take(at).astype(np.float32), flat.take(at + 1)
+    above += (right - above) * x
     at += width
-    below = flat.take(at) * left + flat.take(at + 1) * x
-    light = above * (1 - y) + below * y
-    return np.asarray(0.5 * (light[0] + light[1]))
+    below, right = flat.take(at).astype(np.float32), flat.take(at + 1)
+    below += (right - below) * x
+    above += (below - above) * y
+    return np.asarray(0.5 * (above[0] + above[1]))
 
 
-def _functions(s: FloatArray, sigma: float, shorter_axis: float) -> FloatArray:
-    """Return the light along a ray by b, p0, p1, p0 d, p0 dsigma and p2, (S, 6)."""
+def _functions(
+    s: FloatArray, sigmas: FloatArray, shorter_axes: FloatArray
+) -> FloatArray:
+    """Return the light along rays by b, p0, p1, p0 d, p0 dsigma and p2, (D, S, 6)."""
     from scipy.special import ndtr  # takes 0.1 s
 
+    sigma, shorter = sigmas[:, None], shorter_axes[:, None]
     z = s / sigma
     share = ndtr(-z)
     g = np.exp(-0.5 * z * z) / (sqrt(2 * pi) * sigma)
-    slope = (s * share - sigma**2 * g) / shorter_axis
-    bend = ((s * s + sigma**2) * share - s * sigma**2 * g) / shorter_axis**2
+    slope = (s * share - sigma**2 * g) / shorter
+    bend = ((s * s + sigma**2) * share - s * sigma**2 * g) / shorter**2
     return np.stack([np.ones_like(s), share, slope, g, g * z, bend], axis=-1)
 
 
-def _onto_steepest(image: Image, ellipse: _Ellipse) -> tuple[_Ellipse, float]:
-    """Return the ellipse grown to where the light falls most, and the blur there.
+def _onto_steepest(image: Image, ellipses: _Ellipses) -> tuple[_Ellipses, FloatArray]:
+    """Return the ellipses grown to where the light falls most, and the blur there.
 
     The side of the fall that is outside tells the blur: nothing else shines there.
     """
-    _, shorter = ellipse.semi_axes
-    s = np.arange(-MAX_INSIDE * shorter, MAX_INSIDE * shorter + MORE_OUTSIDE, STEP)
-    rays = _rays(ellipse)
-    falls = -np.diff(_profiles(image, rays, s).mean(axis=0))
-    steepest = int(falls.argmax())
-    beyond = falls[steepest:] < 0.5 * falls[steepest]
-    width = STEP * (int(beyond.argmax()) if beyond.any() else len(beyond))
-    there = np.full(len(rays.feet), s[steepest] + STEP / 2)
-    step = _step(rays, there, np.ones(len(there)))
-    return _moved(ellipse, step), START_SIGMA * width / HALF_WIDTH
+    shorter = ellipses.semi_axes[1]
+    depths = MAX_INSIDE * shorter
+    spans = 2 * depths + MORE_OUTSIDE
+    s = -depths[:, None] + STEP * np.arange(ceil(float(spans.max()) / STEP))
+    rays = _rays(ellipses, COARSE_SPACING)
+    falls = -np.diff(_profiles(image, rays, s).mean(axis=1))
+    falls[s[:, 1:] >= (spans - depths)[:, None]] = -np.inf
+    discs = np.arange(len(s))
+    steepest = falls.argmax(axis=1)
+    outside = np.arange(falls.shape[1]) >= steepest[:, None]
+    beyond = outside & (falls < 0.5 * falls[discs, steepest][:, None])
+    beyond[:, -1] = True
+    widths = STEP * (beyond.argmax(axis=1) - steepest)
+    there = np.repeat(
+        (s[discs, steepest] + STEP / 2)[:, None], rays.feet.shape[1], axis=1
+    )
+    steps = _steps(rays, there, np.ones_like(there))
+    return _moved(ellipses, steps), START_SIGMA * widths / HALF_WIDTH
 
 
-def _is_even(dents: FloatArray, shorter_axis: float) -> bool:
-    """Tell whether noise alone moves the rim off its ellipse, px inwards."""
+def _are_even(dents: FloatArray, shorter_axes: FloatArray) -> BoolArray:
+    """Return whether noise alone moves each rim off its ellipse, px inwards."""
     smooth = _smooth(dents, 3)
-    differences = np.abs(dents - np.roll(dents, 1))
+    differences = np.abs(dents - np.roll(dents, 1, axis=1))
     # Of the difference of two normal variables, and the mean of three.
-    sigma = float(np.median(differences)) / normal_quantile(0.25) / sqrt(6)
-    limit = min(MAX_DENT, MAX_RELATIVE_DENT * shorter_axis) + DENT_SIGMAS * sigma
-    return bool(np.abs(smooth).max() < limit)
+    sigmas = np.median(differences, axis=1) / normal_quantile(0.25) / sqrt(6)
+    limits = np.minimum(MAX_DENT, MAX_RELATIVE_DENT * shorter_axes)
+    return np.asarray(np.abs(smooth).max(axis=1) < limits + DENT_SIGMAS * sigmas)

@@ -30,6 +30,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 
 LABELLED_AT_ONCE = 64  # images; labelling is vectorised over them
+SAME_CENTERS = 0.001  # px, rms, of one image twice; of two, noise leaves thrice that
 SEARCH_MEMORY_A_PIXEL = 5  # bytes: 16 bits, twice, and what is saturated
 
 Report = Callable[[float], None]
@@ -150,9 +151,9 @@ def observe_images(
     mostly_labelled = 2 * seen.reasons.count(Reason.NONE) > n_lit
     if mostly_labelled and not np.isfinite(seen.seen_pixels[..., 0]).any(axis=0).all():
         _require_right_hand(spots, camera, pen)
+    seen = replace(seen, details=tuple(image.detail for image in images))
     return replace(
-        seen,
-        details=tuple(image.detail for image in images),
+        _with_copies(seen),
         advice=None if mostly_labelled else _advice(seen.reasons, spots, camera, pen),
     )
 
@@ -174,7 +175,7 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
     names = tuple(f"frame {frame}" for frame in centers.frames)
     images = zip(pixels, rotations, translations, strict=True)
     detections = [detection_of_centers(*image) for image in images]
-    return _observations(names, detections, np.zeros((len(names), 0, 2)))
+    return _with_copies(_observations(names, detections, np.zeros((len(names), 0, 2))))
 
 
 def leave_out(
@@ -189,6 +190,41 @@ def leave_out(
         if kept[index] is Reason.NONE:
             kept[index] = reason
     return replace(observations, reasons=tuple(kept))
+
+
+def _with_copies(seen: Observations) -> Observations:
+    """Return observations with images left out that are copies of earlier ones.
+
+    Noise moves the centres of two images of a pen at rest; what it does not move is one
+    image given twice, perhaps packed anew, and tells nothing new.
+    """
+    used = [i for i, reason in enumerate(seen.reasons) if reason is Reason.NONE]
+    pixels = seen.pixels[used]
+    places = np.nanmean(pixels, axis=1)[:, 0] if used else np.zeros(0)
+    order = np.argsort(places, kind="stable")
+    copies: dict[int, int] = {}
+    for k, one in enumerate(order):
+        for other in order[k + 1 :]:
+            if places[other] - places[one] > SAME_CENTERS:
+                break
+            first, later = sorted((used[one], used[other]))
+            if later not in copies and _are_same(seen.pixels[[first, later]]):
+                copies[later] = first
+    reasons, details = list(seen.reasons), list(seen.details)
+    for later, first in copies.items():
+        reasons[later] = Reason.COPY
+        details[later] = message("image.copy-of", name=seen.names[first])
+    return replace(seen, reasons=tuple(reasons), details=tuple(details))
+
+
+def _are_same(pixels: FloatArray) -> bool:
+    """Return whether centres of two images, (2, L, 2), are the same but for a trace."""
+    one, other = pixels
+    gaps = one - other
+    both = np.isfinite(gaps[:, 0])
+    if not np.array_equal(np.isfinite(one), np.isfinite(other)):
+        return False
+    return bool(np.sqrt(np.mean(gaps[both] ** 2)) < SAME_CENTERS)
 
 
 def _search(

@@ -13,6 +13,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.disc_moments import PixelBox
+from lightpen.detection.following import follow
 from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.labelling.hypotheses import MAX_SHIFT
 from lightpen.detection.labelling.labels import (
@@ -21,7 +22,7 @@ from lightpen.detection.labelling.labels import (
     label_spots,
     track_spots,
 )
-from lightpen.detection.pose import MIN_POSE_LEDS, fit_poses
+from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_poses
 from lightpen.detection.reasons import MISHAPS, Reason
 from lightpen.detection.spots import EXACT_SIGMA, SpotFlaw, Spots, detect_spots
 from lightpen.model.camera import Camera
@@ -176,14 +177,23 @@ def detect_pen(
     try:
         if is_followed and before is not None and before.has_pose:
             window = _window(camera, pen, before)
-            spots = detect_spots(image, mask, full_scale=full_scale, window=window)
+            spots = detect_spots(
+                *(image, mask),
+                full_scale=full_scale,
+                window=window,
+                before=before.spots,
+            )
+            followed = _followed(spots, camera, pen, before)
+            if followed is not None:
+                return followed
             labels = track_spots(
                 spots, camera, pen, before.rotation, before.translation
             )
             if np.count_nonzero(labels.whole) >= certain_leds(pen):
                 detection = detections_of([spots], [labels], camera)[0]
                 return _fitted(detection, camera, pen, is_near=True)
-        spots = detect_spots(image, mask, full_scale=full_scale)
+        seen = None if before is None else before.spots
+        spots = detect_spots(image, mask, full_scale=full_scale, before=seen)
         labels = _label(spots, camera, pen, before)
         detection = detections_of([spots], [labels], camera)[0]
         return _fitted(detection, camera, pen, is_near=True)
@@ -271,6 +281,25 @@ def unseen(pen: Pen, reason: Reason) -> PenDetection:
     return PenDetection(nothing, nothing, reason)
 
 
+def _followed(
+    spots: Spots, camera: Camera, pen: Pen, before: PenDetection
+) -> PenDetection | None:
+    """Return the detection where LEDs moved little since the image before."""
+    if before.spots is None or before.labels is None:
+        return None
+    labelled = before.labels.spot >= 0
+    areas = np.full(pen.n_leds, np.nan)
+    areas[labelled] = before.spots.areas[before.labels.spot[labelled]]
+    found = follow(spots, camera, pen, before.rotation, before.translation, areas)
+    if found is None:
+        return None
+    pixels = np.where(found.labels.whole[:, None], found.seen, np.nan)
+    detection = PenDetection(
+        pixels, found.seen, Reason.NONE, spots=spots, labels=found.labels
+    )
+    return _posed(detection, found.poses)
+
+
 def _window(camera: Camera, pen: Pen, before: PenDetection) -> PixelBox:
     """Return where in the image the LEDs are that hardly moved, with room round."""
     leds = pen.leds @ before.rotation.T + before.translation
@@ -323,6 +352,10 @@ def _fitted(
         sigmas=detection.sigmas[None],
         is_near=is_near,
     )
+    return _posed(detection, poses)
+
+
+def _posed(detection: PenDetection, poses: Poses) -> PenDetection:
     return replace(
         detection,
         rotation=poses.rotations[0],

@@ -115,6 +115,7 @@ def fit_poses(
     *,
     sigmas: FloatArray | None = None,
     is_near: bool = False,
+    tolerance: float = ROBUST_TOLERANCE,
 ) -> Poses:
     """Fit poses by maximum likelihood on ellipse centres.
 
@@ -132,15 +133,21 @@ def fit_poses(
         How exact the centres are compared with each other, px; all alike if not given.
     is_near : bool
         Whether that is by least squares on most of these LEDs already.
+    tolerance : float
+        Of the last step: its angle, rad, and its translation over the distance.
     """
     problem: Reprojection = CameraReprojection(
         camera, pen.leds, pen.normals, pen.diameter / 2, pixels
     )
     scales = None if sigmas is None else relative_sigmas(sigmas)
     if scales is None:
-        return fit_reprojection(problem, rotations, translations, is_near=is_near)
+        return fit_reprojection(
+            problem, rotations, translations, is_near=is_near, tolerance=tolerance
+        )
     problem = _Scaled(problem, scales)
-    poses = fit_reprojection(problem, rotations, translations, is_near=is_near)
+    poses = fit_reprojection(
+        problem, rotations, translations, is_near=is_near, tolerance=tolerance
+    )
     return replace(poses, residuals=poses.residuals * scales[..., None])
 
 
@@ -182,13 +189,14 @@ def fit_reprojection(
     translations: FloatArray,
     *,
     is_near: bool = False,
+    tolerance: float = ROBUST_TOLERANCE,
 ) -> Poses:
     """Fit poses to the reprojection errors of any cameras, as `fit_poses`."""
     _require_seen(problem.pixels)
     R, t = rotations, translations
     if not is_near:
         R, t = _descend(problem, R, t, robust=False, max_steps=3, tolerance=ROUGHLY)
-    R, t = _descend(problem, R, t, robust=True, tolerance=ROBUST_TOLERANCE)
+    R, t = _descend(problem, R, t, robust=True, tolerance=tolerance)
     return _poses_at(problem, R, t, robust=True)
 
 

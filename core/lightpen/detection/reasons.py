@@ -28,6 +28,7 @@ class Reason(StrEnum):
     SLIPPED = "tip slipped"
     TAKEN_OUT = "taken out"  # by the user
     OTHER_MOMENT = "not of the same moment"  # as that of another camera
+    COPY = "same as another image"
     ABSENT = "no image"  # of one camera at a moment that another saw
 
     @property
@@ -47,6 +48,7 @@ _OF_THE_PEN = {
     Reason.SLIPPED,
     Reason.TAKEN_OUT,
     Reason.OTHER_MOMENT,
+    Reason.COPY,
 }
 
 _WORDS = {
@@ -63,6 +65,7 @@ _WORDS = {
     Reason.SLIPPED: message("reason.slipped"),
     Reason.TAKEN_OUT: message("reason.taken-out"),
     Reason.OTHER_MOMENT: message("reason.other-moment"),
+    Reason.COPY: message("reason.copy"),
     Reason.ABSENT: message("reason.absent"),
 }
 

@@ -228,7 +228,7 @@ def _brightest(image: Image, centers: FloatArray, radii: FloatArray) -> FloatArr
 
 def _cut_out(
     image: Image, centers: FloatArray, half: int
-) -> tuple[IntArray, FloatArray, FloatArray]:
+) -> tuple[IntArray, IntArray, FloatArray]:
     middles = np.rint(centers).astype(np.int64)
     places = np.arange(-half, half + 1)
     rows = np.clip(middles[:, 1, None] + places, 0, image.shape[0] - 1)

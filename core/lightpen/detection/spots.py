@@ -7,12 +7,12 @@ What never becomes a disc is dropped, or kept and flagged if it resembles one.
 """
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import IntFlag
 from math import ceil, sqrt
 from statistics import median
-from typing import Self
+from typing import Self, TypeVar
 
 import cv2
 import numpy as np
@@ -21,6 +21,7 @@ from cv2.typing import MatLike
 from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
 from lightpen.detection.disc_moments import (
     FLAT,
+    GAUSSIAN_RISE,
     HIGH,
     LOW,
     MIN_SIZE,
@@ -28,11 +29,15 @@ from lightpen.detection.disc_moments import (
     PixelBox,
     bounding_box,
     measure_disc,
+    with_rims,
 )
+from lightpen.detection.edge_fit import EdgeStart
 from lightpen.detection.pose import MIN_POSE_LEDS
 from lightpen.detection.small_spots import LARGEST_RADIUS, measure_small, width_of_tiny
 from lightpen.formats.decoding import bits_of
 from lightpen.model.quantiles import normal_quantile
+
+NumberArray = TypeVar("NumberArray", FloatArray, IntArray)
 
 MAX_SPOTS = 64
 MAX_BOXES = 128  # the smallest of more are clutter
@@ -138,6 +143,24 @@ class Spots:
     def __len__(self) -> int:
         return len(self.centers)
 
+    def rims(self, corner: FloatArray) -> list[EdgeStart]:
+        """Return where to look for the rims of the whole spots in the next image.
+
+        Parameters
+        ----------
+        corner : (2,) array
+            Pixel of this image that is the first of the next, px.
+        """
+        return [
+            EdgeStart(center - corner, shape, width / GAUSSIAN_RISE)
+            for center, shape, width, flaws in zip(
+                *(self.centers, self.shapes, self.edge_widths.tolist()),
+                self.flaws.tolist(),
+                strict=True,
+            )
+            if not flaws & (SpotFlaw.MERGED | SpotFlaw.CUT)
+        ]
+
     @property
     def are_small(self) -> BoolArray:
         """Whether a spot is so small that blur leaves it no even inside."""
@@ -175,6 +198,7 @@ def detect_spots(
     *,
     full_scale: int | None = None,
     window: PixelBox | None = None,
+    before: Spots | None = None,
 ) -> Spots:
     """Find the bright discs of an image.
 
@@ -194,6 +218,8 @@ def detect_spots(
         `lightpen.formats.decoding.bits_of`.
     window : PixelBox, optional
         All of the image that is read; what reaches out of it is cut.
+    before : Spots, optional
+        Of the image before, whose rims are about these.
 
     Returns
     -------
@@ -220,17 +246,23 @@ def detect_spots(
         seen = image[window.top : window.bottom, window.left : window.right]
         if mask is not None:
             mask = np.asarray(mask) - np.append(corner, 0)
-        spots = _spots_of(seen, mask, stride, full_scale)
+        starts = [] if before is None else before.rims(corner)
+        spots = _spots_of(seen, mask, stride, full_scale, starts)
         return replace(spots, centers=spots.centers + corner)
-    return _spots_of(image, mask, stride, full_scale)
+    starts = [] if before is None else before.rims(np.zeros(2))
+    return _spots_of(image, mask, stride, full_scale, starts)
 
 
 def _spots_of(
-    image: Image, mask: FloatArray | None, stride: int, full_scale: int
+    image: Image,
+    mask: FloatArray | None,
+    stride: int,
+    full_scale: int,
+    before: Sequence[EdgeStart],
 ) -> Spots:
     budget = iter(range(MAX_REGIONS))
     scene = _survey(image, mask, stride)
-    discs = _find_discs(scene, budget)
+    discs = _find_discs(scene, budget, before)
     # Too few for a pose are worth a closer look.
     if len(discs) < MIN_POSE_LEDS and stride > 1:
         scene = _survey(image, mask, stride // 2)
@@ -336,8 +368,10 @@ def _thinned(image: Image, stride: int) -> MatLike:
     return pixels
 
 
-def _find_discs(scene: _Survey, budget: Iterator[int]) -> list[Disc]:
-    """Return all regions that may be LEDs."""
+def _find_discs(
+    scene: _Survey, budget: Iterator[int], before: Sequence[EdgeStart] = ()
+) -> list[Disc]:
+    """Return whatever may be an LED, each once."""
     rise = scene.peak - scene.background
     level = scene.background + max(LEVEL_SIGMAS * scene.noise, LEVEL_OF_PEAK * rise)
     height, width = scene.image.shape
@@ -345,17 +379,16 @@ def _find_discs(scene: _Survey, budget: Iterator[int]) -> list[Disc]:
     if len(boxes) > MAX_BOXES:
         boxes = sorted(boxes, key=lambda box: box.size, reverse=True)[:MAX_BOXES]
 
-    discs: list[Disc] = []
+    measured: list[Disc] = []
     unclear: list[tuple[PixelBox, Disc | None]] = []
     for box in boxes:
         if _is_too_large(scene, box):
             unclear.append((box, None))
-            continue
-        for disc in _measured(scene, box, level, 0.0, budget):
-            if disc.is_whole:
-                discs.append(disc)
-            else:
-                unclear.append((disc.box, disc))
+        else:
+            measured += _measured(scene, box, level, 0.0, budget)
+    measured = with_rims(scene.image, measured, before)
+    discs = [disc for disc in measured if disc.is_whole]
+    unclear += [(disc.box, disc) for disc in measured if not disc.is_whole]
     for box, region in unclear:
         discs += _parted(scene, box, level, region, budget)
     return _unique(discs) if unclear or len(discs) != len(boxes) else discs
@@ -384,7 +417,8 @@ def _parted(
         if _is_too_large(scene, part):
             blocks += _parted(scene, part, level, None, budget)
             continue
-        for block in _measured(scene, part, level, level, budget):
+        found = list(_measured(scene, part, level, level, budget))
+        for block in with_rims(scene.image, found):
             if block.is_whole:
                 blocks.append(block)
             else:
@@ -514,7 +548,7 @@ def _with_small(
     noises = np.minimum(np.maximum(found.noises, MIN_NOISE), noise)
     flaws |= np.where(found.peaks < DIM_SIGMAS * noises, int(SpotFlaw.DIM), 0)
 
-    def replaced(old: FloatArray, new: FloatArray) -> FloatArray:
+    def replaced(old: NumberArray, new: NumberArray) -> NumberArray:
         values = old.copy()
         values[small] = new
         return values
@@ -525,7 +559,7 @@ def _with_small(
         shapes=replaced(spots.shapes, found.shapes),
         areas=replaced(spots.areas, np.pi * found.radii**2),
         contrasts=replaced(spots.contrasts, found.peaks / full_scale),
-        flaws=replaced(spots.flaws, flaws),
+        flaws=replaced(spots.flaws, np.asarray(flaws, dtype=np.int64)),
         sigmas=replaced(spots.sigmas, np.maximum(found.sigmas, EXACT_SIGMA)),
     )
 

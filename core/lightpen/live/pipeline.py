@@ -44,6 +44,7 @@ UNHURRIED = 0.5  # s from image to image while nothing moves
 LIVELY_NS = 2_000_000_000  # after the last motion, in which every image is taken
 # The same during a capture, longer than the pen is held still for it.
 PATIENT_NS = 10_000_000_000
+FULL_SCAN = 20  # images of a swing, of which one is read in full
 MAY_REST = (Phase.CAPTURING, Phase.PAUSED)  # a pen at rest changes nothing
 
 _logger = logging.getLogger(__name__)
@@ -329,9 +330,10 @@ class Live:
         if rest is not None and frame.host_ts_ns - self._seen_ns < rest * 1e9:
             return
         frames = (frame, *frame.others)[: len(wanted.regions)]
-        is_swing = captured.swing is not None
+        # The whole image tells now and then what else has come into view.
+        is_followed = captured.swing is not None and frame.seq % FULL_SCAN != 0
         images = [
-            self._look(each, wanted, c, is_followed=is_swing)
+            self._look(each, wanted, c, is_followed=is_followed)
             for c, each in enumerate(frames)
         ]
         self._notice(images[0])

@@ -11,6 +11,7 @@ from lightpen.detection.edge_fit import EdgeFit, fit_edge
 from lightpen.detection.labelling.spot_arrays import UNWHOLE
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 from lightpen.model.ellipse import Ellipses, disc_images
+from lightpen.simulator.faces import Dome, Ring
 from lightpen.simulator.image_plans import ImagePlan, plan_scene
 from lightpen.simulator.render import render_view
 from lightpen.simulator.scenes import LEDS, Scene
@@ -111,6 +112,28 @@ def test_the_area_is_that_of_the_rim_however_blurred(leds: str, blur: float) -> 
     # A wrong disc diameter is told from it.
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.005)
     assert np.std(ratios) < 0.01
+
+
+def test_a_narrow_ring_about_a_black_middle_is_whole() -> None:
+    wanted = scene("ring")
+    plan = plan_scene(wanted).image_plans[0]
+    rings = (Ring(inner=0.75, softness=0.05, middle=0.0),) * wanted.pen.n_leds
+    one = show(wanted, replace(plan, view=replace(plan.view, faces=rings)))
+    spots = detect_spots(one.image)
+    assert not (spots.flaws & UNWHOLE).any()
+    errors = [spots.centers[nearest(spots, c)] - c for c in one.discs.centers]
+    assert np.sqrt(np.mean(np.square(errors))) < 0.01
+
+
+def test_a_dome_without_light_at_its_rim_is_not_blurred_and_has_its_center() -> None:
+    wanted = scene("dome")
+    for plan in plan_scene(wanted).image_plans:
+        domes = (Dome(height=1.0, darkening=1.0),) * wanted.pen.n_leds
+        one = show(wanted, replace(plan, view=replace(plan.view, faces=domes)))
+        spots = detect_spots(one.image)
+        assert not (spots.flaws & (UNWHOLE | SpotFlaw.BLURRED)).any()
+        errors = [spots.centers[nearest(spots, c)] - c for c in one.discs.centers]
+        assert np.sqrt(np.mean(np.square(errors))) < 0.03
 
 
 def test_the_rim_tells_the_blur_of_optics_and_pixel() -> None:

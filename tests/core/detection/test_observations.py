@@ -1,6 +1,7 @@
 """From images to observations: what is found, what is dropped and why."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -164,3 +165,35 @@ def test_centres_of_a_larger_image_are_refused(plan: ScenePlan) -> None:
 
     with pytest.raises(FileError, match="made for 2448 x 2048"):
         observe_centers(centers, CAMERA, PEN)
+
+
+def test_an_image_given_twice_counts_once(images: list[Image]) -> None:
+    again = cv2.imencode(".jpg", images[1], [cv2.IMWRITE_JPEG_QUALITY, 100])[1]
+    packed: Image = np.asarray(cv2.imdecode(again, cv2.IMREAD_GRAYSCALE), np.uint8)
+    given = [*images, images[0], packed]
+    found = observe([loader(image) for image in given])
+
+    assert found.reasons == (Reason.NONE,) * 6 + (Reason.COPY,) * 2
+    assert found.details[6] == message("image.copy-of", name="frame_0.png")
+    assert found.details[7] == message("image.copy-of", name="frame_1.png")
+
+
+def test_two_images_of_a_pen_at_rest_count_twice(plan: ScenePlan) -> None:
+    still = plan.image_plans[0]
+    shown = [render_plan(SCENE, replace(still, index=index)) for index in range(3)]
+    assert observe([loader(image) for image in shown]).reasons == (Reason.NONE,) * 3
+
+
+def test_leds_that_are_too_small_are_told_with_what_is_needed() -> None:
+    scene = replace(
+        SCENE,
+        pen=replace(PEN, diameter=0.5),
+        optics=replace(SCENE.optics, psf_sigma=0.6),
+    )
+    plans = plan_scene(scene).image_plans[:3]
+    found = observe([loader(render_plan(scene, each)) for each in plans])
+
+    assert found.reasons == (Reason.TOO_SMALL,) * 3
+    assert found.advice is not None
+    assert found.advice.code == "images.too-small"
+    assert "at least 4 px are needed" in str(found.advice)

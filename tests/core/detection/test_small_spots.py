@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tests.simulated_panels import Panel, panel_image
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.pen_detection import detect_pen
 from lightpen.detection.reasons import Reason
 from lightpen.detection.small_spots import measure_small
@@ -26,7 +26,7 @@ CLEAN = Panel(6.0, reflections=(0.0, 0.0), bloom=0.0, quality=None)
 class Found:
     errors: FloatArray  # (N, 2), px
     sigmas: FloatArray
-    flaws: FloatArray
+    flaws: IntArray
     n_leds: int
 
     @property
@@ -47,7 +47,9 @@ def found_on(panel: Panel, n_images: int = 3) -> Found:
         sigmas.append(spots.sigmas[which])
         flaws.append(spots.flaws[which])
         n_leds += len(shown.centers)
-    return Found(*map(np.concatenate, (errors, sigmas, flaws)), n_leds)
+    return Found(
+        np.concatenate(errors), np.concatenate(sigmas), np.concatenate(flaws), n_leds
+    )
 
 
 @pytest.mark.parametrize("width", [5.0, 6.0, 7.0])
