@@ -55,6 +55,7 @@ CORRECTED_CENTER = 0.007  # of the radius, where shading is corrected to first o
 NOISE_SIGMAS = 3.0
 WIDE_EDGE = 4.5  # px; sharp discs have 2 to 3
 SHARPER = 0.7  # times as wide is a rim that light of the inside widens
+HOLE = 1.05  # times the area that is lit, of a ring with its middle; noise has less
 FULLY = 250  # of 255, the crest of a ring
 MIN_OUTLINE = 0.97  # of the area of an ellipse with the same second moments
 
@@ -288,7 +289,10 @@ def _measure_window(
         rim = _rim_start(soft, around)
         if not is_whole:
             filled = _moments(_without_hole(soft), around, (high - low) / contrast)
-            if filled is not None and not _is_ellipse(filled, noise / contrast):
+            if filled is not None and not (
+                filled.area > HOLE * moments.area
+                and _is_ellipse(filled, noise / contrast)
+            ):
                 filled = None
     return Disc(
         moments,

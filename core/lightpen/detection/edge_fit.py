@@ -37,7 +37,7 @@ STEP = 0.5  # px between samples of a ray
 RAY_SPACING = 2.0  # px along the rim
 COARSE_SPACING = 4.0  # px, as long as the blur is sought
 BESIDE = 0.5  # px from a ray to the lines that are read for it
-MIN_RAYS, MAX_RAYS = 24, 128
+MIN_RAYS, MAX_RAYS = 32, 128
 # The unknowns of a ray are b, p0, p1, p0 d, p0 dsigma and p2. From afar p2 would lead
 # astray; in the end the blur is held.
 SHARPNESS = 4
@@ -215,7 +215,7 @@ def _fitted(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
         ellipses, sigmas = _onto_steepest(image, ellipses)
     else:
         rounds = KNOWN_ROUNDS
-        sigmas = np.array([starts[i].sigma for i in left], dtype=np.float64)
+        sigmas = np.array([starts[i].sigma for i in left.tolist()], dtype=np.float64)
     for n, unknowns in enumerate(rounds, start=1):
         shorter = ellipses.semi_axes[1]
         sigmas = np.minimum(np.maximum(sigmas, MIN_SIGMA), MAX_SIGMA * shorter)
@@ -322,7 +322,7 @@ def _edges(
         each = np.clip(fitted[..., 4] / divisor, -1, 1)
         blurs = (weights * each).sum(axis=1) / weights.sum(axis=1)
         blurs = np.maximum(blurs, -LARGEST_SHARPENING * sigmas)
-    return _Edges(places, weights, blurs, ~lit.all(axis=1), are_lit)
+    return _Edges(places, weights, blurs, np.asarray(~lit.all(axis=1)), are_lit)
 
 
 def _smooth(values: FloatArray, n_rays: int) -> FloatArray:

@@ -60,6 +60,12 @@ def backlit(background: float, shot: ImagePlan = SHOT) -> Image:
     return shown(replace(shot, optics=optics))
 
 
+def tiny(diameter: float) -> Image:
+    """Return LEDs of some 2 px."""
+    sharp = replace(SHOT, optics=replace(SHOT.optics, psf_sigma=0.6))
+    return shown(sharp, replace(SCENE, pen=replace(PEN, diameter=diameter)))
+
+
 def streaked() -> Image:
     """Return what a pen leaves that moves by far more than its discs."""
     return np.asarray(cv2.blur(shown(), (1, 401)), dtype=np.uint8)
@@ -170,6 +176,7 @@ SCENES: dict[str, tuple[Callable[[], Image], Reason]] = {
         Reason.NONE,
     ),
     "another pen": (lambda: of_pen(six_led_pen()), Reason.NOT_THE_PEN),
+    "tiny": (lambda: tiny(0.5), Reason.TOO_SMALL),
     "wrong size": (lambda: shown()[:, 4:], Reason.WRONG_SIZE),
     "upright": (lambda: shown().T.copy(), Reason.WRONG_SIZE),
 }
@@ -178,6 +185,11 @@ SCENES: dict[str, tuple[Callable[[], Image], Reason]] = {
 @pytest.fixture(scope="module")
 def clean() -> Image:
     return shown()
+
+
+@pytest.fixture(scope="module")
+def others() -> list[Image]:
+    return [shown(live_plan(SCENE, index, 1.0 + 0.3 * index)) for index in (1, 2)]
 
 
 @pytest.fixture(scope="module")
@@ -210,7 +222,7 @@ def assert_alike(live: PenDetection, files: Observations, index: int) -> None:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_an_image_shows_the_same_live_and_on_files(
-    name: str, clean: Image, before: PenDetection
+    name: str, others: list[Image], before: PenDetection
 ) -> None:
     render, reason = SCENES[name]
     image = render()
@@ -218,13 +230,13 @@ def test_an_image_shows_the_same_live_and_on_files(
 
     assert live.reason is reason
     # Most of a set must be of use, or the set as a whole is refused or diagnosed.
-    assert_alike(live, on_files([clean, image, clean]), 1)
+    assert_alike(live, on_files([*others, image]), 2)
     assert detect_pen(image, CAMERA, PEN, before=before).reason is reason
 
 
 def test_every_reason_that_one_image_can_have_is_among_the_scenes() -> None:
     reasons = {reason for _, reason in SCENES.values()}
-    of_many_images = {Reason.MISFIT, Reason.SLIPPED, Reason.TAKEN_OUT}
+    of_many_images = {*(Reason.MISFIT, Reason.SLIPPED, Reason.TAKEN_OUT, Reason.COPY)}
     elsewhere = {
         Reason.UNREADABLE,  # a file; a live image comes whole or not at all
         Reason.UNHANDLED,  # a mistake of the program, made in the tests of both ways

@@ -47,7 +47,7 @@ def camera_of(height: int, width: int) -> Camera:
 CAMERA = camera_of(*SEEN)
 SCENE = replace(Scene(), camera=CAMERA, sensor=Sensor(bits=16))
 PEN = SCENE.pen
-PEN_SEEN = render_plan(SCENE, live_plan(SCENE, 0, 1.0))
+PEN_SEEN, PEN_MOVED = (render_plan(SCENE, live_plan(SCENE, i, 1 + i)) for i in (0, 1))
 
 
 def ugly_image(rng: np.random.Generator, height: int, width: int) -> Image:
@@ -140,7 +140,7 @@ def test_no_ugly_image_is_beyond_the_way_of_files() -> None:
 def test_an_image_that_the_search_fails_on_is_left_out_with_its_reason() -> None:
     unforeseen: Any = PEN_SEEN.astype(np.float32)
 
-    found = observed(PEN_SEEN, unforeseen, PEN_SEEN)
+    found = observed(PEN_SEEN, unforeseen, PEN_MOVED)
 
     assert found.reasons == (Reason.NONE, Reason.UNHANDLED, Reason.NONE)
     assert "float32" in str(found.details[1])
@@ -158,7 +158,7 @@ def test_an_image_that_labelling_fails_on_leaves_the_others_of_its_batch(
 
     monkeypatch.setattr(observations, "label_images", fail_on_nothing)
 
-    found = observed(PEN_SEEN, np.zeros_like(PEN_SEEN), PEN_SEEN)
+    found = observed(PEN_SEEN, np.zeros_like(PEN_SEEN), PEN_MOVED)
 
     assert found.reasons == (Reason.NONE, Reason.UNHANDLED, Reason.NONE)
     assert "ZeroDivisionError: no spots" in str(found.details[1])
