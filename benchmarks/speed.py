@@ -2,7 +2,7 @@
 
 import statistics
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -38,7 +38,7 @@ from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.rig import rig_of
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.image_plans import ImagePlan, render_plan
-from lightpen.simulator.scenes import Scene
+from lightpen.simulator.scenes import LEDS, Scene
 from lightpen.simulator.swings import leds_in_camera, simulate_centers, swing_poses
 from lightpen.swing.kept_images import keep, kept_before
 
@@ -52,9 +52,10 @@ REPEATS = 15
 RPG = "rpg_monocular_pose_estimator (on other images, not run here) some"
 SCENE = Scene()
 
-TRACKING_SHARE = 3 / 40  # of the time of cv2, in the same run
+TRACKING_SHARE = 2 / 40  # of the time of cv2, in the same run
 LIMITS_MS = {
     "start": 25.0,
+    "tracking look": 6.0,
     "start labels": 20.0,
     "tracking labels": 1.0,
     "joint": 50.0,
@@ -105,9 +106,13 @@ def speed_rows(workers: Workers) -> list[Row]:
         Row(
             "5 MP image to pose, tracking",
             f"{images.tracking:.2f} ms",
-            f"<= {TRACKING_SHARE * images.blobs:.2f} ms (3 where cv2 takes 40)",
+            f"<= {TRACKING_SHARE * images.blobs:.2f} ms (2 where cv2 takes 40)",
             peer,
             images.tracking <= TRACKING_SHARE * images.blobs,
+        ),
+        *(
+            _row(f"- tracking, LEDs of the look `{look}`", time_ms, "tracking look")
+            for look, time_ms in workers.call(_look_times).items()
         ),
         _row("5 MP image to pose, from nothing", images.start, "start", peer),
         _row(
@@ -170,6 +175,26 @@ def _image_times() -> _ImageTimes:
         default_blobs=_median_over_images(partial(solve, default_blobs)),
         render=_median_over_images(render),
     )
+
+
+def _look_times() -> dict[str, float]:
+    """Return the median times of one image of each look of LEDs while tracking, ms."""
+    times = {}
+    for name, look in LEDS.items():
+        scene = replace(SCENE, faces=look.faces, optics=look.optics)
+        plans = [live_plan(scene, i, i / FRAME_RATE) for i in range(N_IMAGES)]
+        images = [render_plan(scene, plan) for plan in plans]
+        detections = [detect_pen(image, CAMERA, PEN) for image in images]
+
+        times[name] = _median_over_images(partial(_tracked, images, detections))
+    return times
+
+
+def _tracked(
+    images: list[Image], detections: list[PenDetection], i: int
+) -> PenDetection:
+    before = detections[i - 1]
+    return detect_pen(images[i], CAMERA, PEN, None, before, is_followed=True)
 
 
 def _median_over_images(function: Callable[[int], object]) -> float:

@@ -36,7 +36,7 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--leds",
-        choices=("even", "hot-spot", "dome", "ring", "halo", "ghost"),
+        choices=("even", "hot-spot", "dome", "ring", "halo", "ghost", "board"),
         default="even",
         help="appearance of the LEDs",
     )

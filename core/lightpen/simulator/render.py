@@ -21,13 +21,22 @@ from lightpen.simulator.rims import (
     ellipse_rim,
 )
 from lightpen.simulator.swings import faces_camera, leds_in_camera
-from lightpen.simulator.view import GHOST_OFFSET, Finger, Glare, Lamp, Optics, View
+from lightpen.simulator.view import (
+    BOARD_OFFSET,
+    GHOST_OFFSET,
+    Finger,
+    Glare,
+    Lamp,
+    Optics,
+    View,
+)
 
 OUTLINE_BITS = 6  # fraction bits of OpenCV's polygon corners
 HIDDEN_SAMPLES = 8  # per pixel and axis
 POLYGON_SAMPLES = 4
 DEFOCUS_SAMPLES = 9  # per pixel and axis, of the defocus kernel
 HALO_SIGMA = 15.0  # px
+BOARD_SIGMA = 2.0  # px
 HALO_REACH = 3.0  # standard deviations after which it is nil
 
 
@@ -163,7 +172,8 @@ def _margin(optics: Optics) -> int:
     """Return the reach of scattered light around a disc, px."""
     halo = HALO_REACH * HALO_SIGMA if optics.halo > 0 else 0.0
     ghost = max(GHOST_OFFSET) if optics.ghost > 0 else 0
-    return int(np.ceil(optics.defocus_radius + max(halo, ghost)))
+    board = max(BOARD_OFFSET) + HALO_REACH * BOARD_SIGMA if optics.board > 0 else 0.0
+    return int(np.ceil(optics.defocus_radius + max(halo, ghost, board)))
 
 
 def _shining(patches: list[Patch], levels: FloatArray, optics: Optics) -> list[Patch]:
@@ -180,13 +190,14 @@ def _shining(patches: list[Patch], levels: FloatArray, optics: Optics) -> list[P
 
 
 def _scattered(patches: list[Patch], optics: Optics) -> list[Patch]:
-    """Return patches with halo and ghost image."""
-    if optics.halo == 0 and optics.ghost == 0:
+    """Return patches with halo, ghost image and reflection."""
+    if optics.halo == 0 and optics.ghost == 0 and optics.board == 0:
         return patches
     across, down = GHOST_OFFSET
+    beside, below = BOARD_OFFSET
     for patch in patches:
         sharp = patch.levels.copy()
-        patch.levels[:] *= np.float32(1 - optics.halo - optics.ghost)
+        patch.levels[:] *= np.float32(1 - optics.halo - optics.ghost - optics.board)
         if optics.halo > 0:
             patch.levels[:] += np.float32(optics.halo) * cv2.GaussianBlur(
                 sharp, (0, 0), HALO_SIGMA, borderType=cv2.BORDER_CONSTANT
@@ -194,6 +205,13 @@ def _scattered(patches: list[Patch], optics: Optics) -> list[Patch]:
         patch.levels[down:, across:] += (
             np.float32(optics.ghost) * sharp[:-down, :-across]
         )
+        if optics.board > 0:
+            reflected = cv2.GaussianBlur(
+                sharp, (0, 0), BOARD_SIGMA, borderType=cv2.BORDER_CONSTANT
+            )
+            patch.levels[below:, beside:] += (
+                np.float32(optics.board) * reflected[:-below, :-beside]
+            )
     return patches
 
 

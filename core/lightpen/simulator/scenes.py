@@ -90,6 +90,7 @@ LEDS = {
     "ring": Leds("ring"),
     "halo": Leds(optics=Optics(halo=0.15)),
     "ghost": Leds(optics=Optics(ghost=0.03)),
+    "board": Leds("dome", Optics(halo=0.1, board=0.1)),
 }
 
 

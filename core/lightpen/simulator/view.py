@@ -12,6 +12,7 @@ from lightpen.simulator.rims import MIN_SIGMA
 
 PEAK = 205 / 255
 GHOST_OFFSET = (9, 4)  # px, right and down
+BOARD_OFFSET = (1, 8)  # px, right and down
 CAP_STEPS = 16  # corners of a round finger end
 
 
@@ -41,6 +42,8 @@ class Optics:
     ghost : float
         Share of it that is seen again `GHOST_OFFSET` beside, by reflection in the
         filter.
+    board : float
+        Share of it that the board reflects, blurred, `BOARD_OFFSET` beside.
     """
 
     peak: float = PEAK
@@ -52,6 +55,7 @@ class Optics:
     gradient: tuple[float, float] = (0.0, 0.0)
     halo: float = 0.0
     ghost: float = 0.0
+    board: float = 0.0
 
     def __post_init__(self) -> None:
         if self.psf_sigma < MIN_SIGMA:
