@@ -45,7 +45,7 @@ class Followed(NamedTuple):
     poses: Poses
 
 
-def follow(
+def follow_spots(
     spots: Spots,
     camera: Camera,
     pen: Pen,

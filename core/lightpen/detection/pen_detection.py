@@ -13,7 +13,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.disc_moments import PixelBox
-from lightpen.detection.following import follow
+from lightpen.detection.following import follow_spots
 from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.labelling.hypotheses import MAX_SHIFT
 from lightpen.detection.labelling.labels import (
@@ -290,7 +290,7 @@ def _followed(
     labelled = before.labels.spot >= 0
     areas = np.full(pen.n_leds, np.nan)
     areas[labelled] = before.spots.areas[before.labels.spot[labelled]]
-    found = follow(spots, camera, pen, before.rotation, before.translation, areas)
+    found = follow_spots(spots, camera, pen, before.rotation, before.translation, areas)
     if found is None:
         return None
     pixels = np.where(found.labels.whole[:, None], found.seen, np.nan)

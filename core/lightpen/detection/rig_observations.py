@@ -111,6 +111,7 @@ def _responsive(seen: Observations, images: IntArray) -> Observations:
         pixels=moved(seen.pixels),
         seen_pixels=moved(seen.seen_pixels),
         areas=moved(seen.areas),
+        sigmas=moved(seen.sigmas),
         rotations=moved(seen.rotations),
         translations=moved(seen.translations),
         edge_widths=moved(seen.edge_widths),

@@ -16,6 +16,7 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.observations import Observations
 from lightpen.detection.pose import MIN_POSE_LEDS
 from lightpen.detection.reasons import Reason
+from lightpen.detection.spots import EXACT_SIGMA
 from lightpen.discovery.hypotheses import Hypothesis, camera_prior, solve_seed
 from lightpen.discovery.labelling import Labelled, label, pixels_of
 from lightpen.discovery.normals import FACING, towards_camera
@@ -324,6 +325,7 @@ def _observations(
         pixels=pixels,
         seen_pixels=pixels,
         areas=areas,
+        sigmas=np.where(np.isfinite(pixels[..., 0]), EXACT_SIGMA, np.nan),
         rotations=rotations,
         translations=translations,
         edge_widths=np.full(n_images, np.nan) if widths is None else widths,

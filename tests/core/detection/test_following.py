@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from tests.simulated_plans import live_plan
 
-from lightpen.detection.following import Followed, follow
+from lightpen.detection.following import Followed, follow_spots
 from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 from lightpen.simulator.image_plans import render_plan
@@ -27,7 +27,7 @@ def followed(spots: Spots | None) -> Followed | None:
     assert BEFORE.spots is not None
     assert BEFORE.labels is not None
     areas = BEFORE.spots.areas[BEFORE.labels.spot]
-    return follow(
+    return follow_spots(
         spots, SCENE.camera, SCENE.pen, BEFORE.rotation, BEFORE.translation, areas
     )
 
