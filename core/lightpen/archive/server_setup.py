@@ -27,7 +27,16 @@ ALTER TABLE archive_writers ALTER writer SET DEFAULT current_user;
 ALTER TABLE archive_entries
     ADD FOREIGN KEY (chain) REFERENCES archive_writers,
     ADD CONSTRAINT entry_hash
-        CHECK (sha256 = encode(sha256(convert_to(text, 'UTF8')), 'hex'));
+        CHECK (sha256 = encode(sha256(convert_to(text, 'UTF8')), 'hex')),
+    -- For statistics, see docs/grafana; what is checked is the text.
+    ADD grade TEXT GENERATED ALWAYS AS
+        (substring(text FROM '"grade":"([^"]*)"')) STORED,
+    ADD tip_mm TEXT GENERATED ALWAYS AS
+        (substring(text FROM '"tip_pen_mm":\\[([^]]*)\\]')) STORED,
+    ADD uncertainty_mm TEXT GENERATED ALWAYS AS
+        (substring(text FROM '"expanded_uncertainty_mm":\\[([^]]*)\\]')) STORED;
+CREATE INDEX archive_verdicts ON archive_entries (at_us)
+    INCLUDE (station, kind, is_simulated, grade);
 ALTER TABLE archive_records
     ADD CONSTRAINT record_hash
         CHECK (sha256 = encode(sha256(convert_to(text, 'UTF8')), 'hex'));
