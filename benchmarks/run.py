@@ -23,11 +23,13 @@ from benchmarks.cramer_rao import cramer_rao_rows
 from benchmarks.discoveries import discovery_rows
 from benchmarks.guided import guided_rows
 from benchmarks.hard_scene import hard_scene_rows
+from benchmarks.honest_histories import honest_row
 from benchmarks.hostile import hostile_rows
 from benchmarks.image_sets import data_folder
 from benchmarks.killed import killed_rows
 from benchmarks.labelling import labelling_rows
 from benchmarks.machine import description
+from benchmarks.plant_view import plant_view_rows
 from benchmarks.published import with_section
 from benchmarks.rows import NEEDS_DATA, Row, table
 from benchmarks.small_leds import small_led_rows
@@ -65,7 +67,9 @@ SECTIONS: dict[str, Section] = {
     "hostile": lambda workers, data: hostile_rows(),
     "archive": lambda workers, data: archive_rows(),
     "cuts": lambda workers, data: cut_rows(),
+    "honest": lambda workers, data: [honest_row()],
     "plant": lambda workers, data: plant_rows(),
+    "view": lambda workers, data: plant_view_rows(),
     "start": lambda workers, data: start_rows(),
     "idle": lambda workers, data: idle_rows(),
     "link": lambda workers, data: link_rows(),
