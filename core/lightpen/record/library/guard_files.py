@@ -9,7 +9,7 @@ All files have the mode 0600: a password can be guessed by its salt and public k
 from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeAlias
 
 from msgspec import Meta, Struct
 
@@ -40,6 +40,8 @@ from lightpen.record.signing.signed_text import Signers, place_in
 LIMITS_FOLDER = "limits"
 WHAT = message("file.limits")
 NOTHING_BEFORE = "0" * 64
+
+_Signed: TypeAlias = Annotated[str, Meta(pattern="^([0-9a-f]{128})?$")]
 
 
 class PasswordVerifier(Struct, frozen=True):
@@ -90,10 +92,10 @@ class LimitsChange(Struct, omit_defaults=True, kw_only=True):
     password: PasswordVerifier | None = None
     limits: dict[str, float] | None = None
     previous: Digest = NOTHING_BEFORE
-    chain: str = ""
-    station_key: str = ""
-    station_key_signature: str = ""
-    key_approval: str = ""
+    chain: Annotated[str, Meta(pattern="^([0-9a-f]{32})?$")] = ""
+    station_key: Annotated[str, Meta(pattern="^([0-9a-f]{64})?$")] = ""
+    station_key_signature: _Signed = ""
+    key_approval: _Signed = ""
     unsigned: Mapping[str, int] = {}
 
     def __post_init__(self) -> None:

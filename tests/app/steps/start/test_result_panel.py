@@ -5,6 +5,7 @@ from pathlib import Path
 
 from benchmarks.small_records import small_record
 from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
 from pytestqt.qtbot import QtBot
 
@@ -34,7 +35,7 @@ def test_where_there_is_a_password_revoking_asks_for_a_supervisor(
         for each in panel.findChildren(PushButton)
         if each.text() == "Revoke acceptance..."
     )
-    qtbot.mouseClick(revoke, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(revoke, Qt.MouseButton.LeftButton)
     (bar,) = panel.findChildren(WithdrawalBar)
     assert bar.isVisible()
 
@@ -43,9 +44,9 @@ def test_where_there_is_a_password_revoking_asks_for_a_supervisor(
         each for each in bar.findChildren(QLineEdit) if each not in (name, password)
     )
     for field, text in ((reason, "Bent."), (name, "Eve"), (password, "correct horse")):
-        qtbot.keyClicks(field, text)
+        QTest.keyClicks(field, text)
     with qtbot.waitSignal(panel.take_back_requested) as blocker:
-        qtbot.keyClick(password, Qt.Key.Key_Return)
+        QTest.keyClick(password, Qt.Key.Key_Return)
     assert blocker.args is not None
     assert blocker.args[1:] == ["Bent.", Signature("Eve", "correct horse")]
 
