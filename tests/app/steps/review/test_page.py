@@ -92,6 +92,7 @@ from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.state_banner import State, StateBanner
+from lightpen_app.widgets.withdrawal_bar import WithdrawalBar
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -262,7 +263,7 @@ def is_unread(page: ReviewPage) -> bool:
 
 def the(parent: QWidget, kind: type[W]) -> W:
     """Return the only child of a kind."""
-    (found,) = parent.findChildren(kind)
+    (found,) = (each for each in parent.findChildren(kind) if type(each) is kind)
     return found
 
 
@@ -280,7 +281,7 @@ def remarks(page: ReviewPage) -> str:
 
 def button(page: ReviewPage, text: str) -> QPushButton:
     """Return a button of the page, but for those that answer its questions."""
-    asks = the(page, QuestionBar), the(page, ReasonBar)
+    asks = [the(page, kind) for kind in (QuestionBar, ReasonBar, WithdrawalBar)]
     return next(
         each
         for each in page.findChildren(QPushButton)
