@@ -43,9 +43,10 @@ from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.disc_normals import effect_of_normals
-from lightpen.estimation.uncertainty.instrument import Parameters
+from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mixing
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
+from lightpen.model.information import inverse
 from lightpen.model.pen import Pen
 from lightpen.model.posture import tilts_of
 from lightpen.model.rigid import fit_rigid
@@ -180,7 +181,7 @@ def discover(
     numbers = _in_sightings(found.spots, kept)
     observations = _observations(sightings, start, found.images, numbers)
     camera = _camera_to_adjust(start, request)
-    pen = replace(with_lengths_known(start.pen, lengths), normal_sigma=FACING)
+    pen = with_lengths_known(start.pen, lengths)
     calibration = calibrate(camera, pen, observations)
     _require_length(calibration, request, lengths)
     report(0.95)
@@ -399,7 +400,11 @@ def _discovery_of(
 ) -> Discovery:
     bundle, instrument = calibration.bundle, calibration.instrument
     state, tip = bundle.state, calibration.joint.tip_pen
-    covariance = instrument.covariance.copy()
+    # The start found the normal, by the same images.
+    normals = effect_of_normals(bundle)
+    of_turn = inverse(normals.information + FACING**-2 * np.eye(2))
+    by = instrument_mixing(bundle)
+    covariance = instrument.covariance + by @ normals.covariance(of_turn) @ by.T
     at = instrument.parameters
     budget = calibration.budget.covariance[:3, :3] - instrument.covariance[:3, :3]
     values, vectors = np.linalg.eigh(budget)
@@ -419,7 +424,7 @@ def _discovery_of(
         led_covariance=covariance[at.leds, at.leds],
         scale_sigma=EXACT_SCALE,
         diameter_sigma=diameter_sigma,
-        normal_sigma=effect_of_normals(bundle, FACING).sigma,
+        normal_sigma=float(np.sqrt(np.linalg.eigvalsh(of_turn)[-1])),
         nominal_tip=None,
         expansion=None,
     )

@@ -250,7 +250,8 @@ def contributions_of(
         biased += np.outer(along_normals, along_normals)
     facing = bundle.unknowns.start.pen.normal_sigma
     if facing is not None and bundle.state.rig.n_cameras == 1:
-        biased += effect_of_normals(bundle, facing).covariance[:6, :6]
+        of_turn = facing**2 * np.eye(2)
+        biased += effect_of_normals(bundle).covariance(of_turn)[:6, :6]
     size = bundle.part(at.scale)
     warm = float(priors.temperature.covariance[0, 0] / priors.size_covariance[0, 0])
     shares = [

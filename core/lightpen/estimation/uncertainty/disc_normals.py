@@ -27,29 +27,31 @@ TURN = 1e-3  # rad, of a difference
 
 
 class NormalEffect(NamedTuple):
-    """What an unknown turn of all normals comes to.
+    """What a turn of all normals does to a bundle that holds them.
 
     Attributes
     ----------
-    covariance : (p, p) array
-        Of the unknowns of the bundle, beside that with the normals as they are.
-    sigma : float
-        Of the turn after the swing, rad.
+    gain : (p, 2) array
+        Change of the unknowns by the turn, a rad.
+    information : (2, 2) array
+        What the images tell of the turn, all else unknown, 1/rad^2.
     """
 
-    covariance: FloatArray
-    sigma: float
+    gain: FloatArray
+    information: FloatArray
+
+    def covariance(self, of_turn: FloatArray) -> FloatArray:
+        """Return the covariance (p, p) by that of the turn, (2, 2), rad^2."""
+        return np.asarray(self.gain @ of_turn @ self.gain.T)
 
 
-def effect_of_normals(bundle: Bundle, sigma: float) -> NormalEffect:
-    """Return what an unknown turn of all normals adds to the uncertainty.
+def effect_of_normals(bundle: Bundle) -> NormalEffect:
+    """Return what a turn of all normals does, to first order.
 
     Parameters
     ----------
     bundle : Bundle
         Of one camera.
-    sigma : float
-        Standard deviation of the turn before the swing, rad.
     """
     state, unknowns = bundle.state, bundle.unknowns
     view = views_at(state, np.zeros_like(bundle.residuals))[0]
@@ -69,12 +71,11 @@ def effect_of_normals(bundle: Bundle, sigma: float) -> NormalEffect:
     information, _ = replace(unknowns, mixing=mixing, layout=layout).system(each)
     old = np.r_[0:p0, p0 + 2 : len(information)]
     known = bundle.prior_information + bundle.measured_information
-    without = inverse(information[np.ix_(old, old)] + known)
-    information[np.ix_(old, old)] += known
-    information[[p0, p0 + 1], [p0, p0 + 1]] += sigma**-2
-    both = inverse(information)
-    left = float(np.sqrt(max(both[p0, p0], both[p0 + 1, p0 + 1])))
-    return NormalEffect(both[np.ix_(old, old)] - without, left)
+    turn = [p0, p0 + 1]
+    coupling = information[np.ix_(old, turn)]
+    gain = -inverse(information[np.ix_(old, old)] + known) @ coupling
+    own = information[np.ix_(turn, turn)] + coupling.T @ gain
+    return NormalEffect(gain, own)
 
 
 def with_normal(view: CameraView, state: BundleState) -> CameraView:

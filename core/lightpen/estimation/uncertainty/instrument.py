@@ -98,8 +98,9 @@ def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
     spread = spread + np.outer(shrinkage_shift, shrinkage_shift)
     facing = state.pen.normal_sigma
     if facing is not None and state.rig.n_cameras == 1:
-        spread = spread + effect_of_normals(unshrunk, facing).covariance
-    mixing = _mixing(bundle)
+        of_turn = facing**2 * np.eye(2)
+        spread = spread + effect_of_normals(unshrunk).covariance(of_turn)
+    mixing = instrument_mixing(bundle)
     return Instrument(
         rig=state.rig,
         pen=state.pen,
@@ -181,7 +182,7 @@ def _with_budget_noise(bundle: Bundle, budget: Budget) -> FloatArray:
     return np.asarray(covariance + (by_tip - 1) * images)
 
 
-def _mixing(bundle: Bundle) -> FloatArray:
+def instrument_mixing(bundle: Bundle) -> FloatArray:
     """Return the parameters of an instrument by the unknowns of a bundle, (q, p)."""
     unknowns, state = bundle.unknowns, bundle.state
     at = parameters_of(state.rig, state.pen)

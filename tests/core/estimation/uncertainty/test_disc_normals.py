@@ -1,0 +1,57 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.uncertainty.disc_normals import (
+    effect_of_normals,
+    turned_normals,
+)
+from lightpen.formats.observation_files import Centers
+from lightpen.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+CAMERA, PEN = paper_camera(), replace(paper_pen(), led_sigma=0.002)
+TURN = np.array([0.03, -0.02])  # rad
+
+
+def calibrated(turn: FloatArray, normal_sigma: float | None = None) -> Calibration:
+    """Return the calibration by a pen file whose normals are turned."""
+    rng = np.random.default_rng(3)
+    swing = swing_poses(120, rng, pen=PEN, camera=CAMERA)
+    pixels = simulate_centers(
+        CAMERA, PEN, swing.rotations, swing.translations, 0.005, rng
+    )
+    centers = Centers(np.arange(len(pixels)), pixels, Path("centers.csv"))
+    pen = replace(
+        PEN, normals=turned_normals(PEN.normals, turn), normal_sigma=normal_sigma
+    )
+    return calibrate(CAMERA, pen, observe_centers(centers, CAMERA, pen))
+
+
+def test_a_turn_of_all_normals_is_budgeted_where_the_pen_file_states_it() -> None:
+    without, stated = calibrated(TURN), calibrated(TURN, 0.3)
+
+    np.testing.assert_allclose(stated.joint.tip_pen, without.joint.tip_pen)
+    before = without.budget.expanded_uncertainty[:3]
+    assert (before < stated.budget.expanded_uncertainty[:3]).all()
+    more = np.diag(stated.instrument.covariance - without.instrument.covariance)
+    assert (more[:3] > 0).all()
+
+
+def test_the_effect_of_a_turn_is_the_change_of_the_tip_by_it() -> None:
+    straight, turned = calibrated(np.zeros(2)), calibrated(TURN)
+
+    effect = effect_of_normals(straight.bundle)
+
+    change = turned.bundle.state.tip_pen - straight.bundle.state.tip_pen
+    largest = np.abs(change).max()
+    np.testing.assert_allclose(effect.gain[:3] @ TURN, change, atol=0.1 * largest)
+    assert (np.linalg.eigvalsh(effect.information) > 0).all()
