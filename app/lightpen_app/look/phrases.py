@@ -102,6 +102,11 @@ _SHARES: dict[ContributionName, str] = {
     ContributionName.DIAMETER: QT_TRANSLATE_NOOP("phrases", "disc diameter"),
     ContributionName.CAMERA: QT_TRANSLATE_NOOP("phrases", "camera"),
     ContributionName.EXTRINSICS: QT_TRANSLATE_NOOP("phrases", "rig"),
+    ContributionName.LENS: QT_TRANSLATE_NOOP("phrases", "lens"),
+    ContributionName.COMPLIANCE: QT_TRANSLATE_NOOP("phrases", "compliance"),
+    ContributionName.LOOSE: QT_TRANSLATE_NOOP("phrases", "loose stylus"),
+    ContributionName.SAG: QT_TRANSLATE_NOOP("phrases", "sag"),
+    ContributionName.TILT: QT_TRANSLATE_NOOP("phrases", "camera tilt"),
     ContributionName.SHRINKAGE: QT_TRANSLATE_NOOP("phrases", "unmodelled effects"),
 }
 _LACKS: dict[MissingInput, str] = {

@@ -242,6 +242,13 @@ def _share_name(name: ContributionName) -> str:
         ContributionName.DIAMETER: translate("paper", "Diameter of the LED discs"),
         ContributionName.CAMERA: translate("paper", "Intrinsics of the camera file"),
         ContributionName.EXTRINSICS: translate("paper", "Extrinsics of the cameras"),
+        ContributionName.LENS: translate("paper", "Lens beyond its distortion model"),
+        ContributionName.COMPLIANCE: translate(
+            "paper", "Compliance of stylus, seat and stand"
+        ),
+        ContributionName.LOOSE: translate("paper", "Loose stylus"),
+        ContributionName.SAG: translate("paper", "Sag of the pen"),
+        ContributionName.TILT: translate("paper", "Tilt of the camera with the pen"),
         ContributionName.SHRINKAGE: translate(
             "paper", "Effects too uncertain to be fitted"
         ),

@@ -13,7 +13,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -28,12 +28,14 @@ from lightpen.estimation.bundle.adjustment import Adjustment, adjust
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.consistency_findings import Contradiction
 from lightpen.estimation.bundle.disc_diameter import read_diameter
+from lightpen.estimation.bundle.effect_findings import FoundEffect, found_effects
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import Priors, priors_of, thermal_growth
 from lightpen.estimation.contact.camera_motion import (
     CameraPath,
     SteadyImages,
     pose_steadily,
+    without_field,
 )
 from lightpen.estimation.contact.joint import (
     ContactModel,
@@ -194,6 +196,11 @@ class Calibration:
         is_certain = self.bundle.budget_components.drift.is_significant
         return max([*by_lamps, self.bundle.drift if is_certain else 0.0])
 
+    @cached_property
+    def effects(self) -> tuple[FoundEffect, ...]:
+        """Effects of lens and mechanics that the images support."""
+        return found_effects(self.bundle)
+
     @property
     def led_sigma(self) -> float:
         """Estimated standard deviation of the LED file's coordinates, mm.
@@ -325,11 +332,18 @@ class _Start:
 
 @dataclass(frozen=True, eq=False)
 class _Adjusted:
-    """Step 3: the bundle adjustment, and the joint fit at its solution."""
+    """Step 3: the bundle adjustment, and the joint fit at its solution.
+
+    Attributes
+    ----------
+    pixels : (M, C, L, 2) array
+        LED centres less the effects of lens and mechanics, px.
+    """
 
     adjustment: Adjustment
     joint: JointFit
     stated: Priors
+    pixels: FloatArray
 
 
 def _fit_single_cameras(
@@ -338,7 +352,11 @@ def _fit_single_cameras(
     """Fit the poses of each camera's images; a tip slips before all cameras."""
     rig = inputs.rig
     steady = tuple(
-        _of_camera(rig, c, partial(pose_steadily, camera, inputs.pen, seen))
+        _of_camera(
+            rig,
+            c,
+            partial(pose_steadily, camera, inputs.pen, without_field(camera, seen)),
+        )
         for c, (camera, seen) in enumerate(zip(rig.cameras, observations, strict=True))
     )
     reasons = np.stack([each.posed.reasons for each in steady], axis=1)
@@ -410,14 +428,15 @@ def _adjust_jointly(
     adjustment = adjust(state, pixels, priors, start.extrinsics, shifts)
     bundle, found = adjustment.bundle, adjustment.bundle.state
     n = len(moments)
+    corrected = (pixels - bundle.effect_shifts)[:n]
     joint = joint_at(
-        ContactModel(found.rig, found.pen, start.pixels),
+        ContactModel(found.rig, found.pen, corrected),
         found.rotations[:n],
         found.tip_pen,
         found.cone_rig,
         bundle.used[:n].reshape(n, -1),
     )
-    return _Adjusted(adjustment, joint, priors)
+    return _Adjusted(adjustment, joint, priors, corrected)
 
 
 def _calibration_of(
@@ -467,7 +486,7 @@ def _calibration_of(
         budget=budget,
         instrument=adjusted_instrument(adjustment, budget),
         halves=compare_halves(joint),
-        leds=measure_leds(state.rig, pen, start.pixels, joint),
+        leds=measure_leds(state.rig, pen, adjusted.pixels, joint),
         coverage=measure_coverage(joint.rotations),
         lags=start.lags,
         second=(

@@ -46,6 +46,11 @@ COVERED = 0.95
 OF_OTHERS = {
     ContributionName.DISTANCE,
     ContributionName.EXTRINSICS,
+    ContributionName.LENS,
+    ContributionName.COMPLIANCE,
+    ContributionName.LOOSE,
+    ContributionName.SAG,
+    ContributionName.TILT,
 }  # cones, or cameras; not drawn
 
 

@@ -46,6 +46,8 @@ class Assumptions:
     center_bias : float
         Of the centre of an LED's image, px, by what does not average out: another in
         each posture, the same whenever it returns.
+    compliance : float
+        Of how far stylus, seat or stand give way, mm by the sine of the lean.
     rotation, translation : float
         Of a camera in its rig about and along each axis, rad and mm.
     """
@@ -57,14 +59,15 @@ class Assumptions:
     k2: float = 0.1
     tangential: float = 0.0003
     scale: float = 1e-5
-    expansion: float = 1.2e-5
+    expansion: float = 2.3e-5
     expansion_share: float = 0.1
     temperature_c: float | None = None
     temperature: float = 0.5
-    warmth: float = 1.5
+    warmth: float = 3.0
     diameter: float = 0.02
     form_error: float = 0.0002
     center_bias: float = 0.003
+    compliance: float = 0.004
     rotation: float = 0.02
     translation: float = 20.0
 

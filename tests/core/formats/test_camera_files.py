@@ -548,7 +548,7 @@ def test_amplitude_and_length_alone_are_a_field_that_was_not_measured(
         ("{amplitude: 0.1}", "has no correlation_length"),
         ("{amplitude: 0.1, correlation_length: 600, sigma: 1}", "sigma"),
         (
-            "{amplitude: 0.1, correlation_length: 600, values: 1, columns: 99, rows: 2}",
+            "{amplitude: 1, correlation_length: 600, values: 1, columns: 99, rows: 2}",
             "99 columns and 2 rows",
         ),
         (

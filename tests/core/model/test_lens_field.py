@@ -6,6 +6,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
+from lightpen.model.information import inverse
 from lightpen.model.lens_field import LensField, correlation
 
 WIDTH, HEIGHT = 2448, 2048
@@ -53,7 +54,7 @@ def test_what_was_measured_lowers_the_covariance_and_sets_the_mean() -> None:
     weights, noise = prior.basis(points), 0.03
     seen = weights @ truth + noise * rng.normal(size=(4000, 2))
     information = np.linalg.inv(prior.covariance + 1e-9 * np.eye(len(truth)))
-    covariance = np.linalg.inv(information + weights.T @ weights / noise**2)
+    covariance = inverse(information + weights.T @ weights / noise**2)
     field = replace(
         prior, values=covariance @ weights.T @ seen / noise**2, covariance=covariance
     )

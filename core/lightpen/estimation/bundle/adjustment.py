@@ -21,6 +21,8 @@ from lightpen.estimation.bundle.consistency_findings import (
     find_contradicted_inputs,
     find_pen_contradictions,
 )
+from lightpen.estimation.bundle.effect_search import SearchedEffect, search_effects
+from lightpen.estimation.bundle.effects import Effect
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.noise_correlation import (
     Correlation,
@@ -48,6 +50,8 @@ class Adjustment:
         The fit with these priors as assumed; its covariance is the uncertainty.
     priors : Priors
         Priors of ``unshrunk`` with contradicted numbers released.
+    effects : tuple of SearchedEffect
+        Beside a fit without them; candidates are unknowns of ``bundle``.
     """
 
     bundle: Bundle
@@ -55,6 +59,7 @@ class Adjustment:
     priors: Priors
     contradictions: tuple[Contradiction, ...]
     correlation: Correlation
+    effects: tuple[SearchedEffect, ...]
 
     @property
     def shrinkage_shift(self) -> FloatArray:
@@ -73,6 +78,12 @@ class _ConsistentFit:
     correlation: Correlation
     priors: Priors
     contradictions: tuple[Contradiction, ...]
+    effects: tuple[SearchedEffect, ...]
+
+    @property
+    def fitted(self) -> tuple[Effect, ...]:
+        """The effects that the images support."""
+        return tuple(each.effect for each in self.effects if each.is_candidate)
 
 
 def adjust(
@@ -116,13 +127,14 @@ def adjust(
     shrunk = shrunk_priors(fitted.bundle, fitted.priors)
     bundle = unshrunk = fitted.bundle
     if shrunk is not fitted.priors:
-        bundle = fit(shrunk, inflation=inflation)
+        bundle = fit(shrunk, inflation=inflation, effects=fitted.fitted)
     components = fitted.correlation.components
     if components is not None:
         bundle = replace(bundle, budget_components=components)
         unshrunk = replace(unshrunk, budget_components=components)
     return Adjustment(
-        bundle, unshrunk, fitted.priors, fitted.contradictions, fitted.correlation
+        *(bundle, unshrunk, fitted.priors, fitted.contradictions),
+        *(fitted.correlation, fitted.effects),
     )
 
 
@@ -131,6 +143,11 @@ def _fit_consistent(
 ) -> _ConsistentFit:
     """Fit again and again, with contradicted numbers released, until none is left."""
     rig, bundle = state.rig, fit(priors)
+    effects = search_effects(bundle, pixels, priors.compliance)
+    candidates = tuple(each.effect for each in effects if each.is_candidate)
+    if candidates:
+        fit = partial(fit, effects=candidates)
+        bundle = fit(priors)
     correlation = measure_correlation(bundle, pixels)
     inputs = ContradictedInputs(priors)
     for _ in range(MAX_RELEASES):
@@ -146,7 +163,7 @@ def _fit_consistent(
     if of_pen:
         bundle = fit(released)
         correlation = measure_correlation(bundle, pixels)
-    return _ConsistentFit(bundle, correlation, released, found + of_pen)
+    return _ConsistentFit(bundle, correlation, released, found + of_pen, effects)
 
 
 def shrunk_priors(bundle: Bundle, priors: Priors) -> Priors:

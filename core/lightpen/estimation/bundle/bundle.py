@@ -28,6 +28,7 @@ from lightpen.detection.pose import NOISE_FLOOR, robust_sigma
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.components import NO_COMPONENTS, Components
+from lightpen.estimation.bundle.effects import Effect
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     N_TURN,
@@ -135,6 +136,15 @@ class Bundle:
         return float(apart.max())
 
     @property
+    def effect_shifts(self) -> FloatArray | float:
+        """Fitted shift of each LED's image by effects, (N, C, L, 2), px; 0 if none."""
+        columns = self.unknowns.effect_columns
+        if columns is None:
+            return 0.0
+        at = self.layout.effects
+        return np.asarray(columns @ self.values[at[0].start : at[-1].stop])
+
+    @property
     def cone_moves(self) -> FloatArray:
         """Fitted shift of the cone of each image by seat and drift, (N, 3), mm."""
         at = self.layout
@@ -179,6 +189,7 @@ def fit_bundle(
     modes: SeatModes,
     inflation: float = 1.0,
     places: FloatArray | None = None,
+    effects: tuple[Effect, ...] = (),
 ) -> Bundle:
     """Fit tip, cone and the parameters of the files to the LED centres.
 
@@ -192,13 +203,15 @@ def fit_bundle(
         Factor on the variance of the noise beside the priors, for correlated noise.
     places : (6 (C - 1),) array, optional
         Start of the extrinsics less those of the rig file; 0 unless given.
+    effects : tuple of Effect
+        To be fitted.
 
     Raises
     ------
     CalibrationError
         The iteration does not settle.
     """
-    unknowns = Unknowns.of(start, priors, modes)
+    unknowns = Unknowns.of(start, priors, modes, effects)
     now = _started(unknowns, start, pixels, places)
     for n_pass in range(MAX_PASSES):
         weight_sigma = max(now.sigma * float(np.sqrt(inflation)), FINEST)
@@ -214,7 +227,7 @@ def fit_bundle(
         change = solved.values - now.values
         if n_pass > FINDING_PASSES and np.abs(change[:6]).max() < CONVERGED:
             return _bundle_of(unknowns, state, used, solved, weight_sigma)
-        views = views_at(state, pixels)
+        views = views_at(state, pixels, unknowns.effect_columns)
         values = _held_by_state(unknowns, solved.values)
         now = _Linearised(state, values, views, used, components, solved.sigma)
     raise CalibrationError("bundle.not-settled", n_steps=MAX_PASSES)
@@ -260,11 +273,12 @@ def _started(
     if places is not None:
         values[unknowns.layout.extrinsics] = places
         state = unknowns.moved(start, values, np.zeros((len(pixels), N_TURN)))
-    views = views_at(state, pixels)
+    views = views_at(state, pixels, unknowns.effect_columns)
     residuals = np.stack([view.residuals for view in views], axis=1)
     used = inliers(_together(residuals)).reshape(residuals.shape[:-1])
     sigma = robust_sigma(_together(residuals), N_TURN)
-    return _Linearised(state, values, views, used, NO_COMPONENTS, sigma)
+    components = NO_COMPONENTS.with_no_effects(unknowns.effects)
+    return _Linearised(state, values, views, used, components, sigma)
 
 
 def _solve(
@@ -322,7 +336,7 @@ def _jitter_beside(
 def _held_by_state(unknowns: Unknowns, values: FloatArray) -> FloatArray:
     """Return the values that the state contains."""
     at, held = unknowns.layout, values.copy()
-    for kind in (at.tip, at.cone, *at.seat, at.drift):
+    for kind in (at.tip, at.cone, *at.effects, *at.seat, at.drift):
         held[kind] = 0.0
     return held
 
@@ -402,6 +416,8 @@ def _left_over(
     cone = step[:N_CONE] + shifts
     if unknown.shape[1] > N_TURN:
         cone = cone + unknown[:, N_TURN:]
+    n_effects = views[0].effects.shape[-1]
+    by_effects = step[-3 * n_leds - 1 - n_effects : -3 * n_leds - 1]
     row, left = N_CONE, []
     for view in views:
         own = step[row : row + view.own.shape[-1]]
@@ -411,6 +427,7 @@ def _left_over(
             - np.einsum("nlik,nk->nli", view.turn, unknown[:, :N_TURN])
             - np.einsum("nlik,nk->nli", view.cone, cone)
             - view.own @ own
+            - view.effects @ by_effects
             - view.diameter * by_diameter
             - np.einsum("nlik,lk->nli", view.led, by_led)
         )

@@ -7,6 +7,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.components import NO_COMPONENTS, NONE, Components
+from lightpen.estimation.bundle.effects import EffectComponent, size_of
 from lightpen.estimation.bundle.unknowns import Unknowns
 from lightpen.estimation.statistics.variance_components import (
     FITTED,
@@ -15,6 +16,7 @@ from lightpen.estimation.statistics.variance_components import (
     find_component,
 )
 from lightpen.model.information import inverse
+from lightpen.model.quantiles import chi_square_quantile
 
 ROUNDS = 3  # of finding each component beside the others
 
@@ -61,7 +63,18 @@ def _found_once(
         seat=seat,
         oval=oval,
         drift=_likely(find(at.drift)),
+        effects=tuple(
+            _likely_effect(size_of(effect, *own(place)))
+            for effect, place in zip(unknowns.effects, at.effects, strict=True)
+        ),
     )
+
+
+def _likely_effect(found: EffectComponent) -> EffectComponent:
+    """Return an effect that is significant enough to be fitted, else none."""
+    if found.gain > chi_square_quantile(1, FITTED):
+        return found
+    return found._replace(sigma=0.0, covariance=np.zeros_like(found.covariance))
 
 
 def _found_seat(
@@ -138,7 +151,8 @@ def _found_leds(
 def _sigmas(components: Components) -> list[float]:
     """Return the standard deviations by which the unknowns are fitted, mm."""
     found = (components.leds, *components.seat, components.oval, components.drift)
-    return [each.sigma for each in found]
+    of_effects = [each.sigma for each in components.effects]
+    return [*(each.sigma for each in found), *of_effects]
 
 
 def _likely(found: Component, stated: float = 0.0) -> Component:

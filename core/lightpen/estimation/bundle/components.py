@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from lightpen.estimation.bundle.effects import Effect, EffectComponent, held
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS
 from lightpen.estimation.statistics.variance_components import Component, RandomEffect
 
@@ -23,6 +24,8 @@ class Components(NamedTuple):
         Of the cone over the whole range of each drift mode, mm.
     jitter : RandomEffect
         Seating from image to image.
+    effects : tuple of EffectComponent
+        Of the effects that are fitted.
     """
 
     leds: Component
@@ -30,6 +33,11 @@ class Components(NamedTuple):
     oval: Component
     drift: Component
     jitter: RandomEffect
+    effects: tuple[EffectComponent, ...] = ()
+
+    def with_no_effects(self, effects: tuple[Effect, ...]) -> "Components":
+        """Return these with the effects held at 0."""
+        return self._replace(effects=tuple(held(effect) for effect in effects))
 
 
 NO_COMPONENTS = Components(

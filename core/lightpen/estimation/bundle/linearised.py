@@ -82,6 +82,8 @@ class CameraView:
     own : (N, L, 2, k) array
         By the intrinsics of the camera and, unless it is the first of the rig, by its
         rotation and translation in the rig.
+    effects : (N, L, 2, E) array
+        By the unknowns of `lightpen.estimation.bundle.effects`.
     diameter : (N, L, 2) array
         By the diameter of the discs.
     """
@@ -91,15 +93,32 @@ class CameraView:
     cone: FloatArray
     led: FloatArray
     own: FloatArray
+    effects: FloatArray
     diameter: FloatArray
 
 
-def views_at(state: BundleState, pixels: FloatArray) -> tuple[CameraView, ...]:
-    """Linearise the images of each camera about a state; pixels (N, C, L, 2), px."""
-    return tuple(_view(state, c, pixels[:, c]) for c in range(state.rig.n_cameras))
+def views_at(
+    state: BundleState, pixels: FloatArray, effects: FloatArray | None = None
+) -> tuple[CameraView, ...]:
+    """Linearise the images of each camera about a state.
+
+    Parameters
+    ----------
+    pixels : (N, C, L, 2) array
+        px.
+    effects : (N, C, L, 2, E) array, optional
+        Columns of effects.
+    """
+    if effects is None:
+        effects = np.zeros((*pixels.shape, 0))
+    return tuple(
+        _view(state, c, pixels[:, c], effects[:, c]) for c in range(state.rig.n_cameras)
+    )
 
 
-def _view(state: BundleState, c: int, pixels: FloatArray) -> CameraView:
+def _view(
+    state: BundleState, c: int, pixels: FloatArray, effects: FloatArray
+) -> CameraView:
     rig, pen = state.rig, state.pen
     camera, R_c, t_c = rig.cameras[c], rig.rotations[c], rig.translations[c]
     levers, points, normals = state.leds_in(c)
@@ -120,6 +139,7 @@ def _view(state: BundleState, c: int, pixels: FloatArray) -> CameraView:
         cone=by_point @ R_c,
         led=by_point @ (R_c @ state.rotations)[:, None],
         own=own,
+        effects=effects,
         diameter=2 / pen.diameter * offset,
     )
 
@@ -128,7 +148,7 @@ def _view(state: BundleState, c: int, pixels: FloatArray) -> CameraView:
 class NormalEquations:
     """Normal equations of the images of a swing, in units of the noise.
 
-    Columns: cone (3), each camera's own, diameter, LEDs (3 L).
+    Columns: cone (3), each camera's own, effects (E), diameter, LEDs (3 L).
 
     Attributes
     ----------
@@ -183,8 +203,9 @@ def eliminate(
     """
     n_images, _, n_leds = used.shape
     sizes = [view.own.shape[-1] for view in views]
-    K = N_CONE + sum(sizes) + 1 + 3 * n_leds
-    at_diameter, at_leds = K - 3 * n_leds - 1, K - 3 * n_leds
+    n_effects = views[0].effects.shape[-1]
+    K = N_CONE + sum(sizes) + n_effects + 1 + 3 * n_leds
+    at_effects, at_leds = K - 3 * n_leds - 1 - n_effects, K - 3 * n_leds
     N, b = np.zeros((K, K)), np.zeros(K)
     q = N_TURN if jitter is None else N_TURN + N_CONE
     inner = np.zeros((n_images, q, q))
@@ -196,14 +217,18 @@ def eliminate(
     for c, view in enumerate(views):
         k = sizes[c]
         J = np.concatenate(
-            [view.turn, view.cone, view.own, view.diameter[..., None], view.led], axis=3
+            [
+                *(view.turn, view.cone, view.own, view.effects),
+                *(view.diameter[..., None], view.led),
+            ],
+            axis=3,
         )
         mask = used[:, c, :, None]
         J = np.where(mask[..., None], J, 0.0) / sigma
         r = np.where(mask, view.residuals, 0.0) / sigma
-        shared = np.r_[0:N_CONE, own_start : own_start + k, at_diameter]
+        shared = np.r_[0:N_CONE, own_start : own_start + k, at_effects:at_leds]
         own_start += k
-        n = N_TURN + N_CONE + k + 1  # columns that all LEDs share
+        n = N_TURN + N_CONE + k + n_effects + 1  # columns that all LEDs share
         rows = J[..., :n].reshape(n_images, 2 * n_leds, n)
         H = np.swapaxes(rows, 1, 2) @ rows
         g = (r.reshape(n_images, 1, -1) @ rows)[:, 0]

@@ -94,7 +94,7 @@ def measure_correlation(bundle: Bundle, pixels: FloatArray) -> Correlation:
     pairs = 2 * int((used[1:] & used[:-1]).sum())
     if seen <= normal_quantile(BY_CHANCE) / np.sqrt(max(pairs, 1)):
         return Correlation(0.0, independent, 1.0, None, None)
-    views = views_at(bundle.state, pixels)
+    views = views_at(bundle.state, pixels, bundle.unknowns.effect_columns)
     jitter = bundle.components.jitter.covariance
     eliminated = eliminate(views, used, bundle.weight_sigma, jitter)
     rows = rows_of(
@@ -168,7 +168,7 @@ def _noise_model(
     """Find variance and components for one coefficient, starting from the given."""
     unknowns, at = bundle.unknowns, bundle.layout
     current = bundle.values.copy()
-    for kind in (at.tip, at.cone, *at.seat, at.drift):
+    for kind in (at.tip, at.cone, *at.effects, *at.seat, at.drift):
         current[kind] = 0.0
     right = each.gradient + each.information @ current
     floor = (NOISE_FLOOR / bundle.weight_sigma) ** 2

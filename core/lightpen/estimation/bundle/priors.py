@@ -62,6 +62,9 @@ class Priors:
         Of the discs, mm.
     led_sigma : float or None
         Of one LED coordinate, mm; None: to be found from the images.
+    compliance : float
+        Standard deviation of how far stylus, seat or stand give way, mm by the sine of
+        the lean.
     led_covariance : (3 L, 3 L) array or None
         Of all of them, mm^2, where more is known than ``led_sigma``.
     form_error : float
@@ -82,6 +85,7 @@ class Priors:
     led_sigma: float | None
     form_error: float
     center_bias: float
+    compliance: float = 0.0
     led_covariance: FloatArray | None = None
     reading: DiameterReading | None = None
     separation: ConeSeparation | None = None
@@ -118,6 +122,7 @@ def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
         led_sigma=pen.led_sigma,
         form_error=assumptions.form_error,
         center_bias=assumptions.center_bias,
+        compliance=assumptions.compliance,
         led_covariance=pen.led_covariance,
     )
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.components import NONE, Components
+from lightpen.estimation.bundle.effects import Effect
 from lightpen.estimation.bundle.linearised import N_CONE, BundleState, NormalEquations
 from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, SeatModes
@@ -27,6 +28,7 @@ class ParameterLayout(NamedTuple):
     cone: slice
     cameras: tuple[slice, ...]
     extrinsics: slice
+    effects: tuple[slice, ...]
     diameter: slice
     scale: slice
     leds: slice
@@ -59,6 +61,8 @@ class Unknowns:
         Moves of LEDs but those of the pen as a whole.
     scaling : (3 L,) array
         Move of the LEDs by a scale of 1.
+    effects : tuple of Effect
+        That are fitted.
     """
 
     layout: ParameterLayout
@@ -69,16 +73,24 @@ class Unknowns:
     basis: FloatArray
     scaling: FloatArray
     priors: Priors
+    effects: tuple[Effect, ...]
 
     @classmethod
-    def of(cls, start: BundleState, priors: Priors, given: SeatModes) -> "Unknowns":
+    def of(
+        cls,
+        start: BundleState,
+        priors: Priors,
+        given: SeatModes,
+        effects: tuple[Effect, ...] = (),
+    ) -> "Unknowns":
         """Return the unknowns of a fit that starts there."""
         rig, pen = start.rig, start.pen
         n_leds = pen.n_leds
         sizes = [len(camera.intrinsics) for camera in rig.cameras]
         n_extrinsics = 6 * (rig.n_cameras - 1)
         basis = led_basis(pen.leds)
-        counts = [3, 3, *sizes, n_extrinsics, 1, 1, basis.shape[1]]
+        of_effects = [effect.number for effect in effects]
+        counts = [3, 3, *sizes, n_extrinsics, *of_effects, 1, 1, basis.shape[1]]
         counts += [3 * n_forms for n_forms in MODE_COUNTS]
         n_drifts = given.drift.shape[1]
         counts += [3 * n_drifts, 0 if start.at_second is None else 3]
@@ -86,12 +98,15 @@ class Unknowns:
         slices = [slice(end - n, end) for n, end in zip(counts, ends, strict=True)]
         tip, cone, *others = slices
         cameras, others = others[: len(sizes)], others[len(sizes) :]
-        extrinsics, diameter, scale, leds, *seat, drift, between = others
+        extrinsics, *others = others
+        placed, others = others[: len(effects)], others[len(effects) :]
+        diameter, scale, leds, *seat, drift, between = others
         layout = ParameterLayout(
             tip=tip,
             cone=cone,
             cameras=tuple(cameras),
             extrinsics=extrinsics,
+            effects=tuple(placed),
             diameter=diameter,
             scale=scale,
             leds=leds,
@@ -100,7 +115,8 @@ class Unknowns:
             between=between,
         )
         scaling = (pen.leds - pen.leds.mean(axis=0)).ravel()
-        K = N_CONE + sum(sizes) + n_extrinsics + 1 + 3 * n_leds
+        n_effects = sum(of_effects)
+        K = N_CONE + sum(sizes) + n_extrinsics + n_effects + 1 + 3 * n_leds
         mixing = np.zeros((K, layout.leds.stop))
         at_leds = slice(K - 3 * n_leds, K)
         mixing[at_leds, layout.tip] = -np.tile(np.eye(3), (n_leds, 1))
@@ -113,12 +129,23 @@ class Unknowns:
                 place = layout.extrinsics.start + 6 * (c - 1)
                 mixing[row : row + 6, place : place + 6] = np.eye(6)
                 row += 6
-        mixing[row, layout.diameter] = 1.0
+        first = layout.diameter.start - n_effects
+        mixing[row : row + n_effects, first : layout.diameter.start] = np.eye(n_effects)
+        mixing[row + n_effects, layout.diameter] = 1.0
         mixing[at_leds, layout.scale.start] = scaling
         mixing[at_leds, layout.leds] = basis
         second = () if start.at_second is None else (start.at_second.astype(float),)
         forms = np.column_stack([given.lean, given.drift, *second])
-        return cls(layout, start, mixing, forms, given.oval, basis, scaling, priors)
+        return cls(
+            *(layout, start, mixing, forms, given.oval, basis, scaling, priors, effects)
+        )
+
+    @property
+    def effect_columns(self) -> FloatArray | None:
+        """Columns of all effects, (N, C, L, 2, E); None without any."""
+        if not self.effects:
+            return None
+        return np.concatenate([each.columns for each in self.effects], axis=-1)
 
     @property
     def number(self) -> int:
@@ -170,6 +197,8 @@ class Unknowns:
         ):
             n = place.stop - place.start
             prior[place, place] = np.eye(n) / max(sigma, EXACT) ** 2
+        for place, effect in zip(at.effects, components.effects, strict=True):
+            prior[place, place] = known_by(effect.covariance)
         variances, oval = self.seat_variances(components), components.oval.sigma
         prior[at.whole_seat, at.whole_seat] = (
             inverse(np.diag(variances) + oval**2 * self.oval @ self.oval.T)

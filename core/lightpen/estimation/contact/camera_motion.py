@@ -140,6 +140,13 @@ def steadied(
     )
 
 
+def without_field(camera: Camera, observations: Observations) -> Observations:
+    """Return observations less the lens field that the camera file states."""
+    if camera.lens_field is None:
+        return observations
+    return replace(observations, pixels=camera.without_lens_field(observations.pixels))
+
+
 def _turns(camera: Camera, path: CameraPath) -> FloatArray:
     """Return the turn of the camera in each image, (N, 3, 3).
 

@@ -12,6 +12,7 @@ from typing import Annotated, TypeAlias
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 from lightpen.detection.reasons import Reason
+from lightpen.estimation.bundle.effects import EffectName
 from lightpen.estimation.reports.methods import Method
 from lightpen.estimation.reports.verdict import Grade, NextStep
 from lightpen.estimation.uncertainty.budget import ContributionName
@@ -124,6 +125,11 @@ class UncertaintyRecord(Struct, frozen=True):
     disc_diameter_mm: Triple | None
     camera_mm: Triple | None
     rig_mm: Triple | None
+    lens_mm: Triple | None
+    compliance_mm: Triple | None
+    loose_stylus_mm: Triple | None
+    sag_mm: Triple | None
+    camera_tilt_mm: Triple | None
     not_followed_mm: Triple | None
     independent_noise_mm: Triple | None
     blocks_mm: Triple | None
@@ -163,6 +169,26 @@ class ContradictionRecord(Struct, frozen=True, omit_defaults=True):
     camera: str = ""
 
 
+class EffectRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """An effect of the station that the images support.
+
+    Attributes
+    ----------
+    size
+        Standard deviation, of one unknown its value: mm, of lens and tilt px.
+    standard_uncertainty
+        Of one unknown.
+    gain
+        Twice the logarithm of its likelihood ratio to none.
+    """
+
+    name: EffectName
+    camera: str = ""
+    size: Number
+    standard_uncertainty: Number | None = None
+    gain: Number
+
+
 class AdjustmentRecord(Struct, frozen=True):
     """The values of the files after the adjustment."""
 
@@ -175,6 +201,7 @@ class AdjustmentRecord(Struct, frozen=True):
     disc_diameter_mm: Number
     disc_diameter_by_areas_mm: Estimate | None
     contradictions: tuple[ContradictionRecord, ...]
+    effects: tuple[EffectRecord, ...]
 
 
 class LampRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):

@@ -18,6 +18,7 @@ from lightpen.estimation.reports.calibration_record import (
     Convergence,
     CoverageRecord,
     DirectionRecord,
+    EffectRecord,
     Estimate,
     FrameRecord,
     ImageCounts,
@@ -215,6 +216,16 @@ def _adjusted(calibration: Calibration) -> AdjustmentRecord:
                 camera=each.camera,
             )
             for each in calibration.contradictions
+        ),
+        effects=tuple(
+            EffectRecord(
+                name=each.name,
+                camera=each.camera,
+                size=plain(each.size),
+                standard_uncertainty=plain(each.sigma),
+                gain=plain(each.gain),
+            )
+            for each in calibration.effects
         ),
     )
 

@@ -38,6 +38,7 @@ def warnings_of(calibration: Calibration) -> list[Message]:
         *(each.message for each in calibration.contradictions),
         *lamp_warnings(calibration),
         *_seat_warnings(calibration),
+        *(each.message for each in calibration.effects if each.is_certain),
     ]
     warnings += [
         message("warning.led-unseen", led=int(led) + 1)

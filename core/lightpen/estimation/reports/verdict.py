@@ -59,6 +59,11 @@ _ADVICE = {
     ContributionName.DIAMETER: message("share.diameter"),
     ContributionName.CAMERA: message("share.camera"),
     ContributionName.EXTRINSICS: message("share.rig"),
+    ContributionName.LENS: message("share.lens"),
+    ContributionName.COMPLIANCE: message("share.compliance"),
+    ContributionName.LOOSE: message("share.loose-stylus"),
+    ContributionName.SAG: message("share.sag"),
+    ContributionName.TILT: message("share.camera-tilt"),
 }
 
 
@@ -133,6 +138,11 @@ _BY_CAUSE = {
     _ADVICE[ContributionName.CENTERS].code: NextStep.SEE_TO_CAUSE,
     _ADVICE[ContributionName.FORM].code: NextStep.SEE_TO_CAUSE,
     _ADVICE[ContributionName.TEMPERATURE].code: NextStep.SEE_TO_CAUSE,
+    _ADVICE[ContributionName.LENS].code: NextStep.CHECK_CAMERA,
+    _ADVICE[ContributionName.COMPLIANCE].code: NextStep.SEE_TO_CAUSE,
+    _ADVICE[ContributionName.LOOSE].code: NextStep.SEE_TO_CAUSE,
+    _ADVICE[ContributionName.SAG].code: NextStep.SEE_TO_CAUSE,
+    _ADVICE[ContributionName.TILT].code: NextStep.CLAMP,
     _ADVICE[ContributionName.DISTANCE].code: NextStep.SEE_TO_CAUSE,
     "warning.camera-file-contradicted": NextStep.CHECK_CAMERA,
     "warning.camera-file-of-rig-contradicted": NextStep.CHECK_CAMERA,

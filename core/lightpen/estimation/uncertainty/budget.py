@@ -17,6 +17,8 @@ drift              (17)      of cone against camera
 led geometry       (17)      errors of the LED file
 pen scale, temperature, cone distance, disc diameter, camera, rig
                    (16)      prior or measurement of each
+lens, compliance, loose stylus, sag, camera tilt
+                   (17)      effects of the station (`effects`)
 not followed       (19)      shift of the estimate by shrinkage of assumed priors
 =================  ========  =========================================================
 
@@ -45,6 +47,8 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.adjustment import Adjustment
 from lightpen.estimation.bundle.bundle import Bundle
+from lightpen.estimation.bundle.effect_search import SearchedEffect
+from lightpen.estimation.bundle.effects import EffectName
 from lightpen.estimation.bundle.linearised import N_CONE
 from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, axes_of_cone
@@ -80,9 +84,21 @@ class ContributionName(StrEnum):
     DIAMETER = "disc diameter"
     CAMERA = "camera"
     EXTRINSICS = "rig"
+    LENS = "lens"
+    COMPLIANCE = "compliance"
+    LOOSE = "loose stylus"
+    SAG = "sag"
+    TILT = "camera tilt"
     SHRINKAGE = "not followed"  # by the estimate: what assumed priors allow beyond it
 
 
+SHARES_OF_EFFECTS = {
+    EffectName.LENS: ContributionName.LENS,
+    EffectName.COMPLIANCE: ContributionName.COMPLIANCE,
+    EffectName.LOOSE: ContributionName.LOOSE,
+    EffectName.SAG: ContributionName.SAG,
+    EffectName.TILT: ContributionName.TILT,
+}
 IMAGES_SHRINK = (
     ContributionName.NOISE,
     ContributionName.CENTERS,
@@ -208,6 +224,7 @@ def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
             n_images,
             noise=raised * correlation.noise,
             shrinkage_shift=adjustment.shrinkage_shift,
+            effects=adjustment.effects,
         ),
         independent_noise=bundle.independent_noise,
         blocks=blocks,
@@ -223,6 +240,7 @@ def contributions_of(
     n_images: float,
     noise: FloatArray,
     shrinkage_shift: FloatArray,
+    effects: Sequence[SearchedEffect] = (),
 ) -> tuple[UncertaintyContribution, ...]:
     """Return the contributions to the covariance of (tip, cone), equations (15)-(19).
 
@@ -236,6 +254,8 @@ def contributions_of(
         Covariance by image noise, mm^2.
     shrinkage_shift : (6,) array
         See `lightpen.estimation.bundle.adjustment.Adjustment`, mm.
+    effects : sequence of SearchedEffect
+        Beside the fit.
     """
     at = bundle.layout
     jitter = bundle.propagated(bundle.jitter_information + bundle.insignificant_jitter)
@@ -286,6 +306,7 @@ def contributions_of(
                 ContributionName.EXTRINSICS, rig, priors.extrinsics.assumed
             )
         )
+    shares += _of_effects(bundle, effects)
     shares.append(
         UncertaintyContribution(
             ContributionName.SHRINKAGE, np.outer(shrinkage_shift, shrinkage_shift)
@@ -294,6 +315,30 @@ def contributions_of(
     return tuple(
         share for share in shares if share.standard_uncertainty.max() > NEGLIGIBLE
     )
+
+
+def _of_effects(
+    bundle: Bundle, effects: Sequence[SearchedEffect]
+) -> list[UncertaintyContribution]:
+    """Return the shares of effects: of those fitted, and of those held at 0."""
+    parts = [
+        (each.effect.name, each.covariance) for each in effects if not each.is_candidate
+    ]
+    for effect, place, found in zip(
+        bundle.unknowns.effects,
+        bundle.layout.effects,
+        bundle.components.effects,
+        strict=True,
+    ):
+        budgeted = found.covariance if found.sigma > 0 else found.expected
+        gain = bundle.covariance[:6, place] @ bundle.prior_information[place, place]
+        parts.append((effect.name, gain @ budgeted @ gain.T))
+    shares = []
+    for name, share in SHARES_OF_EFFECTS.items():
+        covariance = sum((part for of, part in parts if of is name), np.zeros((6, 6)))
+        assumed = share is ContributionName.COMPLIANCE
+        shares.append(UncertaintyContribution(share, covariance, assumed))
+    return shares
 
 
 def seat_covariance(bundle: Bundle) -> FloatArray:

@@ -19,6 +19,7 @@ from lightpen.estimation.bundle.adjustment import shrunk_priors
 from lightpen.estimation.bundle.bundle import Bundle, jitter_matrices, jitter_of
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.components import NO_COMPONENTS
+from lightpen.estimation.bundle.effect_search import search_cone_effects
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     BundleState,
@@ -108,7 +109,12 @@ class UncertaintyPrediction:
         shrinkage_shift = _shrinkage_shift_of(bundle, priors, equations)
         n_images = int(joint.used.any(axis=1).sum())
         noise = bundle.independent_noise
-        now = contributions_of(bundle, priors, n_images, noise, shrinkage_shift)
+        jitter = bundle.components.jitter.covariance
+        beside = equations if jitter is None else _with_jitter(equations, jitter)
+        effects = search_cone_effects(bundle, beside, priors.compliance)
+        now = contributions_of(
+            bundle, priors, n_images, noise, shrinkage_shift, effects
+        )
         endless = _with_endless_images(bundle)
         nothing = np.zeros((6, 6))
         at_last = contributions_of(endless, priors, n_images, nothing, nothing[0])

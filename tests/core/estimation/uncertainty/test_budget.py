@@ -14,6 +14,7 @@ from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contact.joint import JointFit, fit_joint
 from lightpen.estimation.uncertainty.budget import (
+    SHARES_OF_EFFECTS,
     Budget,
     ContributionName,
     combine,
@@ -87,8 +88,12 @@ def of_images(joint: JointFit, some: slice) -> JointFit:
     )
 
 
-DOUBTED = (ContributionName.CENTERS, ContributionName.SEAT, ContributionName.DRIFT)
+DOUBTED = (
+    *(ContributionName.CENTERS, ContributionName.SEAT, ContributionName.DRIFT),
+    *SHARES_OF_EFFECTS.values(),
+)
 OF_STATION = {
+    ContributionName.COMPLIANCE,
     ContributionName.CENTERS,
     ContributionName.FORM,
     ContributionName.TEMPERATURE,

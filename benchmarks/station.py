@@ -1,0 +1,240 @@
+"""Simulated stations with all that real ones do: lens, mechanics, warmth, uneven noise.
+
+The model is independent of the product's: a lens field is a sum of waves less the best
+Brown distortion, the pen bends, gives way and jumps in its own frame, and so on.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.calibrate import Calibration, calibrate_rig
+from lightpen.formats.observation_files import Centers
+from lightpen.model.camera import Camera
+from lightpen.model.ellipse import ellipse_centers
+from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig, from_first, rig_of
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.samples import row_of_cameras
+from lightpen.simulator.swings import (
+    Swing,
+    paper_camera,
+    paper_pen,
+    seen_from,
+    swing_poses,
+)
+
+N_WAVES = 60  # of a lens field
+GRID = 15  # nodes along a side, at which Brown's distortion is fitted to it
+BASELINE = 1000.0  # mm
+TOP = 1.0  # the height of the highest LED, where the sag is stated
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Usual sizes of the effects; each is drawn anew for every station.
+
+    Attributes
+    ----------
+    noise : float
+        Of one image coordinate, px.
+    led_sigma : float
+        Of the LED file, stated in it, mm.
+    lens : float
+        Largest rms of the field that Brown's distortion leaves, px.
+    compliance : float
+        Standard deviation, mm by the sine of the lean.
+    loose : float
+        Largest play of the stylus, mm.
+    sag : float
+        Largest deflection at the highest LED, pen horizontal, mm.
+    tilt : float
+        Standard deviation of the camera's turn with the lean, px by its sine.
+    seat : float
+        Largest jitter of the seat, mm.
+    warmth : float
+        Standard deviation of the pen's temperature from the stated one, K.
+    uneven : float
+        Standard deviation of the logarithm of each LED's noise.
+    copies : float
+        Share of images that are given twice.
+    """
+
+    noise: float = 0.03
+    led_sigma: float = 0.002
+    lens: float = 0.0
+    compliance: float = 0.0
+    loose: float = 0.0
+    sag: float = 0.0
+    tilt: float = 0.0
+    seat: float = 0.0
+    warmth: float = 0.0
+    uneven: float = 0.0
+    copies: float = 0.0
+
+
+GOOD = Effects()
+USUAL_SIZES = Effects(
+    lens=0.03,
+    compliance=0.004,
+    loose=0.004,
+    sag=0.02,
+    tilt=0.01,
+    seat=0.004,
+    warmth=2.0,
+    uneven=0.3,
+    copies=0.0,
+)
+
+
+class Trial(NamedTuple):
+    """A calibration at a simulated station: error and U (k = 2), mm."""
+
+    error: FloatArray
+    uncertainty: FloatArray
+    calibration: Calibration
+
+
+def calibrated(
+    effects: Effects, n_images: int, n_cameras: int, seed: int, kind: str = "field"
+) -> Trial:
+    """Return the calibration at a station whose effects are drawn by the seed."""
+    rng = np.random.default_rng([26, seed])
+    pen = paper_pen()
+    if n_cameras == 1:
+        rig = rig_of(paper_camera())
+        swing = swing_poses(n_images, rng, kind)  # type: ignore[arg-type]
+    else:
+        row = row_of_cameras(n_cameras, BASELINE)
+        rig = from_first(row)
+        swing = swing_poses(n_images, rng, kind)  # type: ignore[arg-type]
+        swing = seen_from(swing, row.rotations[0], row.translations[0])
+    pixels = _centers(effects, rig, pen, swing, rng)
+    file, pen_file = _drawn_rig(rig, rng), _drawn_pen(effects, pen, rng)
+    if effects.copies:
+        copied = rng.random(n_images) < effects.copies
+        pixels = np.repeat(pixels, np.where(copied, 2, 1), axis=0)
+    seen = [
+        observe_centers(
+            Centers(np.arange(len(pixels)), pixels[:, c], Path("simulated")),
+            camera,
+            pen_file,
+        )
+        for c, camera in enumerate(file.cameras)
+    ]
+    found = calibrate_rig(file, pen_file, seen)
+    return Trial(
+        found.joint.tip_pen - swing.tip_pen,
+        found.budget.expanded_uncertainty[:3],
+        found,
+    )
+
+
+def _centers(
+    effects: Effects, rig: Rig, pen: Pen, swing: Swing, rng: np.random.Generator
+) -> FloatArray:
+    """Return LED centres (N, C, L, 2), px, in the order of the swing."""
+    R, n_images = swing.rotations, len(swing.rotations)
+    # Gravity is along the mean pen, as the cone stands upright.
+    up = R[:, :, 1].mean(axis=0)
+    up /= np.linalg.norm(up)
+    up_pen = np.einsum("nij,i->nj", R, up)
+    fall = -up_pen
+    fall[:, 1] = 0.0  # across the pen; its length is the sine of the lean
+    sine = np.linalg.norm(fall, axis=1, keepdims=True)
+    tip = rng.normal(0, effects.compliance) * fall
+    tip += effects.loose * rng.uniform() * fall / np.maximum(sine, 1e-6)
+    tips_pen = swing.tip_pen + tip
+    heights = pen.leds[:, 1] - pen.leds[:, 1].min()
+    bend = effects.sag * rng.uniform() * TOP * (heights / heights.max()) ** 2
+    leds = pen.leds + fall[:, None] * bend[:, None]
+    seat = effects.seat * rng.uniform() * rng.standard_normal((n_images, 3))
+    points = np.einsum("nij,nlj->nli", R, leds - tips_pen[:, None])
+    points += (swing.cone_cam + seat)[:, None]
+    normals = pen.normals @ np.swapaxes(R, 1, 2)
+    warmth = 1 + (pen.expansion or 0.0) * rng.normal(0, effects.warmth)
+    middle = np.einsum("nij,j->ni", R, pen.leds.mean(axis=0) - swing.tip_pen)
+    middle = (middle + swing.cone_cam)[:, None]
+    points = middle + warmth * (points - middle)
+    side = np.cross(up, [0.0, 0.0, 1.0])
+    lean = np.stack([R[:, :, 1] @ side, R[:, :, 1] @ np.cross(up, side)], axis=1)
+    views = []
+    for c, camera in enumerate(rig.cameras):
+        there = points @ rig.rotations[c].T + rig.translations[c]
+        turned = normals @ rig.rotations[c].T
+        centers = ellipse_centers(camera, there, turned, pen.diameter / 2)
+        centers += _lens_field(effects.lens * rng.uniform(), camera, centers, rng)
+        shift = effects.tilt * rng.standard_normal((2, 2))
+        centers += (lean @ shift)[:, None]
+        noise = effects.noise * np.exp(effects.uneven * rng.standard_normal(pen.n_leds))
+        centers += noise[:, None] * rng.standard_normal(centers.shape)
+        faces = np.einsum("nli,nli->nl", there, turned) < 0
+        views.append(np.where(faces[..., None], centers, np.nan))
+    return np.stack(views, axis=1)
+
+
+def _lens_field(
+    rms: float, camera: Camera, pixels: FloatArray, rng: np.random.Generator
+) -> FloatArray:
+    """Return a smooth random field at pixels (..., 2), less the best Brown model."""
+    length = rng.uniform(250.0, 900.0)
+    waves = rng.normal(0, 1 / length, (2, N_WAVES, 2))
+    phases = rng.uniform(0, 2 * np.pi, (2, N_WAVES))
+    sizes = rms * np.sqrt(2 / N_WAVES)
+
+    def raw(points: FloatArray) -> FloatArray:
+        angles = np.einsum("...i,cwi->...cw", points, waves) + phases
+        return np.asarray(sizes * np.cos(angles).sum(axis=-1))
+
+    line = [np.linspace(0, side - 1, GRID) for side in camera.image_size]
+    nodes = np.stack(np.meshgrid(*line), axis=-1).reshape(-1, 2)
+    by = camera.intrinsics_jacobian(camera.unproject(nodes))[
+        ..., [0, 1, 2, 3, 4, 5, 6, 7]
+    ]
+    # A board calibration also turns and shifts each view: the intrinsics alone here.
+    fitted = np.linalg.lstsq(by.reshape(-1, 8), raw(nodes).ravel(), rcond=None)[0]
+    normalised = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
+    there = camera.intrinsics_jacobian(normalised)[..., [0, 1, 2, 3, 4, 5, 6, 7]]
+    return raw(pixels) - there @ fitted
+
+
+def _drawn_rig(true: Rig, rng: np.random.Generator) -> Rig:
+    file = replace(true, cameras=tuple(_drawn(each, rng) for each in true.cameras))
+    if true.covariance is None:
+        return file
+    off = rng.multivariate_normal(np.zeros(len(true.covariance)), true.covariance)
+    places = np.concatenate([np.zeros(6), off]).reshape(-1, 6)
+    return replace(
+        file,
+        rotations=rotation_from_vector(places[:, :3]) @ true.rotations,
+        translations=true.translations + places[:, 3:],
+    )
+
+
+def _drawn(camera: Camera, rng: np.random.Generator) -> Camera:
+    assert camera.covariance is not None
+    return camera.with_intrinsics(
+        rng.multivariate_normal(camera.intrinsics, camera.covariance)
+    )
+
+
+def _drawn_pen(effects: Effects, pen: Pen, rng: np.random.Generator) -> Pen:
+    """Return a file of the pen, off by what it states; its frame is the true one's."""
+    leds = pen.leds + effects.led_sigma * rng.standard_normal(pen.leds.shape)
+    # The file's frame is where it fits the true LEDs best.
+    one, other = leds - leds.mean(axis=0), pen.leds - pen.leds.mean(axis=0)
+    U, _, Vt = np.linalg.svd(one.T @ other)
+    turn = (U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt).T
+    leds = one @ turn.T + pen.leds.mean(axis=0)
+    scale = 1 + rng.normal(0, pen.scale_sigma or 0.0)
+    middle = leds.mean(axis=0)
+    return replace(
+        pen,
+        leds=middle + scale * (leds - middle),
+        led_sigma=effects.led_sigma,
+        diameter=pen.diameter + rng.normal(0, pen.diameter_sigma or 0.0),
+    )

@@ -1,0 +1,83 @@
+"""The effects of a station that the images support: size, message and remedy."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.estimation.bundle.bundle import Bundle
+from lightpen.estimation.bundle.effects import EffectName
+from lightpen.estimation.statistics.variance_components import CERTAIN
+from lightpen.messages import Message, message
+from lightpen.model.quantiles import chi_square_quantile
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """An effect that is fitted.
+
+    Attributes
+    ----------
+    camera : str
+        Of a rig, whose images it shifts; empty of a single camera, and of the pen.
+    size : float
+        Its value where it has one unknown, else the root mean square of its values:
+        mm, of lens and camera px.
+    sigma : float or None
+        Standard uncertainty of the one value.
+    gain : float
+        Twice the logarithm of its likelihood ratio to none.
+    """
+
+    name: EffectName
+    camera: str
+    size: float
+    sigma: float | None
+    gain: float
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether chance alone makes it less than once in a thousand."""
+        return self.gain > chi_square_quantile(1, CERTAIN)
+
+    @property
+    def message(self) -> Message:
+        """The message to the user: what it is, how large, what to do."""
+        told = message(f"warning.effect-{self.name.replace(' ', '-')}", size=self.size)
+        if not self.camera:
+            return told
+        return message("rig.of-camera", camera=self.camera, trouble=told)
+
+
+def found_effects(bundle: Bundle) -> tuple[FoundEffect, ...]:
+    """Return the effects that a fit supports, the likeliest first."""
+    names = bundle.state.rig.names
+    found = []
+    for effect, place, component in zip(
+        bundle.unknowns.effects,
+        bundle.layout.effects,
+        bundle.components.effects,
+        strict=True,
+    ):
+        if component.sigma == 0 or not np.isfinite(component.gain):
+            continue
+        values, sigma = bundle.values[place], None
+        if effect.name is EffectName.LENS:
+            seen = bundle.used[:, effect.camera]
+            shifts = (effect.columns[:, effect.camera] @ values)[seen]
+            size = float(np.sqrt(np.mean(shifts**2)))
+        elif effect.number == 1:
+            size = float(values[0])
+            sigma = float(np.sqrt(bundle.covariance[place, place][0, 0]))
+        else:
+            size = float(np.linalg.norm(values))
+        of_camera = effect.name in (EffectName.LENS, EffectName.TILT) and names
+        found.append(
+            FoundEffect(
+                effect.name,
+                names[effect.camera] if of_camera else "",
+                size,
+                sigma,
+                component.gain,
+            )
+        )
+    return tuple(sorted(found, key=lambda each: -each.gain))

@@ -1,0 +1,204 @@
+"""Which effects of a station the images support, beside a fit without them.
+
+The information about the unknowns of all effects takes one pass about the fit, with all
+other unknowns marginalised. An effect whose likelihood gains is a candidate: it
+is fitted. The others are held at 0, and what they may be all the same moves tip and
+cone by a covariance of its own.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.estimation.bundle.bundle import Bundle
+from lightpen.estimation.bundle.components import NO_COMPONENTS
+from lightpen.estimation.bundle.effects import (
+    Effect,
+    EffectComponent,
+    EffectName,
+    cone_moves,
+    effects_of,
+    size_of,
+)
+from lightpen.estimation.bundle.linearised import (
+    N_CONE,
+    CameraView,
+    NormalEquations,
+    eliminate,
+    views_at,
+)
+from lightpen.estimation.statistics.variance_components import FITTED
+from lightpen.model.information import inverse
+from lightpen.model.quantiles import chi_square_quantile
+
+
+@dataclass(frozen=True, eq=False)
+class SearchedEffect:
+    """An effect beside a fit without it.
+
+    Attributes
+    ----------
+    by_unknowns : (6, k) array
+        Error of (tip, cone) by its unknowns where they are held at 0.
+    is_candidate : bool
+        Whether the images support it.
+    """
+
+    effect: Effect
+    component: EffectComponent
+    by_unknowns: FloatArray
+    is_candidate: bool
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of (tip, cone) by what the effect may be, (6, 6), mm^2."""
+        G = self.by_unknowns
+        return np.asarray(G @ self.component.expected @ G.T)
+
+
+def search_effects(
+    bundle: Bundle, pixels: FloatArray, compliance: float
+) -> tuple[SearchedEffect, ...]:
+    """Search a fit without effects for them.
+
+    Parameters
+    ----------
+    pixels : (N, C, L, 2) array
+        LED centres, px.
+    compliance : float
+        Standard deviation that is assumed, mm.
+    """
+    state, used, sigma = bundle.state, bundle.used, bundle.weight_sigma
+    views = views_at(state, pixels)
+    effects = effects_of(
+        views,
+        pixels,
+        used,
+        state.rotations,
+        state.pen.leds,
+        state.rig.cameras,
+        compliance,
+    )
+    columns = np.concatenate([each.columns for each in effects], axis=-1)
+    own, with_others, right = _information(bundle, views, columns, used, sigma)
+    at_best = inverse(bundle.covariance) @ bundle.values
+    prior = bundle.unknowns.prior_information(NO_COMPONENTS)
+    plain = inverse(bundle.information + bundle.measured_information + prior)
+    models = []
+    for covariance in (bundle.covariance, plain):
+        change = covariance @ at_best - bundle.values
+        S = own - with_others.T @ covariance @ with_others
+        models.append((0.5 * (S + S.T), right - with_others.T @ change))
+    found, first = [], 0
+    by_all = -bundle.covariance[:6] @ with_others
+    limit = chi_square_quantile(1, FITTED)
+    for effect in effects:
+        at = slice(first, first + effect.number)
+        first = at.stop
+        sizes = [size_of(effect, S[at, at], b[at]) for S, b in models]
+        is_candidate = any(size.gain > limit for size in sizes)
+        found.append(SearchedEffect(effect, sizes[0], by_all[:, at], is_candidate))
+    return tuple(found)
+
+
+def search_cone_effects(
+    bundle: Bundle, each: NormalEquations, compliance: float
+) -> tuple[SearchedEffect, ...]:
+    """Search a fit for effects that move tip against cone, by its normal equations.
+
+    Sag and lens are left out. They need the LEDs one by one.
+
+    Parameters
+    ----------
+    each : NormalEquations
+        About the start of the fit, with jitter where it has one.
+    """
+    state = bundle.state
+    moves = cone_moves(state.rotations)
+    mm_a_px = float(state.cone_rig[2]) / state.rig.cameras[0].fx
+    tilt = np.zeros((len(moves.lean), N_CONE, 4))
+    tilt[:, 0, :2] = tilt[:, 1, 2:] = mm_a_px * moves.lean
+    own_moves = {
+        EffectName.COMPLIANCE: moves.compliance,
+        EffectName.LOOSE: moves.loose,
+        EffectName.TILT: tilt,
+    }
+    found = []
+    spread = bundle.unknowns.sensitivity(each.cone_rows)
+    flat = spread.reshape(-1, spread.shape[-1])
+    left = each.cone_right.ravel() - flat @ bundle.values
+    for name, move in own_moves.items():
+        k = move.shape[-1]
+        stated = compliance if name is EffectName.COMPLIANCE else 0.0
+        effect = Effect(name, 0, np.zeros((1, k)), (np.eye(k),), stated)
+        by_cone = each.cone_rows[..., :N_CONE] @ move
+        rows = move.reshape(-1, k)
+        with_others = flat.T @ rows
+        S = rows.T @ by_cone.reshape(-1, k)
+        S -= with_others.T @ bundle.covariance @ with_others
+        size = size_of(effect, 0.5 * (S + S.T), rows.T @ left)
+        by_unknowns = -bundle.covariance[:6] @ with_others
+        found.append(SearchedEffect(effect, size, by_unknowns, is_candidate=False))
+    return tuple(found)
+
+
+def _information(
+    bundle: Bundle,
+    views: tuple[CameraView, ...],
+    columns: FloatArray,
+    used: BoolArray,
+    sigma: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return information of effects (E, E), with the unknowns (p, E), and right (E,).
+
+    The unknowns of each image are eliminated.
+    """
+    eliminated = eliminate(views, used, sigma, bundle.components.jitter.covariance)
+    n_images, _, n_leds = used.shape
+    unknowns, q = bundle.unknowns, eliminated.nuisance_covariance.shape[-1]
+    K = unknowns.mixing.shape[0]
+    mask = used[..., None, None]
+    A = np.where(mask, columns, 0.0) / sigma
+    E = A.shape[-1]
+    flat = A.reshape(-1, E)
+    by_image = A.reshape(n_images, -1, E)
+    inner = np.concatenate(
+        [
+            np.stack([view.turn for view in views], axis=1),
+            np.stack([view.cone for view in views], axis=1),
+        ],
+        axis=-1,
+    )
+    inner = np.where(mask, inner, 0.0) / sigma
+    crossed = np.swapaxes(inner.reshape(n_images, -1, inner.shape[-1]), 1, 2) @ by_image
+    to_inner = crossed[:, :q]  # (N, q, E)
+    half = np.linalg.cholesky(eliminated.nuisance_covariance)
+    left = (np.swapaxes(half, 1, 2) @ to_inner).reshape(-1, E)
+    own = flat.T @ flat - left.T @ left
+    # Of the columns of the normal equations, cone first, LEDs last.
+    with_columns = np.tensordot(eliminated.turn_by_step, to_inner, ([0, 1], [0, 1]))
+    by_cone = crossed[:, N_CONE : 2 * N_CONE]
+    with_columns[:N_CONE] += by_cone.sum(axis=0)
+    row = N_CONE
+    for c, view in enumerate(views):
+        k = view.own.shape[-1]
+        seen = used[:, c, :, None]
+        of_view = A[:, c].reshape(-1, E)
+        rows = np.where(seen[..., None], view.own, 0.0).reshape(-1, k) / sigma
+        with_columns[row : row + k] += rows.T @ of_view
+        row += k
+        rows = np.where(seen, view.diameter, 0.0).reshape(-1) / sigma
+        with_columns[K - 3 * n_leds - 1] += rows @ of_view
+        led = np.where(seen[..., None], view.led, 0.0) / sigma
+        led = np.swapaxes(led, 0, 1).reshape(n_leds, -1, 3)
+        of_led = np.swapaxes(A[:, c], 0, 1).reshape(n_leds, -1, E)
+        with_columns[K - 3 * n_leds :] += (np.swapaxes(led, 1, 2) @ of_led).reshape(
+            3 * n_leds, E
+        )
+    coupled = eliminated.turn_by_step[..., :N_CONE]  # (N, q, 3)
+    cones = by_cone + np.swapaxes(coupled, 1, 2) @ to_inner
+    shifted = np.tensordot(unknowns.forms, cones, ([0], [0])).reshape(-1, E)
+    with_others = np.concatenate([unknowns.mixing.T @ with_columns, shifted])
+    residuals = np.where(used[..., None], bundle.residuals, 0.0) / sigma
+    return own, with_others, flat.T @ residuals.ravel()

@@ -1,0 +1,295 @@
+"""Effects of a station beyond files and seat: lens, mechanics of pen and camera.
+
+Each effect is a set of unknowns with columns, the derivative of every LED's image by
+them. It is linear, as what it moves is small, and random: normal with one standard
+deviation and one of several shapes of covariance, both by restricted likelihood.
+
+============== =========================================================================
+lens           smooth field over the image of one camera, px: polynomials over the part
+               of the image that the swing covers, with the covariance of a Gaussian
+               process (`lightpen.model.lens_field`) of one of several lengths, or as
+               the camera file states it
+compliance     stylus, seat or stand give way by c h: h is the part of the pen's axis
+               across the axis of the cone, its length the sine of the lean
+loose stylus   jump of the tip with the side of the lean: along h, or along an axis of
+               the pen, with the sign of the lean to that side
+sag            the pen bends under its weight, as the square of the height of the LED
+camera tilt    the image of one camera shifts with h, px
+============== =========================================================================
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.estimation.bundle.linearised import CameraView
+from lightpen.estimation.bundle.seat_modes import axes_of_cone
+from lightpen.estimation.statistics.variance_components import P_NONE
+from lightpen.model.camera import Camera
+from lightpen.model.lens_field import correlation
+
+DEGREE = 6  # of the polynomials of a lens field
+NODES = 10  # along a side, at which polynomials take the covariance of a field
+LENGTHS = np.array([0.1, 0.18, 0.32, 0.56])  # of the image's width
+LEAST_LEAN = 0.02  # sine; below it the side of the lean is not known
+N_SCALES = 60  # standard deviations tried
+SMALLEST = 1e-3  # of the largest one
+ROUNDING = 1e-9  # of the largest eigenvalue
+
+
+class EffectName(StrEnum):
+    """Kind of an effect."""
+
+    LENS = "lens"
+    COMPLIANCE = "compliance"
+    LOOSE = "loose stylus"
+    SAG = "sag"
+    TILT = "camera tilt"
+
+
+# Largest standard deviations, mm or px: what is larger is another fault.
+LARGEST = {
+    EffectName.LENS: 0.08,
+    EffectName.COMPLIANCE: 0.03,
+    EffectName.LOOSE: 0.01,
+    EffectName.SAG: 0.03,
+    EffectName.TILT: 0.1,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """One effect with k unknowns.
+
+    Attributes
+    ----------
+    camera : int
+        Of the rig, whose images it shifts; 0 of an effect that all cameras see.
+    columns : (N, C, L, 2, k) array
+        Derivative of the LEDs' images, px by mm or px.
+    shapes : tuple of (k, k) array
+        Covariances that it may have, for a standard deviation of 1.
+    stated : float
+        Standard deviation that is stated or assumed, mm or px; 0 if none is.
+    is_exact : bool
+        Whether the covariance is ``shapes[0]`` times the stated variance.
+    """
+
+    name: EffectName
+    camera: int
+    columns: FloatArray
+    shapes: tuple[FloatArray, ...]
+    stated: float = 0.0
+    is_exact: bool = False
+
+    @property
+    def number(self) -> int:
+        """Number of unknowns."""
+        return int(self.columns.shape[-1])
+
+
+class EffectComponent(NamedTuple):
+    """Size of an effect by likelihood.
+
+    Attributes
+    ----------
+    sigma : float
+        Standard deviation of maximum likelihood, mm or px.
+    gain : float
+        Twice the logarithm of its likelihood ratio to none.
+    covariance : (k, k) array
+        Of the unknowns with that.
+    expected : (k, k) array
+        Of the unknowns, averaged over what their size may be.
+    """
+
+    sigma: float
+    gain: float
+    covariance: FloatArray
+    expected: FloatArray
+
+
+def held(effect: Effect) -> EffectComponent:
+    """Return the component of an effect that is held at 0, or at what is stated."""
+    nothing = np.zeros((effect.number, effect.number))
+    if effect.is_exact:
+        stated = effect.stated**2 * effect.shapes[0]
+        return EffectComponent(effect.stated, np.inf, stated, stated)
+    return EffectComponent(0.0, 0.0, nothing, nothing)
+
+
+def size_of(effect: Effect, S: FloatArray, right: FloatArray) -> EffectComponent:
+    """Find the size of an effect by restricted likelihood.
+
+    Parameters
+    ----------
+    S : (k, k) array
+        Information about its unknowns, all others marginalised.
+    right : (k,) array
+        Right side that belongs to it.
+    """
+    if effect.is_exact:
+        return held(effect)
+    largest = LARGEST[effect.name]
+    sigmas = np.geomspace(SMALLEST * largest, largest, N_SCALES)
+    all_costs = np.array([_costs(S, right, shape, sigmas) for shape in effect.shapes])
+    s, i = np.unravel_index(int(np.argmin(all_costs)), all_costs.shape)
+    gain = -float(all_costs[s, i])
+    if effect.stated > 0:
+        own = np.linalg.inv(np.linalg.inv(effect.shapes[0] * effect.stated**2) + S)
+        mean = own @ right
+        expected = own + np.outer(mean, mean)
+    else:
+        weights = np.exp(-0.5 * (all_costs + gain)) * (1 - P_NONE) / all_costs.size
+        total = weights.sum() + P_NONE * np.exp(-0.5 * gain)
+        variances = (weights / total) @ sigmas**2
+        expected = np.einsum("s,sij->ij", variances, np.array(effect.shapes))
+    sigma = float(sigmas[i])
+    return EffectComponent(sigma, gain, sigma**2 * effect.shapes[s], expected)
+
+
+def _costs(
+    S: FloatArray, right: FloatArray, shape: FloatArray, sigmas: FloatArray
+) -> FloatArray:
+    """Return twice the negative log likelihood ratio to no effect, of each size."""
+    values, vectors = np.linalg.eigh(shape)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    seen, turned = np.linalg.eigh(root.T @ S @ root)
+    seen = np.maximum(seen, 0.0)
+    projected = turned.T @ (root.T @ right)
+    excess = 1 + seen * sigmas[:, None] ** 2
+    gains = sigmas[:, None] ** 2 * projected**2 / excess
+    return np.asarray(np.log(excess).sum(axis=1) - gains.sum(axis=1))
+
+
+class ConeMoves(NamedTuple):
+    """Moves of the tip against the cone, mm, in the frame of the rig.
+
+    Attributes
+    ----------
+    lean : (N, 2) array
+        The pen's axis across the axis of the cone, right and away.
+    compliance : (N, 3, 1) array
+        By 1 mm of compliance.
+    loose : (N, 3, 3) array
+        By the three unknowns of a loose stylus.
+    """
+
+    lean: FloatArray
+    compliance: FloatArray
+    loose: FloatArray
+
+
+def cone_moves(rotations: FloatArray) -> ConeMoves:
+    """Return the moves of the tip in images of rotations rig_from_pen (N, 3, 3)."""
+    axes = axes_of_cone(rotations)
+    lean = rotations[:, :, 1] @ axes[:2].T
+    across = lean @ axes[:2]
+    side = across / np.maximum(np.hypot(*lean.T), LEAST_LEAN)[:, None]
+    smooth = np.tanh(lean / LEAST_LEAN)
+    loose = [
+        side,
+        smooth[:, :1] * rotations[:, :, 0],
+        smooth[:, 1:] * rotations[:, :, 2],
+    ]
+    return ConeMoves(lean, across[..., None], np.stack(loose, axis=2))
+
+
+def effects_of(
+    views: tuple[CameraView, ...],
+    pixels: FloatArray,
+    used: BoolArray,
+    rotations: FloatArray,
+    leds: FloatArray,
+    cameras: tuple[Camera, ...],
+    compliance: float,
+) -> tuple[Effect, ...]:
+    """Return all effects that a swing may show.
+
+    Parameters
+    ----------
+    views : tuple of CameraView
+        About a solution.
+    pixels : (N, C, L, 2) array
+        LED centres, px.
+    used : (N, C, L) array of bool
+    rotations : (N, 3, 3) array
+        Of rig_from_pen.
+    leds : (L, 3) array
+        Of the pen, mm.
+    compliance : float
+        Standard deviation that is assumed, mm.
+    """
+    by_cone = np.stack([view.cone for view in views], axis=1)
+    by_led = np.stack([view.led for view in views], axis=1)
+    moves = cone_moves(rotations)
+    lean, across = moves.lean, moves.compliance[..., 0]
+    found = [
+        Effect(
+            EffectName.COMPLIANCE,
+            0,
+            np.einsum("nclik,nkm->nclim", by_cone, moves.compliance),
+            (np.eye(1),),
+            stated=compliance,
+        ),
+        Effect(
+            EffectName.LOOSE,
+            0,
+            np.einsum("nclik,nkm->nclim", by_cone, moves.loose),
+            (np.eye(3),),
+        ),
+    ]
+    heights = leds[:, 1] - leds[:, 1].min()
+    if heights.max() > 0:
+        weight = (heights / heights.max()) ** 2
+        down = np.einsum("nji,nj->ni", rotations, across)  # in the pen's frame
+        down[:, 1] = 0.0
+        found.append(
+            Effect(
+                EffectName.SAG,
+                0,
+                np.einsum("nclik,nk,l->ncli", by_led, down, weight)[..., None],
+                (np.eye(1),),
+            )
+        )
+    for c, camera in enumerate(cameras):
+        tilt = np.zeros((*pixels.shape, 4))
+        tilt[:, c, :, 0, :2] = tilt[:, c, :, 1, 2:] = lean[:, None]
+        found.append(Effect(EffectName.TILT, c, tilt, (np.eye(4),)))
+        found.append(_lens(camera, c, pixels, used))
+    return tuple(found)
+
+
+def _lens(camera: Camera, c: int, pixels: FloatArray, used: BoolArray) -> Effect:
+    seen = pixels[:, c][used[:, c]]
+    low, high = (seen.min(axis=0), seen.max(axis=0)) if len(seen) else np.zeros((2, 2))
+    middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1.0)
+    clean = np.nan_to_num((pixels[:, c] - middle) / half)
+    basis = _polynomials(np.clip(clean, -1.0, 1.0))
+    m = basis.shape[-1]
+    columns = np.zeros((*pixels.shape, 2 * m))
+    columns[:, c, :, 0, :m] = columns[:, c, :, 1, m:] = basis
+    line = np.linspace(-1.0, 1.0, NODES)
+    nodes = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
+    by_values = np.linalg.pinv(_polynomials(nodes))
+    places = nodes * half + middle
+    if camera.lens_field is not None:
+        stated = by_values @ camera.lens_field.covariance_at(places) @ by_values.T
+        shape: FloatArray = np.kron(np.eye(2), stated).astype(np.float64)
+        return Effect(EffectName.LENS, c, columns, (shape,), 1.0, is_exact=True)
+    shapes = []
+    for length in LENGTHS * camera.width:
+        of_values = by_values @ correlation(places, places, length) @ by_values.T
+        shapes.append(np.kron(np.eye(2), of_values).astype(np.float64))
+    return Effect(EffectName.LENS, c, columns, tuple(shapes))
+
+
+def _polynomials(points: FloatArray) -> FloatArray:
+    """Return products of Legendre polynomials at points (..., 2) of [-1, 1]."""
+    u, v = (np.polynomial.legendre.legvander(points[..., k], DEGREE) for k in (0, 1))
+    pairs = [(i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)]
+    one, other = np.array(pairs).T
+    return np.asarray(u[..., one] * v[..., other])

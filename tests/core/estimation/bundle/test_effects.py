@@ -1,0 +1,165 @@
+"""Effects of lens and mechanics are found, and cost nothing where they are not."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.bundle.effect_findings import FoundEffect
+from lightpen.estimation.bundle.effects import Effect, EffectName, size_of
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.uncertainty.budget import ContributionName
+from lightpen.formats.observation_files import Centers
+from lightpen.model.camera import Camera
+from lightpen.model.lens_field import LensField
+from lightpen.simulator.swings import (
+    Swing,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+CAMERA, PEN = paper_camera(), paper_pen()
+N_IMAGES, SIGMA = 120, 0.03
+
+
+def swing(seed: int = 0) -> tuple[Swing, np.random.Generator]:
+    rng = np.random.default_rng([260, seed])
+    return swing_poses(N_IMAGES, rng), rng
+
+
+def lean_of(R: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the mean pen axis, and each pen's axis across it, (N, 3)."""
+    along = R[:, :, 1].mean(axis=0)
+    along = along / np.linalg.norm(along)
+    axes = R[:, :, 1]
+    return along, axes - (axes @ along)[:, None] * along
+
+
+def calibrated(
+    moves: FloatArray | float = 0.0,
+    shifts: FloatArray | float = 0.0,
+    seed: int = 0,
+    camera: Camera = CAMERA,
+) -> tuple[Calibration, FloatArray]:
+    """Return a calibration whose tip moves and images shift, and its error, mm."""
+    true, rng = swing(seed)
+    pixels = simulate_centers(
+        CAMERA, PEN, true.rotations, true.translations + moves, SIGMA, rng
+    )
+    centers = Centers(np.arange(N_IMAGES), pixels + shifts, Path("simulated"))
+    found = calibrate(camera, PEN, observe_centers(centers, camera, PEN))
+    return found, found.joint.tip_pen - true.tip_pen
+
+
+def only(calibration: Calibration, name: EffectName) -> FoundEffect:
+    return next(each for each in calibration.effects if each.name is name)
+
+
+def lens(pixels: FloatArray, amplitude: float) -> FloatArray:
+    """Return two waves over the image that Brown's distortion cannot follow."""
+    u, v = pixels[..., 0] / 260.0, pixels[..., 1] / 330.0
+    waves = np.stack([np.sin(u + 0.7 * v), np.cos(v - u)], axis=-1)
+    return np.asarray(amplitude * np.sqrt(2) * waves)
+
+
+def test_a_good_station_shows_no_effect_and_keeps_its_tip() -> None:
+    found, error = calibrated()
+    assert not [each for each in found.effects if each.is_certain]
+    assert (np.abs(error) < found.budget.expanded_uncertainty[:3]).all()
+
+
+def test_a_lens_field_is_found_and_corrected() -> None:
+    true, _ = swing()
+    exact = simulate_centers(
+        CAMERA, PEN, true.rotations, true.translations, 0.0, np.random.default_rng(0)
+    )
+    found, error = calibrated(shifts=lens(exact, 0.08))
+    field = only(found, EffectName.LENS)
+    assert field.is_certain
+    assert 0.05 < field.size < 0.11  # px, rms over u and v
+    assert field.message.code == "warning.effect-lens"
+    # What is left of it in the images is hardly more than the noise.
+    assert found.joint.sigma < 1.15 * SIGMA
+    assert (np.abs(error) < 1.2 * found.budget.expanded_uncertainty[:3]).all()
+    assert not found.contradictions
+
+
+def test_a_measured_lens_field_of_the_camera_file_is_corrected() -> None:
+    true, _ = swing()
+    exact = simulate_centers(
+        CAMERA, PEN, true.rotations, true.translations, 0.0, np.random.default_rng(0)
+    )
+    prior = LensField.of(CAMERA.width, CAMERA.height, 0.05, 300.0)
+    nodes = lens(prior.nodes, 0.08)
+    field = replace(prior, values=nodes, covariance=1e-4 * prior.covariance)
+    known, error = calibrated(
+        shifts=field.at(exact), camera=replace(CAMERA, lens_field=field)
+    )
+    plain, plain_error = calibrated()
+    np.testing.assert_allclose(error, plain_error, atol=1e-3)
+    assert known.joint.sigma < 1.1 * plain.joint.sigma
+
+
+def test_compliance_is_an_unknown_along_the_pen() -> None:
+    true, _ = swing()
+    _, across = lean_of(true.rotations)
+    found, error = calibrated(moves=0.06 * across)
+    given_way = only(found, EffectName.COMPLIANCE)
+    assert given_way.sigma is not None
+    assert abs(given_way.size - 0.06) < 3 * given_way.sigma
+    assert abs(error[1]) < found.budget.expanded_uncertainty[1]
+
+
+def test_a_stylus_that_jumps_with_the_side_of_the_lean_is_found() -> None:
+    true, _ = swing()
+    _, across = lean_of(true.rotations)
+    sides = across / np.linalg.norm(across, axis=1, keepdims=True)
+    found, error = calibrated(moves=0.015 * sides)
+    loose = only(found, EffectName.LOOSE)
+    assert loose.is_certain
+    assert 0.008 < loose.size < 0.022
+    assert (np.abs(error) < 1.2 * found.budget.expanded_uncertainty[:3]).all()
+
+
+def test_a_camera_that_turns_with_the_lean_is_found() -> None:
+    true, _ = swing()
+    _, across = lean_of(true.rotations)
+    shifts = np.zeros((N_IMAGES, 1, 2))
+    shifts[..., 1] = 0.3 * across[:, 2:]
+    found, error = calibrated(shifts=shifts)
+    assert only(found, EffectName.TILT).size == pytest.approx(0.3, abs=0.15)
+    assert (np.abs(error) < 1.2 * found.budget.expanded_uncertainty[:3]).all()
+
+
+def test_what_is_assumed_of_compliance_counts_where_the_images_hardly_show_it() -> None:
+    found, _ = calibrated()
+    shares = {share.name: share for share in found.budget.shares}
+    assert shares[ContributionName.COMPLIANCE].assumed
+    # As large as assumed at most: the tip goes along the pen by about as much.
+    assert 0.001 < shares[ContributionName.COMPLIANCE].standard_uncertainty[1] < 0.006
+
+
+def test_the_size_of_an_effect_is_found_by_likelihood() -> None:
+    rng = np.random.default_rng(5)
+    S = np.diag(np.full(8, 1e7))  # a standard deviation of 0.3 um each
+    columns = np.zeros((1, 8))
+    effect = Effect(EffectName.SAG, 0, columns, (np.eye(8),))
+    none = size_of(effect, S, rng.normal(size=8) * np.sqrt(1e7))
+    assert none.gain < 6.6
+    moved = rng.normal(0, 0.004, 8)
+    found = size_of(effect, S, S @ moved)
+    assert found.sigma == pytest.approx(float(np.sqrt(np.mean(moved**2))), rel=0.15)
+    assert found.gain > 50
+
+
+def test_the_likelier_of_two_shapes_is_taken() -> None:
+    S, columns = np.diag(np.full(2, 1e8)), np.zeros((1, 2))
+    shapes = (np.diag([1.0, 1e-9]), np.diag([1e-9, 1.0]))
+    effect = Effect(EffectName.LENS, 0, columns, shapes)
+    found = size_of(effect, S, S @ np.array([0.0, 0.01]))
+    assert found.covariance[1, 1] > 1e3 * found.covariance[0, 0]
