@@ -40,7 +40,7 @@ SMALL: Mapping[str, Any] = {
         "values": {"uncertainty": 0.005},
         "grade": "pass",
         "next_step": "accept",
-        "limits": {"max_uncertainty_mm": 0.012, "min_images": 2, "min_per_field": 0},
+        "limits": {"max_uncertainty_mm": 0.016, "min_images": 2, "min_per_field": 0},
     },
     "warnings": [],
     "uncertainty": {
@@ -65,6 +65,7 @@ SMALL: Mapping[str, Any] = {
         "disc_diameter_mm": 10.0,
         "disc_diameter_by_areas_mm": None,
         "contradictions": [],
+        "effects": [],
     },
     "assumptions": {},
     "fixed_lamps": [],

@@ -22,7 +22,7 @@ from lightpen.estimation.bundle.consistency_findings import (
     find_pen_contradictions,
 )
 from lightpen.estimation.bundle.effect_search import SearchedEffect, search_effects
-from lightpen.estimation.bundle.effects import Effect
+from lightpen.estimation.bundle.led_noise import find_led_noise
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.noise_correlation import (
     Correlation,
@@ -35,6 +35,8 @@ from lightpen.model.information import inverse
 
 RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit
 MAX_RELEASES = 8  # rounds in which contradicted numbers are sought
+NOISE_ROUNDS = 3  # in which noisy LEDs lose their weight
+NOISE_SETTLED = 0.15  # of a noise; a weight may be off by that
 MOST_SHRUNK = 0.01  # of an assumed standard deviation
 
 
@@ -80,11 +82,6 @@ class _ConsistentFit:
     contradictions: tuple[Contradiction, ...]
     effects: tuple[SearchedEffect, ...]
 
-    @property
-    def fitted(self) -> tuple[Effect, ...]:
-        """The effects that the images support."""
-        return tuple(each.effect for each in self.effects if each.is_candidate)
-
 
 def adjust(
     state: BundleState,
@@ -127,7 +124,10 @@ def adjust(
     shrunk = shrunk_priors(fitted.bundle, fitted.priors)
     bundle = unshrunk = fitted.bundle
     if shrunk is not fitted.priors:
-        bundle = fit(shrunk, inflation=inflation, effects=fitted.fitted)
+        same = bundle.unknowns
+        bundle = fit(
+            shrunk, inflation=inflation, effects=same.effects, noise=same.noise
+        )
     components = fitted.correlation.components
     if components is not None:
         bundle = replace(bundle, budget_components=components)
@@ -148,6 +148,7 @@ def _fit_consistent(
     if candidates:
         fit = partial(fit, effects=candidates)
         bundle = fit(priors)
+    fit, bundle = _with_led_noise(fit, bundle, priors)
     correlation = measure_correlation(bundle, pixels)
     inputs = ContradictedInputs(priors)
     for _ in range(MAX_RELEASES):
@@ -164,6 +165,20 @@ def _fit_consistent(
         bundle = fit(released)
         correlation = measure_correlation(bundle, pixels)
     return _ConsistentFit(bundle, correlation, released, found + of_pen, effects)
+
+
+def _with_led_noise(
+    fit: "partial[Bundle]", bundle: Bundle, priors: Priors
+) -> tuple["partial[Bundle]", Bundle]:
+    """Weigh each LED by its noise, where these differ, until it settles."""
+    for _ in range(NOISE_ROUNDS):
+        weights = bundle.unknowns.noise
+        noise = find_led_noise(bundle.residuals, bundle.used, bundle.sigma, weights)
+        if noise is None or np.abs(noise / weights - 1).max() < NOISE_SETTLED:
+            break
+        fit = partial(fit, noise=noise)
+        bundle = fit(priors)
+    return fit, bundle
 
 
 def shrunk_priors(bundle: Bundle, priors: Priors) -> Priors:

@@ -37,7 +37,6 @@ from lightpen.estimation.bundle.linearised import (
     Eliminated,
     NormalEquations,
     eliminate,
-    views_at,
 )
 from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.seat_modes import SeatModes
@@ -190,6 +189,7 @@ def fit_bundle(
     inflation: float = 1.0,
     places: FloatArray | None = None,
     effects: tuple[Effect, ...] = (),
+    noise: FloatArray | None = None,
 ) -> Bundle:
     """Fit tip, cone and the parameters of the files to the LED centres.
 
@@ -205,13 +205,15 @@ def fit_bundle(
         Start of the extrinsics less those of the rig file; 0 unless given.
     effects : tuple of Effect
         To be fitted.
+    noise : (C, L) or (N, C, L) array, optional
+        Noise of the LEDs' centres, by that of a usual one.
 
     Raises
     ------
     CalibrationError
         The iteration does not settle.
     """
-    unknowns = Unknowns.of(start, priors, modes, effects)
+    unknowns = Unknowns.of(start, priors, modes, effects, noise)
     now = _started(unknowns, start, pixels, places)
     for n_pass in range(MAX_PASSES):
         weight_sigma = max(now.sigma * float(np.sqrt(inflation)), FINEST)
@@ -227,7 +229,7 @@ def fit_bundle(
         change = solved.values - now.values
         if n_pass > FINDING_PASSES and np.abs(change[:6]).max() < CONVERGED:
             return _bundle_of(unknowns, state, used, solved, weight_sigma)
-        views = views_at(state, pixels, unknowns.effect_columns)
+        views = unknowns.views_at(state, pixels)
         values = _held_by_state(unknowns, solved.values)
         now = _Linearised(state, values, views, used, components, solved.sigma)
     raise CalibrationError("bundle.not-settled", n_steps=MAX_PASSES)
@@ -273,7 +275,7 @@ def _started(
     if places is not None:
         values[unknowns.layout.extrinsics] = places
         state = unknowns.moved(start, values, np.zeros((len(pixels), N_TURN)))
-    views = views_at(state, pixels, unknowns.effect_columns)
+    views = unknowns.views_at(state, pixels)
     residuals = np.stack([view.residuals for view in views], axis=1)
     used = inliers(_together(residuals)).reshape(residuals.shape[:-1])
     sigma = robust_sigma(_together(residuals), N_TURN)
@@ -358,7 +360,7 @@ def _bundle_of(
         values=solved.values,
         components=solved.components,
         budget_components=solved.components,
-        residuals=solved.residuals,
+        residuals=solved.residuals * unknowns.noise[..., None],
         used=used,
         sigma=solved.sigma,
         information=solved.information,

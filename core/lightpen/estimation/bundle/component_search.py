@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.components import NO_COMPONENTS, NONE, Components
-from lightpen.estimation.bundle.effects import EffectComponent, size_of
+from lightpen.estimation.bundle.effects import Effect, EffectComponent, size_of
 from lightpen.estimation.bundle.unknowns import Unknowns
 from lightpen.estimation.statistics.variance_components import (
     FITTED,
@@ -16,7 +16,6 @@ from lightpen.estimation.statistics.variance_components import (
     find_component,
 )
 from lightpen.model.information import inverse
-from lightpen.model.quantiles import chi_square_quantile
 
 ROUNDS = 3  # of finding each component beside the others
 
@@ -64,15 +63,15 @@ def _found_once(
         oval=oval,
         drift=_likely(find(at.drift)),
         effects=tuple(
-            _likely_effect(size_of(effect, *own(place)))
+            _likely_effect(effect, size_of(effect, *own(place)))
             for effect, place in zip(unknowns.effects, at.effects, strict=True)
         ),
     )
 
 
-def _likely_effect(found: EffectComponent) -> EffectComponent:
-    """Return an effect that is significant enough to be fitted, else none."""
-    if found.gain > chi_square_quantile(1, FITTED):
+def _likely_effect(effect: Effect, found: EffectComponent) -> EffectComponent:
+    """Return the component of an effect that the images support, else none."""
+    if found.supports(effect):
         return found
     return found._replace(sigma=0.0, covariance=np.zeros_like(found.covariance))
 

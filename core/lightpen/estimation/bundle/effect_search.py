@@ -28,9 +28,7 @@ from lightpen.estimation.bundle.linearised import (
     eliminate,
     views_at,
 )
-from lightpen.estimation.statistics.variance_components import FITTED
 from lightpen.model.information import inverse
-from lightpen.model.quantiles import chi_square_quantile
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,55 +90,43 @@ def search_effects(
         models.append((0.5 * (S + S.T), right - with_others.T @ change))
     found, first = [], 0
     by_all = -bundle.covariance[:6] @ with_others
-    limit = chi_square_quantile(1, FITTED)
     for effect in effects:
         at = slice(first, first + effect.number)
         first = at.stop
         sizes = [size_of(effect, S[at, at], b[at]) for S, b in models]
-        is_candidate = any(size.gain > limit for size in sizes)
+        is_candidate = any(size.supports(effect) for size in sizes)
         found.append(SearchedEffect(effect, sizes[0], by_all[:, at], is_candidate))
     return tuple(found)
 
 
-def search_cone_effects(
+def search_compliance(
     bundle: Bundle, each: NormalEquations, compliance: float
-) -> tuple[SearchedEffect, ...]:
-    """Search a fit for effects that move tip against cone, by its normal equations.
+) -> SearchedEffect:
+    """Search a fit for compliance alone, by its normal equations.
 
-    Sag and lens are left out. They need the LEDs one by one.
+    Other effects need the LEDs one by one.
 
     Parameters
     ----------
     each : NormalEquations
         About the start of the fit, with jitter where it has one.
+    compliance : float
+        Standard deviation that is assumed, mm.
     """
-    state = bundle.state
-    moves = cone_moves(state.rotations)
-    mm_a_px = float(state.cone_rig[2]) / state.rig.cameras[0].fx
-    tilt = np.zeros((len(moves.lean), N_CONE, 4))
-    tilt[:, 0, :2] = tilt[:, 1, 2:] = mm_a_px * moves.lean
-    own_moves = {
-        EffectName.COMPLIANCE: moves.compliance,
-        EffectName.LOOSE: moves.loose,
-        EffectName.TILT: tilt,
-    }
-    found = []
+    move = cone_moves(bundle.state.rotations).compliance
     spread = bundle.unknowns.sensitivity(each.cone_rows)
-    flat = spread.reshape(-1, spread.shape[-1])
-    left = each.cone_right.ravel() - flat @ bundle.values
-    for name, move in own_moves.items():
-        k = move.shape[-1]
-        stated = compliance if name is EffectName.COMPLIANCE else 0.0
-        effect = Effect(name, 0, np.zeros((1, k)), (np.eye(k),), stated)
-        by_cone = each.cone_rows[..., :N_CONE] @ move
-        rows = move.reshape(-1, k)
-        with_others = flat.T @ rows
-        S = rows.T @ by_cone.reshape(-1, k)
-        S -= with_others.T @ bundle.covariance @ with_others
-        size = size_of(effect, 0.5 * (S + S.T), rows.T @ left)
-        by_unknowns = -bundle.covariance[:6] @ with_others
-        found.append(SearchedEffect(effect, size, by_unknowns, is_candidate=False))
-    return tuple(found)
+    spread = spread.reshape(-1, spread.shape[-1])
+    left = each.cone_right.ravel() - spread @ bundle.values
+    rows = move.reshape(-1, 1)
+    with_others = spread.T @ rows
+    S = rows.T @ (each.cone_rows[..., :N_CONE] @ move).reshape(-1, 1)
+    S -= with_others.T @ bundle.covariance @ with_others
+    effect = Effect(
+        EffectName.COMPLIANCE, 0, np.zeros((1, 1)), (np.eye(1),), compliance
+    )
+    size = size_of(effect, S, rows.T @ left)
+    by_unknowns = -bundle.covariance[:6] @ with_others
+    return SearchedEffect(effect, size, by_unknowns, is_candidate=False)
 
 
 def _information(

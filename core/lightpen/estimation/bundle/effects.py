@@ -11,8 +11,8 @@ lens           smooth field over the image of one camera, px: polynomials over t
                the camera file states it
 compliance     stylus, seat or stand give way by c h: h is the part of the pen's axis
                across the axis of the cone, its length the sine of the lean
-loose stylus   jump of the tip with the side of the lean: along h, or along an axis of
-               the pen, with the sign of the lean to that side
+loose stylus   jump of the tip with the side of the lean: along h, or along one of two
+               axes of the pen, with the sign of the lean to that side
 sag            the pen bends under its weight, as the square of the height of the LED
 camera tilt    the image of one camera shifts with h, px
 ============== =========================================================================
@@ -30,11 +30,16 @@ from lightpen.estimation.bundle.seat_modes import axes_of_cone
 from lightpen.estimation.statistics.variance_components import P_NONE
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import correlation
+from lightpen.model.quantiles import chi_square_quantile
 
 DEGREE = 6  # of the polynomials of a lens field
 NODES = 10  # along a side, at which polynomials take the covariance of a field
 LENGTHS = np.array([0.1, 0.18, 0.32, 0.56])  # of the image's width
 LEAST_LEAN = 0.02  # sine; below it the side of the lean is not known
+# How often chance alone supports an effect, at most. One in six is Akaike's criterion:
+# to fit an effect that may be there costs less than to count it in U. A lens field has
+# many unknowns, and hardly counts where it is that small.
+CHANCE, LENS_CHANCE = 0.157, 0.01
 N_SCALES = 60  # standard deviations tried
 SMALLEST = 1e-3  # of the largest one
 ROUNDING = 1e-9  # of the largest eigenvalue
@@ -110,6 +115,11 @@ class EffectComponent(NamedTuple):
     gain: float
     covariance: FloatArray
     expected: FloatArray
+
+    def supports(self, effect: Effect) -> bool:
+        """Tell whether the images support an effect, so that it is fitted."""
+        chance = LENS_CHANCE if effect.name is EffectName.LENS else CHANCE
+        return self.gain > chi_square_quantile(1, chance)
 
 
 def held(effect: Effect) -> EffectComponent:
@@ -239,7 +249,7 @@ def effects_of(
             EffectName.LOOSE,
             0,
             np.einsum("nclik,nkm->nclim", by_cone, moves.loose),
-            (np.eye(3),),
+            tuple(np.diag(one) for one in np.eye(3)),
         ),
     ]
     heights = leds[:, 1] - leds[:, 1].min()

@@ -96,6 +96,21 @@ class CameraView:
     effects: FloatArray
     diameter: FloatArray
 
+    def in_units_of(self, noise: FloatArray) -> "CameraView":
+        """Return residuals and derivatives by the noise of each LED, (N, L)."""
+        if np.all(noise == 1):
+            return self
+        by_two, by_three = noise[..., None], noise[..., None, None]
+        return CameraView(
+            residuals=self.residuals / by_two,
+            turn=self.turn / by_three,
+            cone=self.cone / by_three,
+            led=self.led / by_three,
+            own=self.own / by_three,
+            effects=self.effects / by_three,
+            diameter=self.diameter / by_two,
+        )
+
 
 def views_at(
     state: BundleState, pixels: FloatArray, effects: FloatArray | None = None

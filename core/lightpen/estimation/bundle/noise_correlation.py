@@ -22,7 +22,7 @@ from lightpen.detection.pose import NOISE_FLOOR
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.components import Components
-from lightpen.estimation.bundle.linearised import eliminate, views_at
+from lightpen.estimation.bundle.linearised import eliminate
 from lightpen.estimation.bundle.reduced_normal_equations import (
     WhitenedEquations,
     rows_of,
@@ -90,11 +90,11 @@ def measure_correlation(bundle: Bundle, pixels: FloatArray) -> Correlation:
     """
     used = bundle.used
     independent = bundle.independent_noise
-    seen = lag1(bundle.residuals, used)
+    seen = lag1(bundle.residuals / bundle.unknowns.noise[..., None], used)
     pairs = 2 * int((used[1:] & used[:-1]).sum())
     if seen <= normal_quantile(BY_CHANCE) / np.sqrt(max(pairs, 1)):
         return Correlation(0.0, independent, 1.0, None, None)
-    views = views_at(bundle.state, pixels, bundle.unknowns.effect_columns)
+    views = bundle.unknowns.views_at(bundle.state, pixels)
     jitter = bundle.components.jitter.covariance
     eliminated = eliminate(views, used, bundle.weight_sigma, jitter)
     rows = rows_of(

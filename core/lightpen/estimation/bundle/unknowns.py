@@ -14,7 +14,13 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.components import NONE, Components
 from lightpen.estimation.bundle.effects import Effect
-from lightpen.estimation.bundle.linearised import N_CONE, BundleState, NormalEquations
+from lightpen.estimation.bundle.linearised import (
+    N_CONE,
+    BundleState,
+    CameraView,
+    NormalEquations,
+    views_at,
+)
 from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, SeatModes
 from lightpen.model.information import EXACT, inverse, known_by
@@ -63,6 +69,8 @@ class Unknowns:
         Move of the LEDs by a scale of 1.
     effects : tuple of Effect
         That are fitted.
+    noise : (C, L) or (N, C, L) array
+        Noise of the LEDs' centres, by that of a usual one.
     """
 
     layout: ParameterLayout
@@ -74,6 +82,7 @@ class Unknowns:
     scaling: FloatArray
     priors: Priors
     effects: tuple[Effect, ...]
+    noise: FloatArray
 
     @classmethod
     def of(
@@ -82,6 +91,7 @@ class Unknowns:
         priors: Priors,
         given: SeatModes,
         effects: tuple[Effect, ...] = (),
+        noise: FloatArray | None = None,
     ) -> "Unknowns":
         """Return the unknowns of a fit that starts there."""
         rig, pen = start.rig, start.pen
@@ -137,7 +147,19 @@ class Unknowns:
         second = () if start.at_second is None else (start.at_second.astype(float),)
         forms = np.column_stack([given.lean, given.drift, *second])
         return cls(
-            *(layout, start, mixing, forms, given.oval, basis, scaling, priors, effects)
+            *(layout, start, mixing, forms, given.oval, basis, scaling, priors),
+            effects,
+            np.ones((rig.n_cameras, n_leds)) if noise is None else noise,
+        )
+
+    def views_at(
+        self, state: BundleState, pixels: FloatArray
+    ) -> tuple[CameraView, ...]:
+        """Linearise the images about a state, each LED in units of its noise."""
+        views = views_at(state, pixels, self.effect_columns)
+        return tuple(
+            view.in_units_of(np.broadcast_to(self.noise, pixels.shape[:-1])[:, c])
+            for c, view in enumerate(views)
         )
 
     @property

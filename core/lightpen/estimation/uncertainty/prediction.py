@@ -19,7 +19,7 @@ from lightpen.estimation.bundle.adjustment import shrunk_priors
 from lightpen.estimation.bundle.bundle import Bundle, jitter_matrices, jitter_of
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.components import NO_COMPONENTS
-from lightpen.estimation.bundle.effect_search import search_cone_effects
+from lightpen.estimation.bundle.effect_search import search_compliance
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     BundleState,
@@ -111,9 +111,9 @@ class UncertaintyPrediction:
         noise = bundle.independent_noise
         jitter = bundle.components.jitter.covariance
         beside = equations if jitter is None else _with_jitter(equations, jitter)
-        effects = search_cone_effects(bundle, beside, priors.compliance)
+        compliance = search_compliance(bundle, beside, priors.compliance)
         now = contributions_of(
-            bundle, priors, n_images, noise, shrinkage_shift, effects
+            bundle, priors, n_images, noise, shrinkage_shift, (compliance,)
         )
         endless = _with_endless_images(bundle)
         nothing = np.zeros((6, 6))

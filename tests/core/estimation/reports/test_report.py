@@ -175,7 +175,7 @@ def test_the_record_holds_each_share_of_the_uncertainty() -> None:
         2 * np.sqrt(squares), record()["expanded_uncertainty_mm"]
     )
     assumed = [share["name"] for share in found["shares"] if share["assumed"]]
-    assert assumed == OF_THE_STATION
+    assert assumed == [*OF_THE_STATION, "compliance"]
     assert np.shape(found["independent_noise_mm"]) == (3,)
     for share in found["shares"]:
         by_name = found[f"{share['name'].replace(' ', '_')}_mm"]
@@ -204,9 +204,9 @@ def test_what_is_assumed_is_marked_in_record_and_text() -> None:
 
     shares = json.loads(written)["uncertainty"]["shares"]
     assumed = [share["name"] for share in shares if share["assumed"]]
-    assert assumed == [*OF_THE_STATION, "camera"]
+    assert assumed == [*OF_THE_STATION, "camera", "compliance"]
     assert "U from camera, assumed" in text
-    assert text.count(", assumed") == len(OF_THE_STATION) + 1  # and the camera
+    assert text.count(", assumed") == len(assumed)
 
 
 def test_a_contradicted_file_is_in_record_warnings_and_text() -> None:

@@ -1,0 +1,52 @@
+"""Noise of each LED as a variance component.
+
+The logarithms of the LEDs' variances are normal about a common mean. Their spread is
+that beyond what as few residuals scatter by, and each is shrunk to the mean by what is
+known of it. LEDs that are alike are not told apart.
+"""
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.estimation.statistics.variance_components import CERTAIN
+from lightpen.model.quantiles import chi_square_quantile
+
+WORTH_IT = 1.25  # times the noise of another LED; less is not worth a new fit
+MIN_FREE = 10.0  # degrees of freedom of an LED that is told apart
+LEAST = 1e-12  # px^2
+
+
+def find_led_noise(
+    residuals: FloatArray, used: BoolArray, sigma: float, weights: FloatArray
+) -> FloatArray | None:
+    """Return the noise of each LED by that of a usual one, (C, L); None if alike.
+
+    Parameters
+    ----------
+    residuals : (N, C, L, 2) array
+        px.
+    used : (N, C, L) array of bool
+    sigma : float
+        Noise of the fit for a weight of 1, px, degrees of freedom counted.
+    weights : (C, L) array
+        Noise of each LED by which the fit weighed it.
+    """
+    squares = np.sum(np.where(used[..., None], residuals, 0.0) ** 2, axis=(0, 3))
+    counts = 2.0 * used.sum(axis=0)
+    weighed = float(np.sum(squares / weights**2))
+    freedom = min(weighed / (sigma**2 * max(counts.sum(), 1.0)), 1.0)
+    free = counts * freedom
+    told = free >= MIN_FREE
+    if told.sum() < 2:
+        return None
+    logs = np.log(np.maximum(squares[told] / free[told], LEAST))
+    by_chance = 2 / free[told]
+    mean = np.sum(logs / by_chance) / np.sum(1 / by_chance)
+    misfit = float(np.sum((logs - mean) ** 2 / by_chance))
+    if misfit < chi_square_quantile(len(logs) - 1, CERTAIN):
+        return None
+    middle = float(np.median(logs))  # a few noisy LEDs are the usual case
+    spread = max(float(np.mean((logs - middle) ** 2 - by_chance)), 0.0)
+    noise = np.ones(counts.shape)
+    noise[told] = np.exp(0.5 * (logs - middle) * spread / (spread + by_chance))
+    return noise if noise.max() > WORTH_IT * noise.min() else None
