@@ -38,7 +38,7 @@ from lightpen.record.signing.keys import KEYS
 SEED = 25
 N_HISTORIES = 1000
 MOST_CUTS = 3
-LONGEST_LIFE_S = 0.8  # of a program until it is killed
+LONGEST_LIFE_S = 1.5  # of a program until it is killed
 WRITES = (accept, change_library, note)
 
 
