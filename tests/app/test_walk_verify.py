@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 STATION = "Hall 2"
 TASKS_BEFORE_PEN = len(TASKS)
-THREE = (FixedPointOptions(n_touches=3),)
+FIVE = (FixedPointOptions(n_touches=5),)  # fewer do not verify a tip
 TOUCHES = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
-    verification=VerificationChoices(options=THREE, n_frames=2),
+    verification=VerificationChoices(options=FIVE, n_frames=2),
 )
 
 

@@ -7,6 +7,7 @@ from PySide6.QtCore import QObject
 from lightpen.cameras.worker_events import Connection
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import Message
+from lightpen.model.limits import rule_in_words
 from lightpen.model.origin import Origin
 from lightpen.record.library.calibration_status import TipStatus
 from lightpen.verification.probing.probing import HELD_ENOUGH, ProbingPhase
@@ -18,6 +19,7 @@ from lightpen.verification.session.session_state import (
     instruction,
 )
 from lightpen.verification.session.status import ReadingState, VerificationStatus
+from lightpen.verification.tasks.assessment import USE_TIP
 from lightpen.verification.tasks.registry import TASKS, AnyTask
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import Instruction, grade_text
@@ -220,8 +222,11 @@ class VerifyPresenter(QObject):
                 self.tr("Wait"), self.tr("The current tip is being read.")
             )
         if status.assessment is not None and status.is_done:
+            verifies_tip = status.assessment.next_step == USE_TIP
             verdicts = {
-                Grade.PASS: self.tr("Tip verified"),
+                Grade.PASS: self.tr("Tip verified")
+                if verifies_tip
+                else self.tr("Scale and form verified"),
                 Grade.CHECK: self.tr("Check needed"),
                 Grade.REPEAT: self.tr("Not verified"),
             }
@@ -268,7 +273,8 @@ class VerifyPresenter(QObject):
             return State(self.tr("READING"), "", Sign.WAIT, Tone.ACTIVE)
         if task is None and status.assessment is not None:
             grade = status.assessment.grade
-            why = worded(status.assessment.reason)
+            rule = worded(rule_in_words(setup.choices.limits))
+            why = f"{worded(status.assessment.reason)} {rule}"
             return State(self._grade_text(grade), why, *GRADE_MARKS[grade])
         if self._live.connection is not Connection.STREAMING:
             return State(self.tr("NO IMAGES"), "", Sign.CROSS, Tone.BAD)

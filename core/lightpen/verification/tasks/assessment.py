@@ -41,8 +41,12 @@ class VerificationAssessment:
 
 
 def worst(found: Iterable[VerificationAssessment]) -> VerificationAssessment:
-    """Return the worst of several; of equals the first."""
-    return max(found, key=lambda each: WORST.index(each.grade))
+    """Return the worst of several; of those that pass one that verifies the tip."""
+
+    def badness(each: VerificationAssessment) -> tuple[int, bool]:
+        return WORST.index(each.grade), each.is_accepted and each.next_step == USE_TIP
+
+    return max(found, key=badness)
 
 
 def accepted(reason: Message, next_step: Message = USE_TIP) -> VerificationAssessment:
