@@ -162,7 +162,7 @@ def interrupted(known: "Walker", tmp_path: Path) -> "Walker":
     kept = folder / SIMULATED / VERIFICATIONS
     verifier = Verifier(folder, known.workbench.selection.preparation)
     kinds = (FIXED_POINT.kind, DRIFT.kind)
-    verifier.come(VerificationChoices(kinds, THREE, n_frames=2))
+    verifier.come(VerificationChoices(kinds, FIVE, n_frames=2))
     for _ in range(VISIT_POINTS):
         verifier.touch(Hold(tilt=0.0))
         verifier.see(verifier.holder.away())
@@ -184,7 +184,7 @@ def test_a_verification_that_was_interrupted_is_gone_on_with(
     walker = interrupted
     walker.click("Continue")
     walker.until(lambda: walker.title() == "Verify")
-    walker.until_says("2 of 3 points")
+    walker.until_says("2 of 5 points")
     walker.click("Let the simulated operator probe")
     walker.until(lambda: walker.main_button().text() == "Back to Start")
 
