@@ -263,7 +263,12 @@ def is_unread(page: ReviewPage) -> bool:
 
 def the(parent: QWidget, kind: type[W]) -> W:
     """Return the only child of a kind."""
-    (found,) = (each for each in parent.findChildren(kind) if type(each) is kind)
+    children = parent.findChildren(kind)
+    (found,) = [
+        each
+        for each in children
+        if kind is WithdrawalBar or not isinstance(each, WithdrawalBar)
+    ]
     return found
 
 
