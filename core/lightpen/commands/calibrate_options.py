@@ -86,7 +86,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         metavar="K",
         help=(
             "standard uncertainty of the temperature (0.5), or without "
-            "--temperature the temperature difference from the LED measurement (1.5)"
+            "--temperature the temperature difference from the LED measurement (3)"
         ),
     )
     parser.add_argument(
@@ -94,6 +94,15 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         type=number_from(1e-7, 1.0, "uncertainty", "mm"),
         metavar="MM",
         help="standard uncertainty due to the form error of ball and cone (0.0002)",
+    )
+    parser.add_argument(
+        "--compliance",
+        type=number_from(1e-7, 1.0, "compliance", "mm"),
+        metavar="MM",
+        help=(
+            "standard uncertainty of how far stylus, seat and stand give way, by the "
+            "sine of the tilt (0.004)"
+        ),
     )
     parser.add_argument(
         "--center-bias",
@@ -149,6 +158,7 @@ def assumptions_of(options: argparse.Namespace) -> Assumptions:
         "temperature_c": options.temperature,
         temperature: options.temperature_sigma,
         "form_error": options.form_error,
+        "compliance": options.compliance,
         "center_bias": options.center_bias,
     }
     return replace(assumed, **{n: x for n, x in given.items() if x is not None})

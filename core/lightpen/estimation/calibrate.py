@@ -37,6 +37,7 @@ from lightpen.estimation.contact.camera_motion import (
     pose_steadily,
     without_field,
 )
+from lightpen.estimation.contact.copies import without_copies
 from lightpen.estimation.contact.joint import (
     ContactModel,
     JointFit,
@@ -355,7 +356,12 @@ def _fit_single_cameras(
         _of_camera(
             rig,
             c,
-            partial(pose_steadily, camera, inputs.pen, without_field(camera, seen)),
+            partial(
+                pose_steadily,
+                camera,
+                inputs.pen,
+                without_field(camera, without_copies(seen)),
+            ),
         )
         for c, (camera, seen) in enumerate(zip(rig.cameras, observations, strict=True))
     )

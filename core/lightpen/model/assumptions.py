@@ -64,7 +64,7 @@ class Assumptions:
     temperature_c: float | None = None
     temperature: float = 0.5
     warmth: float = 3.0
-    diameter: float = 0.02
+    diameter: float = 0.05
     form_error: float = 0.0002
     center_bias: float = 0.003
     compliance: float = 0.004

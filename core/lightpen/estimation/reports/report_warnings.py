@@ -13,6 +13,8 @@ from lightpen.messages import Message, message
 from lightpen.model.rig import of_camera
 from lightpen.swing_messages import not_simultaneous
 
+NOISY = 2.5  # times the noise of the usual LED
+
 
 def lamp_warnings(calibration: Calibration) -> list[Message]:
     """Return warnings on fixed lamps that moved in the images."""
@@ -39,6 +41,8 @@ def warnings_of(calibration: Calibration) -> list[Message]:
         *lamp_warnings(calibration),
         *_seat_warnings(calibration),
         *(each.message for each in calibration.effects if each.is_certain),
+        *_copy_warnings(calibration),
+        *_noise_warnings(calibration),
     ]
     warnings += [
         message("warning.led-unseen", led=int(led) + 1)
@@ -57,6 +61,29 @@ def warnings_of(calibration: Calibration) -> list[Message]:
             message("warning.large-residuals", sigma=sigma, usual=USUAL_SIGMA)
         )
     return warnings
+
+
+def _copy_warnings(calibration: Calibration) -> list[Message]:
+    n_copies = calibration.reasons.count(Reason.COPY)
+    if not n_copies:
+        return []
+    n_images = len(calibration.reasons)
+    return [message("warning.copies", n_copies=n_copies, n_images=n_images)]
+
+
+def _noise_warnings(calibration: Calibration) -> list[Message]:
+    """Return what is told of LEDs that are far noisier than the others."""
+    bundle = calibration.bundle
+    noise = bundle.unknowns.noise.max(axis=0)
+    return [
+        message(
+            "warning.led-noise",
+            led=int(led) + 1,
+            sigma=float(noise[led] * bundle.sigma),
+            usual=bundle.sigma,
+        )
+        for led in np.flatnonzero(noise > NOISY)
+    ]
 
 
 def _seat_warnings(calibration: Calibration) -> list[Message]:

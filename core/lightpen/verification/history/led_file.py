@@ -168,8 +168,7 @@ def _require_unchanged(calibrations: Sequence[CalibrationFile], pen: Pen) -> Non
 def _pooled(calibrations: Sequence[Calibration], pen: Pen, scale: Scale | None) -> Pen:
     first = calibrations[0].bundle
     at = first.layout
-    shared = (*at.cameras, at.extrinsics, at.diameter, at.scale, at.leds)
-    common = np.r_[shared].astype(np.int64)
+    common = _common_to_swings(first)
     information = first.prior_information[np.ix_(common, common)].copy()
     leds = np.flatnonzero(np.isin(common, np.r_[at.leds]))
     information[np.ix_(leds, leds)] = 0.0
@@ -178,7 +177,7 @@ def _pooled(calibrations: Sequence[Calibration], pen: Pen, scale: Scale | None) 
     information[leds, leds] = 1 / known**2
     right = np.zeros(len(common))
     for calibration in calibrations:
-        own, own_right = _of_images(calibration.bundle, common)
+        own, own_right = _of_images(calibration.bundle)
         information += own
         right += own_right
     at_scale = int(np.flatnonzero(common == at.scale.start)[0])
@@ -205,10 +204,18 @@ def _pooled(calibrations: Sequence[Calibration], pen: Pen, scale: Scale | None) 
     )
 
 
-def _of_images(bundle: Bundle, common: IntArray) -> tuple[FloatArray, FloatArray]:
+def _common_to_swings(bundle: Bundle) -> IntArray:
+    """Return the indices of what swings share; effects differ from swing to swing."""
+    at = bundle.layout
+    shared = (*at.cameras, at.extrinsics, at.diameter, at.scale, at.leds)
+    return np.asarray(np.r_[shared], dtype=np.int64)
+
+
+def _of_images(bundle: Bundle) -> tuple[FloatArray, FloatArray]:
     """Return information and right side of what swings share, by one of them."""
     both = bundle.information + bundle.prior_information
     right = both @ bundle.values
+    common = _common_to_swings(bundle)
     own = np.setdiff1d(np.arange(len(both)), common)
     cross = bundle.information[np.ix_(common, own)]
     gain = np.linalg.solve(both[np.ix_(own, own)], cross.T).T

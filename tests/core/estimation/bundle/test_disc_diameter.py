@@ -53,7 +53,7 @@ def state_with(diameter: float) -> BundleState:
 
 
 def observed(areas: FloatArray, pen: Pen = PEN, rim: float = RIM) -> Observations:
-    rng = np.random.default_rng(4)
+    rng = np.random.default_rng(6)
     pixels = simulate_centers(
         CAMERA, pen, SWING.rotations, SWING.translations, 0.03, rng
     )

@@ -29,7 +29,7 @@ def drawn(sigmas: FloatArray, seed: int = 0, n_images: int = 100) -> FloatArray:
 def test_leds_that_are_alike_are_not_told_apart() -> None:
     told = [
         find_led_noise(
-            drawn(np.full(10, 0.03), seed), np.ones((100, 1, 10), bool), 0.03
+            drawn(np.full(10, 0.03), seed), np.ones((100, 1, 10), bool), 0.03, EVEN
         )
         for seed in range(50)
     ]

@@ -1,0 +1,66 @@
+"""Images that are copies of others count once."""
+
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.detection.reasons import Reason
+from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.contact.copies import without_copies
+from lightpen.estimation.reports.report_warnings import warnings_of
+from lightpen.formats.observation_files import Centers
+from lightpen.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+CAMERA, PEN = paper_camera(), paper_pen()
+
+
+def swung(n_images: int = 40) -> FloatArray:
+    rng = np.random.default_rng(0)
+    swing = swing_poses(n_images, rng)
+    return simulate_centers(CAMERA, PEN, swing.rotations, swing.translations, 0.03, rng)
+
+
+def reasons(pixels: FloatArray) -> list[Reason]:
+    centers = Centers(np.arange(len(pixels)), pixels, Path("simulated"))
+    return list(without_copies(observe_centers(centers, CAMERA, PEN)).reasons)
+
+
+def test_the_first_of_equal_images_counts() -> None:
+    pixels = swung()
+    found = reasons(np.concatenate([pixels, pixels[3:5], pixels[3:4]]))
+    assert found == [Reason.NONE] * 40 + [Reason.COPY] * 3
+
+
+def test_an_image_that_was_coded_anew_is_a_copy() -> None:
+    pixels = swung()
+    coded = pixels[:5] + 0.0005 * np.random.default_rng(1).normal(size=(5, 10, 2))
+    assert reasons(np.concatenate([pixels, coded])).count(Reason.COPY) == 5
+
+
+def test_images_of_a_pen_at_rest_differ_by_their_noise() -> None:
+    pixels = swung()
+    again = pixels[:5] + 0.01 * np.random.default_rng(1).normal(size=(5, 10, 2))
+    assert Reason.COPY not in reasons(np.concatenate([pixels, again]))
+
+
+def test_images_given_three_times_are_worth_as_much_as_once() -> None:
+    pixels = swung()
+    results = []
+    for given in (pixels, np.concatenate([pixels] * 3)):
+        centers = Centers(np.arange(len(given)), given, Path("simulated"))
+        results.append(calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN)))
+    once, thrice = results
+    np.testing.assert_allclose(thrice.joint.tip_pen, once.joint.tip_pen, atol=1e-9)
+    np.testing.assert_allclose(
+        thrice.budget.expanded_uncertainty, once.budget.expanded_uncertainty
+    )
+    codes = [each.code for each in warnings_of(thrice)]
+    assert "warning.copies" in codes
+    assert "warning.copies" not in [each.code for each in warnings_of(once)]
