@@ -24,7 +24,6 @@ MESSAGES = {
     "reason.ambiguous": "ambiguous",
     "reason.misfit": "LEDs do not fit",
     "reason.slipped": "tip slipped",
-    "reason.copy": "copy of another image",
     "reason.taken-out": "excluded manually",
     "reason.other-moment": "not simultaneous",
     "reason.copy": "same as another image",

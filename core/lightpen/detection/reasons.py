@@ -26,7 +26,6 @@ class Reason(StrEnum):
     AMBIGUOUS = "ambiguous"
     MISFIT = "LEDs do not fit"
     SLIPPED = "tip slipped"
-    COPY = "copy of another image"
     TAKEN_OUT = "taken out"  # by the user
     OTHER_MOMENT = "not of the same moment"  # as that of another camera
     COPY = "same as another image"
@@ -64,7 +63,6 @@ _WORDS = {
     Reason.AMBIGUOUS: message("reason.ambiguous"),
     Reason.MISFIT: message("reason.misfit"),
     Reason.SLIPPED: message("reason.slipped"),
-    Reason.COPY: message("reason.copy"),
     Reason.TAKEN_OUT: message("reason.taken-out"),
     Reason.OTHER_MOMENT: message("reason.other-moment"),
     Reason.COPY: message("reason.copy"),
