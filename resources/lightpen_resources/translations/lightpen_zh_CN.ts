@@ -144,6 +144,10 @@
         <translation>测球和锥孔的形状误差</translation>
     </message>
     <message>
+        <source>Compliance of stylus, seat and stand</source>
+        <translation>测杆、锥座和支架的柔度</translation>
+    </message>
+    <message>
         <source>Systematic error of LED centres</source>
         <translation>LED 中心的系统误差</translation>
     </message>
@@ -437,6 +441,179 @@
     </message>
 </context>
 <context>
+    <name>DayControl</name>
+    <message>
+        <source>Start swing</source>
+        <translation>开始摆动</translation>
+    </message>
+    <message>
+        <source>Check the camera</source>
+        <translation>检查相机</translation>
+    </message>
+    <message>
+        <source>Check the LEDs</source>
+        <translation>检查 LED</translation>
+    </message>
+    <message>
+        <source>Verify the tip</source>
+        <translation>验证测头</translation>
+    </message>
+</context>
+<context>
+    <name>DayPage</name>
+    <message>
+        <source>Tip {0}, pen {1}</source>
+        <translation>测头 {0}，光笔 {1}</translation>
+    </message>
+    <message>
+        <source>ball {0:g} mm</source>
+        <translation>测球 {0:g} mm</translation>
+    </message>
+    <message>
+        <source>cone {0}</source>
+        <translation>锥孔 {0}</translation>
+    </message>
+    <message>
+        <source>nominal {0} {1} {2}</source>
+        <translation>标称 {0} {1} {2}</translation>
+    </message>
+    <message>
+        <source>limit of U {0:g} mm</source>
+        <translation>U 的限值 {0:g} mm</translation>
+    </message>
+    <message>
+        <source>{0} µm</source>
+        <translation>{0} µm</translation>
+    </message>
+    <message>
+        <source>due today</source>
+        <translation>今天到期</translation>
+    </message>
+    <message>
+        <source>due in {0} days</source>
+        <translation>{0} 天后到期</translation>
+    </message>
+    <message>
+        <source>today</source>
+        <translation>今天</translation>
+    </message>
+    <message>
+        <source>yesterday</source>
+        <translation>昨天</translation>
+    </message>
+    <message>
+        <source>{0} days ago</source>
+        <translation>{0} 天前</translation>
+    </message>
+    <message>
+        <source>The camera sends no images.</source>
+        <translation>相机没有发送图像。</translation>
+    </message>
+    <message>
+        <source>Camera</source>
+        <translation>相机</translation>
+    </message>
+    <message>
+        <source>Camera {0:.0f} fps</source>
+        <translation>相机 {0:.0f} fps</translation>
+    </message>
+    <message>
+        <source>LEDs fit to {0:.2f} px only, usual is {1:g} px.</source>
+        <translation>LED 仅吻合到 {0:.2f} px，通常为 {1:g} px。</translation>
+    </message>
+    <message>
+        <source>Pen {0} is overdue.</source>
+        <translation>光笔 {0} 已过期。</translation>
+    </message>
+    <message>
+        <source>LEDs of pen {0}</source>
+        <translation>光笔 {0} 的 LED</translation>
+    </message>
+    <message>
+        <source>Drift reference not watched</source>
+        <translation>未监视漂移参考</translation>
+    </message>
+    <message>
+        <source>The camera moved. Verify the tip.</source>
+        <translation>相机已移动。请验证测头。</translation>
+    </message>
+    <message>
+        <source>Drift reference stable</source>
+        <translation>漂移参考稳定</translation>
+    </message>
+</context>
+<context>
+    <name>DayView</name>
+    <message>
+        <source>Camera</source>
+        <translation>相机</translation>
+    </message>
+    <message>
+        <source>LEDs</source>
+        <translation>LED</translation>
+    </message>
+    <message>
+        <source>Drift reference</source>
+        <translation>漂移参考</translation>
+    </message>
+    <message>
+        <source>Scan or type a tip</source>
+        <translation>扫描或输入测头</translation>
+    </message>
+    <message>
+        <source>Search tips</source>
+        <translation>搜索测头</translation>
+    </message>
+    <message>
+        <source>All tips</source>
+        <translation>所有测头</translation>
+    </message>
+    <message>
+        <source>Due tips</source>
+        <translation>到期的测头</translation>
+    </message>
+    <message>
+        <source>Tips shown</source>
+        <translation>显示的测头</translation>
+    </message>
+    <message>
+        <source>Tips of this station</source>
+        <translation>本工作站的测头</translation>
+    </message>
+    <message>
+        <source>Tip</source>
+        <translation>测头</translation>
+    </message>
+    <message>
+        <source>Pen</source>
+        <translation>光笔</translation>
+    </message>
+    <message>
+        <source>Due</source>
+        <translation>到期</translation>
+    </message>
+    <message>
+        <source>U (k = 2)</source>
+        <translation>U (k = 2)</translation>
+    </message>
+    <message>
+        <source>Calibrated</source>
+        <translation>标定时间</translation>
+    </message>
+    <message>
+        <source>Verdict</source>
+        <translation>结论</translation>
+    </message>
+    <message>
+        <source>Swing anyway</source>
+        <translation>仍然摆动</translation>
+    </message>
+    <message>
+        <source>Set up station...</source>
+        <translation>设置工作站…</translation>
+    </message>
+</context>
+<context>
     <name>Demo</name>
     <message>
         <source>Demo ended: no tip to accept.</source>
@@ -614,7 +791,7 @@
     </message>
     <message>
         <source>This tip was accepted at another station.</source>
-        <translation>关于 Lightpen</translation>
+        <translation>此测头是在另一个工作站接受的。</translation>
     </message>
     <message>
         <source>This tip is current.</source>
@@ -1404,6 +1581,10 @@
         <translation>{0} 和 {1} px</translation>
     </message>
     <message>
+        <source>{0} and {1} px (k = 2)</source>
+        <translation>{0} 和 {1} px (k = 2)</translation>
+    </message>
+    <message>
         <source>{0} x {1}</source>
         <translation>{0} × {1}</translation>
     </message>
@@ -1736,6 +1917,14 @@
         <translation>放弃修改</translation>
     </message>
     <message>
+        <source>{0} Use it for this pen from now on?</source>
+        <translation>{0} 今后将其用于此光笔吗？</translation>
+    </message>
+    <message>
+        <source>Use this file</source>
+        <translation>使用此文件</translation>
+    </message>
+    <message>
         <source>{0} remains open.</source>
         <translation>{0} 仍处于打开状态。</translation>
     </message>
@@ -1927,8 +2116,8 @@
         <translation>请打开本光笔的 LED 文件，并将光笔置于相机视野内。</translation>
     </message>
     <message>
-        <source>{0} The swing will probably fail.</source>
-        <translation>此测头为当前测头。</translation>
+        <source>The swing will probably fail.</source>
+        <translation>摆动很可能失败。</translation>
     </message>
     <message>
         <source>Swing anyway</source>
@@ -2308,7 +2497,7 @@
     </message>
     <message>
         <source>Answer the question first.</source>
-        <translation>LED 表有未保存的更改。</translation>
+        <translation>请先回答问题。</translation>
     </message>
     <message>
         <source>Press this button at the computer.</source>
@@ -2343,8 +2532,8 @@
         <translation>光笔测头标定</translation>
     </message>
     <message>
-        <source>Choose the data folder at the step Start or in the options (F10).</source>
-        <translation>请在“开始”步骤或选项 (F10) 中选择数据文件夹。</translation>
+        <source>Choose the data folder at Set up station or in the options (F10).</source>
+        <translation>请在“设置工作站”或选项 (F10) 中选择数据文件夹。</translation>
     </message>
 </context>
 <context>
@@ -2717,6 +2906,25 @@
     </message>
 </context>
 <context>
+    <name>PenFiles</name>
+    <message>
+        <source>{0} is the LED file of pen {1}, not of pen {2}.</source>
+        <translation>{0} 是光笔 {1} 的 LED 文件，而不是光笔 {2} 的。</translation>
+    </message>
+    <message>
+        <source>{0} is not the LED file stored with pen {1} ({2}).</source>
+        <translation>{0} 不是与光笔 {1} 一起保存的 LED 文件（{2}）。</translation>
+    </message>
+    <message>
+        <source>LED file</source>
+        <translation>LED 文件</translation>
+    </message>
+    <message>
+        <source>{0} was changed since it was stored with pen {1}. Open the LED file of this pen.</source>
+        <translation>{0} 在与光笔 {1} 一起保存后被更改。请打开此光笔的 LED 文件。</translation>
+    </message>
+</context>
+<context>
     <name>PenInSpace</name>
     <message>
         <source>The pen in space</source>
@@ -2987,7 +3195,7 @@
     <name>ReasonBar</name>
     <message>
         <source>The tip was replaced or refitted.</source>
-        <translation>请在计算机上按此按钮。</translation>
+        <translation>测头已更换或重新安装。</translation>
     </message>
     <message>
         <source>The pen was repaired or its LEDs were measured again.</source>
@@ -3232,14 +3440,6 @@
         <translation>测头已接受。</translation>
     </message>
     <message>
-        <source>Start next calibration</source>
-        <translation>开始下一次标定</translation>
-    </message>
-    <message>
-        <source>Read the result first.</source>
-        <translation>记录的图像</translation>
-    </message>
-    <message>
         <source>Check settings</source>
         <translation>检查设置</translation>
     </message>
@@ -3330,6 +3530,18 @@
     <message>
         <source>Capture more</source>
         <translation>继续采集</translation>
+    </message>
+    <message>
+        <source>Back to Start</source>
+        <translation>返回“开始”</translation>
+    </message>
+    <message>
+        <source>Swing tip {0}</source>
+        <translation>摆动测头 {0}</translation>
+    </message>
+    <message>
+        <source>Read the result first.</source>
+        <translation>请先查看结果。</translation>
     </message>
     <message>
         <source>NO TIP YET</source>
@@ -3652,6 +3864,13 @@
     </message>
 </context>
 <context>
+    <name>SetupView</name>
+    <message>
+        <source>Show the tips of this station</source>
+        <translation>显示本工作站的测头</translation>
+    </message>
+</context>
+<context>
     <name>Sidebar</name>
     <message>
         <source>Live stream at {0}, clients: {1}</source>
@@ -3860,6 +4079,14 @@
     <message>
         <source>Start</source>
         <translation>开始</translation>
+    </message>
+    <message>
+        <source>Set up station</source>
+        <translation>设置工作站</translation>
+    </message>
+    <message>
+        <source>Choose a tip, seat it in the cone and start the swing.</source>
+        <translation>选择测头，将其放入锥孔，然后开始摆动。</translation>
     </message>
     <message>
         <source>Enter what you are calibrating. Entries are saved for this station.</source>
@@ -4266,7 +4493,7 @@
     </message>
     <message>
         <source>Left and right are swapped</source>
-        <translation>检查设置</translation>
+        <translation>左右互换</translation>
     </message>
     <message>
         <source>Learn again on which side you stand.</source>
@@ -4720,6 +4947,10 @@
         <translation>测头已通过验证</translation>
     </message>
     <message>
+        <source>Scale and form verified</source>
+        <translation>比例和形状已验证</translation>
+    </message>
+    <message>
         <source>Check needed</source>
         <translation>需检查</translation>
     </message>
@@ -4804,7 +5035,7 @@
     <name>WithdrawalBar</name>
     <message>
         <source>Revoke this acceptance? The previous result becomes current again, which a supervisor has to approve.</source>
-        <translation>重新开始</translation>
+        <translation>撤销此次接受？之前的结果将重新成为当前结果，这需要主管批准。</translation>
     </message>
     <message>
         <source>Reason</source>
@@ -4873,10 +5104,6 @@
     <message>
         <source>1 number</source>
         <translation>1 个数</translation>
-    </message>
-    <message>
-        <source>3D Slicer (ITK transform)</source>
-        <translation>3D Slicer（ITK 变换）</translation>
     </message>
     <message>
         <source>A fixed cone is the drift reference: its moves from visit to visit count in U of what is probed in between.</source>
@@ -5185,18 +5412,6 @@
     <message>
         <source>Location error</source>
         <translation>位置误差</translation>
-    </message>
-    <message>
-        <source>Location error {error:.4f} mm over all postures (limit {limit:.4f} mm).</source>
-        <translation>各姿态的位置误差 {error:.4f} mm（限值 {limit:.4f} mm）。</translation>
-    </message>
-    <message>
-        <source>Location error {error:.4f} mm over all postures (limit {limit:.4f} mm): the point moves with the pen tilt.</source>
-        <translation>各姿态的位置误差 {error:.4f} mm（限值 {limit:.4f} mm）：该点随光笔倾斜而移动。</translation>
-    </message>
-    <message>
-        <source>Location error {error:.4f} mm, {expected:.4f} mm expected.</source>
-        <translation>位置误差 {error:.4f} mm，预期 {expected:.4f} mm。</translation>
     </message>
     <message>
         <source>Measured</source>
@@ -5595,6 +5810,14 @@
         <translation>视频路径 {path} 不是有效的 UTF-8，视频解码器无法使用。请重命名视频或其文件夹，或将其复制到别处。</translation>
     </message>
     <message>
+        <source>The plan has no feature {name}. Its features are: {names}. Name the touches after a feature.</source>
+        <translation>计划中没有要素 {name}。其要素为：{names}。请按要素命名测点。</translation>
+    </message>
+    <message>
+        <source>The point scatters, std. deviation {deviation:.4f} mm along {axis} (at most {limit:.4f} mm is allowed or expected by noise), which no other tip position explains. The tip may not rest in the cone: look for dirt, wear and a loose cone.</source>
+        <translation>点的散布沿 {axis} 的标准差为 {deviation:.4f} mm（允许或按噪声预期不超过 {limit:.4f} mm），其他测头位置无法解释。测头可能未就位于锥孔：请检查污物、磨损和锥座松动。</translation>
+    </message>
+    <message>
         <source>The points lie in one place or on a line, which determines no plane. Probe the plate all over.</source>
         <translation>各测点位于同一处或一条直线上，不能确定平面。请在整个平板上触测。</translation>
     </message>
@@ -5743,10 +5966,6 @@
         <translation>符合 PTB 模式的数字校准证书；其中注明实验室</translation>
     </message>
     <message>
-        <source>a Transform element for the device set of PLUS</source>
-        <translation>PLUS 设备配置中的 Transform 元素</translation>
-    </message>
-    <message>
         <source>a TransformStamped of ROS, in metres</source>
         <translation>ROS 的 TransformStamped，单位为米</translation>
     </message>
@@ -5757,10 +5976,6 @@
     <message>
         <source>a table with a row for each image</source>
         <translation>每幅图像一行的表格</translation>
-    </message>
-    <message>
-        <source>an ITK transform (.tfm) for 3D Slicer</source>
-        <translation>供 3D Slicer 使用的 ITK 变换 (.tfm)</translation>
     </message>
     <message>
         <source>bottom left</source>
@@ -5955,10 +6170,6 @@
         <translation>{name} 中 calibration_temperature 为 {celsius:g}；应为 {coldest:g} 至 {warmest:g} 摄氏度。请更正或删除。</translation>
     </message>
     <message>
-        <source>{name} has the distortion model {model}, which is not supported. Calibrate the camera again with plumb_bob (radtan) or rational_polynomial.</source>
-        <translation>{name} 的畸变模型为 {model}，本程序不支持。请用 plumb_bob (radtan) 或 rational_polynomial 重新标定相机。</translation>
-    </message>
-    <message>
         <source>{name} has the same camera file {file} for {one} and {other}. Give each camera its own calibration file.</source>
         <translation>{name} 为 {one} 和 {other} 指定了同一个内参文件 {file}。每台相机都需要自己的标定文件。</translation>
     </message>
@@ -5996,7 +6207,31 @@
     </message>
     <message>
         <source>&apos;{id}&apos; is not a valid ID. Enter up to {most} letters and digits without / and \, as on the label.</source>
-        <translation>本程序在使用同一数据文件夹 {0} 的其他窗口中打开。结果共享。</translation>
+        <translation>&apos;{id}&apos; 不是有效的编号。请按标签输入不超过 {most} 个字母和数字，不含 / 和 \。</translation>
+    </message>
+    <message>
+        <source>3D Slicer</source>
+        <translation>3D Slicer</translation>
+    </message>
+    <message>
+        <source>5 distortion coefficients, cross-validated error {held_out:.4f} px; {others} not significantly better.</source>
+        <translation>5 个畸变系数，交叉验证误差 {held_out:.4f} px；{others}没有显著改善。</translation>
+    </message>
+    <message>
+        <source>8 distortion coefficients (rational model). Cross-validated error: {held_out:.4f} px.</source>
+        <translation>8 个畸变系数（有理模型）。交叉验证误差：{held_out:.4f} px。</translation>
+    </message>
+    <message>
+        <source>8 distortion coefficients (rational model): they reduce the cross-validated error to {held_out:.4f} px; {others}.</source>
+        <translation>8 个畸变系数（有理模型）：交叉验证误差降至 {held_out:.4f} px；{others}。</translation>
+    </message>
+    <message>
+        <source>A file is missing among the limits in {folder}. Nothing is accepted until the folder is restored from a copy.</source>
+        <translation>{folder} 的限值中缺少一个文件。在从副本恢复该文件夹之前，不接受任何结果。</translation>
+    </message>
+    <message>
+        <source>A length from LED {number} to itself is none. Give the numbers of two LEDs.</source>
+        <translation>LED {number} 到自身的长度没有意义。请给出两个 LED 的编号。</translation>
     </message>
     <message>
         <source>The swing is paused.</source>
@@ -6439,10 +6674,6 @@
         <translation>{name} 描述的相机模型为 {model}；需要 pinhole 模型。请用 pinhole-radtan 重新标定相机。</translation>
     </message>
     <message>
-        <source>{name} describes a fisheye lens ({model}). A pinhole camera is needed: calibrate the camera again with the distortion model plumb_bob (radtan) or rational_polynomial.</source>
-        <translation>{name} 描述的是鱼眼镜头（{model}）。需要针孔相机：请用畸变模型 plumb_bob (radtan) 或 rational_polynomial 重新标定相机。</translation>
-    </message>
-    <message>
         <source>{name} gives an image size of {width:g} x {height:g} px. Two whole numbers from 1 to {most} are needed.</source>
         <translation>{name} 给出的图像尺寸为 {width:g} × {height:g} px。需要两个 1 到 {most} 的整数。</translation>
     </message>
@@ -6567,24 +6798,8 @@
         <translation>0 0 0 不是方向。请给出测杆轴线在光笔坐标系中由测球指向光笔的方向，例如 0 1 0。</translation>
     </message>
     <message>
-        <source>5 distortion coefficients: 8 do not reduce the cross-validated error ({held_out:.4f} px with 5, {held_out_more:.4f} px with 8).</source>
-        <translation>采用 5 个畸变系数：8 个系数未减小交叉验证误差（5 个：{held_out:.4f} px，8 个：{held_out_more:.4f} px）。</translation>
-    </message>
-    <message>
         <source>5 distortion coefficients: the views do not determine 8. Cross-validated error: {held_out:.4f} px.</source>
         <translation>采用 5 个畸变系数：这些视图不足以确定 8 个系数。交叉验证误差：{held_out:.4f} px。</translation>
-    </message>
-    <message>
-        <source>8 distortion coefficients: they reduce the cross-validated error from {held_out:.4f} to {held_out_more:.4f} px.</source>
-        <translation>采用 8 个畸变系数：交叉验证误差由 {held_out:.4f} px 减小到 {held_out_more:.4f} px。</translation>
-    </message>
-    <message>
-        <source>A file is missing among the limits in {folder}. Nothing is accepted until the folder is restored from a copy.</source>
-        <translation>摆动已暂停。</translation>
-    </message>
-    <message>
-        <source>A length from LED {number} to itself is none. Give the numbers of two LEDs.</source>
-        <translation>LED {number} 到自身的长度没有意义。请给出两个 LED 的编号。</translation>
     </message>
     <message>
         <source>A name, the camera images or a file is missing. Complete the earlier steps, then continue the verification.</source>
@@ -6592,7 +6807,7 @@
     </message>
     <message>
         <source>A pen file needs one known length. Measure the distance between two LEDs, and give it.</source>
-        <translation>缺少名称、相机图像或文件。请完成前面的步骤，然后继续验证。</translation>
+        <translation>光笔文件需要一个已知长度。请测量两个 LED 之间的距离并给出。</translation>
     </message>
     <message>
         <source>A point {distance:.1f} mm from the others does not count: the tip was not in the cone. Put it into the cone and hold it still.</source>
@@ -6604,7 +6819,7 @@
     </message>
     <message>
         <source>A supervisor&apos;s approval and a reason are needed. Enter the supervisor&apos;s name and password.</source>
-        <translation>与其他点相距 {distance:.1f} mm 的点无效：测头不在锥孔中。请将其放入锥孔并保持静止。</translation>
+        <translation>需要主管批准和理由。请输入主管的姓名和密码。</translation>
     </message>
     <message>
         <source>All LEDs changed by one scale factor, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (aluminium), or the distance between cone and camera changed. No single LED moved.</source>
@@ -6656,7 +6871,7 @@
     </message>
     <message>
         <source>Beside one pen {n_others} other lights move with each other: there is a second pen, or a mirror. Remove or cover it, and repeat the swing.</source>
-        <translation>所有 LED 按同一比例变化 {growth:+.0f} ppm：光笔温度变化 {kelvin:+.1f} K（铝），或锥孔与相机的距离发生了变化。没有单个 LED 移动。</translation>
+        <translation>除一支光笔外，另有 {n_others} 个光点一起移动：存在第二支光笔或镜子。请移走或遮住，然后重新摆动。</translation>
     </message>
     <message>
         <source>Both cameras see the board in {n_pairs} views; at least {least} are needed. Add views in which both cameras see the whole board.</source>
@@ -6719,12 +6934,24 @@
         <translation>未安装集群计算所需的 Dask。请安装附加组件 cluster，或在本机计算。</translation>
     </message>
     <message>
+        <source>Decision rule of verifications</source>
+        <translation>验证的判定规则</translation>
+    </message>
+    <message>
+        <source>Decision rule: {rule}, at most {risk:g} %.</source>
+        <translation>判定规则：{rule}，不超过 {risk:g} %。</translation>
+    </message>
+    <message>
+        <source>Decision rule: {rule}.</source>
+        <translation>判定规则：{rule}。</translation>
+    </message>
+    <message>
         <source>Desktop entries exist on Linux only. On Windows the installer creates the start menu entry.</source>
         <translation>桌面条目仅适用于 Linux。在 Windows 上，开始菜单项由安装程序创建。</translation>
     </message>
     <message>
         <source>Different poses of the board: {n_views}; at least {least} are needed, 15 are better. Move and tilt the board between views.</source>
-        <translation>两台相机同时看到标定板的视图有 {n_pairs} 个；至少需要 {least} 个。请增加两台相机都能看到整块标定板的视图。</translation>
+        <translation>标定板的不同位姿：{n_views} 个；至少需要 {least} 个，最好 15 个。请在各视图之间移动并倾斜标定板。</translation>
     </message>
     <message>
         <source>Enter the reason for reinstating this tip.</source>
@@ -6744,7 +6971,7 @@
     </message>
     <message>
         <source>Entry {number} is not of this station. Only a tip that was accepted here can be reinstated.</source>
-        <translation>链 {chain} 的第 {first} 至 {last} 条记录缺失。</translation>
+        <translation>第 {number} 条记录不属于本工作站。只有在此接受的测头才能恢复。</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} does not match its predecessor: one of the two was replaced.</source>
@@ -6756,15 +6983,19 @@
     </message>
     <message>
         <source>Entry {number} of chain {chain} introduces a station key that neither the key before nor a supervisor approved. Ask the station whether its data folder was moved to another computer.</source>
-        <translation>链 {chain} 的第 {number} 条记录与前一条不匹配：其中一条被替换。</translation>
+        <translation>链 {chain} 的第 {number} 条记录引入了一个工作站密钥，既未经之前的密钥也未经主管批准。请询问该工作站其数据文件夹是否被移到另一台计算机。</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} is missing.</source>
         <translation>链 {chain} 的第 {number} 个条目缺失。</translation>
     </message>
     <message>
+        <source>Entry {number} of chain {chain} is not the same here and on the server: a data folder was copied and both copies were used, or one side was modified. Nothing was copied. Check both sides, and keep them until the cause is known.</source>
+        <translation>链 {chain} 的第 {number} 条记录在此处与服务器上不同：数据文件夹被复制且两份副本都被使用，或有一方被修改。未复制任何内容。请检查双方，并在查明原因之前予以保留。</translation>
+    </message>
+    <message>
         <source>Entry {number} of chain {chain} is signed by a key that is not the station&apos;s: it was forged, or entered by a copy of the data folder on another computer.</source>
-        <translation>链 {chain} 的第 {number} 条记录缺失。</translation>
+        <translation>链 {chain} 的第 {number} 条记录不是用本工作站的密钥签名的：它是伪造的，或由另一台计算机上的数据文件夹副本登记。</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} was modified.</source>
@@ -6775,8 +7006,16 @@
         <translation>标定板{sides}倾斜的视图少于 {least} 幅。请补充。</translation>
     </message>
     <message>
+        <source>Fisheye model (Kannala-Brandt), cross-validated error {held_out:.4f} px; {others}.</source>
+        <translation>鱼眼模型 (Kannala-Brandt)，交叉验证误差 {held_out:.4f} px；{others}。</translation>
+    </message>
+    <message>
+        <source>Fisheye model (Kannala-Brandt): no other fits. Cross-validated error: {held_out:.4f} px.</source>
+        <translation>鱼眼模型 (Kannala-Brandt)：其他模型均不适合。交叉验证误差：{held_out:.4f} px。</translation>
+    </message>
+    <message>
         <source>For a moment, the tip in the cone. Then the program learns where you stand.</source>
-        <translation>链 {chain} 的第 {number} 条记录被修改。</translation>
+        <translation>请保持片刻，测头在锥孔中。随后程序识别您所站的位置。</translation>
     </message>
     <message>
         <source>Frame rate {sent:.1f} fps instead of {wanted:.1f} fps, limited by link or exposure. Lower the frame rate, or use a smaller region or a shorter exposure.</source>
@@ -6793,6 +7032,10 @@
     <message>
         <source>Hold the pen upright. Images needed: {n_images}.</source>
         <translation>请竖直握持光笔。还需 {n_images} 幅图像。</translation>
+    </message>
+    <message>
+        <source>ITK transform</source>
+        <translation>ITK 变换</translation>
     </message>
     <message>
         <source>If the tip has its own limit of change, the distance from the previous tip (as found) to the accepted tip (as left) is compared with it by simple acceptance; beyond it the verdict is CHECK.</source>
@@ -6843,6 +7086,10 @@
         <translation>应为 LED {needed} 的地方是 LED {led}。请按升序列出 LED 1 至 {n_leds}。</translation>
     </message>
     <message>
+        <source>LED {led} is noisier than the others: {sigma:.3f} px, usual is {usual:.3f} px; it counts accordingly less. Clean it, and check its brightness and its supply.</source>
+        <translation>LED {led} 的噪声大于其他 LED：{sigma:.3f} px，通常为 {usual:.3f} px；其权重相应降低。请清洁它，并检查其亮度和供电。</translation>
+    </message>
+    <message>
         <source>LED {led} is {distance:.2f} mm from its file position. Check that the LED file belongs to this pen.</source>
         <translation>LED {led} 与文件中的位置相差 {distance:.2f} mm。请检查 LED 文件是否属于此光笔。</translation>
     </message>
@@ -6873,6 +7120,10 @@
     <message>
         <source>LEDs of a pen</source>
         <translation>光笔的 LED</translation>
+    </message>
+    <message>
+        <source>LEDs too small</source>
+        <translation>LED 过小</translation>
     </message>
     <message>
         <source>LEDs {first} and {second} are swapped. LEDs 1 to 4 must be in order along the back line, and 5 to 7 and 8 to 10 along the columns in the same direction. Swap their coordinates.</source>
@@ -6915,12 +7166,24 @@
         <translation>无法在 {place} 提供实时数据流：{reason}。请选择 1024 到 65535 之间空闲的端口。</translation>
     </message>
     <message>
+        <source>Location error {error:.4f} mm (U {uncertainty:.4f} mm), {expected:.4f} mm expected by noise.</source>
+        <translation>位置误差 {error:.4f} mm（U {uncertainty:.4f} mm），按噪声预期 {expected:.4f} mm。</translation>
+    </message>
+    <message>
+        <source>Location error {error:.4f} mm over all postures (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
+        <translation>各姿态的位置误差为 {error:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
+        <source>Location error {error:.4f} mm over all postures (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the point moves with the pen tilt.</source>
+        <translation>各姿态的位置误差为 {error:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：点随光笔倾斜而移动。</translation>
+    </message>
+    <message>
         <source>Max. change {limit:g} mm is not valid. Enter a value above 0 and up to {most:g} mm.</source>
         <translation>最大变化 {limit:g} mm 无效。请输入大于 0 且不超过 {most:g} mm 的值。</translation>
     </message>
     <message>
         <source>Most centres are outside the image: they reach to ({x:.0f}, {y:.0f}) px, and the images have {width} x {height} px. Check the size of the images.</source>
-        <translation>帧率为 {sent:.1f} fps 而不是 {wanted:.1f} fps，受链路或曝光限制。请降低帧率，或使用更小的区域或更短的曝光。</translation>
+        <translation>大多数中心位于图像之外：最远到 ({x:.0f}, {y:.0f}) px，而图像为 {width} x {height} px。请检查图像尺寸。</translation>
     </message>
     <message>
         <source>Most images show fewer than {n_needed} spots (median {median:.0f}); at least {n_needed} of the {n_leds} LEDs are needed. Check that the LEDs are lit and in the image, and check the exposure.</source>
@@ -6933,6 +7196,10 @@
     <message>
         <source>Motion blur. Swing the pen more slowly.</source>
         <translation>图像有运动模糊。请放慢摆动。</translation>
+    </message>
+    <message>
+        <source>Next: average more calibrations, reduce the noise of the images, or use the tip for wider tolerances only.</source>
+        <translation>下一步：对更多次标定取平均，降低图像噪声，或仅将测头用于较宽的公差。</translation>
     </message>
     <message>
         <source>Next: capture more images. The images of this swing are retained.</source>
@@ -6983,6 +7250,10 @@
         <translation>下一步：让光笔达到室温，并测量一段已认证的长度。</translation>
     </message>
     <message>
+        <source>Next: probe more points with more images each, tilt the pen farther to all sides, and turn it.</source>
+        <translation>下一步：探测更多的点，每点更多图像，将光笔向各侧进一步倾斜并转动。</translation>
+    </message>
+    <message>
         <source>Next: tighten the tip, inspect the LEDs, calibrate again, and verify the new result.</source>
         <translation>下一步：拧紧测头，检查光笔的 LED，重新标定，并验证新的结果。</translation>
     </message>
@@ -6999,6 +7270,10 @@
         <translation>下一步：使用最近一次标定的测头。</translation>
     </message>
     <message>
+        <source>Next: verify the tip in a fixed point, or probe again with the pen tilted and turned another way at each point.</source>
+        <translation>下一步：用固定点验证测头，或重新探测，每点以不同方式倾斜和转动光笔。</translation>
+    </message>
+    <message>
         <source>No Dask scheduler responds at {address}. Check the address, such as tcp://10.0.0.5:8786, and that the scheduler is running.</source>
         <translation>{address} 处没有 Dask 调度器应答。请检查地址（例如 tcp://10.0.0.5:8786）以及调度器是否在运行。</translation>
     </message>
@@ -7008,7 +7283,7 @@
     </message>
     <message>
         <source>No focal length from 0.3 to 12 image widths explains the tracks. Check that the tip stayed in the cone, and tilt the pen in all directions, with roll.</source>
-        <translation>大多数图像中的光斑少于 {n_needed} 个（中位数 {median:.0f}）；{n_leds} 个 LED 中至少需要 {n_needed} 个。请检查 LED 是否点亮并在图像内，并检查曝光。</translation>
+        <translation>0.3 至 12 倍图像宽度的焦距均不能解释这些轨迹。请检查测头是否始终在锥孔中，并将光笔向各方向倾斜且绕轴转动。</translation>
     </message>
     <message>
         <source>No image from camera {serial} for {silence:.0f} s. Check cable and power.</source>
@@ -7036,7 +7311,7 @@
     </message>
     <message>
         <source>No length is known: all lengths are in hundredths of the largest distance between two LEDs.</source>
-        <translation>相机 {serial} 已 {silence:.0f} s 没有图像。请检查电缆和电源。</translation>
+        <translation>没有已知长度：所有长度以两个 LED 之间最大距离的百分之一为单位。</translation>
     </message>
     <message>
         <source>No pen, no camera and no fixed tip explain the tracks: they miss by {misfit:.1f} px. Check that the tip stayed in the cone, that the LEDs are fixed to one pen, and that camera and cone stand still.</source>
@@ -7052,7 +7327,7 @@
     </message>
     <message>
         <source>No touches of {name} are given. Give them as {name}=IMAGES, or as a folder of that name.</source>
-        <translation>尚未设置主管密码。请在“开始”的“所有限值”中设置。</translation>
+        <translation>未给出 {name} 的测点。请以 {name}=IMAGES 或同名文件夹给出。</translation>
     </message>
     <message>
         <source>No view covers these image corners: {corners}. Add such views.</source>
@@ -7063,8 +7338,20 @@
         <translation>{n_images} 幅图像中均未找到标定板 {board}。整块板须在图像内且清晰，四周留有亮边；请检查其类型和点数。</translation>
     </message>
     <message>
+        <source>Not capable: the least of Cg and Cgk is {least:.2f}, {needed:.2f} are needed for a tolerance of {tolerance:g} mm.</source>
+        <translation>能力不足：Cg 与 Cgk 的较小值为 {least:.2f}，对 {tolerance:g} mm 的公差需要 {needed:.2f}。</translation>
+    </message>
+    <message>
         <source>Not enough tilt {sides}. Tilt the pen further. Images needed: about {n_images}.</source>
         <translation>{sides}倾斜不足。请增大倾斜。还需约 {n_images} 幅图像。</translation>
+    </message>
+    <message>
+        <source>Nothing was fetched: {finding}</source>
+        <translation>未取回任何内容：{finding}</translation>
+    </message>
+    <message>
+        <source>On the server: {finding}</source>
+        <translation>服务器上：{finding}</translation>
     </message>
     <message>
         <source>One swing does not show how a pen changes; give two at least.</source>
@@ -7072,7 +7359,7 @@
     </message>
     <message>
         <source>Only {n_used} of {n_images} images agree on one tip. Press the tip into the cone, clamp cone and camera, and repeat the swing.</source>
-        <translation>没有视图覆盖图像的这些角：{corners}。请增加这样的视图。</translation>
+        <translation>{n_images} 幅图像中只有 {n_used} 幅与同一测头一致。请将测头压入锥孔，夹紧锥座和相机，然后重新摆动。</translation>
     </message>
     <message>
         <source>Point std. deviation: u {u:.4f}, v {v:.4f}, w {w:.4f} mm over all postures.</source>
@@ -7115,12 +7402,20 @@
         <translation>圆环、平板：形状误差和面外偏差</translation>
     </message>
     <message>
+        <source>Risk of a wrong decision</source>
+        <translation>误判风险</translation>
+    </message>
+    <message>
         <source>Settings not saved: {file} cannot be written ({reason}). Check free space and write permission of its folder.</source>
         <translation>无法保存设置：无法写入 {file}（{reason}）。请确认您对其文件夹有写入权限，且磁盘未满。</translation>
     </message>
     <message>
         <source>Settings saved, but another program had locked {file} for {seconds:g} s. End that program if it hangs; it may overwrite the settings.</source>
         <translation>设置已保存，但另一个程序将 {file} 锁定了 {seconds:g} s。如果该程序无响应，请结束它，否则它可能覆盖设置。</translation>
+    </message>
+    <message>
+        <source>Stylus, seat or stand give way with the tilt, by {size:.4f} mm at 90°; the result is corrected and U includes the rest. Press gently, use a stiffer stylus, and clamp the cone.</source>
+        <translation>测杆、锥座或支架随倾斜而变形，90° 时为 {size:.4f} mm；结果已修正，U 包含其余部分。请轻压，使用刚性更好的测杆，并夹紧锥座。</translation>
     </message>
     <message>
         <source>Swings given: {n_swings}. {needed} are needed for pooling, and one more for confirmation.</source>
@@ -7159,8 +7454,12 @@
         <translation>LED 不在光笔坐标系中：LED {led} 与规定位置相差 {distance:.2f} mm（原点在 LED 1 前方，y 轴沿 LED 1-4，LED 5-10 位于 z = 0）。请将测量机坐标转换到光笔坐标系。</translation>
     </message>
     <message>
+        <source>The LEDs are {width:.1f} px wide in most images; at least {needed:.0f} px are needed. Bring the camera nearer, or use a longer focal length or a camera of higher resolution.</source>
+        <translation>大多数图像中 LED 宽度为 {width:.1f} px；至少需要 {needed:.0f} px。请将相机移近，或使用更长的焦距或更高分辨率的相机。</translation>
+    </message>
+    <message>
         <source>The LEDs cannot be followed from image to image: in no {needed} of {n_images} images in a row the same 5 LEDs are seen. Give the images in the order in which they were taken, 10 or more a second, with the whole pen in view.</source>
-        <translation>各姿态下点的标准差：u {u:.4f}、v {v:.4f}、w {w:.4f} mm。</translation>
+        <translation>无法逐幅跟踪 LED：在 {n_images} 幅图像中，没有连续 {needed} 幅看到相同的 5 个 LED。请按拍摄顺序给出图像，每秒 10 幅或更多，且整支光笔在视野内。</translation>
     </message>
     <message>
         <source>The LEDs found do not resemble the sketch, in whatever order. Check that it is of this pen, right-handed and in millimetres to 5 mm.</source>
@@ -7172,7 +7471,7 @@
     </message>
     <message>
         <source>The archive of this data folder is not the one its limits belong to. Nothing is accepted until the archive is restored from a copy.</source>
-        <translation>平差在 {n_steps} 次迭代内未收敛：视图过于相似，或显示的是另一块标定板。请增加标定板向各侧倾斜 20° 至 40° 以及位于图像各角的视图；否则请重新清点并测量方格。</translation>
+        <translation>本数据文件夹的档案不是其限值所属的档案。在从副本恢复档案之前，不接受任何结果。</translation>
     </message>
     <message>
         <source>The archive {file} does not exist or is empty. Check the data folder.</source>
@@ -7192,7 +7491,7 @@
     </message>
     <message>
         <source>The ball is larger than the feature {name}. Check the ball diameter, and the side in the plan.</source>
-        <translation>档案 {file} 不存在或为空。请检查数据文件夹。</translation>
+        <translation>测球大于要素 {name}。请检查测球直径以及计划中的内外侧。</translation>
     </message>
     <message>
         <source>The board does not match {board}: lengths along the rows are {stretch:+.2%} longer than along the columns, and right angles deviate by {shear:+.2f}°. It may have been scaled in printing. Print it at true scale, or measure it again.</source>
@@ -7204,7 +7503,7 @@
     </message>
     <message>
         <source>The board&apos;s squares are stated as {pitch:g} mm, which makes a board of {side:.3g} m. Lengths are in mm: check them. Intrinsics do not depend on it; distances do.</source>
-        <translation>标定板与 {board} 不符：沿行的长度比沿列的长 {stretch:+.2%}，直角偏差 {shear:+.2f}°。打印时可能被缩放。请按实际比例打印，或重新测量。</translation>
+        <translation>标定板方格给出为 {pitch:g} mm，即板长 {side:.3g} m。长度单位为 mm：请检查。内参与此无关；距离则有关。</translation>
     </message>
     <message>
         <source>The calibration of this tip expired on {due}. Calibrate it again.</source>
@@ -7220,7 +7519,7 @@
     </message>
     <message>
         <source>The camera changed during the swing: its focal length was {first:.0f} px first and {second:.0f} px later. Lock zoom, focus and image stabilisation, and repeat the swing.</source>
-        <translation>标定文件 {path} 在写入后被修改或损坏。请从副本恢复，或重新标定。</translation>
+        <translation>相机在摆动期间发生了变化：焦距先为 {first:.0f} px，后为 {second:.0f} px。请锁定变焦、对焦和防抖，然后重新摆动。</translation>
     </message>
     <message>
         <source>The camera drifts during the set: by {px:.2f} px over the image from the first view to the last (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px). Let the camera warm up, fix lens and mount, and take the views again.</source>
@@ -7268,7 +7567,7 @@
     </message>
     <message>
         <source>The characteristic {name} is not defined for features of this kind or number. Check the plan.</source>
-        <translation>该相机文件属于相机 {stated}；当前使用的相机是 {used}。请给出此相机的文件。</translation>
+        <translation>特性 {name} 对此类或此数量的要素没有定义。请检查计划。</translation>
     </message>
     <message>
         <source>The characteristic {name} needs a datum. Name a feature as its datum in the plan.</source>
@@ -7296,7 +7595,7 @@
     </message>
     <message>
         <source>The construction {name} is not defined for features of this kind or number. Check the plan.</source>
-        <translation>锥孔有 {n_touches} 个可用点，至少需要 {needed} 个，通常为 {usual} 个。请重新探测，每次采用不同的姿态。</translation>
+        <translation>构造 {name} 对此类或此数量的要素没有定义。请检查计划。</translation>
     </message>
     <message>
         <source>The copy of chain {chain} in this archive is damaged. Check the archive.</source>
@@ -7313,6 +7612,10 @@
     <message>
         <source>The data folder {folder} is not writable: {reason}</source>
         <translation>数据文件夹 {folder} 无法写入：{reason}</translation>
+    </message>
+    <message>
+        <source>The database {name} is empty. Its administrator sets it up as the page on the archive in the documents says.</source>
+        <translation>数据库 {name} 为空。请由其管理员按文档中的档案页面进行设置。</translation>
     </message>
     <message>
         <source>The datum points are on one line, which leaves the rotation about it undetermined. Add a point beside that line.</source>
@@ -7348,7 +7651,7 @@
     </message>
     <message>
         <source>The feature {name} has {n_touches} touches; the plan needs {needed}. Probe the missing points.</source>
-        <translation>准则“{criterion}”对{kind}没有定义。请使用最小二乘法。</translation>
+        <translation>要素 {name} 有 {n_touches} 个测点；计划需要 {needed} 个。请探测缺少的点。</translation>
     </message>
     <message>
         <source>The file agrees with the images if it contains rig_from_cam; cam_from_rig is needed. For each camera transpose the rotation R and replace the translation t by -R^T t.</source>
@@ -7371,8 +7674,12 @@
         <translation>若将 {one} 与 {other} 的图像对调，则与图像一致：请按相机组文件中的顺序（{names}）给出图像。</translation>
     </message>
     <message>
+        <source>The file {file} has no entry in the archive yet. Start the program to enter it.</source>
+        <translation>文件 {file} 在档案中尚无记录。请启动程序进行登记。</translation>
+    </message>
+    <message>
         <source>The file {file} is not signed by this station and its supervisor: it was changed or comes from elsewhere. Restore it from a copy, or move it away to continue without it.</source>
-        <translation>若文件内容为 rig_from_cam，则与图像一致；但需要的是 cam_from_rig。请对每台相机将旋转 R 转置，并将平移 t 替换为 -R^T t。</translation>
+        <translation>文件 {file} 未由本工作站及其主管签名：它被更改或来自别处。请从副本恢复，或将其移走后继续。</translation>
     </message>
     <message>
         <source>The file {file} of entry {number} was modified after it was entered.</source>
@@ -7407,8 +7714,12 @@
         <translation>文件夹 {folder} 不是空的：其中有 {example}。请选择其他文件夹，或将其清空；不会覆盖任何内容。</translation>
     </message>
     <message>
+        <source>The image shifts by {size:.3f} px with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand, apart from where you step.</source>
+        <translation>图像随光笔倾斜移动 {size:.3f} px：相机随操作者的移动而转动。结果已修正，U 包含其余部分。请将相机放在远离踩踏处的稳固支架上。</translation>
+    </message>
+    <message>
         <source>The images are from two cameras, or one camera with two zoom or focus settings (fx {fx:.1f} and {other_fx:.1f} px): {n_named} of {n_views} differ from the others: {names}. Give the images of one camera with one setting.</source>
-        <translation>第 {number} 条记录的文件 {file} 在登记后被修改。</translation>
+        <translation>图像来自两台相机，或来自同一相机的两种变焦或对焦设置（fx {fx:.1f} 和 {other_fx:.1f} px）：{n_views} 个视图中有 {n_named} 个与其他不同：{names}。请给出同一相机同一设置的图像。</translation>
     </message>
     <message>
         <source>The images contradict the LED file: the standard deviation of its coordinates is {found:.4f} mm, stated {stated:.4f} mm. Measure the pen again, or check that the file belongs to this pen.</source>
@@ -7432,7 +7743,7 @@
     </message>
     <message>
         <source>The images do not decide between the pen and its mirror image. Tilt the pen further towards the camera and away from it, by 30 degrees or more, and come closer to the camera.</source>
-        <translation>图像与 LED 文件矛盾：其坐标的标准差为 {found:.4f} mm，文件给出 {stated:.4f} mm。请重新测量光笔，或检查文件是否属于本光笔。</translation>
+        <translation>图像不能区分光笔及其镜像。请将光笔朝向和背离相机进一步倾斜 30 度或以上，并靠近相机。</translation>
     </message>
     <message>
         <source>The images do not determine the tip yet. Tilt the pen to all sides.</source>
@@ -7472,7 +7783,7 @@
     </message>
     <message>
         <source>The key of the station with chain {chain} is not in this user account, so that nothing can be signed. Use the account and computer of the station, copy the key here, or let a supervisor introduce another (documents: security).</source>
-        <translation>图像尚不能确定测头。请将光笔向各侧倾斜。</translation>
+        <translation>链 {chain} 所属工作站的密钥不在此用户账户中，因此无法签名。请使用该工作站的账户和计算机，将密钥复制到此处，或由主管引入新密钥（见文档：安全）。</translation>
     </message>
     <message>
         <source>The lamp at {x:.0f}, {y:.0f} px moved by {shift:.2f} px during the swing, but the pen did not. No correction is made. Fix or cover the lamp.</source>
@@ -7488,7 +7799,7 @@
     </message>
     <message>
         <source>The length limits U: known to {sigma:.3f} mm it would reduce U from {now:.0f} to {then:.0f} um.</source>
-        <translation>位于 {x:.0f}, {y:.0f} px 的灯在摆动期间移动了 {shift:.2f} px，而光笔没有。不作修正。请固定或遮住该灯。</translation>
+        <translation>长度限制了 U：若其已知到 {sigma:.3f} mm，U 将从 {now:.0f} 降至 {then:.0f} um。</translation>
     </message>
     <message>
         <source>The length of {length:g} mm is not that between LEDs {first} and {second}: by it the discs would be {found:.2f} mm wide, and {stated:g} mm is stated. It may be that between LEDs {other} and {another}. Check which LEDs were measured, and the diameter of the discs.</source>
@@ -7503,8 +7814,12 @@
         <translation>标定板 {text} 的尺寸不合理：单位为 mm，须大于 0，且标记或圆须小于其所在的格子。请重新测量。</translation>
     </message>
     <message>
+        <source>The lens leaves {size:.3f} px (rms) beyond its distortion model; the result is corrected and U includes the rest. Calibrate the camera with views that fill the image; its file then states the lens field.</source>
+        <translation>镜头在畸变模型之外残留 {size:.3f} px（均方根）；结果已修正，U 包含其余部分。请用布满图像的视图标定相机；其文件将给出镜头残差场。</translation>
+    </message>
+    <message>
         <source>The limits and the supervisor password in {folder} are missing, or older than those seen here before. Nothing is accepted until the folder is restored. To begin anew without them, an administrator removes {memory}.</source>
-        <translation>标定板 {text} 的长度无效：必须大于 0 mm，且标记或圆必须小于其方格。请重新测量。</translation>
+        <translation>{folder} 中的限值和主管密码缺失，或比此前在此见到的更旧。在恢复该文件夹之前，不接受任何结果。如需不带它们重新开始，由管理员删除 {memory}。</translation>
     </message>
     <message>
         <source>The limits and the supervisor password of this data folder are not those entered in its archive: {file} is missing or was changed. Nothing is accepted until the folder is restored from a copy.</source>
@@ -7524,7 +7839,7 @@
     </message>
     <message>
         <source>The limits were changed in another window after they were shown here. Nothing was saved. Read the present limits, then change them again.</source>
-        <translation>{file} 中的限值在保存后被修改或损坏。请从副本恢复该文件。</translation>
+        <translation>限值在此处显示后已在另一个窗口中更改。未保存任何内容。请查看当前限值，然后重新更改。</translation>
     </message>
     <message>
         <source>The line of the alignment is perpendicular to its plane and defines no direction in it. Choose another line.</source>
@@ -7535,8 +7850,12 @@
         <translation>此处保存的内容与{entry}不相接。可能是数据文件夹被复制后两份都在继续使用，或条目被改动过。请检查两边的档案库。</translation>
     </message>
     <message>
+        <source>The measured length {measured:g} mm (stated {stated:g}, U {u:g} mm) is not valid: all must be above 0, and U at most a twentieth of the length. Measure over as many squares as possible.</source>
+        <translation>测得长度 {measured:g} mm（标称 {stated:g}，U {u:g} mm）无效：均须大于 0，且 U 不超过长度的二十分之一。请跨尽可能多的方格测量。</translation>
+    </message>
+    <message>
         <source>The measuring plan {name} is not valid: {found}. Correct the plan; docs/measuring.md describes its entries.</source>
-        <translation>找正所用的直线垂直于其平面，在平面内不能确定方向。请选择另一条直线。</translation>
+        <translation>测量计划 {name} 无效：{found}。请更正计划；docs/measuring.md 说明其条目。</translation>
     </message>
     <message>
         <source>The next image of {place} follows in {seconds:.1f} s. Wait, or replay the images faster.</source>
@@ -7549,6 +7868,10 @@
     <message>
         <source>The password has {length} characters. Enter at least {needed}.</source>
         <translation>密码有 {length} 个字符。请至少输入 {needed} 个。</translation>
+    </message>
+    <message>
+        <source>The pen bends under its weight by {size:.4f} mm at its upper end when horizontal; the result is corrected and U includes the rest. Hold it near its middle, or stiffen it.</source>
+        <translation>光笔水平时其上端因自重弯曲 {size:.4f} mm；结果已修正，U 包含其余部分。请握住其中部附近，或提高其刚度。</translation>
     </message>
     <message>
         <source>The pen hardly moved: its postures differ by {found:.1f}° (RMS); {needed:.0f}° are needed. Tilt the pen to all sides by 20° or more, and turn it about its own axis.</source>
@@ -7585,18 +7908,6 @@
     <message>
         <source>The picture {path} was modified after it was saved. Save it again.</source>
         <translation>图片 {path} 在保存后被更改。请重新保存。</translation>
-    </message>
-    <message>
-        <source>The plan has no feature {name}. Its features are: {names}. Name the touches after a feature.</source>
-        <translation>{place} 的下一幅图像将在 {seconds:.1f} s 后出现。请等待，或加快回放。</translation>
-    </message>
-    <message>
-        <source>The point moves with the pen tilt, std. deviation {deviation:.4f} mm along {axis} (limit {limit:.4f} mm): the tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position. Was the tip replaced, bent or refitted, or is it that of another pen?</source>
-        <translation>该点随光笔倾斜而移动，沿 {axis} 的标准差 {deviation:.4f} mm（限值 {limit:.4f} mm）：测头偏离标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm。测头是否被更换、弯曲或重新安装，或属于另一支光笔？</translation>
-    </message>
-    <message>
-        <source>The point scatters, std. deviation {deviation:.4f} mm along {axis} (limit {limit:.4f} mm), which no other tip position explains. The tip may not rest in the cone: look for dirt, wear and a loose cone.</source>
-        <translation>该点离散，沿 {axis} 的标准差 {deviation:.4f} mm（限值 {limit:.4f} mm），其他测头位置不能解释。测头可能未落稳在锥孔中：请检查污物、磨损和锥孔是否松动。</translation>
     </message>
     <message>
         <source>The points do not determine a {kind}. Distribute them over more of its surface.</source>
@@ -7651,6 +7962,10 @@
         <translation>各姿态相差 {found:.1f}°（均方根），需要 {needed:.0f}°。请使光笔竖直，并向四个方向倾斜。</translation>
     </message>
     <message>
+        <source>The projection is uncertain by {px:.1f} px over the image: the views do not determine the lens there. Add views with the board in each corner of the image.</source>
+        <translation>图像上投影的不确定度为 {px:.1f} px：视图在该处不能确定镜头。请增加标定板位于图像各角的视图。</translation>
+    </message>
+    <message>
         <source>The radius of the ring is not specified. Enter the certified one.</source>
         <translation>未指定圆环的半径。请输入证书值。</translation>
     </message>
@@ -7691,6 +8006,30 @@
         <translation>旋转矩阵似乎被转置：按现有数据，各位姿的测头散布为 {as_read:.3g} mm，转置后为 {undone:.3g} mm。请按行给出 r11 至 r33，且旋转与平移均为 cam_from_pen。</translation>
     </message>
     <message>
+        <source>The same as {name}.</source>
+        <translation>与 {name} 相同。</translation>
+    </message>
+    <message>
+        <source>The seal {file} is missing: entries that were removed from the end of the archive are not found by it.</source>
+        <translation>封印 {file} 缺失：无法据此发现从档案末尾删除的记录。</translation>
+    </message>
+    <message>
+        <source>The server had the entries {first} to {last} of this station and no longer shows them. Ask its administrator whether they were removed or the user was changed. They are delivered again only on request.</source>
+        <translation>服务器曾有本工作站的第 {first} 至 {last} 条记录，现在不再显示。请询问其管理员是否已删除这些记录或更改了用户。仅在要求时才会重新传送。</translation>
+    </message>
+    <message>
+        <source>The server has the chains of several stations: {chains}. Choose one.</source>
+        <translation>服务器有多个工作站的链：{chains}。请选择其一。</translation>
+    </message>
+    <message>
+        <source>The server has {there} entries of this station, this data folder only {here}: it was replaced by an older copy. Nothing was delivered. Fetch the missing entries from the server.</source>
+        <translation>服务器有本工作站的 {there} 条记录，而本数据文件夹只有 {here} 条：它被较旧的副本替换。未传送任何内容。请从服务器取回缺失的记录。</translation>
+    </message>
+    <message>
+        <source>The server {name} has no entries of this station. Check the address and the user.</source>
+        <translation>服务器 {name} 没有本工作站的记录。请检查地址和用户。</translation>
+    </message>
+    <message>
         <source>The settings {file} are damaged and were renamed to {aside}. Restore them from a copy, or enter the settings again.</source>
         <translation>设置文件 {file} 已损坏，已改名为 {aside}。请用备份恢复，或重新输入设置。</translation>
     </message>
@@ -7700,7 +8039,7 @@
     </message>
     <message>
         <source>The signature of entry {number} of chain {chain} is missing or wrong: the entry or its signature was changed.</source>
-        <translation>点随光笔倾斜而移动，沿 {axis} 的标准差为 {deviation:.4f} mm（限值 {limit:.4f} mm）：测头偏离其标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm。测头是否被更换、弯曲或重新安装，或属于另一支光笔？</translation>
+        <translation>链 {chain} 的第 {number} 条记录的签名缺失或错误：记录或其签名被更改。</translation>
     </message>
     <message>
         <source>The station key {file} was changed or damaged. Restore it from a copy, or remove it and let a supervisor introduce another (documents: security).</source>
@@ -7724,7 +8063,7 @@
     </message>
     <message>
         <source>The swing is too weak: U of the tip is {U:.2g} mm, the focal length is known to {focal:.2g} %, and the pen&apos;s tilt varies by {tilt:.0f} degrees. Tilt the pen by 30 degrees in all directions, and turn it about its axis.</source>
-        <translation>无法读取 {folder} 中的摆动：{reason}。请检查读取权限，或移走该文件夹。</translation>
+        <translation>摆动的几何条件太弱：测头的 U 为 {U:.2g} mm，焦距已知到 {focal:.2g} %，光笔倾斜变化 {tilt:.0f} 度。请将光笔向各方向倾斜 30 度，并绕其轴线转动。</translation>
     </message>
     <message>
         <source>The swing {swing} does not confirm the new LED file: residuals {after:.4f} px, with the old file {before:.4f} px. The old file is as good, or the pen changed in between.</source>
@@ -7767,6 +8106,18 @@
         <translation>测头距光笔原点 {tip:.0f} mm，比支点距相机原点（{pivot:.0f} mm）更远。位姿求逆后正是如此：如果给出的是 pen_from_cam，则测头与支点应互换。</translation>
     </message>
     <message>
+        <source>The tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position, {distance:.4f} mm in all (U {uncertainty:.4f} mm, limit {limit:.4f} mm). That is more than chance.</source>
+        <translation>测头偏离其标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm，总计 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。这超出偶然误差。</translation>
+    </message>
+    <message>
+        <source>The tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position, {distance:.4f} mm in all (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Was the tip replaced, bent or refitted, or is it that of another pen?</source>
+        <translation>测头偏离其标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm，总计 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头是否被更换、弯曲或重新安装，或属于另一支光笔？</translation>
+    </message>
+    <message>
+        <source>The tip jumps by {size:.4f} mm with the side of the tilt: the stylus is loose. The result is corrected and U includes the rest. Tighten the stylus and repeat the swing.</source>
+        <translation>测头随倾斜侧跳动 {size:.4f} mm：测杆松动。结果已修正，U 包含其余部分。请拧紧测杆并重新摆动。</translation>
+    </message>
+    <message>
         <source>The tip library {file} was modified or damaged after it was saved. Restore the file from a copy.</source>
         <translation>测头库 {file} 在保存后被更改或损坏。请从副本恢复该文件。</translation>
     </message>
@@ -7777,6 +8128,14 @@
     <message>
         <source>The tip moved in its seat with the tilt by about {distance:.4f} mm; U includes this. Check tip and cone for form error, wear and dirt.</source>
         <translation>测头随倾斜在锥孔中移动约 {distance:.4f} mm，已计入 U。请检查测头和锥孔的形状误差、磨损和污物。</translation>
+    </message>
+    <message>
+        <source>The tip of entry {number} was accepted before it was computed: the clock of the station was set back, or the entry is not what happened.</source>
+        <translation>第 {number} 条记录的测头在计算之前已被接受：工作站的时钟被调回，或记录与实际不符。</translation>
+    </message>
+    <message>
+        <source>The tip of entry {number} was accepted earlier than the one before: the clock of the station was set back.</source>
+        <translation>第 {number} 条记录的测头的接受时间早于前一条：工作站的时钟被调回。</translation>
     </message>
     <message>
         <source>The tip rested on two points, {distance:.2f} mm apart: cone or tracker moved. First point: poses {first}. Second point: poses {second}. {consequence}</source>
@@ -7804,7 +8163,7 @@
     </message>
     <message>
         <source>The touches of {name} come from both sides of the surface. Probe the feature again from one side.</source>
-        <translation>摆动 {swing} 不能证实新的 LED 文件：残差 {after:.4f} px，旧文件为 {before:.4f} px。旧文件同样好，或光笔在此期间发生了变化。</translation>
+        <translation>{name} 的测点来自表面的两侧。请从一侧重新探测该要素。</translation>
     </message>
     <message>
         <source>The touches of {name} do not show on which side of the surface the ball was. State &apos;side: inside&apos; or &apos;side: outside&apos; in the plan.</source>
@@ -7824,7 +8183,7 @@
     </message>
     <message>
         <source>The uncertainty of the certified value is not specified. Enter U (k = 2) of its certificate.</source>
-        <translation>平移似乎以米为单位：按毫米计仅 {typical:.3f} mm（中位数）。请将 tx、ty 和 tz 乘以 1000。</translation>
+        <translation>未指定校准值的不确定度。请输入其证书中的 U (k = 2)。</translation>
     </message>
     <message>
         <source>The uncertainty of the stylus axis is {uncertainty:.1f}°; the limit is {needed:.1f}°. The pen was tilted during the rotation. Hold the stylus upright between two fingers and only turn it.</source>
@@ -7864,7 +8223,7 @@
     </message>
     <message>
         <source>The views fit only a board {board} that is bent by {bend:.0f} mm, as no board is. Check the number and size of its squares, and that all images are from one camera with one setting.</source>
-        <translation>测杆轴线的不确定度为 {uncertainty:.1f}°；限值为 {needed:.1f}°。旋转期间光笔发生了倾斜。请用两指将测杆保持竖直，仅作旋转。</translation>
+        <translation>视图只与弯曲 {bend:.0f} mm 的标定板 {board} 相符，而这不可能。请检查方格的数量和尺寸，并确认所有图像来自同一相机的同一设置。</translation>
     </message>
     <message>
         <source>The views from {name} on differ from those before by {px:.2f} px over the image (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px), more than by chance. Check whether zoom, focus or mount changed there.</source>
@@ -7884,7 +8243,7 @@
     </message>
     <message>
         <source>The {kind} {id} was changed in another window after it was shown here. Nothing was saved. Read the present entries, then edit them again.</source>
-        <translation>{kind} {id} 已于 {due} 到期。请送检。</translation>
+        <translation>{kind} {id} 在此处显示后已在另一个窗口中更改。未保存任何内容。请查看当前条目，然后重新编辑。</translation>
     </message>
     <message>
         <source>The {what} of recorded images is fixed. Choose a live camera to change it.</source>
@@ -7920,7 +8279,7 @@
     </message>
     <message>
         <source>There are {n_images} images; at least {needed} are needed, and 300 are usual. Record a swing of 15 seconds or more, 10 images a second or more.</source>
-        <translation>记录图像的{what}是固定的。如需更改，请选择实时相机。</translation>
+        <translation>现有 {n_images} 幅图像；至少需要 {needed} 幅，通常为 300 幅。请记录 15 秒或更长的摆动，每秒 10 幅或更多。</translation>
     </message>
     <message>
         <source>There are {n_postures} postures, {needed} are needed: upright, and tilted to four sides.</source>
@@ -7928,7 +8287,7 @@
     </message>
     <message>
         <source>There is no LED {number}; {n_leds} LEDs are found, numbered from the tip upwards and from left to right. Give a length between two of these.</source>
-        <translation>现有 {n_postures} 个姿态，需要 {needed} 个：竖直，以及向四侧倾斜。</translation>
+        <translation>没有 LED {number}；找到 {n_leds} 个 LED，从测头向上、从左到右编号。请给出其中两个之间的长度。</translation>
     </message>
     <message>
         <source>This end was probed before. Probe the other one.</source>
@@ -7965,6 +8324,10 @@
     <message>
         <source>Tilt the pen towards and away from the camera as well as to the left and right, and turn it about its own axis.</source>
         <translation>除了左右，请也朝向和远离相机倾斜光笔，并绕自身轴线转动。</translation>
+    </message>
+    <message>
+        <source>Tip error</source>
+        <translation>测头误差</translation>
     </message>
     <message>
         <source>Tip {tip} is retired and cannot be accepted. Reactivate it in the tip library, or calibrate another tip.</source>
@@ -8011,6 +8374,18 @@
         <translation>验证完成。可以放下光笔。</translation>
     </message>
     <message>
+        <source>Verifies scale and form, not the tip: in these postures no tip error would be found (limit {limit:.4f} mm).</source>
+        <translation>仅验证比例和形状，不验证测头：在这些姿态下不会发现测头误差（限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
+        <source>Verifies scale and form, not the tip: only a tip error of {detectable:.4f} mm would be found with 95 % probability (limit {limit:.4f} mm).</source>
+        <translation>仅验证比例和形状，不验证测头：只有 {detectable:.4f} mm 的测头误差才会以 95 % 的概率被发现（限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
+        <source>Verifies the tip: an error of {detectable:.4f} mm would be found with 95 % probability.</source>
+        <translation>可验证测头：{detectable:.4f} mm 的误差会以 95 % 的概率被发现。</translation>
+    </message>
+    <message>
         <source>Webcam (evaluation only)</source>
         <translation>网络摄像头（仅供试用）</translation>
     </message>
@@ -8027,8 +8402,20 @@
         <translation>主管密码错误。请重新输入。</translation>
     </message>
     <message>
+        <source>You excluded {n_excluded} images. Undo, or repeat the swing.</source>
+        <translation>您剔除了 {n_excluded} 幅图像。请撤销，或重新摆动。</translation>
+    </message>
+    <message>
         <source>Zoom, focus or camera changed at {name}: fx, cx, cy are {before:.1f}, {cx_before:.1f}, {cy_before:.1f} px in the {n_before} views before it and {after:.1f}, {cx_after:.1f}, {cy_after:.1f} px in the {n_after} views from there on. Lock zoom and focus, and take all views again.</source>
-        <translation>此端已探测过。请探测另一端。</translation>
+        <translation>变焦、对焦或相机在 {name} 处发生了变化：其前 {n_before} 个视图的 fx、cx、cy 为 {before:.1f}、{cx_before:.1f}、{cy_before:.1f} px，其后 {n_after} 个视图为 {after:.1f}、{cx_after:.1f}、{cy_after:.1f} px。请锁定变焦和对焦，并重新拍摄所有视图。</translation>
+    </message>
+    <message>
+        <source>an ITK transform (.tfm) for 3D Slicer alone</source>
+        <translation>仅用于 3D Slicer 的 ITK 变换 (.tfm)</translation>
+    </message>
+    <message>
+        <source>an ITK transform (.tfm) that maps points from the tip to the pen</source>
+        <translation>将点从测头坐标系映射到光笔坐标系的 ITK 变换 (.tfm)</translation>
     </message>
     <message>
         <source>calibration result</source>
@@ -8071,6 +8458,10 @@
         <translation>固定点验证记录</translation>
     </message>
     <message>
+        <source>guard band (ISO 14253-1)</source>
+        <translation>保护带（ISO 14253-1）</translation>
+    </message>
+    <message>
         <source>length verification</source>
         <translation>长度验证记录</translation>
     </message>
@@ -8088,7 +8479,7 @@
     </message>
     <message>
         <source>measuring plan</source>
-        <translation>标定结果</translation>
+        <translation>测量计划</translation>
     </message>
     <message>
         <source>minimum circumscribed feature</source>
@@ -8127,8 +8518,20 @@
         <translation>程序错误</translation>
     </message>
     <message>
+        <source>same as another image</source>
+        <translation>与另一幅图像相同</translation>
+    </message>
+    <message>
+        <source>simple acceptance (JCGM 106, 8.2)</source>
+        <translation>简单接受（JCGM 106，8.2）</translation>
+    </message>
+    <message>
         <source>slot</source>
         <translation>键槽</translation>
+    </message>
+    <message>
+        <source>specific risk (JCGM 106, 8.3)</source>
+        <translation>特定风险（JCGM 106，8.3）</translation>
     </message>
     <message>
         <source>sphere</source>
@@ -8140,15 +8543,31 @@
     </message>
     <message>
         <source>station key</source>
-        <translation>最小外接要素</translation>
+        <translation>工作站密钥</translation>
     </message>
     <message>
         <source>systematic errors common to all poses: the scale of the tracker and of the pen, a worn or badly seated tip</source>
         <translation>在所有位姿中保持不变的误差：跟踪仪和光笔的尺度、测头磨损或未就位</translation>
     </message>
     <message>
+        <source>the CoordinateDefinitions for the device set of PLUS</source>
+        <translation>用于 PLUS 设备集的 CoordinateDefinitions</translation>
+    </message>
+    <message>
         <source>the LED file. Measure the LEDs more accurately, and state their uncertainty</source>
         <translation>LED 文件。请更准确地测量 LED，并给出其不确定度</translation>
+    </message>
+    <message>
+        <source>the bending of the pen under its weight. Stiffen it, and tilt the pen further</source>
+        <translation>光笔因自重的弯曲。请提高其刚度，并将光笔进一步倾斜</translation>
+    </message>
+    <message>
+        <source>the camera, as it turns with the tilt of the pen. Put it on a firm stand</source>
+        <translation>随光笔倾斜而转动的相机。请将其放在稳固的支架上</translation>
+    </message>
+    <message>
+        <source>the compliance of stylus, seat and stand. Make the press test, or use a stiffer stylus</source>
+        <translation>测杆、锥座和支架的柔度。请进行按压试验，或使用刚性更好的测杆</translation>
     </message>
     <message>
         <source>the distance of the two cones. Measure it more accurately</source>
@@ -8161,6 +8580,14 @@
     <message>
         <source>the form error of ball and cone. Use better ones, and state their form error</source>
         <translation>测球与锥孔的形状误差。请换用更好的，并给出其形状误差</translation>
+    </message>
+    <message>
+        <source>the lens, beyond its distortion model. Calibrate the camera with views that fill the image; its file then states the lens field</source>
+        <translation>镜头畸变模型之外的残差。请用布满图像的视图标定相机；其文件将给出镜头残差场</translation>
+    </message>
+    <message>
+        <source>the play of the stylus. Tighten it, and tilt the pen to all sides</source>
+        <translation>测杆的间隙。请拧紧，并将光笔向各侧倾斜</translation>
     </message>
     <message>
         <source>the scale of the LED file. Calibrate the LED coordinates against a better length standard and state the uncertainty, or swing in two cones at a known distance</source>
@@ -8192,7 +8619,7 @@
     </message>
     <message>
         <source>{entry} belongs to the chain of this station, but was not entered here. Nothing was imported. If this data folder was replaced by an older copy, fetch the missing entries from the server; if not, the file was forged.</source>
-        <translation>所有位姿共有的系统误差：跟踪器和光笔的比例、测头磨损或未就位</translation>
+        <translation>{entry} 属于本工作站的链，但并非在此登记。未导入任何内容。若本数据文件夹被较旧的副本替换，请从服务器取回缺失的记录；否则该文件是伪造的。</translation>
     </message>
     <message>
         <source>{file} is damaged: its verification cannot be continued. The images of its points stay where they are.</source>
@@ -8207,6 +8634,18 @@
         <translation>{folder} 中有摆动的图像，但没有 {name}。请用备份恢复该文件，或移走文件夹。</translation>
     </message>
     <message>
+        <source>{held_out:.4f} px with 5 coefficients</source>
+        <translation>5 个系数时 {held_out:.4f} px</translation>
+    </message>
+    <message>
+        <source>{held_out:.4f} px with 8 coefficients</source>
+        <translation>8 个系数时 {held_out:.4f} px</translation>
+    </message>
+    <message>
+        <source>{held_out:.4f} px with a fisheye model</source>
+        <translation>鱼眼模型时 {held_out:.4f} px</translation>
+    </message>
+    <message>
         <source>{journal} lists none of the {n_images} images in its folder. Restore this file from a copy.</source>
         <translation>{journal} 中没有其文件夹内 {n_images} 幅图像的任何一幅。请用备份恢复该文件。</translation>
     </message>
@@ -8216,7 +8655,11 @@
     </message>
     <message>
         <source>{misfit} Also: {why}</source>
-        <translation>{file} 已损坏：其验证无法继续。各点的图像保持原位。</translation>
+        <translation>{misfit} 此外：{why}</translation>
+    </message>
+    <message>
+        <source>{n_copies} of {n_images} images are copies of others and count once. Check the recording, and give each image once.</source>
+        <translation>{n_images} 幅图像中有 {n_copies} 幅是其他图像的副本，只计一次。请检查记录，每幅图像只给出一次。</translation>
     </message>
     <message>
         <source>{n_dropped} of {n_images} images are excluded. Repeat the swing if the tip slipped.</source>
@@ -8224,7 +8667,7 @@
     </message>
     <message>
         <source>{n_duplicates} views show the board where another view shows it, and do not count; {n_views} views remain: {names}. Move the board between views.</source>
-        <translation>{n_images} 幅图像中有 {n_dropped} 幅被剔除。若测头滑动过，请重新摆动。</translation>
+        <translation>{n_duplicates} 个视图中标定板的位姿与另一视图相同，不计入；剩余 {n_views} 个视图：{names}。请在各视图之间移动标定板。</translation>
     </message>
     <message>
         <source>{n_failed} of {n_trials} trials failed: the swing is too weak for simulation. Capture more images in other postures.</source>
@@ -8232,7 +8675,7 @@
     </message>
     <message>
         <source>{n_found} LEDs are found, and the sketch has {n_sketched}. Give a sketch with all LEDs of the pen, or none.</source>
-        <translation>{n_trials} 次试算中有 {n_failed} 次失败：摆动的几何条件太弱，无法模拟。请以其他姿态采集更多图像。</translation>
+        <translation>找到 {n_found} 个 LED，而草图有 {n_sketched} 个。请给出包含光笔所有 LED 的草图，或不给出草图。</translation>
     </message>
     <message>
         <source>{n_leds} LEDs are seen; at least {needed} are needed. Keep the whole pen in view, switch on all LEDs, and check exposure and focus.</source>
@@ -8252,7 +8695,7 @@
     </message>
     <message>
         <source>{n_named} of {n_views} images are rotated by 180°: {names}. Rotate them back, or leave them out; the camera must not be turned during a calibration, and viewers must not rotate its images.</source>
-        <translation>{n_poses} 个位姿中有 {n_left_out} 个为粗差，已剔除：{poses}。请检查跟踪是否受到干扰。</translation>
+        <translation>{n_views} 幅图像中有 {n_named} 幅旋转了 180°：{names}。请转回或剔除；标定期间不得转动相机，看图软件也不得旋转其图像。</translation>
     </message>
     <message>
         <source>{n_points} datum points are given; an alignment needs at least {needed}, each with its nominal position.</source>
@@ -8267,20 +8710,44 @@
         <translation>{n_tips} 次标定看不出重复性；请至少给出两次，通常为十次。</translation>
     </message>
     <message>
+        <source>{name} cannot be written in the form of Kalibr: its model radtan has k1 k2 p1 p2 alone, and this camera needs more. Write it in the form of OpenCV.</source>
+        <translation>{name} 不能以 Kalibr 形式写出：其模型 radtan 只有 k1 k2 p1 p2，而此相机需要更多系数。请以 OpenCV 形式写出。</translation>
+    </message>
+    <message>
+        <source>{name} describes a fisheye lens ({model}). The fisheye model of Kannala and Brandt (equidistant) is supported: calibrate the camera again with it, or with lightpen intrinsics.</source>
+        <translation>{name} 描述的是鱼眼镜头（{model}）。支持 Kannala 和 Brandt 的鱼眼模型（等距）：请用该模型或用 lightpen intrinsics 重新标定相机。</translation>
+    </message>
+    <message>
         <source>{name} has a lens field of the amplitude {amplitude:g} px and the correlation length {length:g} px; an amplitude above 0 and up to {largest:g} px, and a length from {shortest:g} px are needed. Correct or remove the entry lens_field.</source>
-        <translation>给出了 {n_points} 个基准点；找正至少需要 {needed} 个，且每个都有标称位置。</translation>
+        <translation>{name} 的镜头残差场幅值为 {amplitude:g} px，相关长度为 {length:g} px；幅值须大于 0 且不超过 {largest:g} px，长度须不小于 {shortest:g} px。请更正或删除条目 lens_field。</translation>
     </message>
     <message>
         <source>{name} has a lens field of {columns:g} columns and {rows:g} rows; 2 to {most} of each are needed. Correct or remove the entry lens_field.</source>
         <translation>{name} 的镜头残差场有 {columns:g} 列、{rows:g} 行；行列各需 2 至 {most}。请更正或删除条目 lens_field。</translation>
     </message>
     <message>
+        <source>{name} has the distortion model {model}, which is not supported. Calibrate the camera again with plumb_bob (radtan), rational_polynomial or equidistant.</source>
+        <translation>{name} 的畸变模型 {model} 不受支持。请用 plumb_bob (radtan)、rational_polynomial 或 equidistant 重新标定相机。</translation>
+    </message>
+    <message>
         <source>{name} has two cameras named {camera}. Give each camera a unique name.</source>
         <translation>{name} 中有两台相机都名为 {camera}。请为每台相机取不同的名称。</translation>
     </message>
     <message>
+        <source>{name} has {counted}; the fisheye model needs 4 (k1 k2 k3 k4). Export the file again.</source>
+        <translation>{name} 有 {counted}；鱼眼模型需要 4 个（k1 k2 k3 k4）。请重新导出该文件。</translation>
+    </message>
+    <message>
         <source>{name} is not valid YAML. Check that this is the right file.</source>
         <translation>{name} 不是有效的 YAML。请检查是否选对了文件。</translation>
+    </message>
+    <message>
+        <source>{path} is the name of a device on Windows, not of a file. Choose another name.</source>
+        <translation>{path} 是 Windows 上的设备名，而不是文件名。请选择其他名称。</translation>
+    </message>
+    <message>
+        <source>{reason} {power}</source>
+        <translation>{reason} {power}</translation>
     </message>
     <message>
         <source>{unit} is not a supported unit of length. Choose one of {known}.</source>
@@ -8535,7 +9002,7 @@
     </message>
     <message>
         <source>other station</source>
-        <translation>{name} 中有两台名为 {camera} 的相机。请为每台相机指定唯一的名称。</translation>
+        <translation>其他工作站</translation>
     </message>
     <message>
         <source>current</source>
@@ -9131,6 +9598,26 @@
         <translation>内参文件的内参</translation>
     </message>
     <message>
+        <source>Lens beyond its distortion model</source>
+        <translation>镜头畸变模型之外的残差</translation>
+    </message>
+    <message>
+        <source>Compliance of stylus, seat and stand</source>
+        <translation>测杆、锥座和支架的柔度</translation>
+    </message>
+    <message>
+        <source>Loose stylus</source>
+        <translation>测杆松动</translation>
+    </message>
+    <message>
+        <source>Sag of the pen</source>
+        <translation>光笔下垂</translation>
+    </message>
+    <message>
+        <source>Tilt of the camera with the pen</source>
+        <translation>相机随光笔的倾斜</translation>
+    </message>
+    <message>
         <source>Effects too uncertain to be fitted</source>
         <translation>尚不确定而未拟合的影响</translation>
     </message>
@@ -9370,6 +9857,10 @@
         <translation>舍去图像过多</translation>
     </message>
     <message>
+        <source>Many images excluded</source>
+        <translation>剔除的图像过多</translation>
+    </message>
+    <message>
         <source>LED displaced</source>
         <translation>LED 移位</translation>
     </message>
@@ -9416,6 +9907,26 @@
     <message>
         <source>disc diameter</source>
         <translation>发光面直径</translation>
+    </message>
+    <message>
+        <source>lens</source>
+        <translation>镜头</translation>
+    </message>
+    <message>
+        <source>compliance</source>
+        <translation>柔度</translation>
+    </message>
+    <message>
+        <source>loose stylus</source>
+        <translation>测杆松动</translation>
+    </message>
+    <message>
+        <source>sag</source>
+        <translation>下垂</translation>
+    </message>
+    <message>
+        <source>camera tilt</source>
+        <translation>相机倾斜</translation>
     </message>
     <message>
         <source>unmodelled effects</source>
