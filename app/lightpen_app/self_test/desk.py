@@ -36,15 +36,15 @@ from lightpen_app.work.settings import Settings
 TICK_MS = 50
 # The classes to which a platform gives fonts of its own.
 CLASSES_WITH_FONTS = (
-    "QAbstractItemView",
-    "QHeaderView",
-    "QListView",
-    "QMenu",
-    "QMenuBar",
-    "QMessageBox",
-    "QStatusBar",
-    "QTableView",
-    "QTreeView",
+    b"QAbstractItemView",
+    b"QHeaderView",
+    b"QListView",
+    b"QMenu",
+    b"QMenuBar",
+    b"QMessageBox",
+    b"QStatusBar",
+    b"QTableView",
+    b"QTreeView",
 )
 
 
@@ -203,7 +203,9 @@ class Desk:
         for name in CLASSES_WITH_FONTS:
             family = QApplication.font(name).family()
             if family != FAMILIES[0]:
-                raise SelfTestError(f"{name} is shown in {family}, not {FAMILIES[0]}.")
+                raise SelfTestError(
+                    f"{name.decode()} is shown in {family}, not {FAMILIES[0]}."
+                )
         return ", ".join(FAMILIES)
 
     def tested_record(self) -> str:

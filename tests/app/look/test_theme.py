@@ -231,7 +231,7 @@ def test_the_bundled_fonts_are_in_use(family: str) -> None:
 
 @pytest.mark.parametrize("name", CLASSES_WITH_FONTS)
 def test_a_theme_takes_fonts_of_the_platform_from_tables_lists_and_menus(
-    qapp: QApplication, name: str
+    qapp: QApplication, name: bytes
 ) -> None:
     QApplication.setFont(QFont("DejaVu Sans Mono", 8), name)  # as Windows does
 
