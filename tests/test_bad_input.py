@@ -1410,7 +1410,7 @@ def test_more_images_than_can_be_held_are_not_simulated(
     outcome = lightpen("simulate", "--images", "1000000000", tmp_path / "out")
 
     assert outcome.returncode == 2
-    assert "at most 5000 images" in outcome.stderr
+    assert "at most 30000 images" in outcome.stderr
     assert not (tmp_path / "out").exists()
 
 

@@ -14,7 +14,7 @@ MESSAGES = {
     "camera-file.image-size": "{name} gives an image size of {width:g} x {height:g} px. Two whole numbers from 1 to {most} are needed.",
     "camera-file.fold": "The distortion coefficients of {name} fold the image of {width} x {height} px: some pixels have no direction of view, or two. Check them, or calibrate the camera again with views that reach into the corners.",
     "file.camera": "camera file",
-    "camera-file.fisheye": "{name} describes a fisheye lens ({model}). The fisheye model of Kannala and Brandt (equidistant) is supported: calibrate the camera again with it, or with lightpen intrinsics.",
+    "camera-file.fisheye": "{name} describes a fisheye lens ({model}). The fisheye model of Kannala and Brandt (equidistant) is supported: calibrate the camera again with it.",
     "camera-file.suffix": "{name} does not end in .yaml; camera files are written as YAML. Choose a name that ends in .yaml.",
     "camera-file.several-cameras": "{name} describes {n_cameras} cameras. Keep the camera that observes the pen, and remove the others.",
     "camera-file.not-pinhole": "{name} describes a camera of the model {model}; the model pinhole is needed. Calibrate the camera again with pinhole-radtan.",

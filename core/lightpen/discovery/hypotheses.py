@@ -19,7 +19,7 @@ from lightpen.discovery.starts import (
     any_camera,
     focal_length_of,
     free_focal_length,
-    held,
+    held_camera,
     ideal_camera,
     state_of,
 )
@@ -276,7 +276,9 @@ class _Trial:
                 ideal_camera(*self.size, focal) if self.known is None else self.known
             )
             start = state_of(shape, camera, POINT, unit)
-            rough = adjust_start(start, self.pixels, held(camera), 12, length, ROUGH)
+            rough = adjust_start(
+                start, self.pixels, held_camera(camera), 12, length, ROUGH
+            )
             if self.known is None:
                 prior = free_focal_length(camera)
                 rough = adjust_start(rough.state, self.pixels, prior, 20, length, FINER)

@@ -62,7 +62,7 @@ class CameraPrior(NamedTuple):
         return cls(values, np.asarray(known, dtype=np.float64))
 
 
-def held(camera: Camera) -> CameraPrior:
+def held_camera(camera: Camera) -> CameraPrior:
     """Return the prior of a camera that is taken as it is."""
     return CameraPrior.of(camera, np.zeros((len(camera.intrinsics),) * 2))
 

@@ -105,8 +105,13 @@ def checked_distortion(
             if count == 1
             else message("count.distortion-coefficients", count=count)
         )
-        code = "fisheye-count" if is_fisheye else "distortion-count"
-        raise FileError(f"camera-file.{code}", name=entries.name, counted=counted)
+        if is_fisheye:
+            raise FileError(
+                "camera-file.fisheye-count", name=entries.name, counted=counted
+            )
+        raise FileError(
+            "camera-file.distortion-count", name=entries.name, counted=counted
+        )
     if np.any(coefficients[8:]):
         raise FileError("camera-file.distortion-terms", name=entries.name, count=count)
     return np.append(coefficients, 0.0) if count == 4 else coefficients[:8]

@@ -165,7 +165,11 @@ def explain(
     turned = _turned(views, board, near)
     if turned is not None:
         which, rms = turned
-        consider(rms, cost_of_groups, _named("intrinsics.turned", views, which))
+        names, n_named = _fewer(views, which)
+        turned_error = CalibrationError(
+            "intrinsics.turned", names=names, n_named=n_named, n_views=views.n_views
+        )
+        consider(rms, cost_of_groups, turned_error)
     if change is not None and change.name:
         after = np.arange(views.n_views) >= views.names.index(change.name)
         parted = _two_cameras(views, board, near, after, rounds=0)
@@ -181,10 +185,12 @@ def explain(
     groups = _best_groups(views, board, near)
     if groups is not None and _differ(groups[2]):
         which, rms, cameras = groups
-        error = _named(
+        names, n_named = _fewer(views, which)
+        error = CalibrationError(
             "intrinsics.two-cameras",
-            views,
-            which,
+            names=names,
+            n_named=n_named,
+            n_views=views.n_views,
             fx=cameras[0].fx,
             other_fx=cameras[1].fx,
         )
@@ -255,16 +261,12 @@ def message_on_change(change: CameraChange) -> Message:
     )
 
 
-def _named(
-    code: str, views: Views, which: BoolArray, **values: float
-) -> CalibrationError:
-    """Return an error that names the fewer views of two groups."""
+def _fewer(views: Views, which: BoolArray) -> tuple[str, int]:
+    """Return the names of the fewer views of two groups, and their number."""
     fewer = which if which.sum() <= len(which) / 2 else ~which
     names = [n for n, own in zip(views.names, fewer, strict=True) if own]
     shown = ", ".join(names[:SHOWN]) + (" ..." if len(names) > SHOWN else "")
-    return CalibrationError(
-        code, names=shown, n_named=len(names), n_views=views.n_views, **values
-    )
+    return shown, len(names)
 
 
 def _rms(residuals: FloatArray | None) -> float:

@@ -23,16 +23,6 @@ from lightpen.messages import Message, message
 from lightpen.model.camera import Camera, LensModel
 
 FEW, MANY, FISHEYE = 5, 8, 4  # distortion coefficients
-CODES = {
-    FEW: "intrinsics.five",
-    MANY: "intrinsics.eight",
-    FISHEYE: "intrinsics.fisheye",
-}
-OTHER_CODES = {
-    FEW: "held-out.five",
-    MANY: "held-out.eight",
-    FISHEYE: "held-out.fisheye",
-}
 WIDE = 0.6  # distance in the normalised plane: 31 degrees off the axis
 FOLDING = {FEW: [4], MANY: [5, 6, 7]}  # which of them fold: k3, and the denominator's
 PULLS = (0.1, 0.03, 0.01, 0.003, 0.001, 1e-4, 1e-10)  # the weakest first
@@ -67,13 +57,11 @@ class Choice:
         """It in words."""
         own = self.held_out[self.n_coefficients]
         others = tuple(
-            message(OTHER_CODES[n], held_out=rms)
+            _other_model(n, rms)
             for n, rms in self.held_out.items()
             if n != self.n_coefficients
         )
-        if not others:
-            return message(f"{CODES[self.n_coefficients]}-only", held_out=own)
-        return message(CODES[self.n_coefficients], held_out=own, others=others)
+        return _model(self.n_coefficients, own, others)
 
     @property
     def remark(self) -> Message | None:
@@ -84,6 +72,34 @@ class Choice:
             "intrinsics.drawn-in",
             coefficients="k3" if self.n_coefficients == FEW else "(k4, k5, k6)",
         )
+
+
+def _model(n_coefficients: int, own: float, others: tuple[Message, ...]) -> Message:
+    """Return the message on the chosen model."""
+    match n_coefficients, bool(others):
+        case 5, True:
+            return message("intrinsics.five", held_out=own, others=others)
+        case 5, False:
+            return message("intrinsics.five-only", held_out=own)
+        case 8, True:
+            return message("intrinsics.eight", held_out=own, others=others)
+        case 8, False:
+            return message("intrinsics.eight-only", held_out=own)
+        case _, True:
+            return message("intrinsics.fisheye", held_out=own, others=others)
+        case _:
+            return message("intrinsics.fisheye-only", held_out=own)
+
+
+def _other_model(n_coefficients: int, rms: float) -> Message:
+    """Return the message on a model that was tried, too."""
+    match n_coefficients:
+        case 5:
+            return message("held-out.five", held_out=rms)
+        case 8:
+            return message("held-out.eight", held_out=rms)
+        case _:
+            return message("held-out.fisheye", held_out=rms)
 
 
 def choose_distortion(

@@ -63,9 +63,16 @@ def _limit(
 RULES = tuple(DecisionRule)
 
 
+_RULE_NAMES = {
+    DecisionRule.SIMPLE: message("decision-rule.simple"),
+    DecisionRule.GUARD_BAND: message("decision-rule.guard-band"),
+    DecisionRule.RISK: message("decision-rule.risk"),
+}
+
+
 def rule_name(rule: DecisionRule) -> Message:
     """Return the name of a decision rule with its standard."""
-    return message(f"decision-rule.{rule.name.lower().replace('_', '-')}")
+    return _RULE_NAMES[rule]
 
 
 _RULE: Any = field(

@@ -1,5 +1,6 @@
 """The effects of a station that the images support: size, message and remedy."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,14 @@ from lightpen.estimation.bundle.effects import EffectName
 from lightpen.estimation.statistics.variance_components import CERTAIN
 from lightpen.messages import Message, message
 from lightpen.model.quantiles import chi_square_quantile
+
+_MESSAGES: Mapping[EffectName, Callable[[float], Message]] = {
+    EffectName.LENS: lambda size: message("warning.effect-lens", size=size),
+    EffectName.COMPLIANCE: lambda size: message("warning.effect-compliance", size=size),
+    EffectName.LOOSE: lambda size: message("warning.effect-loose-stylus", size=size),
+    EffectName.SAG: lambda size: message("warning.effect-sag", size=size),
+    EffectName.TILT: lambda size: message("warning.effect-camera-tilt", size=size),
+}
 
 
 @dataclass(frozen=True)
@@ -42,7 +51,7 @@ class FoundEffect:
     @property
     def message(self) -> Message:
         """The message to the user: what it is, how large, what to do."""
-        told = message(f"warning.effect-{self.name.replace(' ', '-')}", size=self.size)
+        told = _MESSAGES[self.name](self.size)
         if not self.camera:
             return told
         return message("rig.of-camera", camera=self.camera, trouble=told)

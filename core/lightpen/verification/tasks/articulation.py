@@ -256,19 +256,21 @@ def _assessment(
     error: float, by_noise: FloatArray, tip: TipEvidence, limits: VerificationLimits
 ) -> VerificationAssessment:
     usual, largest = np.quantile(by_noise, [COVERAGE, 1 - UNUSUAL]).tolist()
-    values = {"error": error, "uncertainty": usual, "limit": limits.location}
+    limit = limits.location
+    off = message("articulation.off", error=error, uncertainty=usual, limit=limit)
+    good = message("articulation.good", error=error, uncertainty=usual, limit=limit)
     against = judged_tip(tip, limits)
     if against is not None:
         return against
     if error > max(limits.location, largest):
-        return refused(message("articulation.off", **values), CALIBRATE_AGAIN)
+        return refused(off, CALIBRATE_AGAIN)
     if limits.decision(error, usual, limits.location) is not Decision.ACCEPTED:
-        return check(message("articulation.off", **values), MORE_POINTS)
+        return check(off, MORE_POINTS)
     if error > max(largest, RELEVANT * limits.location):
-        return check(message("articulation.off", **values), CALIBRATE_AGAIN)
+        return check(off, CALIBRATE_AGAIN)
     if not tip.verifies_tip(limits):
         return check(not_the_tip(tip, limits), MORE_POINTS)
-    return with_power(message("articulation.good", **values), tip, limits)
+    return with_power(good, tip, limits)
 
 
 def _screen(

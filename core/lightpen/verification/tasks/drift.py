@@ -133,18 +133,27 @@ def _assessment(
     uncertainty = COVERAGE_FACTOR * float(np.sqrt(along @ spread @ along))
     deviations = scaled[worst] @ np.linalg.pinv(spread) @ scaled[worst]
     is_significant = deviations > chi_square_quantile(3, BY_CHANCE)
-    values = {"distance": float(np.linalg.norm(moves[worst])), "limit": limits.drift}
-    values["uncertainty"] = uncertainty
+    move, limit = float(np.linalg.norm(moves[worst])), limits.drift
     grade = graded(distance, uncertainty, limits.drift, limits)
     if is_significant and grade is not Grade.PASS:
-        moved = message("drift.moved", first=names[0], visit=names[worst], **values)
+        moved = message(
+            "drift.moved",
+            first=names[0],
+            visit=names[worst],
+            distance=move,
+            uncertainty=uncertainty,
+            limit=limit,
+        )
         return VerificationAssessment(grade, moved, VERIFY_AGAIN)
     variances = np.diagonal(spreads, axis1=1, axis2=2)
     largest = COVERAGE_FACTOR * float(np.sqrt(variances.max()))
     if largest > limits.drift:
-        values["uncertainty"] = largest
-        return check(message("drift.uncertain", **values), TOUCH_LONGER)
-    return accepted(message("drift.good", **values), USE_TOUCHES)
+        doubt = message(
+            "drift.uncertain", distance=move, uncertainty=largest, limit=limit
+        )
+        return check(doubt, TOUCH_LONGER)
+    good = message("drift.good", distance=move, uncertainty=uncertainty, limit=limit)
+    return accepted(good, USE_TOUCHES)
 
 
 def _screen(

@@ -161,12 +161,28 @@ def judged_tip(
     if not found.is_significant or distance <= RELEVANT * limits.tip:
         return None
     x, y, z = found.change.tolist()
-    values = {"x": x, "y": y, "z": z, "distance": distance}
-    values |= {"uncertainty": uncertainty, "limit": limits.tip}
     decision = limits.decision(distance, uncertainty, limits.tip)
     if decision is Decision.REJECTED:
-        return refused(message("tip.another", **values), CALIBRATE_AGAIN)
-    return check(message("tip.differs", **values), CALIBRATE_AGAIN)
+        another = message(
+            "tip.another",
+            x=x,
+            y=y,
+            z=z,
+            distance=distance,
+            uncertainty=uncertainty,
+            limit=limits.tip,
+        )
+        return refused(another, CALIBRATE_AGAIN)
+    differs = message(
+        "tip.differs",
+        x=x,
+        y=y,
+        z=z,
+        distance=distance,
+        uncertainty=uncertainty,
+        limit=limits.tip,
+    )
+    return check(differs, CALIBRATE_AGAIN)
 
 
 def with_power(
