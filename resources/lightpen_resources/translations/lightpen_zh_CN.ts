@@ -8714,8 +8714,8 @@
         <translation>{name} 不能以 Kalibr 形式写出：其模型 radtan 只有 k1 k2 p1 p2，而此相机需要更多系数。请以 OpenCV 形式写出。</translation>
     </message>
     <message>
-        <source>{name} describes a fisheye lens ({model}). The fisheye model of Kannala and Brandt (equidistant) is supported: calibrate the camera again with it, or with lightpen intrinsics.</source>
-        <translation>{name} 描述的是鱼眼镜头（{model}）。支持 Kannala 和 Brandt 的鱼眼模型（等距）：请用该模型或用 lightpen intrinsics 重新标定相机。</translation>
+        <source>{name} describes a fisheye lens ({model}). The fisheye model of Kannala and Brandt (equidistant) is supported: calibrate the camera again with it.</source>
+        <translation>{name} 描述的是鱼眼镜头（{model}）。支持 Kannala 和 Brandt 的鱼眼模型（等距）：请用该模型重新标定相机。</translation>
     </message>
     <message>
         <source>{name} has a lens field of the amplitude {amplitude:g} px and the correlation length {length:g} px; an amplitude above 0 and up to {largest:g} px, and a length from {shortest:g} px are needed. Correct or remove the entry lens_field.</source>
