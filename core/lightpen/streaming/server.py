@@ -90,16 +90,29 @@ class _Client:
     rest: bytes = b""
     newest: bytes = b""
     active_s: float = field(default_factory=time.monotonic)  # it took or sent data
+    waiting_s: float = field(default_factory=time.monotonic)  # since when data waits
+
+    def offer(self, data: bytes) -> None:
+        """Make data the next to be sent, in place of what waits unsent."""
+        if not self.is_waiting:
+            self.waiting_s = time.monotonic()
+        self.newest = data
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether data waits to be sent."""
+        return bool(self.rest or self.newest)
 
     def is_stuck(self, now_s: float) -> bool:
         """Return whether data waits for a client that takes none."""
-        return bool(self.rest) and now_s - self.active_s > IDLE_S
+        since_s = max(self.waiting_s, self.active_s)
+        return self.is_waiting and now_s - since_s > IDLE_S
 
     @property
     def awaited(self) -> int:
         """Selector events: also writing while data is pending."""
-        has_more = self.rest or self.newest
-        return selectors.EVENT_READ | (selectors.EVENT_WRITE if has_more else 0)
+        writing = selectors.EVENT_WRITE if self.is_waiting else 0
+        return selectors.EVENT_READ | writing
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +248,7 @@ class PoseStream:
             return
         sent = pose_messages(seen.detection, self._tip, seen.number, seen.at)
         for client in clients:
-            client.newest = sent
+            client.offer(sent)
 
     def _tell(self, status: StreamStatus) -> None:
         self._status = status
