@@ -68,7 +68,7 @@ from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session import advance_session
 from lightpen.verification.session.session_state import SessionSetup, SessionState
 from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleOptions
-from lightpen.verification.tasks.fixed_point import FIXED_POINT
+from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.look.pooling import pooled
@@ -94,7 +94,11 @@ N_RECORDED = 60  # images that are reviewed
 N_SHOWN = 40  # live images that a page is shown
 CHOICES = VerificationChoices(
     (FIXED_POINT.kind, CIRCLE.kind, LENGTH.kind),
-    (CircleOptions(SIMULATED_RADIUS, 0.001), LengthOptions(SIMULATED_LENGTH, 0.001)),
+    (
+        FixedPointOptions(n_touches=10),
+        CircleOptions(SIMULATED_RADIUS, 0.001),
+        LengthOptions(SIMULATED_LENGTH, 0.001),
+    ),
 )
 N_ON_RING = 7  # touches when the verification is drawn
 N_HELD = 10  # images through which the pen is held still

@@ -124,7 +124,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     walker.until_says("Today")
     assert walker.says("PASS")
     assert all(walker.says(number) for number in shown.numbers)
-    assert walker.steps()["Swing"] == "to do"
+    assert walker.steps()["Swing"] == "done"
 
 
 def is_shown(walker: "Walker") -> bool:

@@ -82,7 +82,7 @@ def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
 
     walker = open_wizard(SourceEnvironment(scene, clock))
     rendered.operator.seat()
-    walker.click("Continue to the camera")
+    walker.click_step("Camera")
     walker.until_tells("10 of 10 LEDs")
     assert walker.tells("Matches the live images: 1224 x 1024")
     assert walker.tells("Incomplete: 0")
