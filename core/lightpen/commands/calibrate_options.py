@@ -86,7 +86,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         metavar="K",
         help=(
             "standard uncertainty of the temperature (0.5), or without "
-            "--temperature the temperature difference from the LED measurement (3)"
+            "--temperature the temperature difference from the LED measurement (1.5)"
         ),
     )
     parser.add_argument(

@@ -63,7 +63,7 @@ class Assumptions:
     expansion_share: float = 0.1
     temperature_c: float | None = None
     temperature: float = 0.5
-    warmth: float = 3.0
+    warmth: float = 1.5  # U (k = 2) of 3 K
     diameter: float = 0.05
     form_error: float = 0.0002
     center_bias: float = 0.003
