@@ -411,7 +411,8 @@ def test_the_centers_of_a_record_give_its_tip_again(
 ) -> None:
     fields = record(clean)
     again = record(clean, "--centers", str(clean_centers))
-    np.testing.assert_allclose(again["tip_pen_mm"], fields["tip_pen_mm"], atol=5e-4)
+    # Centres have no areas, which leaves the disc diameter uncertain by 5 %.
+    np.testing.assert_allclose(again["tip_pen_mm"], fields["tip_pen_mm"], atol=1e-3)
     assert len(again["frames"]) == 60
     digest = hashlib.sha256(clean_centers.read_bytes()).hexdigest()
     assert digest in json.dumps(again)

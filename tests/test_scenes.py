@@ -180,7 +180,11 @@ def test_two_leds_exchanged_in_one_image_would_be_noticed(
     hard: Path, record: Record, truth: Truth
 ) -> None:
     fields = json.loads(json.dumps(record(hard)))
-    frame = next(frame for frame in fields["frames"] if len(frame["leds"]) == 10)
+    frame = next(
+        frame
+        for frame in fields["frames"]
+        if len(frame["leds"]) == 10 and all(led["used"] for led in frame["leds"])
+    )
     one, other = frame["leds"][2], frame["leds"][7]
     one["led"], other["led"] = other["led"], one["led"]
     assert len(wrong_leds(fields, truth(hard))) == 2

@@ -19,6 +19,8 @@ def without_copies(observations: Observations) -> Observations:
     """
     reasons = list(observations.reasons)
     used = np.flatnonzero([reason is Reason.NONE for reason in reasons])
+    if len(used) == 0:
+        return observations
     pixels = observations.pixels[used].reshape(len(used), -1)
     seen = np.isfinite(pixels)
     clean = np.where(seen, pixels, 0.0)

@@ -73,7 +73,6 @@ def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedIm
         observations.pixels[posed],
         observations.rotations[posed],
         observations.translations[posed],
-        sigmas=observations.sigmas[posed],
     )
     require_fit(poses.sigma)
     fitting = _fitting(poses)
