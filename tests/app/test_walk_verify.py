@@ -166,7 +166,7 @@ def interrupted(known: "Walker", tmp_path: Path) -> "Walker":
     for _ in range(VISIT_POINTS):
         verifier.touch(Hold(tilt=0.0))
         verifier.see(verifier.holder.away())
-    verifier.touch(*leant(3)[:2])
+    verifier.touch(*leant(5)[:2])
     shutil.copytree(kept, copy)
     verifier.runner.shut_down()
     assert verifier.runner.await_end(TIMEOUT)
