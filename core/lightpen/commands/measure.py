@@ -109,11 +109,11 @@ def _measure(options: argparse.Namespace) -> None:
     found: list[tuple[str, ProbedPoint]] = []
     files: list[Path] = []
     with progress("Finding LEDs") as report:
-        for name, place in places:
+        for i, (name, place) in enumerate(places):
             points, own = _points(place, instrument, viewers, rules)
             found += [(name, point) for point in points]
             files += own
-            report(len(found) / max(len(found), len(places)))
+            report((i + 1) / len(places))
     require_other_file(options.json, *files)
     ball = options.ball_diameter
     if ball is None:
