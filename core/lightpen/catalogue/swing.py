@@ -48,7 +48,6 @@ MESSAGES = {
     "verdict.led-displaced": "LED {led} is {distance:.2f} mm from its file position. Check that the LED file belongs to this pen.",
     "verdict.leds-misfit": "Residuals {sigma:.2f} px; usual is {usual:.2f} px or less. Check that the LED file belongs to this pen and the intrinsics file to this camera and lens.",
     "verdict.no-tip": "{why}",
-    "verdict.misfit-first": "{misfit} Also: {why}",
     "verdict.good": "U (k = 2) of the tip is {uncertainty:.4f} mm.",
     "verdict.file-assumed": "U (k = 2) of the tip is {uncertainty:.4f} mm, limit {limit:.4f} mm; {share:.4f} mm is assumed for {advice}. More images hardly help.",
     "swing.images-stay-in": "Without these images the tip is not determined; they remain included. {why}",

@@ -12,6 +12,7 @@ from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.solving import Solution
+from lightpen.swing.failed_swing import FailedSwing
 from lightpen.swing.state import Pause, Phase, SwingEvent, SwingSetup, SwingState
 
 
@@ -44,6 +45,8 @@ class SwingStatus:
         Origin of the images.
     assessment : SwingAssessment or None
         Assessment of the solution, compared with the current result.
+    failed : FailedSwing or None
+        What came of the images that gave no tip; None where they gave one.
     result : Result or None
         The result that was accepted.
     revoked : Result or None
@@ -64,6 +67,7 @@ class SwingStatus:
     origin: Origin | None = None
     solution: Solution | None = None
     assessment: SwingAssessment | None = None
+    failed: FailedSwing | None = None
     result: Result | None = None
     revoked: Result | None = None
     activity: Activity = Activity.NONE
@@ -75,6 +79,13 @@ class SwingStatus:
     def verdict(self) -> Verdict | None:
         """The verdict on the solution."""
         return None if self.assessment is None else self.assessment.verdict
+
+    @property
+    def failure(self) -> FailedSwing | None:
+        """Why there is no tip, once its computation has failed."""
+        state = self.state
+        is_judged = state is not None and state.phase is Phase.VERDICT
+        return self.failed if is_judged and self.solution is None else None
 
     @property
     def is_capturing(self) -> bool:

@@ -11,14 +11,11 @@ from datetime import datetime
 from pathlib import Path
 from typing import TypeVar
 
-import numpy as np
-
 from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
 from lightpen.errors import AcceptanceError, LightpenError
-from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import Message, message
 from lightpen.record.library.supervision import Signature
@@ -41,6 +38,7 @@ from lightpen.record.swings.writing import (
 )
 from lightpen.runners.faults import FaultReporter
 from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread, Task
+from lightpen.swing.failed_swing import failed_swing
 from lightpen.swing.operator_presence import OperatorPresence
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
@@ -65,7 +63,7 @@ from lightpen.swing.state import (
 )
 from lightpen.swing.status import Activity, SwingListener, SwingStatus
 from lightpen.swing.swing_recorder import SwingRecorder
-from lightpen.swing_messages import leds_misfit, no_tip
+from lightpen.swing_messages import no_tip
 
 T = TypeVar("T")
 
@@ -482,6 +480,7 @@ class SwingWorkflow:
             status,
             solution=solution,
             assessment=solved.assessment,
+            failed=None,
             result=None,
             activity=activity,
         )
@@ -492,21 +491,16 @@ class SwingWorkflow:
     def _on_unsolved(self, why: Message) -> None:
         solution = self._status.solution
         if solution is None:
-            status = replace(self._status, activity=Activity.NONE)
-            self._conclude(status, no_tip(self._by_evidence(why)), passed=False)
+            state, setup = self._status.state, self._status.setup
+            assert state is not None
+            assert setup is not None
+            failed = failed_swing(setup, state.kept, why)
+            status = replace(self._status, activity=Activity.NONE, failed=failed)
+            self._conclude(status, no_tip(failed.causes[0]), passed=False)
             return
         if set(self._tried) > set(solution.taken_out):
             why = message("swing.images-stay-in", why=why)
         self._keep_solution(solution, why)
-
-    def _by_evidence(self, why: Message) -> Message:
-        """Return why there is no tip; LEDs that misfit in each image come first."""
-        kept = None if self._status.state is None else self._status.state.kept
-        sigma = 0.0 if kept is None or not len(kept) else float(np.median(kept.sigmas))
-        if sigma <= USUAL_SIGMA:
-            return why
-        misfit = leds_misfit(sigma, USUAL_SIGMA)
-        return message("verdict.misfit-first", misfit=misfit, why=why)
 
     def _keep_solution(self, solution: Solution, why: Message) -> None:
         """Keep the solution and its images, and report why."""

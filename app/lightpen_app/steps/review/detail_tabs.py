@@ -44,9 +44,10 @@ class DetailTabs(QTabWidget):
         self._run = run
         self._place = place
         self._images = LazyWidget(_make_images_panel)
+        self._residuals = LazyWidget(_make_residuals_panel)
         self._panels: tuple[LazyWidget[ImagesPanel] | LazyWidget[PlotsPanel], ...] = (
             self._images,
-            LazyWidget(_make_residuals_panel),
+            self._residuals,
             LazyWidget(_make_uncertainty_panel),
             LazyWidget(_make_methods_panel),
         )
@@ -72,7 +73,13 @@ class DetailTabs(QTabWidget):
         return self._images.content_so_far()
 
     def fill(self) -> None:
-        """Show the solution in the tab that is seen."""
+        """Show the solution in the tab that is seen; residuals where there is none."""
+        has_failed = self._run.status.failure is not None
+        residuals = self._tab_of[self._residuals]
+        for tab in self._tab_of.values():
+            self.setTabEnabled(self.indexOf(tab), tab is residuals or not has_failed)
+        if has_failed:
+            self.setCurrentWidget(residuals)
         for panel, tab in self._tab_of.items():
             if tab is self.currentWidget():
                 self._show_solution(panel.content())
@@ -92,9 +99,12 @@ class DetailTabs(QTabWidget):
                 content.shut_down()
 
     def _show_solution(self, panel: "ImagesPanel | PlotsPanel") -> None:
-        solution = self._run.status.solution
+        solution, failure = self._run.status.solution, self._run.status.failure
         if panel.value() is not solution:
             panel.set_value(solution)
+        setup, residuals = self._run.status.setup, self._residuals.content_so_far()
+        if failure is not None and setup is not None and residuals is not None:
+            residuals.set_failed(failure, setup.rig)
 
     def _on_panel_made(self, panel: "ImagesPanel | PlotsPanel") -> None:
         for card in panel.cards():

@@ -22,6 +22,7 @@ from lightpen_app.steps.review.view import ReviewView
 from lightpen_app.steps.review.view_state import (
     OF_FILES,
     differs,
+    next_step,
     next_step_text,
     repeat_question,
     returns_to_swing,
@@ -109,8 +110,9 @@ class ReviewPage(Page):
 
     @override
     def why_closed(self) -> str:
-        has_tip = self._run.status.solution is not None
-        return "" if has_tip else self.tr("Swing the pen first.")
+        status = self._run.status
+        is_judged = status.solution is not None or status.failure is not None
+        return "" if is_judged else self.tr("Swing the pen first.")
 
     @override
     def main_action(self) -> MainAction:
@@ -129,9 +131,9 @@ class ReviewPage(Page):
                 self.step_requested.emit("start")
             self._runner.abandon()  # which leads to the next swing
             return
-        if status.verdict is None or why_not_now(status):
+        if why_not_now(status):
             return
-        match status.verdict.next_step:
+        match next_step(status):
             case NextStep.ACCEPT:
                 self._runner.accept()
             case NextStep.CAPTURE_MORE if not status.is_recording:
@@ -139,7 +141,10 @@ class ReviewPage(Page):
             case NextStep.SEE_TO_CAUSE:
                 self.step_requested.emit("start")
             case step if step in OF_FILES:
-                self.step_requested.emit(step_of_file(status.verdict.reason))
+                verdict = status.verdict
+                self.step_requested.emit(
+                    "leds" if verdict is None else step_of_file(verdict.reason)
+                )
             case _:
                 self._ask_to_repeat()
 

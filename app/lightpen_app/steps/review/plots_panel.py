@@ -7,10 +7,13 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.reports.methods import result_of
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.model.camera import Camera
+from lightpen.model.rig import Rig
 from lightpen.record.swings.solving import Solution
+from lightpen.swing.failed_swing import FailedSwing
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import share_text
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
@@ -65,6 +68,9 @@ class PlotsPanel(Translated, QWidget):
         if solution is not None:
             self._show(solution)
 
+    def set_failed(self, failed: FailedSwing, rig: Rig) -> None:
+        """Show images that gave no tip; only their residuals are known."""
+
     def cards(self) -> Sequence[PlotCard]:
         """Return the plots with their menus."""
         return self._grid.cards()
@@ -101,6 +107,7 @@ class ResidualsPanel(PlotsPanel):
         )
         self._advice = text_label(TextSize.SMALL, Tone.QUIET)
         self._switch = CameraSwitch()
+        self._failed: tuple[FailedSwing, Rig] | None = None
 
         # Layout
         horizontal_layout(self._layout, (self._advice, 1), self._switch, spacing=-1)
@@ -110,12 +117,29 @@ class ResidualsPanel(PlotsPanel):
 
         self._retranslate()
 
+    @override
+    def set_failed(self, failed: FailedSwing, rig: Rig) -> None:
+        """Show the residuals of images, each from its own pose."""
+        self._failed = failed, rig
+        self._switch.setVisible(rig.n_cameras > 1)
+        c = self._switch.value() if rig.n_cameras > 1 else 0
+        residuals, pixels = failed.residuals[:, c], failed.pixels[:, c]
+        seen: BoolArray = np.isfinite(residuals[..., 0])
+        sums = np.where(seen[..., None], residuals, 0.0)
+        n_seen = np.maximum(seen.sum(axis=0), 1)
+        rms = np.sqrt((sums**2).sum(axis=(0, 2)) / (2 * n_seen))
+        mean = sums.sum(axis=0) / n_seen[:, None]
+        self._draw(rig.cameras[c], pixels[seen], residuals[seen], rms, mean)
+
     def _on_camera_changed(self) -> None:
         if self._solution is not None:
             self._show(self._solution)
+        elif self._failed is not None:
+            self.set_failed(*self._failed)
 
     @override
     def _show(self, solution: Solution) -> None:
+        self._failed = None
         rig = solution.source.rig
         self._switch.setVisible(rig is not None)
         if rig is None:
@@ -127,12 +151,23 @@ class ResidualsPanel(PlotsPanel):
         used = images.leds_used & calibration.used[:, None]
         points = images.observations.seen_pixels[used]
         residuals = solution.residuals[:, c][used]
+        leds = calibration.leds
+        self._draw(camera, points, residuals, leds.rms, leds.mean)
+
+    def _draw(
+        self,
+        camera: Camera,
+        points: FloatArray,
+        residuals: FloatArray,
+        rms: FloatArray,
+        mean: FloatArray,
+    ) -> None:
+        """Draw residuals (N, 2), px, at points (N, 2), and those of the LEDs."""
         self._arrows.set_data(camera.image_size, points, residuals)
         self._dots.set_data(residuals[:, 0], residuals[:, 1])
         self._histogram.set_data(residuals.ravel())
-        leds = calibration.leds
-        numbers = [str(led + 1) for led in range(len(leds.rms))]
-        self._leds.set_data(numbers, leds.rms, leds.mean[:, 0], leds.mean[:, 1])
+        numbers = [str(led + 1) for led in range(len(rms))]
+        self._leds.set_data(numbers, rms, mean[:, 0], mean[:, 1])
         self._retranslate()
 
     @override

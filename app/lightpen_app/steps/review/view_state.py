@@ -10,9 +10,11 @@ from lightpen.messages import Message
 from lightpen.model.origin import Origin
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
+from lightpen.swing.state import Phase
 from lightpen.swing.status import Activity, SwingStatus
+from lightpen.swing_messages import Code
 from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.phrases import accepted_phrase, grade_text, phrase
+from lightpen_app.look.phrases import accepted_phrase, grade_text, phase_text, phrase
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
@@ -76,7 +78,7 @@ def review_page_state(
     if status.is_recording:
         all_read = translate("ReviewPage", "All recorded images are loaded.")
     if status.solution is None:
-        not_swung = translate("ReviewPage", "Swing the pen first.")
+        not_swung = why_not_swung(status)
     if not is_accepted:
         not_accepted = translate(
             "ReviewPage",
@@ -90,8 +92,8 @@ def review_page_state(
         is_accepted=is_accepted,
         takes_reason=is_doubted and not is_accepted,
         why_locked=why_locked or goes_on,
-        why_not_more=why_locked or all_read,
-        why_not_repeated=why_locked,
+        why_not_more=(why_locked if status.failure is None else goes_on) or all_read,
+        why_not_repeated=why_locked if status.failure is None else goes_on,
         why_not_accepted=why_not_accepted(status),
         why_not_saved=not_swung,
         why_not_printed=not_accepted,
@@ -101,20 +103,30 @@ def review_page_state(
 def differs(before: SwingStatus, now: SwingStatus) -> bool:
     """Return whether the review shows something else by another status."""
     return (
-        *(before.solution, before.assessment, before.result),
+        *(before.solution, before.failure, before.assessment, before.result),
         *(before.activity, before.is_capturing),
     ) != (
-        *(now.solution, now.assessment, now.result),
+        *(now.solution, now.failure, now.assessment, now.result),
         *(now.activity, now.is_capturing),
     )
 
 
 def returns_to_swing(before: SwingStatus, now: SwingStatus) -> bool:
     """Return whether the swing continues with more images, or another begins."""
-    if before.solution is None or now.is_reading:
+    if (before.solution is None and before.failure is None) or now.is_reading:
         return False
     captures_more = now.is_capturing and (before.is_reading or not before.is_capturing)
-    return captures_more or now.solution is None
+    return captures_more or (now.solution is None and now.failure is None)
+
+
+def next_step(status: SwingStatus) -> NextStep | None:
+    """Return what to do after the verdict; None as long as there is none."""
+    if status.verdict is not None:
+        return status.verdict.next_step
+    if status.failure is None:
+        return None
+    is_misfit = status.failure.causes[0].code == Code.LEDS_MISFIT
+    return NextStep.CHECK_FILES if is_misfit else NextStep.CAPTURE_MORE
 
 
 def review_action(
@@ -138,8 +150,8 @@ def review_action(
             return MainAction(translate("ReviewPage", "Back to Start"), why_not)
         text = translate("ReviewPage", "Swing tip {0}").format(shortened(next_tip, 12))
         return MainAction(text, why_not)
-    verdict, why_not = status.verdict, why_not_now(status)
-    match None if verdict is None else verdict.next_step:
+    why_not = why_not_now(status)
+    match next_step(status):
         case None | NextStep.ACCEPT:
             text = translate("ReviewPage", "Accept")
             if not is_read:
@@ -186,6 +198,10 @@ def review_state(status: SwingStatus) -> State:
     translate = QCoreApplication.translate
     if status.result is not None:
         return _accepted_state(status.result)
+    if status.failure is not None:
+        assert status.state is not None
+        said = phrase(status.state.message, status.state.heading)
+        return State(phase_text(Phase.VERDICT), said.hint, Sign.CROSS, Tone.BAD)
     if status.verdict is None:
         text = translate("ReviewPage", "The tip appears here after the swing.")
         word = translate("ReviewPage", "NO TIP YET")
@@ -200,9 +216,14 @@ def review_state(status: SwingStatus) -> State:
 
 def remarks(status: SwingStatus, named: Names) -> tuple[StatusMessage, ...]:
     """Return the doubts, and whether the step Start names another pen or tip by now."""
-    if status.assessment is None:
+    doubts: tuple[Message, ...] = ()
+    if status.failure is not None:
+        doubts = status.failure.causes[1:]
+    elif status.assessment is not None:
+        doubts = status.assessment.doubts
+    else:
         return ()
-    texts = (_other_names(status.names, named), *map(worded, status.assessment.doubts))
+    texts = (_other_names(status.names, named), *map(worded, doubts))
     return tuple(StatusMessage(text, Sign.WARNING, Tone.WARN) for text in texts if text)
 
 
@@ -213,17 +234,17 @@ def next_step_text(status: SwingStatus) -> str:
         return translate(
             "ReviewPage", "Next: start the next calibration or close the program."
         )
-    if status.verdict is None:
+    step = next_step(status)
+    if step is None:
         return translate("ReviewPage", "The result takes effect when it is accepted.")
-    next_step = status.verdict.next_step
-    text = worded(next_step.message)
-    if next_step is NextStep.CAPTURE_MORE and status.is_recording:
+    text = worded(step.message)
+    if step is NextStep.CAPTURE_MORE and status.is_recording:
         text = translate(
             "ReviewPage", "Next: record more images and load all of them again."
         )
     has_last = status.assessment is not None and status.assessment.last is not None
     is_practice = status.origin is Origin.SIMULATED
-    if next_step is NextStep.ACCEPT and has_last and not is_practice:
+    if step is NextStep.ACCEPT and has_last and not is_practice:
         form = translate(
             "ReviewPage", "{0} Until then the previous result remains current."
         )
@@ -234,7 +255,7 @@ def next_step_text(status: SwingStatus) -> str:
 def why_not_now(status: SwingStatus) -> str:
     """Return why nothing can be done with the tip at this moment."""
     translate = QCoreApplication.translate
-    if status.solution is None or status.verdict is None:
+    if status.failure is None and (status.solution is None or status.verdict is None):
         return translate("ReviewPage", "Swing the pen first.")
     if status.is_solving:
         return translate("ReviewPage", "Computing the tip")
@@ -260,6 +281,14 @@ def why_not_changed(status: SwingStatus) -> str:
     translate = QCoreApplication.translate
     if status.result is not None:
         return translate("ReviewPage", "Tip accepted. Start the next calibration.")
+    return why_not_swung(status)
+
+
+def why_not_swung(status: SwingStatus) -> str:
+    """Return why there is no solution."""
+    translate = QCoreApplication.translate
+    if status.failure is not None:
+        return translate("ReviewPage", "These images gave no tip.")
     if status.solution is None:
         return translate("ReviewPage", "Swing the pen first.")
     return ""

@@ -12,7 +12,7 @@ from lightpen.model.limits import SwingLimits
 from lightpen.swing.kept_images import AcceptedImages
 from lightpen.swing.rules import stillness
 from lightpen.swing.shortfall import Shortfall, measure_shortfall, missing
-from lightpen.swing.state import Pause, Phase, SwingEventKind, SwingState
+from lightpen.swing.state import Pause, Phase, SwingEventKind
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.phrases import phrase
 from lightpen_app.look.sounds import Sound
@@ -212,23 +212,17 @@ def main_action(status: SwingStatus) -> MainAction:
         why_not = translate("SwingPage", "No image captured yet")
         finish = translate("SwingPage", "Finish early")
         return MainAction(finish, "" if has_images else why_not)
-    return MainAction(translate("SwingPage", "Review"), _why_no_review(status, state))
+    return MainAction(translate("SwingPage", "Review"), _why_no_review(status))
 
 
-def _why_no_review(status: SwingStatus, state: SwingState) -> str:
+def _why_no_review(status: SwingStatus) -> str:
     translate = QCoreApplication.translate
     if status.is_solving:
         return translate("SwingPage", "Computing the tip")
     if status.is_reading:
         return translate("SwingPage", "Swing in progress")
-    if status.solution is not None:
+    if status.solution is not None or status.failure is not None:
         return ""
-    if state.phase is Phase.VERDICT and status.is_recording:
-        return translate("SwingPage", "No tip to review. Choose other images.")
-    if state.phase is Phase.VERDICT:
-        return translate(
-            "SwingPage", "No tip to review. Capture more images or start over."
-        )
     return translate("SwingPage", "Tip not computed yet")
 
 

@@ -36,6 +36,7 @@ from tests.app.undressed import undressed
 from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import detect_pen
 from lightpen.detection.reasons import Reason
+from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
@@ -1556,3 +1557,55 @@ def test_whether_to_repeat_is_asked_no_more_once_the_tip_is_accepted(bed: Bed) -
     bed.qtbot.waitUntil(page.is_complete)
 
     assert the(page, QuestionBar).words() == ""
+
+
+# Without a tip
+
+
+@pytest.fixture
+def failed(bed: Bed, monkeypatch: pytest.MonkeyPatch) -> ReviewPage:
+    """The page of a swing whose fit does not converge."""
+
+    def diverges(record: Record, report: Callable[[float], None]) -> Solution:
+        raise CalibrationError("joint.not-settled", n_steps=100)
+
+    monkeypatch.setattr("lightpen.swing.workflow.solve_record", diverges)
+    workbench, folder = bed.workbench, bed.workbench.run.records_folder / "swing"
+    workbench.run.runner.go_on(bed.solved_once.read(folder))
+    workbench.run.runner.finish()
+    bed.qtbot.waitUntil(lambda: workbench.run.status.failure is not None)
+    with undressed():
+        page = ReviewPage(workbench)
+    bed.pages.append(page)
+    bed.qtbot.addWidget(page)
+    page.resize(1000, 600)
+    page.show()
+    page.entered()
+    return page
+
+
+def test_a_swing_without_a_tip_shows_its_cause_once_and_its_residuals(
+    failed: ReviewPage,
+) -> None:
+    tabs = the(failed, QTabWidget)
+
+    assert failed.why_closed() == ""
+    assert banner(failed).word == "NO TIP"
+    assert "did not converge" in banner(failed).detail
+    assert "did not converge" not in remarks(failed)
+    assert "did not converge" not in failed.lead()
+    assert tabs.tabText(tabs.currentIndex()) == "Residuals"
+    assert [tabs.isTabEnabled(i) for i in range(tabs.count())] == [
+        tabs.tabText(i) == "Residuals" for i in range(tabs.count())
+    ]
+    plots = [card.plot().columns() for card in failed.findChildren(PlotCard)]
+    (leds,) = (columns for columns in plots if "rms_px" in columns)
+    assert (np.asarray(leds["rms_px"], dtype=float) > 0).all()
+
+
+def test_a_swing_without_a_tip_goes_on_with_more_images_or_anew(
+    failed: ReviewPage,
+) -> None:
+    assert failed.main_action() == MainAction("Capture more")
+    assert button(failed, "Repeat swing").isEnabled()
+    assert not button(failed, "Copy tip").isEnabled()

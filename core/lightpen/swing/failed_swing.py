@@ -1,0 +1,49 @@
+"""A swing without a tip: its causes and the residuals of its images."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.rig_pose import fit_rig_poses
+from lightpen.estimation.contact.single_images import USUAL_SIGMA
+from lightpen.messages import Message
+from lightpen.swing.kept_images import AcceptedImages
+from lightpen.swing.state import SwingSetup
+from lightpen.swing_messages import leds_misfit
+
+
+@dataclass(frozen=True, eq=False)
+class FailedSwing:
+    """Why there is no tip, and how the LEDs fit in each image by itself.
+
+    Attributes
+    ----------
+    causes : tuple of Message
+        The most evident one first.
+    pixels, residuals : (N, C, L, 2) array
+        Centres of the LEDs in the images of each camera, and their residuals from the
+        pose of each moment, px; NaN where an LED was not seen.
+    """
+
+    causes: tuple[Message, ...]
+    pixels: FloatArray
+    residuals: FloatArray
+
+
+def failed_swing(setup: SwingSetup, kept: AcceptedImages, why: Message) -> FailedSwing:
+    """Return a swing that gave no tip.
+
+    Residuals of the poses do not depend on the cone. Where they are above the usual
+    ones, a file or an LED is a likelier cause than the seat.
+    """
+    residuals = np.full_like(kept.pixels, np.nan)
+    if len(kept):
+        poses = fit_rig_poses(
+            setup.rig, setup.pen, kept.pixels, kept.rotations, kept.translations
+        )
+        residuals = poses.residuals.reshape(kept.pixels.shape)
+    sigma = float(np.median(kept.sigmas)) if len(kept) else 0.0
+    fits = sigma <= USUAL_SIGMA
+    causes = (why,) if fits else (leds_misfit(sigma, USUAL_SIGMA), why)
+    return FailedSwing(causes, kept.pixels, residuals)
