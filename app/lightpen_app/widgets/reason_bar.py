@@ -128,6 +128,7 @@ class ReasonBar(AskingBar):
         self._edit.setPlaceholderText(field)
         self._give.setText(yes)
         self._decline.setText(no)
+        self._refresh()
 
     def ask(self, *, of_supervisor: bool = False) -> None:
         """Ask and wait for a text, signed by a supervisor if required."""
@@ -163,7 +164,7 @@ class ReasonBar(AskingBar):
         self._too_short.setVisible(bool(self._reason()) and n_typed < self._least)
         self._too_short.setText(
             QCoreApplication.translate(
-                "ReasonBar", "Enter at least {0} letters; there are {1}."
+                "ReasonBar", "Letters needed: {0}; entered: {1}."
             ).format(self._least, n_typed)
         )
 

@@ -120,14 +120,17 @@ def solve_seed(
     """
     images, chosen = _best_part(pieces)
     seed = _solved(pieces, images, chosen, size, known)
-    if seed.start.sigma > FITTING:
-        _require_one_pen(pieces, seed, size, known)
-        _require_one_camera(pieces, seed, size, known)
-        raise CalibrationError("discover.no-fit", misfit=seed.start.sigma)
     others = [h.misfit for h in seed.hypotheses if not h.is_best]
-    if min(others, default=np.inf) < DECIDED * seed.start.sigma:
+    is_decided = min(others, default=np.inf) >= DECIDED * seed.start.sigma
+    fits = seed.start.sigma <= FITTING
+    if fits and is_decided:
+        return seed
+    if not fits:
+        _require_one_pen(pieces, seed, size, known)
+    _require_one_camera(pieces, seed, size, known)
+    if fits:
         raise CalibrationError("discover.mirror-undecided")
-    return seed
+    raise CalibrationError("discover.no-fit", misfit=seed.start.sigma)
 
 
 def _solved(

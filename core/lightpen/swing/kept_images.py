@@ -244,8 +244,11 @@ def _refit(
     if posture_spread(joint.rotations[used])[0][0] < MIN_SPREAD:
         return replace(kept, seat=seat)  # as the solution of the whole swing judges
     fitted = Seat(joint.tip_pen, joint.cone_cam, joint.covariance)
-    prediction = predict_uncertainty(rig, pen, kept.pixels, joint, kept.prediction)
-    predicted = prediction.predicted(joint, max(joint.sigma, NO_NOISE), kept.assumed)
+    sigma = max(joint.sigma, NO_NOISE)
+    prediction = predict_uncertainty(
+        rig, pen, kept.pixels, joint, sigma, kept.assumed, kept.prediction
+    )
+    predicted = prediction.predicted(joint, sigma, kept.assumed)
     return replace(
         kept, seat=fitted, joint=joint, prediction=prediction, predicted=predicted
     )

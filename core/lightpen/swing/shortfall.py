@@ -35,6 +35,7 @@ LEARNING_TILT = np.radians(12.0)  # tells to which side the operator leans
 REACHED = np.radians(5.0)  # of a target
 N_MORE = 40  # images at least, where more are asked for than a swing needs
 PATIENCE = 4.0  # s until a target that is not reached is chosen anew
+DECAY = 2 / 3  # U^2 less its floor goes with n^-DECAY, measured with simulated stations
 ENOUGH_FILLED = 0.5  # of the fields, before it is said what no image can lower
 
 
@@ -96,9 +97,11 @@ def _n_for_uncertainty(state: SwingState, limits: SwingLimits) -> int:
     limit, floor = limits.max_uncertainty, state.kept.predicted.floor
     if state.kept.uncertainty <= limit or floor >= limit:
         return 0
-    # All but the floor goes with one over the number of images.
-    excess = (state.kept.uncertainty**2 - limit**2) / (limit**2 - floor**2)
-    bounded = min(excess * max(state.n_kept, 1), limits.max_images)
+    # Noise goes with one over the number of images; what lens and mechanics may be is
+    # known more slowly.
+    ratio = (state.kept.uncertainty**2 - floor**2) / (limit**2 - floor**2)
+    times = float(ratio) ** (1 / DECAY) - 1
+    bounded = min(times * max(state.n_kept, 1), limits.max_images)
     return max(ceil(bounded), 1)
 
 

@@ -239,7 +239,9 @@ def test_what_more_images_are_predicted_to_give_is_as_before(name: str) -> None:
     calibration = calibrated(name)
     pixels = calibration.observations.pixels[calibration.used][:, None]
     state, joint = calibration.bundle.state, calibration.joint
-    prediction = predict_uncertainty(state.rig, state.pen, pixels, joint)
+    prediction = predict_uncertainty(
+        state.rig, state.pen, pixels, joint, joint.sigma, USUAL
+    )
     found = {
         f"{sigma} {assumed.form_error}": prediction.predicted(joint, sigma, assumed)
         for sigma in (0.02, 0.1)

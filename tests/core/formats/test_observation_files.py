@@ -124,7 +124,7 @@ def test_a_file_that_ends_within_a_number_is_refused(tmp_path: Path) -> None:
 
 def test_more_frames_than_any_swing_has_are_refused(tmp_path: Path) -> None:
     lines = [f"{n},1,2,3" for n in range(30_001)]
-    assert "has 5001 frames; at most 5000" in refusal_of_centers(tmp_path, *lines)
+    assert "has 30001 frames; at most 5000" in refusal_of_centers(tmp_path, *lines)
 
 
 def test_a_huge_file_of_centres_is_refused(tmp_path: Path) -> None:

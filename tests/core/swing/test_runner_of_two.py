@@ -50,8 +50,8 @@ def test_both_images_of_a_moment_are_recorded_with_what_they_show(by_two: Path) 
         (other,) = image.others
         assert image.device_time_ns == other.device_time_ns
         own, others = image.rig_pixels
-        assert np.isfinite(own).all(axis=1).sum() >= 8
-        assert np.isfinite(others).all(axis=1).sum() >= 8
+        assert np.isfinite(own).all(axis=1).sum() >= 6
+        assert np.isfinite(others).all(axis=1).sum() >= 6
         assert not np.allclose(own, others, atol=1)
     data = (by_two / "images-2/000001.png").read_bytes()
     assert decode_image(data, "it").shape == (1024, 1224)

@@ -71,7 +71,7 @@ def _found_once(
 
 def _likely_effect(effect: Effect, found: EffectComponent) -> EffectComponent:
     """Return the component of an effect that the images support, else none."""
-    if found.supports(effect):
+    if found.is_supported:
         return found
     return found._replace(sigma=0.0, covariance=np.zeros_like(found.covariance))
 

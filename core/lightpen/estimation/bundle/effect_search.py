@@ -56,7 +56,10 @@ class SearchedEffect:
 
 
 def search_effects(
-    bundle: Bundle, pixels: FloatArray, compliance: float
+    bundle: Bundle,
+    pixels: FloatArray,
+    compliance: float,
+    residuals_at: FloatArray | None = None,
 ) -> tuple[SearchedEffect, ...]:
     """Search a fit without effects for them.
 
@@ -66,6 +69,8 @@ def search_effects(
         LED centres, px.
     compliance : float
         Standard deviation that is assumed, mm.
+    residuals_at : (p,) array or None
+        Values of the unknowns to which the residuals belong; None are those of the fit.
     """
     state, used, sigma = bundle.state, bundle.used, bundle.weight_sigma
     views = views_at(state, pixels)
@@ -81,11 +86,12 @@ def search_effects(
     columns = np.concatenate([each.columns for each in effects], axis=-1)
     own, with_others, right = _information(bundle, views, columns, used, sigma)
     at_best = inverse(bundle.covariance) @ bundle.values
+    start = bundle.values if residuals_at is None else residuals_at
     prior = bundle.unknowns.prior_information(NO_COMPONENTS)
     plain = inverse(bundle.information + bundle.measured_information + prior)
     models = []
     for covariance in (bundle.covariance, plain):
-        change = covariance @ at_best - bundle.values
+        change = covariance @ at_best - start
         S = own - with_others.T @ covariance @ with_others
         models.append((0.5 * (S + S.T), right - with_others.T @ change))
     found, first = [], 0
@@ -94,7 +100,7 @@ def search_effects(
         at = slice(first, first + effect.number)
         first = at.stop
         sizes = [size_of(effect, S[at, at], b[at]) for S, b in models]
-        is_candidate = any(size.supports(effect) for size in sizes)
+        is_candidate = any(size.is_supported for size in sizes)
         found.append(SearchedEffect(effect, sizes[0], by_all[:, at], is_candidate))
     return tuple(found)
 

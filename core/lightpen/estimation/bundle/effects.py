@@ -38,7 +38,7 @@ LENGTHS = np.array([0.1, 0.18, 0.32, 0.56])  # of the image's width
 LEAST_LEAN = 0.02  # sine; below it the side of the lean is not known
 # How often chance alone supports an effect, at most. Four kinds are tried at every
 # station: of 24 without effects, one in six (Akaike) made the tip twice as far off.
-CHANCE, LENS_CHANCE = 0.02, 0.01
+CHANCE = 0.01
 N_SCALES = 60  # standard deviations tried
 SMALLEST = 1e-3  # of the largest one
 ROUNDING = 1e-9  # of the largest eigenvalue
@@ -115,10 +115,10 @@ class EffectComponent(NamedTuple):
     covariance: FloatArray
     expected: FloatArray
 
-    def supports(self, effect: Effect) -> bool:
-        """Tell whether the images support an effect, so that it is fitted."""
-        chance = LENS_CHANCE if effect.name is EffectName.LENS else CHANCE
-        return self.gain > chi_square_quantile(1, chance)
+    @property
+    def is_supported(self) -> bool:
+        """Whether the images support the effect, so that it is fitted."""
+        return self.gain > chi_square_quantile(1, CHANCE)
 
 
 def held(effect: Effect) -> EffectComponent:

@@ -61,9 +61,6 @@ _ADVICE = {
     ContributionName.EXTRINSICS: message("share.rig"),
     ContributionName.LENS: message("share.lens"),
     ContributionName.COMPLIANCE: message("share.compliance"),
-    ContributionName.LOOSE: message("share.loose-stylus"),
-    ContributionName.SAG: message("share.sag"),
-    ContributionName.TILT: message("share.camera-tilt"),
 }
 
 

@@ -105,6 +105,9 @@ IMAGES_SHRINK = (
     ContributionName.SEAT,
     ContributionName.DRIFT,
     ContributionName.SHRINKAGE,
+    ContributionName.LOOSE,
+    ContributionName.SAG,
+    ContributionName.TILT,
 )
 
 

@@ -3,7 +3,9 @@
 During a swing tip and cone are fitted with the parameters of the files held. U is that
 of the whole budget all the same (`budget.contributions_of`), by one step of the bundle
 adjustment about the joint fit: its normal equations are kept, and a new image adds its
-own. Correlated noise is left to the calibration.
+own. What lens, sag, loose stylus and camera tilt may add is searched for when all images
+are linearised anew, as it needs the LEDs one by one. Correlated noise is left to the
+calibration.
 """
 
 from collections.abc import Sequence
@@ -19,7 +21,12 @@ from lightpen.estimation.bundle.adjustment import shrunk_priors
 from lightpen.estimation.bundle.bundle import Bundle, jitter_matrices, jitter_of
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.components import NO_COMPONENTS
-from lightpen.estimation.bundle.effect_search import search_compliance
+from lightpen.estimation.bundle.effect_search import (
+    SearchedEffect,
+    search_compliance,
+    search_effects,
+)
+from lightpen.estimation.bundle.effects import EffectName
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     BundleState,
@@ -83,11 +90,14 @@ class UncertaintyPrediction:
         For a noise of 1 px.
     n_whole : int
         Images that were linearised together.
+    effects : tuple of SearchedEffect
+        What these images leave open of the effects of a station, but for compliance.
     """
 
     state: BundleState
     equations: NormalEquations
     n_whole: int
+    effects: tuple[SearchedEffect, ...] = ()
 
     def predicted(
         self, joint: JointFit, sigma: float, assumed: Assumptions
@@ -101,19 +111,16 @@ class UncertaintyPrediction:
         sigma : float
             Noise of one image coordinate, px.
         """
-        state = self.state
-        priors = priors_of(state.rig, state.pen, assumed)
-        unknowns = Unknowns.of(state, priors, seat_modes_of(state.rotations))
-        equations = _weighed(self.equations, sigma)
-        bundle = _linear_bundle(unknowns, equations, joint, sigma)
+        priors, equations, bundle = self._adjusted(joint, sigma, assumed)
         shrinkage_shift = _shrinkage_shift_of(bundle, priors, equations)
         n_images = int(joint.used.any(axis=1).sum())
         noise = bundle.independent_noise
         jitter = bundle.components.jitter.covariance
         beside = equations if jitter is None else _with_jitter(equations, jitter)
         compliance = search_compliance(bundle, beside, priors.compliance)
+        effects = (compliance, *self.effects)
         now = contributions_of(
-            bundle, priors, n_images, noise, shrinkage_shift, (compliance,)
+            bundle, priors, n_images, noise, shrinkage_shift, effects
         )
         endless = _with_endless_images(bundle)
         nothing = np.zeros((6, 6))
@@ -127,12 +134,38 @@ class UncertaintyPrediction:
         ]
         return PredictedUncertainty(_weakest(now), _weakest(stays))
 
+    def with_effects(
+        self, pixels: FloatArray, joint: JointFit, sigma: float, assumed: Assumptions
+    ) -> "UncertaintyPrediction":
+        """Search images, pixels (N, C, L, 2), for the effects of a station."""
+        priors, _, bundle = self._adjusted(joint, sigma, assumed)
+        found = search_effects(
+            bundle, pixels, priors.compliance, residuals_at=np.zeros_like(bundle.values)
+        )
+        effects = tuple(
+            replace(each, is_candidate=False)
+            for each in found
+            if each.effect.name is not EffectName.COMPLIANCE
+        )
+        return replace(self, effects=effects)
+
+    def _adjusted(
+        self, joint: JointFit, sigma: float, assumed: Assumptions
+    ) -> tuple[Priors, NormalEquations, Bundle]:
+        state = self.state
+        priors = priors_of(state.rig, state.pen, assumed)
+        unknowns = Unknowns.of(state, priors, seat_modes_of(state.rotations))
+        equations = _weighed(self.equations, sigma)
+        return priors, equations, _linear_bundle(unknowns, equations, joint, sigma)
+
 
 def predict_uncertainty(
     rig: Rig,
     pen: Pen,
     pixels: FloatArray,
     joint: JointFit,
+    sigma: float,
+    assumed: Assumptions,
     before: UncertaintyPrediction | None = None,
 ) -> UncertaintyPrediction:
     """Add images to a prediction.
@@ -143,21 +176,25 @@ def predict_uncertainty(
         Of each camera, px; NaN where an LED was not seen.
     joint : JointFit
         The fit to them.
+    sigma : float
+        Noise of one image coordinate, px.
     before : UncertaintyPrediction or None
         Prediction for the first of these images.
     """
     n_images = len(pixels)
     state = BundleState(rig, pen, joint.tip_pen, joint.cone_cam, joint.rotations)
     if before is None or n_images > GROWTH * before.n_whole:
-        return UncertaintyPrediction(
+        whole = UncertaintyPrediction(
             state, _equations_of(state, pixels, joint, 0), n_images
         )
+        return whole.with_effects(pixels, joint, sigma, assumed)
     n_before = len(before.state.rotations)
     fresh = _equations_of(state, pixels, joint, n_before)
     return UncertaintyPrediction(
         replace(before.state, rotations=joint.rotations),
         _joined(before.equations, _moved(fresh, state, before.state)),
         before.n_whole,
+        before.effects,
     )
 
 

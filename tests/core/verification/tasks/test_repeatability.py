@@ -186,7 +186,7 @@ def test_the_control_chart_is_a_table_or_a_picture(tmp_path: Path) -> None:
 
     lines = (tmp_path / "chart.csv").read_text().splitlines()
     assert len(lines) == 1 + 3 * len(TABLE_1)
-    assert lines[1].startswith('1,"test 1",x,-1.278000,')
+    assert lines[1].startswith("1,test 1,x,-1.278000,")
     root = ElementTree.parse(tmp_path / "chart.svg").getroot()
     circles = [each for each in root if each.tag.endswith("circle")]
     assert len(circles) == 3 * len(TABLE_1)
