@@ -247,9 +247,9 @@ def _require_one_camera(
     images = images[shown >= min(4, len(seed.pieces))]
     if len(images) < 2 * MIN_IMAGES:
         return
-    parts = [
-        _solved(pieces, half, seed.pieces, size, known)
-        for half in np.array_split(images, 2)
+    parts = [  # the change is somewhere between them
+        _solved(pieces, part, seed.pieces, size, known)
+        for part in (images[:MIN_IMAGES], images[-MIN_IMAGES:])
     ]
     if all(part.start.sigma < APART * seed.start.sigma for part in parts):
         first, second = (part.start.state.rig.cameras[0].fx for part in parts)
