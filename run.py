@@ -32,7 +32,10 @@ Each command first sets up whatever it needs."""
 ROOT = Path(__file__).resolve().parent
 PIP = "pip>=25.1"
 # All tests of a file in one process: what they share is made once.
-PARALLEL = ("--numprocesses", "auto", "--dist", "loadfile", "--no-loadscope-reorder")
+PARALLEL = (
+    *("--numprocesses", "auto", "--dist", "loadfile", "--no-loadscope-reorder"),
+    *("--max-worker-restart", "1"),  # a test that ends its process is run again
+)
 CHECKS = (
     ("ruff", "check"),
     ("ruff", "format", "--check"),
