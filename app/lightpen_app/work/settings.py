@@ -26,7 +26,7 @@ from lightpen.streaming.server import StreamPlace
 from lightpen_app.look.languages import system_language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.work.settings_store import Changes, Content, load, save, with_changes
-from lightpen_app.work.stations import Station
+from lightpen_app.work.stations import CameraFiles, Station
 from lightpen_resources import SOURCE_LANGUAGE, languages
 
 AGAIN_MS = 5000  # after which what could not be written is tried again
@@ -58,7 +58,7 @@ class Preferences:
     stream_port: int = StreamPlace.port
 
 
-Group = TypeVar("Group", Preferences, Station, CameraSettings, DueRule)
+Group = TypeVar("Group", Preferences, Station, CameraSettings, DueRule, CameraFiles)
 
 
 class Settings(QObject):
@@ -136,6 +136,23 @@ class Settings(QObject):
     def set_camera(self, serial: str, settings: CameraSettings) -> None:
         """Remember how a camera is set up."""
         self._save("cameras", {serial: _entries(settings)})
+
+    def camera_files(self, serials: str) -> CameraFiles:
+        """Return what is stored for the camera of a serial number, or for a pair."""
+        kept = self._content.get("camera files", {}).get(serials)
+        return _read(kept, CameraFiles())
+
+    def set_camera_files(self, serials: str, files: CameraFiles) -> None:
+        """Remember the files of a camera, or of a pair."""
+        self._save("camera files", {serials: _entries(files)})
+
+    def camera_of_file(self, sha256: str) -> str:
+        """Return the serial number of the camera that a file is stored for."""
+        kept = self._content.get("camera files", {})
+        for serial in kept:
+            if sha256 and self.camera_files(serial).sha256 == sha256:
+                return serial
+        return ""
 
     def last_station(self) -> str:
         """Return the name of the station used last; empty at first."""

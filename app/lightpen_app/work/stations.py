@@ -31,6 +31,23 @@ class StoredCamera:
 
 
 @dataclass(frozen=True)
+class CameraFiles:
+    """What belongs to a camera, whatever the station.
+
+    Attributes
+    ----------
+    file, sha256 : str
+        Path and hash of the intrinsics file; path of the rig file for a pair.
+    mask : tuple of triples
+        Circles of stray light: centre x, y and radius, px.
+    """
+
+    file: str = ""
+    sha256: str = ""
+    mask: tuple[Triple, ...] = ()
+
+
+@dataclass(frozen=True)
 class FilePaths:
     """Paths of the files in use, empty where none is; units of a pen file without."""
 

@@ -13,6 +13,7 @@ from lightpen.record.library.supervision import Supervision, read_supervision
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.archive_writer import ArchiveWriter
+from lightpen_app.work.camera_files import FilesOfCameras
 from lightpen_app.work.camera_setup import CameraSetup
 from lightpen_app.work.chosen_files import ChosenFiles
 from lightpen_app.work.folder_watch import FolderWatch
@@ -58,8 +59,8 @@ class Workbench(QObject):
         The tips, and how they stand.
     pens : PenFiles
         The LED file of each pen.
-    pens : PenFiles
-        The LED file of each pen.
+    camera_files : FilesOfCameras
+        Intrinsics, mask and rig file of each camera.
     streaming : Streaming
         Lets other programs follow the pen.
     folder_watch : FolderWatch
@@ -98,6 +99,7 @@ class Workbench(QObject):
         self.pens = PenFiles(
             self.selection, self.library, notices, folder, around.now, self
         )
+        self.camera_files = FilesOfCameras(self.selection, settings, notices, self)
         self.folder_watch = FolderWatch(folder, self)
         self.archive_writer = ArchiveWriter(
             folder, self.run.logbook, around.now, notices, self
@@ -144,6 +146,7 @@ class Workbench(QObject):
             told.blockSignals(True)  # nothing more is begun because of what they tell
         self.folder_watch.stop()
         self.pens.shut_down()
+        self.camera_files.shut_down()
         self.library.shut_down()
         self.run.runner.shut_down()
         self.verification.runner.shut_down()

@@ -23,11 +23,14 @@ class CameraFile:
     ----------
     is_simulated : bool
         Whether it is of a simulated camera.
+    sha256 : str
+        Hash of the content that was read.
     """
 
     path: Path
     camera: Camera
     is_simulated: bool = False
+    sha256: str = ""
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -38,7 +41,7 @@ class CameraFile:
         FileError
             It cannot be read.
         """
-        return cls(path, read_camera(path), is_simulated(path))
+        return cls(path, read_camera(path), is_simulated(path), sha256(path))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,13 @@ import numpy as np
 from PySide6.QtCore import QCoreApplication, QObject, Signal
 
 from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.files import write_whole
 from lightpen.formats.hashes import InputFile, all_hashed, hashed
 from lightpen.formats.images import find_images
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.observing import observe_board
+from lightpen.intrinsics.page import board_page
 from lightpen.intrinsics.uncertainty_map import UncertaintyMap, map_uncertainty
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.local_time import local_now
@@ -115,6 +117,19 @@ class BoardCalibration(QObject):
         job.succeeded.connect(partial(self._on_saved, trial))
         job.failed.connect(partial(self._on_save_refused, trial))
         job.start()
+
+    def print_board(self, board: Board, path: Path) -> None:
+        """Write a board as a PDF page at true scale, and say so."""
+        job = Job(lambda _: write_whole(path, board_page(board)), self)
+
+        # Connections
+        job.succeeded.connect(lambda _: self.tell(partial(self._printed_message, path)))
+        job.failed.connect(self._on_refused)
+        job.start()
+
+    def _printed_message(self, path: Path) -> StatusMessage:
+        words = self.tr("Saved: {0}. Print it at 100 % and mount it on a flat plate.")
+        return StatusMessage(words.format(path), Sign.CHECK, Tone.GOOD)
 
     def conclude(self) -> None:
         """Discard the result, and report the outcome of the attempt."""

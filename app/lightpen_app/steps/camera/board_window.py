@@ -10,8 +10,9 @@ from PySide6.QtWidgets import QFileDialog, QListWidget, QListWidgetItem, QWidget
 from typing_extensions import override
 
 from lightpen.errors import UsageError
-from lightpen.intrinsics.boards import Board, parse_board
+from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.calibration import MIN_VIEWS
+from lightpen.intrinsics.view_progress import ViewProgress, view_progress
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.camera.board_calibration import BoardCalibration, facts_text
@@ -20,19 +21,19 @@ from lightpen_app.steps.camera.board_capture import (
     fault_message,
     sight_message,
 )
+from lightpen_app.steps.camera.board_form import BoardForm
 from lightpen_app.steps.camera.board_overlay import board_overlay
+from lightpen_app.steps.camera.board_progress import BoardProgress
 from lightpen_app.steps.camera.board_view import BoardView
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.page_scroll import PageScroll
-from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.live_view import DisplayedImage, LiveView
 
-USUAL_BOARD = "chessboard:11x8:20"
-SIDE_WIDTH = 46 * GRID
-LEAST_LIST = 20 * GRID  # px, of the views
+SIDE_WIDTH = 48 * GRID
+LEAST_LIST = 28 * GRID  # px, of the views
 
 
 class BoardWindow(FittedWindow, Translated, QWidget):
@@ -60,9 +61,8 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         # Widgets
         self._image = BoardView()
         self._remark = SignLabel()
-        self._board = EnterEdit(USUAL_BOARD)
-        self._board_name = text_label(TextSize.BODY)
-        self._forms = text_label(TextSize.SMALL, Tone.QUIET)
+        self.board, self._progress = BoardForm(), BoardProgress()
+        self._print = PushButton()
         self._begin = PushButton()
         self._folder = PushButton()
         self._compute = PushButton()
@@ -80,11 +80,9 @@ class BoardWindow(FittedWindow, Translated, QWidget):
 
         # Layout
         panel = QWidget()
-        side = vertical_layout(
-            panel, self._board_name, self._board, self._forms, margins=None
-        )
+        side = vertical_layout(panel, self.board, self._print, margins=None)
         horizontal_layout(side, self._begin, self._folder, spacing=-1)
-        fill(side, self._count, self._compute, self._facts)
+        fill(side, self._progress, self._count, self._compute, self._facts)
         horizontal_layout(
             side, self._shows_residuals, self._shows_uncertainty, spacing=-1
         )
@@ -105,6 +103,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._calibration.saved.connect(self.saved)
         self._calibration.concluded.connect(self.concluded)
         self._begin.clicked.connect(self._on_begin_clicked)
+        self._print.clicked.connect(self._on_print_clicked)
         self._folder.clicked.connect(self._on_folder_clicked)
         self._compute.clicked.connect(self._calibration.calibrate_by_capture)
         self._remove.clicked.connect(self._on_remove_clicked)
@@ -146,7 +145,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     def _named_board(self) -> Board | None:
         """Return the board of the fields, or report why there is none."""
         try:
-            board = parse_board(self._board.text())
+            board = self.board.board()
         except UsageError as error:
             self._calibration.tell(partial(fault_message, error.message))
             return None
@@ -165,6 +164,19 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         folder = QFileDialog.getExistingDirectory(self, self.tr("Board images"))
         if folder:
             self.read_folder(folder)
+
+    def print_board(self, path: str) -> None:
+        """Write the board as a page at true scale."""
+        board = self._named_board()
+        if board is not None:
+            self._calibration.print_board(board, Path(path))
+
+    def _on_print_clicked(self) -> None:
+        path, _ = QFileDialog.getSaveFileName(
+            self, self.tr("Save the board"), "board.pdf", "*.pdf"
+        )
+        if path:
+            self.print_board(path)
 
     def _on_remove_clicked(self) -> None:
         item = self._worst.currentItem()
@@ -206,16 +218,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Camera calibration"))
-        self._board_name.setText(self.tr("Board"))
-        self._board.setAccessibleName(self.tr("Board"))
-        self._forms.setText(
-            self.tr(
-                "Type, columns x rows, lengths in mm: chessboard:11x8:20 (inner "
-                "corners, square), charuco:12x9:20:15:DICT_5X5_100 (squares, "
-                "square, marker), circles:9x7:20:10 (distance, diameter), "
-                "asymmetric-circles:4x11:20:10"
-            )
-        )
+        self._print.setText(self.tr("Print (PDF)..."))
         self._folder.setText(self.tr("From a folder..."))
         self._compute.setText(self.tr("Calibrate"))
         self._worst_title.setText(self.tr("Views (worst first)"))
@@ -240,7 +243,14 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         state, found = self._capture.state, self._calibration.found
         is_live = state.sought is not None
         self._begin.setText(self.tr("Stop") if is_live else self.tr("Start"))
-        self._count.setText(self.tr("Views captured: {0}").format(state.n_kept))
+        views = None if state.capture is None else state.capture.views
+        if found is not None:
+            views = found.views
+        n_views = 0 if views is None else views.n_views
+        self._count.setText(self.tr("Views captured: {0}").format(n_views))
+        self._progress.set_value(
+            view_progress(views) if views is not None and n_views else ViewProgress()
+        )
         too_few = self.tr("At least {0} views are needed.").format(MIN_VIEWS)
         self._compute.set_why_not(too_few if state.n_kept < MIN_VIEWS else "")
         nothing = self.tr("Calibrate first.")

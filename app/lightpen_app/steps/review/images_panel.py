@@ -92,17 +92,18 @@ class ImagesPanel(Translated, QWidget):
 
         # Layout
         layout = grid_layout(self, margins=(0, GRID, 0, 0))
-        layout.addWidget(self._table, 0, 0, 3, 1)
-        layout.addWidget(self._count, 3, 0)
-        horizontal_layout(layout, (self._take_out, 1), (self._put_back, 1), at=(4, 0))
-        layout.addWidget(self._undo, 5, 0)
+        layout.addWidget(self._table, 0, 0, 4, 1)
+        layout.addWidget(self._count, 4, 0)
+        horizontal_layout(layout, (self._take_out, 1), (self._put_back, 1), at=(5, 0))
+        layout.addWidget(self._undo, 6, 0)
         layout.addWidget(self._view, 0, 1)
-        horizontal_layout(layout, (self._caption, 1), self._switch, at=(1, 1))
-        layout.addWidget(self._card, 2, 1, 4, 1)
+        layout.addWidget(self._caption, 1, 1)
+        layout.addWidget(self._switch, 2, 1)
+        layout.addWidget(self._card, 3, 1, 4, 1)
         layout.setColumnMinimumWidth(0, TABLE_WIDTH)
         layout.setColumnStretch(1, 1)
         layout.setRowStretch(0, VIEW_SHARE)
-        layout.setRowStretch(2, PLOT_SHARE)
+        layout.setRowStretch(3, PLOT_SHARE)
 
         # Connections
         self._table.number_changed.connect(self._on_number_changed)

@@ -1,10 +1,9 @@
 """The result of a swing in figures: the tip, how sure it is, and what has changed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFrame, QSizePolicy, QWidget
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.verdict import halves_agree
@@ -13,98 +12,17 @@ from lightpen.model.coverage import Coverage
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.solving import Solution
-from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
+from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.look.words import shortened
+from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
-
-@dataclass(frozen=True)
-class TipValue:
-    """A point and its uncertainty.
-
-    Attributes
-    ----------
-    tip : tuple of three floats
-        mm.
-    uncertainty : tuple of three floats
-        U (k = 2) along x, y and z, mm.
-    """
-
-    tip: tuple[float, float, float]
-    uncertainty: tuple[float, float, float]
-
-
-class TipReadout(QWidget):
-    """Shows a tip to the digit that its uncertainty warrants; can be copied."""
-
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._value: TipValue | None = None
-
-        # Widgets
-        self._numbers = [_number_label(TextSize.TITLE) for _ in AXES]
-        self._uncertainties = [_number_label(TextSize.LEAD, Tone.QUIET) for _ in AXES]
-
-        # Layout
-        layout = grid_layout(self, spacing=(GRID, 0))
-        right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBaseline
-        self._names = [text_label(TextSize.LEAD, Tone.QUIET) for _ in AXES]
-        for row, axis in enumerate(AXES):
-            name = self._names[row]
-            name.setText(axis)
-            layout.addWidget(name, row, 0, Qt.AlignmentFlag.AlignBaseline)
-            layout.addWidget(self._numbers[row], row, 1, right)
-            layout.addWidget(self._uncertainties[row], row, 2, right)
-        layout.setColumnStretch(1, 1)
-
-    def set_large(self, large: bool) -> None:
-        """Show the figures larger, where there is the room, or no longer."""
-        for label in self._numbers:
-            set_size(label, TextSize.DISPLAY if large else TextSize.TITLE)
-        for label in (*self._names, *self._uncertainties):
-            set_size(label, TextSize.TITLE if large else TextSize.LEAD)
-
-    def value(self) -> TipValue | None:
-        """Return the tip that is shown."""
-        return self._value
-
-    def set_value(self, value: TipValue | None) -> None:
-        """Show another tip, or none."""
-        self._value = value
-        for row, axis in enumerate(AXES):
-            number, uncertainty = self._numbers[row], self._uncertainties[row]
-            if value is None:
-                number.clear()
-                uncertainty.clear()
-                continue
-            decimals = decimals_for(value.uncertainty[row])
-            number.setText(number_text(value.tip[row], decimals))
-            within = number_text(value.uncertainty[row], decimals)
-            uncertainty.setText(f"\N{PLUS-MINUS SIGN} {within}")
-            number.setAccessibleName(f"{axis} = {number.text()} mm")
-            uncertainty.setAccessibleName(f"{uncertainty.text()} mm")
-
-    def texts(self) -> tuple[str, ...]:
-        """Return the numbers of x, y and z and their uncertainties, as shown."""
-        labels = zip(self._numbers, self._uncertainties, strict=True)
-        return tuple(f"{number.text()} {u.text()}" for number, u in labels)
-
-
-def _number_label(size: TextSize, tone: Tone = Tone.PLAIN) -> QLabel:
-    label = text_label(size, tone)
-    label.setWordWrap(False)
-    label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-    label.setAlignment(Qt.AlignmentFlag.AlignRight)
-    return label
-
-
-BLANK = ("", "", "")
 DIAL_HEIGHT = 22 * GRID  # px
 
 
@@ -190,8 +108,8 @@ class ResultPanel(Translated, QFrame):
         self._refresh()
 
     def _retranslate(self) -> None:
-        self._comparison.setText(self.tr("Differences / \xb5m"))
-        self._table.setAccessibleName(self.tr("Differences"))
+        self._comparison.setText(self.tr("Odd and even images / \xb5m"))
+        self._table.setAccessibleName(self.tr("Odd and even images"))
         self._postures.setText(self.tr("Postures of the included images"))
         self._refresh()
 
@@ -207,10 +125,8 @@ class ResultPanel(Translated, QFrame):
             self._dial.set_value(DialValue())
             return
         self._dial.set_value(_postures(outcome.solution.calibration.coverage))
-        x, y, z = outcome.tip_pen.tolist()
-        u_x, u_y, u_z = outcome.uncertainty.tolist()
-        self._readout.set_value(TipValue((x, y, z), (u_x, u_y, u_z)))
-        self._table.set_value(self._differences(outcome))
+        self._readout.set_value(_tip_value(outcome))
+        self._table.set_value(self._halves_figures(outcome.solution))
         self._as_found.set_value(self._as_found_message(outcome.assessment))
         self._halves.set_value(self._halves_message(outcome.solution))
         used = outcome.solution.calibration.used
@@ -228,37 +144,17 @@ class ResultPanel(Translated, QFrame):
         text = self.tr("Tip {0} in the frame of pen {1} / mm, U\xa0(k\xa0=\xa02)")
         return text.format(shortened(outcome.names.tip), shortened(outcome.names.pen))
 
-    def _differences(self, outcome: ReviewedResult) -> Figures:
-        rows: list[tuple[str, tuple[str, ...]]] = []
-        change, last = outcome.assessment.change, outcome.assessment.last
-        within = self.tr("U (k = 2)")
-        if change is None or last is None:
-            rows.append((self.tr("No earlier result"), BLANK))
-        else:
-            date = f"{local_time(last.accepted):%Y-%m-%d}"
-            since = self.tr("Since {0}").format(date)
-            u = change.expanded_uncertainty
-            rows += [(since, _texts(change.difference, u)), (within, _texts(u, u))]
-        nominal = outcome.solution.source.pen.nominal_tip
-        if nominal is None:
-            rows.append((self.tr("No nominal tip"), BLANK))
-        else:
-            deviation = _texts(outcome.tip_pen - nominal, outcome.uncertainty)
-            rows.append((self.tr("From nominal"), deviation))
-        halves = outcome.solution.calibration.halves
+    def _halves_figures(self, solution: Solution) -> Figures:
+        halves = solution.calibration.halves
         u = halves.expanded_uncertainty
-        rows += [
-            (self.tr("Odd - even"), _texts(halves.difference, u)),
-            (within, _texts(u, u)),
-        ]
-        names, cells = zip(*rows, strict=True)
-        return Figures(AXES, tuple(names), tuple(cells))
+        rows = self.tr("Odd - even"), self.tr("U (k = 2)")
+        return Figures(AXES, rows, (_texts(halves.difference, u), _texts(u, u)))
 
     def _as_found_message(self, assessment: SwingAssessment) -> StatusMessage:
         """Return the deviation of the tip as found, with its limit."""
         change, last, limit = assessment.change, assessment.last, assessment.max_change
         if change is None or last is None:
-            return StatusMessage()
+            return StatusMessage(self.tr("No earlier result"), Sign.RING, Tone.PLAIN)
         decimals = decimals_for(float(change.expanded_uncertainty.max()))
         off = number_text(change.distance, decimals)
         if limit is None:
@@ -284,6 +180,31 @@ class ResultPanel(Translated, QFrame):
         return StatusMessage(text, Sign.WARNING, Tone.WARN)
 
 
+def _tip_value(outcome: ReviewedResult) -> TipValue:
+    """Return the tip beside the previous and the nominal one, as far as there are."""
+    x, y, z = outcome.tip_pen.tolist()
+    u_x, u_y, u_z = outcome.uncertainty.tolist()
+    u, assessment = outcome.uncertainty, outcome.assessment
+    value = TipValue((x, y, z), (u_x, u_y, u_z))
+    change, last = assessment.change, assessment.last
+    if change is not None and last is not None:
+        before = outcome.tip_pen - change.difference
+        value = replace(
+            value,
+            previous=_texts(before / MICROMETRES, u / MICROMETRES),
+            change=_with_u(change.difference, change.expanded_uncertainty),
+            since=f"{local_time(last.accepted):%Y-%m-%d}",
+        )
+    nominal = outcome.solution.source.pen.nominal_tip
+    if nominal is not None:
+        value = replace(
+            value,
+            nominal=tuple(f"{each:g}" for each in nominal.tolist()),
+            deviation=_texts(outcome.tip_pen - nominal, u),
+        )
+    return value
+
+
 def _postures(coverage: Coverage) -> DialValue:
     """Return a dial of which each field is full that the images have."""
     turns = coverage.turns
@@ -294,6 +215,12 @@ def _postures(coverage: Coverage) -> DialValue:
         n_upright_needed=min(coverage.n_upright, 1),
         turns=(float(turns.min()), float(turns.max())),
     )
+
+
+def _with_u(values: FloatArray, u: FloatArray) -> tuple[str, ...]:
+    """Return lengths in micrometres, each with its U."""
+    pairs = zip(_texts(values, u), _texts(u, u), strict=True)
+    return tuple(f"{value} \N{PLUS-MINUS SIGN} {within}" for value, within in pairs)
 
 
 def _texts(values: FloatArray, uncertainties: FloatArray) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import QSize, QThreadPool
-from PySide6.QtWidgets import QApplication, QListWidget, QPushButton
+from PySide6.QtWidgets import QApplication, QLabel, QListWidget, QPushButton
 from pytestqt.qtbot import QtBot
 from tests.simulated_boards import expose_board, render_board, simulate_board_poses
 
@@ -19,7 +19,8 @@ from lightpen.arrays import Image
 from lightpen.cameras.protocol import Frame, sealed
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import read_camera
-from lightpen.intrinsics.boards import parse_board
+from lightpen.intrinsics.boards import Board, BoardKind, parse_board
+from lightpen.intrinsics.page import board_page
 from lightpen.live.pipeline import LiveImage
 from lightpen.model.camera import Camera
 from lightpen.record.folder.camera_calibrations import CAMERA_CALIBRATIONS, CameraTrial
@@ -27,9 +28,9 @@ from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.simulator.sensor import Sensor
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.pooling import pooled
+from lightpen_app.steps.camera.board_progress import BoardProgress
 from lightpen_app.steps.camera.board_view import BoardView
 from lightpen_app.steps.camera.board_window import BoardWindow
-from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
@@ -56,7 +57,7 @@ def images() -> list[Image]:
 def window(qtbot: QtBot, workbench: Workbench) -> Iterator[BoardWindow]:
     window = BoardWindow(workbench.live)
     qtbot.addWidget(window)
-    window.findChildren(EnterEdit)[0].setText(BOARD)
+    window.board.set_board(parse_board(BOARD))
     window.show()
     yield window
     window.close()
@@ -136,10 +137,39 @@ def test_a_view_that_is_left_out_takes_no_part(
 
 
 def test_a_board_that_is_none_is_refused(window: BoardWindow) -> None:
-    window.findChildren(EnterEdit)[0].setText("chess")
+    window.board.set_board(Board(BoardKind.CHESSBOARD, 7, 5, 0.0))
     press(window, "Start")
 
-    assert "chess is not a board" in remark(window)
+    assert "lengths" in remark(window)
+
+
+@pytest.mark.parametrize(
+    "name", ["charuco:12x9:20:15:DICT_5X5_100", "asymmetric-circles:4x11:20:10", BOARD]
+)
+def test_the_fields_tell_the_board_and_print_it(
+    window: BoardWindow, name: str, tmp_path: Path, qtbot: QtBot
+) -> None:
+    board, path = parse_board(name), tmp_path / "board.pdf"
+    window.board.set_board(board)
+    assert window.board.board() == board
+
+    window.print_board(str(path))
+
+    qtbot.waitUntil(lambda: "board.pdf" in remark(window))
+    assert path.read_bytes() == board_page(board)
+
+
+def test_the_views_of_a_folder_are_counted_and_judged(
+    window: BoardWindow, images: list[Image], tmp_path: Path, qtbot: QtBot
+) -> None:
+    (progress,) = window.findChildren(BoardProgress)
+    assert progress.verdict().text.startswith("Add views at the left and right edges")
+    window.read_folder(written(tmp_path, images))
+    qtbot.waitUntil(lambda: views_listed(window) == 7)
+
+    labels = [label.text() for label in window.findChildren(QLabel)]
+    assert "Views captured: 7" in labels
+    assert progress.value().x > 0.3
 
 
 def test_images_without_a_board_are_refused_with_the_reason(
@@ -174,7 +204,7 @@ def test_a_board_held_still_is_kept_by_itself(
 def test_another_board_held_before_the_camera_is_named(
     window: BoardWindow, images: list[Image], workbench: Workbench, qtbot: QtBot
 ) -> None:
-    window.findChildren(EnterEdit)[0].setText("chessboard:8x6:20")
+    window.board.set_board(parse_board("chessboard:8x6:20"))
     press(window, "Start")
     told = []
     for count in range(6):  # in 4 s

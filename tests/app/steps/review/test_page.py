@@ -82,8 +82,9 @@ from lightpen_app.steps.review.plot_card import PlotCard
 from lightpen_app.steps.review.plots_panel import MethodsPanel
 from lightpen_app.steps.review.residual_plots import MisfitPlot
 from lightpen_app.steps.review.residual_view import ResidualView
-from lightpen_app.steps.review.result_panel import ResultPanel, TipReadout
+from lightpen_app.steps.review.result_panel import ResultPanel
 from lightpen_app.steps.review.result_tools import ResultTools
+from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import NumberTable
 from lightpen_app.widgets.plots import MARK_HEIGHT, PNG_SCALE
@@ -344,9 +345,16 @@ def look_at_all_tabs(page: ReviewPage) -> None:
         QTest.keyClick(bar, Qt.Key.Key_Right)
 
 
-def differences(page: ReviewPage) -> dict[str, tuple[str, ...]]:
-    shown = the(the(page, ResultPanel), NumberTable).value()
-    return dict(zip(shown.rows, shown.cells, strict=True))
+def readout(page: ReviewPage) -> TipValue:
+    value = the(page, TipReadout).value()
+    assert value is not None
+    return value
+
+
+def told_of_result(page: ReviewPage) -> str:
+    """Return the messages below the figures."""
+    signs = the(page, ResultPanel).findChildren(SignLabel)
+    return " ".join(sign.value().text for sign in signs)
 
 
 def count(page: ReviewPage) -> str:
@@ -516,13 +524,11 @@ def test_a_tip_that_is_far_too_uncertain_cannot_be_accepted(bed: Bed) -> None:
     assert in_force(workbench) is None
 
 
-def test_without_an_earlier_result_or_a_nominal_tip_that_is_said(
-    page: ReviewPage,
-) -> None:
-    rows = differences(page)
-    assert rows["No earlier result"] == ("", "", "")
+def test_without_an_earlier_result_that_is_said(page: ReviewPage) -> None:
+    assert readout(page).previous == readout(page).change == ()
+    assert "No earlier result" in told_of_result(page)
     assert page.lead() == "Next: accept the tip."  # none is in force until then
-    assert "Odd - even" in rows
+    assert "Odd - even" in the(the(page, ResultPanel), NumberTable).value().rows
     assert remarks(page) == ""
 
 
@@ -532,7 +538,9 @@ def test_a_small_change_since_the_last_result_is_told_in_micrometres(bed: Bed) -
     bed.solve_after([0.5 * u, 0.0, 0.0])
     page = bed.show()
 
-    x, y, z = map(float, differences(page)[f"Since {THEN:%Y-%m-%d}"])
+    shown = readout(page)
+    assert shown.since == f"{THEN:%Y-%m-%d}"
+    x, y, z = (float(each.split()[0]) for each in shown.change)
     assert (x, y, z) == pytest.approx((500 * u, 0.0, 0.0), abs=0.5)
     assert banner(page).word == "PASS: Within limits"
 
@@ -590,7 +598,7 @@ def test_a_tip_that_cannot_be_compared_is_to_be_checked(bed: Bed) -> None:
 
     assert banner(page).word == "CHECK: No comparison possible"
     assert "is damaged" in banner(page).detail
-    assert "No earlier result" in differences(page)
+    assert "No earlier result" in told_of_result(page)
 
 
 def test_what_comes_into_force_meanwhile_is_compared_before_it_is_replaced(
@@ -866,6 +874,7 @@ def test_plots_that_were_not_looked_at_are_saved_whole_and_with_their_mark(
     recorded = replace(bed, origin=Origin.RECORDED)
     recorded.solve()
     page = recorded.show()
+    page.resize(1080, 600)  # where plots that are seen are as wide as others
     folder = tmp_path / "saved"
     folder.mkdir()
     save(recorded, page, "All plots (PNG)...", folder)
@@ -894,8 +903,9 @@ def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
     page = bed.show()
 
     deviation = (tip(workbench) - [-1.0, -90.0, -24.0]) * 1000
-    shown = list(map(float, differences(page)["From nominal"]))
+    shown = list(map(float, readout(page).deviation))
     assert shown == pytest.approx(deviation.tolist(), abs=1.0)
+    assert readout(page).nominal == ("-1", "-90", "-24")
 
 
 def test_the_budget_is_checked_by_monte_carlo_on_request(
@@ -1375,7 +1385,7 @@ def test_an_accepted_tip_is_in_force_and_said_to_be(
     assert f"{result.accepted.astimezone():%Y-%m-%d %H:%M:%S}" in state.detail
     assert page.is_complete()
     assert page.unsaved() == ""
-    assert "No earlier result" in differences(page)  # not compared with itself
+    assert "No earlier result" in told_of_result(page)  # not compared with itself
     assert open_record(workbench.run.records_folder / "swing").verdict == Grade.PASS
 
 

@@ -16,7 +16,7 @@ from lightpen_app.look.theme import Tone
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.message_list import MOST, StatusMessageList
 from lightpen_app.steps.review.residual_view import Arrows, ResidualView
-from lightpen_app.steps.review.result_panel import TipReadout, TipValue
+from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.sign_label import StatusMessage

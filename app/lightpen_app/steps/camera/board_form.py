@@ -1,0 +1,242 @@
+"""The board in fields, with a picture of it."""
+
+from dataclasses import replace
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QSpinBox, QWidget
+from typing_extensions import override
+
+from lightpen.errors import UsageError
+from lightpen.intrinsics.boards import (
+    MAX_LENGTH,
+    MAX_SIDE,
+    MIN_SIDE,
+    Board,
+    BoardKind,
+    parse_board,
+)
+from lightpen_app.look.layouts import grid_layout
+from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.choice_field import ChoiceField
+from lightpen_app.widgets.labelled import add_labelled, field_label
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.translated import Translated
+
+DICTIONARIES = (
+    *("DICT_4X4_50", "DICT_4X4_100", "DICT_4X4_250", "DICT_5X5_50", "DICT_5X5_100"),
+    *("DICT_5X5_250", "DICT_6X6_50", "DICT_6X6_100", "DICT_6X6_250"),
+    *("DICT_7X7_50", "DICT_7X7_100", "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_36h11"),
+)
+USUAL = {
+    kind: parse_board(f"{kind}:{form}")
+    for kind, form in (
+        (BoardKind.CHESSBOARD, "11x8:20"),
+        (BoardKind.CHARUCO, "12x9:20:15:DICT_5X5_100"),
+        (BoardKind.LEGACY_CHARUCO, "12x9:20:15:DICT_5X5_100"),
+        (BoardKind.MARKERS, "5x7:30:6:DICT_6X6_250"),
+        (BoardKind.CIRCLES, "9x7:20:10"),
+        (BoardKind.ASYMMETRIC_CIRCLES, "4x11:20:10"),
+    )
+}
+PICTURE_HEIGHT = 12 * GRID  # px
+
+
+class BoardPicture(QWidget):
+    """Draws a board as it looks from the front."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._board: Board | None = None
+        self.setFixedHeight(PICTURE_HEIGHT)
+
+    def set_value(self, board: Board | None) -> None:
+        """Draw another board, or none."""
+        self._board = board
+        self.update()
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        board = self._board
+        if board is None:
+            return
+        places, side = _cells(board)
+        least, most = places.min(axis=0) - side, places.max(axis=0) + side
+        scale = float(
+            min(
+                self.width() / np.ptp([least, most], axis=0)[0],
+                self.height() / np.ptp([least, most], axis=0)[1],
+            )
+        )
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        width, height = ((most - least) * scale).tolist()
+        painter.translate(0.5 * (self.width() - width), 0.0)
+        painter.fillRect(QRectF(0.0, 0.0, width, height), Qt.GlobalColor.white)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(Qt.GlobalColor.black)
+        half = 0.5 * side * scale
+        for x, y in ((places - least) * scale).tolist():
+            if board.kind.is_circles:
+                painter.drawEllipse(QPointF(x, y), half, half)
+            else:
+                painter.drawRect(QRectF(x - half, y - half, 2 * half, 2 * half))
+
+
+def _cells(board: Board) -> tuple[np.ndarray, float]:
+    """Return the middles of what is black, (N, 2), and its side or diameter, mm."""
+    if board.kind.is_circles:
+        return board.points[:, :2], board.detail
+    extra = 0 if board.kind.has_markers else 1
+    columns, rows = board.columns + extra, board.rows + extra
+    y, x = np.mgrid[:rows, :columns]
+    lattice = np.stack([x.ravel(), y.ravel()], axis=-1).astype(np.float64)
+    if board.kind is BoardKind.MARKERS:
+        return lattice * (board.pitch + board.detail), board.pitch
+    return lattice[(x + y).ravel() % 2 == 0] * board.pitch, board.pitch
+
+
+class BoardForm(Translated, QWidget):
+    """Kind, columns, rows and lengths of a board.
+
+    Signals
+    -------
+    changed()
+        Another board is told.
+    """
+
+    changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+
+        # Widgets
+        self._kind = ChoiceField()
+        for kind in BoardKind:
+            self._kind.addItem("", kind)
+        self._columns, self._rows = QSpinBox(), QSpinBox()
+        for count in (self._columns, self._rows):
+            count.setRange(MIN_SIDE, MAX_SIDE)
+        self._pitch = NumberField("mm", (0.0, MAX_LENGTH), 3)
+        self._detail = NumberField("mm", (0.0, MAX_LENGTH), 3)
+        self._dictionary = ChoiceField()
+        self._dictionary.addItems(DICTIONARIES)
+        for choice in (self._kind, self._dictionary):  # narrower than their words
+            choice.setSizeAdjustPolicy(
+                ChoiceField.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+            )
+            choice.setMinimumContentsLength(8)
+        self._picture = BoardPicture()
+        fields = (
+            *(self._kind, self._dictionary, self._columns, self._rows),
+            *(self._pitch, self._detail),
+        )
+        self._labels = [field_label(field) for field in fields]
+
+        # Layout
+        layout = grid_layout(self, spacing=(GRID, GRID))
+        for i, (label, field) in enumerate(zip(self._labels, fields, strict=True)):
+            add_labelled(layout, label, field, at=divmod(i, 2))
+        layout.addWidget(self._picture, 3, 0, 1, 2)
+        layout.setColumnStretch(0, 1)
+        layout.setColumnStretch(1, 1)
+
+        # Connections
+        self._kind.activated.connect(self._on_kind_chosen)
+        self._dictionary.activated.connect(self._on_changed)
+        for count in (self._columns, self._rows):
+            count.valueChanged.connect(self._on_changed)
+        for length in (self._pitch, self._detail):
+            length.valueChanged.connect(self._on_changed)
+
+        self.set_board(USUAL[BoardKind.CHESSBOARD])
+        self._retranslate()
+
+    def board(self) -> Board:
+        """Return the board of the fields.
+
+        Raises
+        ------
+        UsageError
+            There is no such board.
+        """
+        kind = BoardKind(self._kind.currentData())
+        told = Board(
+            kind=kind,
+            columns=self._columns.value(),
+            rows=self._rows.value(),
+            pitch=self._pitch.value(),
+            detail=0.0 if kind is BoardKind.CHESSBOARD else self._detail.value(),
+            dictionary=self._dictionary.currentText() if kind.has_markers else "",
+        )
+        return parse_board(told.name)
+
+    def set_board(self, board: Board) -> None:
+        """Show another board."""
+        fields = (self._columns, self._rows, self._pitch, self._detail)
+        for field in fields:
+            field.blockSignals(True)
+        self._kind.setCurrentIndex(self._kind.findData(board.kind))
+        self._columns.setValue(board.columns)
+        self._rows.setValue(board.rows)
+        self._pitch.setValue(board.pitch)
+        self._detail.setValue(board.detail)
+        for field in fields:
+            field.blockSignals(False)
+        if board.dictionary:
+            if self._dictionary.findText(board.dictionary) < 0:
+                self._dictionary.addItem(board.dictionary)
+            self._dictionary.setCurrentText(board.dictionary)
+        self._on_changed()
+
+    def _on_kind_chosen(self) -> None:
+        kind = BoardKind(self._kind.currentData())
+        self.set_board(replace(USUAL[kind]))
+
+    def _on_changed(self) -> None:
+        try:
+            board = self.board()
+        except UsageError:
+            board = None  # it is told when the board is used
+        self._picture.set_value(board)
+        self._retranslate()
+        self.changed.emit()
+
+    @override
+    def _retranslate(self) -> None:
+        kind = BoardKind(self._kind.currentData())
+        names = {
+            BoardKind.CHESSBOARD: self.tr("Chessboard"),
+            BoardKind.CHARUCO: "ChArUco",
+            BoardKind.LEGACY_CHARUCO: "ChArUco (OpenCV \N{LESS-THAN OR EQUAL TO} 4.6)",
+            BoardKind.MARKERS: self.tr("Markers"),
+            BoardKind.CIRCLES: self.tr("Circles"),
+            BoardKind.ASYMMETRIC_CIRCLES: self.tr("Asymmetric circles"),
+        }
+        for i in range(self._kind.count()):
+            self._kind.setItemText(i, names[BoardKind(self._kind.itemData(i))])
+        is_chessboard = kind is BoardKind.CHESSBOARD
+        square, marker = self.tr("Square"), self.tr("Marker")
+        pitch, detail = {
+            BoardKind.MARKERS: (marker, self.tr("Gap")),
+            BoardKind.CIRCLES: (self.tr("Distance"), self.tr("Diameter")),
+            BoardKind.ASYMMETRIC_CIRCLES: (self.tr("Distance"), self.tr("Diameter")),
+        }.get(kind, (square, marker))
+        words = (
+            *(self.tr("Board"), self.tr("Dictionary")),
+            self.tr("Corners per row") if is_chessboard else self.tr("Columns"),
+            self.tr("Corners per column") if is_chessboard else self.tr("Rows"),
+            *(pitch, detail),
+        )
+        for label, text in zip(self._labels, words, strict=True):
+            label.setText(text)
+            buddy = label.buddy()
+            assert buddy is not None
+            buddy.setAccessibleName(text)
+        for label, is_used in (
+            (self._labels[1], kind.has_markers),
+            (self._labels[5], not is_chessboard),
+        ):
+            label.setVisible(is_used)
+            label.buddy().setVisible(is_used)

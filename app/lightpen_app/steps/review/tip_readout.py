@@ -1,0 +1,141 @@
+"""The tip of a review: value, U, previous and nominal tip, a row for each axis."""
+
+from dataclasses import dataclass
+from itertools import chain
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QWidget
+from typing_extensions import override
+
+from lightpen_app.look.layouts import grid_layout
+from lightpen_app.look.quantities import AXES, decimals_for, number_text
+from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
+from lightpen_app.widgets.translated import Translated
+
+BLANK = ("", "", "")
+
+
+@dataclass(frozen=True)
+class TipValue:
+    """A point and its uncertainty, with what it is compared with.
+
+    Attributes
+    ----------
+    tip : tuple of three floats
+        mm.
+    uncertainty : tuple of three floats
+        U (k = 2) along x, y and z, mm.
+    previous, nominal : tuple of str
+        Previous result and centre by design, mm; empty without one.
+    change, deviation : tuple of str
+        The tip less these, um; the change with its U (k = 2).
+    since : str
+        Date of the previous result.
+    """
+
+    tip: tuple[float, float, float]
+    uncertainty: tuple[float, float, float]
+    previous: tuple[str, ...] = ()
+    change: tuple[str, ...] = ()
+    nominal: tuple[str, ...] = ()
+    deviation: tuple[str, ...] = ()
+    since: str = ""
+
+    def comparisons(self) -> tuple[tuple[str, ...], ...]:
+        """Return the columns beside tip and U."""
+        return self.previous, self.change, self.nominal, self.deviation
+
+
+class TipReadout(Translated, QWidget):
+    """Shows a tip to the digit that its uncertainty warrants, a row for each axis."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value: TipValue | None = None
+
+        # Widgets
+        self._names = [text_label(TextSize.LEAD, Tone.QUIET) for _ in AXES]
+        self._numbers = [_number_label(TextSize.LEAD) for _ in AXES]
+        self._uncertainties = [_number_label(TextSize.BODY, Tone.QUIET) for _ in AXES]
+        self._compared = [
+            [_number_label(TextSize.SMALL) for _ in AXES] for _ in range(4)
+        ]
+        self._heads = [_number_label(TextSize.SMALL, Tone.QUIET) for _ in range(6)]
+
+        # Layout
+        layout = grid_layout(self, spacing=(GRID // 2, 0))
+        right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBaseline
+        columns = self._numbers, self._uncertainties, *self._compared
+        for column, (head, labels) in enumerate(
+            zip(self._heads, columns, strict=True), 1
+        ):
+            layout.addWidget(head, 0, column)
+            layout.setColumnStretch(column, 1)
+            for row, label in enumerate(labels, 1):
+                layout.addWidget(label, row, column, right)
+        for row, (name, axis) in enumerate(zip(self._names, AXES, strict=True), 1):
+            name.setText(axis)
+            layout.addWidget(name, row, 0, Qt.AlignmentFlag.AlignBaseline)
+
+        self._retranslate()
+
+    def set_large(self, large: bool) -> None:
+        """Show the figures larger, where there is the room, or no longer."""
+        for label in (*self._names, *self._numbers):
+            set_size(label, TextSize.TITLE if large else TextSize.LEAD)
+        for label in self._uncertainties:
+            set_size(label, TextSize.LEAD if large else TextSize.BODY)
+        for label in chain(self._heads, *self._compared):
+            set_size(label, TextSize.BODY if large else TextSize.SMALL)
+
+    def value(self) -> TipValue | None:
+        """Return the tip that is shown."""
+        return self._value
+
+    def set_value(self, value: TipValue | None) -> None:
+        """Show another tip, or none."""
+        self._value = value
+        self._retranslate()
+        columns = ((),) * 4 if value is None else value.comparisons()
+        labels = self._heads[2:], self._compared, columns
+        for head, cells, texts in zip(*labels, strict=True):
+            head.setVisible(bool(texts))
+            for cell, text in zip(cells, texts or BLANK, strict=True):
+                cell.setText(text)
+                cell.setVisible(bool(texts))
+        for row, axis in enumerate(AXES):
+            number, uncertainty = self._numbers[row], self._uncertainties[row]
+            if value is None:
+                number.clear()
+                uncertainty.clear()
+                continue
+            decimals = decimals_for(value.uncertainty[row])
+            number.setText(number_text(value.tip[row], decimals))
+            within = number_text(value.uncertainty[row], decimals)
+            uncertainty.setText(f"\N{PLUS-MINUS SIGN} {within}")
+            number.setAccessibleName(f"{axis} = {number.text()} mm")
+            uncertainty.setAccessibleName(f"{uncertainty.text()} mm")
+
+    def texts(self) -> tuple[str, ...]:
+        """Return the numbers of x, y and z and their uncertainties, as shown."""
+        labels = zip(self._numbers, self._uncertainties, strict=True)
+        return tuple(f"{number.text()} {u.text()}" for number, u in labels)
+
+    @override
+    def _retranslate(self) -> None:
+        since = "" if self._value is None else self._value.since
+        words = (
+            *(self.tr("Value\nmm"), self.tr("U\nmm")),
+            *(self.tr("Previous") + f"\n{since}", self.tr("Change\n\xb5m")),
+            *(self.tr("Nominal\nmm"), self.tr("Deviation\n\xb5m")),
+        )
+        for head, text in zip(self._heads, words, strict=True):
+            head.setText(text)
+
+
+def _number_label(size: TextSize, tone: Tone = Tone.PLAIN) -> QLabel:
+    label = text_label(size, tone)
+    label.setWordWrap(False)
+    label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    label.setAlignment(Qt.AlignmentFlag.AlignRight)
+    return label
