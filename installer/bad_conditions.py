@@ -48,11 +48,14 @@ def try_interruption(trial: Trial) -> None:
     trial.expect("the next one repairs it", outcome.status == 0 and not damaged(trial))
 
 
-def try_other_folder(trial: Trial) -> None:
-    """Install into a folder whose name has blanks and Chinese letters."""
+def try_other_folders(trial: Trial) -> None:
+    """Install into two folders in turn whose names have blanks and Chinese letters."""
     folder = trial.machine.drive / "测量 程序" / "Light pen 1"
+    before = folder.with_name("Light pen 0")
+    trial.install(place=trial.machine.windows_path(before))
     place = trial.machine.windows_path(folder)
     trial.install(place=place)
+    trial.expect("the folder before is removed", not before.exists())
     said = trial.machine.run([rf"{place}\bin\lightpen.exe", "--version"])
     trial.expect("runs from a folder with blanks and Chinese", said.status == 0, said)
     uninstaller = rf"{place}\uninstall.exe"

@@ -12,8 +12,9 @@ SUFFIXES = {".dll", ".exe", ".pyd"}
 # Of Windows 10 1809 and later.
 API_SETS = ("api-ms-win-core-", "api-ms-win-crt-", "api-ms-win-shcore-")
 OF_WINDOWS = {
-    *("advapi32", "authz", "bcrypt", "comctl32", "comdlg32", "crypt32", "d3d11"),
-    *("d3d12", "d3d9", "dnsapi", "dwmapi", "dwrite", "dxgi", "gdi32", "icuuc", "imm32"),
+    *("advapi32", "authz", "bcrypt", "bcryptprimitives", "comctl32", "comdlg32"),
+    *("crypt32", "d3d11", "d3d12", "d3d9", "dnsapi", "dwmapi", "dwrite", "dxgi"),
+    *("gdi32", "icuuc", "imm32"),
     *("iphlpapi", "kernel32", "mf", "mfplat", "mfreadwrite", "mpr", "mscms", "msvcrt"),
     *("ncrypt", "netapi32", "ntdll", "ole32", "oleaut32", "propsys", "rpcrt4"),
     *("secur32", "setupapi", "shell32", "shlwapi", "uiautomationcore", "user32"),

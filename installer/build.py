@@ -23,20 +23,20 @@ from installer.binaries import missing_exports, unmet_needs
 from installer.bytecode import compile_modules
 from installer.downloads import PIP, download_runtime, download_wheels
 from installer.launchers import (
-    CONSOLE,
-    WINDOW,
     ToolMissingError,
     build_launchers,
     icon,
     numbers_of,
+    order_of,
     tool,
 )
+from installer.libraries import find_libraries
 from installer.licences import Part, licence_text, parts_of, unlicensed
 from installer.locked import Pin, windows_pins
 from installer.payload import (
     EARLIEST,
     PACKAGES,
-    add_start,
+    add_own,
     all_files,
     promote_cpp_runtime,
     set_times,
@@ -45,11 +45,13 @@ from installer.payload import (
 )
 from installer.places import INSTALLER, IS_WINDOWS, ROOT
 from installer.runtime import RuntimeFileError
-from installer.sbom import BundledPart, bill_of_materials
+from installer.sbom import BundledPart, bill_of_materials, cpe
+from installer.signatures import is_signed, unsigned
 
 from lightpen import __version__
 
 KILOBYTE = 1024
+PYTHON_MAKER = "Python Software Foundation"
 EXTRAS = {
     *("genicam", "harvesters"),  # "genicam"
     *("crcmod", "pyigtl"),  # "stream"
@@ -71,6 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     except (
         BuildError,
+        LookupError,  # as of a library that is no longer where it was
         RuntimeFileError,
         ToolMissingError,
         subprocess.CalledProcessError,  # as of a command that cannot sign
@@ -116,10 +119,12 @@ def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> P
     runtime.unpack(distribution, folder / "runtime")
     unpack_wheels([*wheels, own], folder / PACKAGES)
     promote_cpp_runtime(folder)
-    add_start(folder)
+    add_own(folder)
     build_launchers(folder, version)
-    for name in (WINDOW, CONSOLE):
-        sign_file(sign, folder / name)
+    if sign:
+        _say("Signing")
+        for path in unsigned(folder):
+            sign_file(sign, path)
     _say("Compiling the modules")
     compile_modules(folder)
     parts = parts_of(folder / PACKAGES, _runtime_part(folder))
@@ -127,7 +132,7 @@ def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> P
     text = licence_text(parts)
     (folder / "LICENCES.txt").write_text(text, encoding="utf-8-sig", newline="\r\n")
     bill = bill_of_materials(
-        version, _components(distribution, pins, wheels, parts), moment
+        version, _components(folder, distribution, pins, wheels, parts), moment
     )
     (folder / "sbom.cdx.json").write_bytes(bill)
     (out / f"Lightpen-{version}.cdx.json").write_bytes(bill)
@@ -182,9 +187,16 @@ def build_wheel(work: Path, moment: int) -> Path:
 
 
 def sign_file(sign: str, path: Path) -> None:
-    """Have a file signed, if a command for it is given."""
-    if sign:
-        subprocess.run(f'{sign} "{path}"', shell=True, check=True)
+    """Have a file signed by a command.
+
+    Raises
+    ------
+    BuildError
+        It still bears no signature.
+    """
+    subprocess.run(f'{sign} "{path}"', shell=True, check=True)
+    if not is_signed(path):
+        raise BuildError(f"{path} bears no signature after: {sign}")
 
 
 class Packing(Enum):
@@ -217,6 +229,7 @@ def pack(
     size = sum(path.stat().st_size for path in all_files(folder)) // KILOBYTE
     defined = {
         "VERSION": version,
+        "ORDER": order_of(version),
         "NUMBERS": numbers_of(version).replace(",", "."),
         "PAYLOAD": str(folder),
         "OUTFILE": str(setup),
@@ -247,16 +260,17 @@ def _require_fit(folder: Path, parts: Sequence[Part], pins: Sequence[Pin]) -> No
 
 def _runtime_part(folder: Path) -> Part:
     licence = folder / "runtime" / "LICENSE.txt"
-    return Part("CPython", runtime.VERSION, "PSF-2.0", (licence,))
+    return Part("CPython", runtime.VERSION, "PSF-2.0", PYTHON_MAKER, (licence,))
 
 
 def _components(
+    folder: Path,
     distribution: Path,
     pins: Sequence[Pin],
     wheels: Sequence[Path],
     parts: Sequence[Part],
 ) -> list[BundledPart]:
-    licences = {part.name.lower().replace("_", "-"): part.licence for part in parts}
+    found = {part.name.lower().replace("_", "-"): part for part in parts}
     files = {path.name.split("-")[0].lower().replace("_", "-"): path for path in wheels}
     python = BundledPart(
         "CPython",
@@ -265,21 +279,36 @@ def _components(
         _digest(distribution),
         f"pkg:generic/python@{runtime.VERSION}",
         "PSF-2.0",
+        PYTHON_MAKER,
+        cpe("python:python", runtime.VERSION),
     )
-    return [
-        python,
-        *(
-            BundledPart(
-                pin.name,
-                pin.version,
-                files[pin.name.lower()].name,
-                _digest(files[pin.name.lower()]),
-                f"pkg:pypi/{pin.name.lower()}@{pin.version}",
-                licences[pin.name.lower()],
-            )
-            for pin in pins
-        ),
+    packages = [
+        BundledPart(
+            pin.name,
+            pin.version,
+            files[pin.name.lower()].name,
+            _digest(files[pin.name.lower()]),
+            f"pkg:pypi/{pin.name.lower()}@{pin.version}",
+            found[pin.name.lower()].licence,
+            found[pin.name.lower()].supplier,
+            cpe(f"{pin.name.lower()}:{pin.name.lower()}", pin.version),
+        )
+        for pin in pins
     ]
+    libraries = [
+        BundledPart(
+            each.library.name,
+            each.version,
+            each.path.relative_to(folder).as_posix(),
+            _digest(each.path),
+            f"pkg:generic/{each.library.product.split(':')[1]}@{each.version}",
+            each.library.licence,
+            each.library.supplier,
+            cpe(each.library.product, each.version),
+        )
+        for each in find_libraries(folder)
+    ]
+    return [python, *packages, *libraries]
 
 
 def _digest(path: Path) -> str:

@@ -1,7 +1,9 @@
 """Try an installer for real: ``python installer/check.py SETUP.exe``.
 
-On Linux in a fresh Wine prefix, on Windows in the user's own account. Prints what it
-tries; the exit status is 1 if anything is not as it must be. See installer/README.md.
+On Linux in a fresh Wine prefix, on Windows in the user's own account, unless there is
+an installation or data of the program: then nothing is tried, as they would be lost.
+Prints what it tries; the exit status is 1 if anything is not as it must be. See
+installer/README.md.
 """
 
 import argparse
@@ -21,18 +23,23 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from installer import bad_conditions, life
+from installer import bad_conditions, life, users
 from installer.build import Packing, pack
 from installer.launchers import ToolMissingError
 from installer.machine import fresh_machine
 from installer.places import IS_WINDOWS
+from installer.signatures import binaries, is_signed, wrongly_signed
 from installer.trial import Trial, await_so
 
 from lightpen import __version__
 
 DISPLAY = 93
 CHINESE_LOCALE = Path("/usr/share/i18n/locales/zh_CN")  # of the package locales
-NEWER = "999.0.0"
+NEWER = "999.0.0rc1"  # a candidate can be packed, too
+REFUSAL = """check.py: This account has Lightpen or its data:
+  {}
+They would be changed and deleted. Nothing was done: use an account or a computer
+without them."""
 START_LIMIT_S = 8.0
 N_LATER_STARTS = 2
 TIP_LIMIT = 1e-6  # mm between the tips of Linux and Windows
@@ -45,10 +52,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with fresh_machine(life.USUAL_PLATFORM) as machine:
             trial = Trial(machine, options.setup.absolute())
+            if remains := trial.remains():
+                print(REFUSAL.format("\n  ".join(remains)), file=sys.stderr)
+                return 1
             if options.quick:
-                try_quickly(trial)
+                try_quickly(trial, options.authority)
             else:
-                try_all(trial, options.setup.absolute().parent / "payload")
+                payload = options.setup.absolute().parent / "payload"
+                try_all(trial, payload, options.authority)
     except ToolMissingError as error:
         print(f"check.py: {error}", file=sys.stderr)
         return 1
@@ -56,32 +67,47 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 1 if trial.faults else 0
 
 
-def try_quickly(trial: Trial) -> None:
+def try_signatures(trial: Trial, authority: Path | None) -> None:
+    """Verify the signature of every program and library that is installed."""
+    installed = [trial.setup, *binaries(trial.folder)]
+    if authority is None and not is_signed(trial.setup):
+        print("skip signatures: the installer is not signed")
+        return
+    wrong = [path.name for path in wrongly_signed(installed, authority)]
+    trial.expect(f"{len(installed)} signatures are right", not wrong, wrong)
+
+
+def try_quickly(trial: Trial, authority: Path | None) -> None:
     """Install, self-test and uninstall."""
     files, registry = trial.machine.files(), trial.machine.registry()
     life.try_installation(trial, __version__)
+    try_signatures(trial, authority)
     compare_tips(trial, life.try_self_test(trial, "offscreen"))
     life.try_removal(trial, files, registry)
 
 
-def try_all(trial: Trial, payload: Path) -> None:
+def try_all(trial: Trial, payload: Path, authority: Path | None) -> None:
     """Try all that an installation goes through, and what goes wrong with it.
 
     Parameters
     ----------
     payload : Path
         The folder that the installer was packed from, for one of a newer version.
+    authority : Path or None
+        File of the certificate that signatures go back to.
     """
     files, registry = trial.machine.files(), trial.machine.registry()
     bad_conditions.try_no_right(trial)
     bad_conditions.try_full_disk(trial)
-    bad_conditions.try_other_folder(trial)
+    bad_conditions.try_other_folders(trial)
     try_chinese(trial)
     life.try_installation(trial, __version__)
+    try_signatures(trial, authority)
     compare_tips(trial, life.try_self_test(trial, "offscreen"))
     with _screen(trial) as seen:
         if seen is not None:
             life.try_self_test(seen, "windows")
+    life.try_remains(trial)
     try_start(trial)
     life.try_entry_points(trial, __version__)
     life.try_demo(trial)
@@ -94,6 +120,10 @@ def try_all(trial: Trial, payload: Path) -> None:
         pack(payload, Path(work), newer, NEWER, Packing.STORED)
         life.try_upgrade(trial, newer, __version__, NEWER)
     life.try_removal(trial, files, registry)
+    users.try_all_users(trial, __version__)
+    users.try_system(trial)
+    users.try_old_windows(trial)
+    life.expect_nothing_left(trial, files, registry)
 
 
 def compare_tips(trial: Trial, there: Mapping[str, Any]) -> None:
@@ -170,6 +200,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("setup", type=Path, metavar="SETUP.exe")
     parser.add_argument(
         "--quick", action="store_true", help="only install, self-test and uninstall"
+    )
+    parser.add_argument(
+        "--authority",
+        type=Path,
+        metavar="FILE",
+        help="certificate that the signatures of the installer go back to",
     )
     return parser
 

@@ -8,6 +8,7 @@ from string import Template
 from tempfile import TemporaryDirectory
 
 from installer.places import INSTALLER, ROOT
+from packaging.version import Version
 from PySide6.QtCore import QBuffer, QByteArray, Qt
 from PySide6.QtGui import QImage, QPainter
 from PySide6.QtSvg import QSvgRenderer
@@ -16,6 +17,8 @@ ICON = ROOT / "resources" / "lightpen_resources" / "icons" / "lightpen.svg"
 ICON_SIZES = (16, 20, 24, 32, 40, 48, 64, 128, 256)  # px
 WINDOW, CONSOLE = "Lightpen.exe", "bin/lightpen.exe"
 PYTHON = "python313.dll"
+PRERELEASES = {"a": 1000, "b": 2000, "rc": 3000}
+RELEASE = 9000
 COMPILERS = ("x86_64-w64-mingw32-", "")  # on Debian, and as MinGW calls them on Windows
 LINKED = (
     *("-municode", "-static", "-s"),
@@ -71,9 +74,17 @@ def icon() -> bytes:
 
 
 def numbers_of(version: str) -> str:
-    """Return a version as the four numbers that Windows wants."""
-    parts = version.split(".")
-    return ",".join([*parts, "0", "0", "0", "0"][:4])
+    """Return a version as the four numbers of Windows, without a candidate's."""
+    return ",".join(map(str, [*Version(version).release, 0, 0, 0][:4]))
+
+
+def order_of(version: str) -> str:
+    """Return four numbers by which a release comes after its candidates."""
+    parsed = Version(version)
+    major, minor, patch = [*parsed.release, 0, 0][:3]
+    kind, number = parsed.pre or (None, 0)
+    last = RELEASE if kind is None else PRERELEASES[kind] + number
+    return f"{major}.{minor}.{patch}.{last}"
 
 
 def _png(size: int) -> bytes:

@@ -8,19 +8,36 @@ from email.parser import HeaderParser
 from pathlib import Path
 
 from installer.places import INSTALLER
+from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
 
 HEAD = """\
-Lightpen is distributed under the MIT licence. With it are installed the programs and
-libraries below, each under its own licence. Qt and PySide6 are used under the LGPL 3:
-they are separate files in runtime\\Lib\\site-packages\\PySide6, which you may replace
-by versions of your own. So is FFmpeg, under the LGPL 2.1, in cv2 beside it.
+Lightpen is distributed under the MIT licence, its fonts under the OFL 1.1. With it are
+installed the programs and libraries below, each under its own licence. Qt, PySide6,
+shiboken6 and psycopg are used under the LGPL 3: they are separate files in
+runtime\\Lib\\site-packages, which you may replace by versions of your own.
+
+Source of the LGPL parts: for three years from the day you received this program, the
+lightpen developers give anyone who asks, at the cost of sending it, the complete source
+of the versions named below. Their makers offer it, too: Qt at download.qt.io, PySide6
+and shiboken6 at code.qt.io, psycopg at pypi.org.
 """
 RULE = "=" * 78
 # Qt for Python names the LGPL and leaves its text out; it refers to that of the GPL.
 LGPL = ("LGPL-3.0.txt", "GPL-3.0.txt")
-ADDED = {"PySide6_Essentials": LGPL, "shiboken6": LGPL}
+ADDED = {
+    "PySide6_Essentials": (*LGPL, "Qt-attributions.txt"),
+    "shiboken6": LGPL,
+    "psycopg-binary": ("PostgreSQL.txt",),  # of libpq
+}
+# As SPDX writes what some makers write otherwise.
+SPDX = {
+    "Apache 2.0": "Apache-2.0",
+    "Apache Software License V2.0": "Apache-2.0",
+    "BSD License": "BSD-3-Clause",  # colorama
+}
+SPDX_OF = {"scipy": "BSD-3-Clause"}  # states its copyright there
 LICENCE = "License :: "  # of the classifiers of PyPI
-NAMES = re.compile("(licen[cs]e|copying|notice|authors)", re.IGNORECASE)
+NAMES = re.compile("(licen[cs]e|copying|notice|authors|ofl)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -30,7 +47,9 @@ class Part:
     Attributes
     ----------
     licence : str
-        As its makers name it.
+        Expression of SPDX.
+    supplier : str
+        Who makes it.
     texts : tuple of Path
         Files that hold it.
     """
@@ -38,6 +57,7 @@ class Part:
     name: str
     version: str
     licence: str
+    supplier: str
     texts: tuple[Path, ...]
 
 
@@ -75,6 +95,7 @@ def _part(folder: Path) -> Part:
         name=metadata["Name"],
         version=metadata["Version"],
         licence=_licence(metadata),
+        supplier=_supplier(metadata),
         texts=tuple(texts),
     )
 
@@ -83,7 +104,19 @@ def _licence(metadata: Message) -> str:
     classifiers = metadata.get_all("Classifier", [])
     classified = [c.rpartition(" :: ")[2] for c in classifiers if c.startswith(LICENCE)]
     stated = metadata.get("License-Expression") or metadata.get("License")
-    return (stated or ", ".join(classified) or "see below").strip().splitlines()[0]
+    line = (stated or ", ".join(classified) or "NOASSERTION").strip().splitlines()[0]
+    named = SPDX_OF.get(metadata["Name"]) or SPDX.get(line, line)
+    try:
+        return canonicalize_license_expression(named)
+    except InvalidLicenseExpression:
+        return "NOASSERTION"
+
+
+def _supplier(metadata: Message) -> str:
+    for kind in ("Author", "Author-Email", "Maintainer", "Maintainer-Email"):
+        if name := re.sub(r"\s*<[^>]*>", "", metadata.get(kind) or "").strip(' "'):
+            return name
+    return "NOASSERTION"
 
 
 def _read(path: Path) -> str:

@@ -7,7 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from installer.places import IS_WINDOWS
-from installer.trial import CLASSES, IMAGE, UNINSTALL, Trial, await_so, last_option
+from installer.trial import (
+    CLASSES,
+    IMAGE,
+    UNINSTALL,
+    UNINSTALL_ALL,
+    Trial,
+    await_so,
+    last_option,
+)
 
 from lightpen.record.swings.reading import OPENER, open_record
 from lightpen.record.swings.writing import RecordWriter
@@ -17,6 +25,8 @@ from lightpen_app.self_test.run import FILE_LIST, damaged_files
 RUNNING, NEWER, FOREIGN = 5, 6, 7  # exit status of the installer
 USUAL_PLATFORM = "offscreen"  # on which windows are seen nowhere
 NOTES = "my notes 笔记.txt"
+# For cameras, for archives, and for the keys of stations.
+NEEDED = ("harvesters.core", "psycopg", "cryptography.hazmat.bindings._rust")
 SIZE_LIMIT = 350e6  # bytes installed
 
 
@@ -51,7 +61,7 @@ def look_over(trial: Trial, version: str) -> None:
     trial.expect("owns .lightpen", owner == "Lightpen.Swing", owner)
     links = sorted(path.name for path in _menu(trial).glob("*.lnk"))
     trial.expect("two entries in the menu", len(links) == 2, links)
-    system = trial.value(UNINSTALL.replace("HKCU", "HKLM"), "DisplayName")
+    system = trial.value(UNINSTALL_ALL, "DisplayName")
     trial.expect("nothing for all users", not system, system)
 
 
@@ -75,7 +85,7 @@ def try_self_test(trial: Trial, platform: str) -> dict[str, Any]:
         found = {check["name"]: check["found"] for check in report["checks"]}
         drawn = found["window system"]
         trial.expect(f"it draws through {platform}", drawn == platform, drawn)
-        for name in ("harvesters.core", "psycopg"):  # for cameras, and for archives
+        for name in NEEDED:
             loads = name in found["imports"]
             trial.expect(f"{name} loads", loads, found["imports"])
         program = report["executable"]
@@ -87,7 +97,7 @@ def try_entry_points(trial: Trial, version: str) -> None:
     """Use the command line."""
     said = trial.console("--version")
     trial.expect("console tells its version", said.output.strip() == version, said)
-    work = trial.machine.home / "Messung ä 测量"
+    work = trial.machine.drive / "Messung ä 测量"
     work.mkdir()
     made = trial.console("simulate", "set 校", "--images", "20", folder=work)
     trial.expect("console simulates", made.status == 0, made)
@@ -177,6 +187,13 @@ def try_upgrade(trial: Trial, newer: Path, version: str, newer_version: str) -> 
     (trial.folder / NOTES).unlink()
 
 
+def try_remains(trial: Trial) -> None:
+    """See that what is installed is noticed, so that no trial begins on it."""
+    remains = trial.remains()
+    is_noticed = {str(trial.folder), UNINSTALL} <= set(remains)
+    trial.expect("an installation keeps trials away", is_noticed, remains)
+
+
 def try_removal(trial: Trial, files: frozenset[str], registry: frozenset[str]) -> None:
     """Uninstall, and see that nothing is left but the user's data; then that, too.
 
@@ -192,14 +209,14 @@ def try_removal(trial: Trial, files: frozenset[str], registry: frozenset[str]) -
     trial.expect("uninstalls in silence", outcome.status == 0, outcome)
     trial.expect("the user's data stay", record.exists())
     shutil.rmtree(trial.data)
-    _expect_nothing_left(trial, files, registry)
+    expect_nothing_left(trial, files, registry)
 
     trial.install()
     trial.data.mkdir(exist_ok=True)
     trial.settings.write_text("{}")
     trial.uninstall("/PURGE")
     trial.expect("the user's data go when asked", not trial.data.exists())
-    _expect_nothing_left(trial, files, registry)
+    expect_nothing_left(trial, files, registry)
 
 
 def damaged(trial: Trial) -> tuple[str, ...]:
@@ -208,9 +225,10 @@ def damaged(trial: Trial) -> tuple[str, ...]:
     return damaged_files(files) if files.exists() else (FILE_LIST,)
 
 
-def _expect_nothing_left(
+def expect_nothing_left(
     trial: Trial, files: frozenset[str], registry: frozenset[str]
 ) -> None:
+    """See that files and registry are as they were before."""
     found = trial.machine.files() - files
     # An empty folder for the programs of all makers may stay.
     left = {name for name in found if not name.endswith("AppData/Local/Programs")}

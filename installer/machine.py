@@ -44,6 +44,10 @@ class Machine(Protocol):
 
     @property
     def drive(self) -> Path:
+        r"""Return the folder for files of a trial, which is ``C:\`` under Wine."""
+
+    @property
+    def shared(self) -> Path:
         r"""Return the folder that is ``C:\``."""
 
     def windows_path(self, path: Path) -> str:
@@ -82,7 +86,7 @@ class Machine(Protocol):
         """Return the files and folders that an installation could leave behind."""
 
     def registry(self) -> frozenset[str]:
-        """Return what of the user's registry is of the program."""
+        """Return what of the registry is of the program."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +106,11 @@ class WineMachine(Prefix):
         for variable in ("TEMP", "TMP"):
             self._set_variable(variable, self.windows_path(home / TEMPORARY))
         self.await_end()
+
+    @property
+    def shared(self) -> Path:
+        r"""Return the folder that is ``C:\``."""
+        return self.drive
 
     def with_display(self, display: str) -> Self:
         """Return the machine with its windows on an X server."""
@@ -140,7 +149,8 @@ class WineMachine(Prefix):
     def registry(self) -> frozenset[str]:
         """Return the keys and values with the program's name in them."""
         self.await_end()
-        text = (self.folder / "user.reg").read_text("utf-8", errors="replace")
+        files = (self.folder / "user.reg", self.folder / "system.reg")
+        text = "\n".join(file.read_text("utf-8", errors="replace") for file in files)
         found = set()
         for block in re.split(r"\n(?=\[)", text):
             head, *lines = block.splitlines()
@@ -157,10 +167,13 @@ class OwnMachine:
 
     Attributes
     ----------
+    drive : Path
+        A folder of its own, for all files that are not the program's.
     platform : str
         Through which Qt draws.
     """
 
+    drive: Path
     platform: str = "offscreen"
 
     @property
@@ -169,7 +182,7 @@ class OwnMachine:
         return Path.home()
 
     @property
-    def drive(self) -> Path:
+    def shared(self) -> Path:
         r"""Return the folder that is ``C:\``."""
         return Path("C:\\")
 
@@ -239,8 +252,10 @@ class OwnMachine:
 
     def registry(self) -> frozenset[str]:
         """Return the keys and values with the program's name in them."""
-        outcome = self.run(["reg", "query", r"HKCU\Software", "/s", "/f", WORD])
-        lines = outcome.output.splitlines()
+        lines: list[str] = []
+        for root in ("HKCU", "HKLM"):
+            words = ["reg", "query", rf"{root}\Software", "/s", "/f", WORD]
+            lines += self.run(words).output.splitlines()
         return frozenset(line for line in lines if WORD in line.lower())
 
 
@@ -254,7 +269,8 @@ def fresh_machine(platform: str) -> Iterator[Machine]:
         Through which Qt draws.
     """
     if IS_WINDOWS:
-        yield OwnMachine(platform)
+        with TemporaryDirectory(prefix="lightpen-machine-") as name:
+            yield OwnMachine(Path(name), platform)
         return
     made = Prefix.for_builds()
     made.await_end()

@@ -16,6 +16,7 @@ PACKAGES = "runtime/Lib/site-packages"
 # The C++ runtime that is loaded first must be the newest that anything was linked with.
 CPP_RUNTIME = ("vcruntime140.dll", "vcruntime140_1.dll", "msvcp140.dll")
 CPP_BRINGERS = ("PySide6", "shiboken6")
+OPENGL = ("QtOpenGL", "QtOpenGLWidgets")
 FILE_LIST = "files.sha256"
 # Without a commit, as in an unpacked source archive: the first day that ZIP can state.
 EARLIEST = 315_532_800  # s, 1980-01-01
@@ -52,10 +53,16 @@ def promote_cpp_runtime(folder: Path) -> None:
             shutil.copyfile(newest, own)
 
 
-def add_start(folder: Path) -> None:
-    """Add what the launchers run."""
-    for name, place in (("start.py", "."), ("compiled_modules.py", "runtime")):
-        shutil.copyfile(INSTALLER / "windows" / name, folder / place / name)
+def add_own(folder: Path) -> None:
+    """Add what the launchers run, and what stands in for Qt's OpenGL."""
+    places: dict[str, tuple[str, ...]] = {
+        "start.py": ("start.py",),
+        "compiled_modules.py": ("runtime/{}",),
+    }
+    places["without_opengl.py"] = tuple(f"{PACKAGES}/PySide6/{n}.py" for n in OPENGL)
+    for name, copies in places.items():
+        for copy in copies:
+            shutil.copyfile(INSTALLER / "windows" / name, folder / copy.format(name))
 
 
 def write_file_list(folder: Path) -> None:

@@ -10,8 +10,7 @@ from fnmatch import fnmatchcase
 from lightpen_resources import languages
 
 QT_MODULES = {
-    *("Core", "Gui", "Network", "OpenGL", "OpenGLWidgets", "PrintSupport"),
-    *("Svg", "SvgWidgets", "Test", "Widgets"),
+    *("Core", "Gui", "Network", "PrintSupport", "Svg", "SvgWidgets", "Test", "Widgets")
 }
 QT_PLUGINS = ("generic/*", "iconengines/*", "imageformats/*", "platforms/*", "styles/*")
 QT_TRANSLATIONS = tuple(f"qtbase_{language}.qm" for language in languages())
@@ -21,6 +20,7 @@ DROPPED = (
     "PySide6/lib/*", "PySide6/metatypes/*", "PySide6/qml/*", "PySide6/resources/*",
     "PySide6/scripts/*", "PySide6/typesystems/*",
     "PySide6/opengl32sw.dll",  # draws OpenGL in software; nothing here uses OpenGL
+    "pyqtgraph/opengl/*",
     "PySide6/pyside6qml*", "PySide6/plugins/platforms/qdirect2d.dll",
     "PySide6/plugins/imageformats/qpdf.dll", "PySide6/plugins/imageformats/qtiff.dll",
     # Of the C++ runtime, what nothing here loads.
@@ -28,12 +28,25 @@ DROPPED = (
     "*/vcomp140.dll",
     "harvesters/test/*", "numpy/f2py/src/*", "numpy/_pyinstaller/*",
     "pyqtgraph/examples/*",
+    # Without FFmpeg OpenCV reads videos of Motion JPEG; see lightpen.formats.videos.
+    "cv2/opencv_videoio_ffmpeg*.dll",
     "cv2/LICENSE*",  # a copy of that beside the metadata
+    "*/LicenseRef-Qt-Commercial.txt",  # Qt is used under the LGPL
     "*.dist-info/RECORD",  # lists what is no longer there
 )  # fmt: skip
 # Sub-packages of scipy that are imported, and those that they import.
 SCIPY = {
-    *("_lib", "constants", "fft", "linalg", "optimize", "sparse", "spatial", "special")
+    *(
+        "_external",
+        "_lib",
+        "constants",
+        "fft",
+        "linalg",
+        "optimize",
+        "sparse",
+        "spatial",
+        "special",
+    )
 }
 KEPT = ("numpy/testing/*",)
 

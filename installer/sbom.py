@@ -8,6 +8,8 @@ from typing import Any
 from uuid import NAMESPACE_URL, uuid5
 
 SPECIFICATION = "1.6"
+SUPPLIER = "The lightpen developers"
+LICENCE = "MIT AND OFL-1.1"
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,11 @@ class BundledPart:
     purl : str
         Package URL.
     licence : str
-        As its makers name it.
+        Expression of SPDX.
+    supplier : str
+        Who makes it.
+    cpe : str
+        Its name among those of known vulnerabilities.
     """
 
     name: str
@@ -32,6 +38,13 @@ class BundledPart:
     sha256: str
     purl: str
     licence: str
+    supplier: str
+    cpe: str
+
+
+def cpe(product: str, version: str) -> str:
+    """Return the name of a version by the vendor and product that CPE knows."""
+    return f"cpe:2.3:a:{product.replace('+', chr(92) + '+')}:{version}:*:*:*:*:*:*:*"
 
 
 def bill_of_materials(
@@ -60,6 +73,8 @@ def bill_of_materials(
                 "bom-ref": "lightpen",
                 "name": "lightpen",
                 "version": version,
+                "supplier": {"name": SUPPLIER},
+                "licenses": [{"expression": LICENCE}],
             },
         },
         "components": entries,
@@ -73,11 +88,13 @@ def bill_of_materials(
 def _entry(component: BundledPart) -> dict[str, Any]:
     return {
         "type": "library",
-        "bom-ref": component.purl,
+        "bom-ref": f"{component.purl}#{component.file}",
+        "supplier": {"name": component.supplier},
         "name": component.name,
         "version": component.version,
+        "cpe": component.cpe,
         "purl": component.purl,
-        "licenses": [{"license": {"name": component.licence}}],
+        "licenses": [{"expression": component.licence}],
         "hashes": [{"alg": "SHA-256", "content": component.sha256}],
         "properties": [{"name": "lightpen:file", "value": component.file}],
     }

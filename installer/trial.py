@@ -14,6 +14,7 @@ from installer.machine import Machine
 from installer.wine.prefix import CommandResult
 
 UNINSTALL = r"HKCU\Software\Microsoft\Windows\CurrentVersion\Uninstall\Lightpen"
+UNINSTALL_ALL = UNINSTALL.replace("HKCU", "HKLM")
 CLASSES = r"HKCU\Software\Classes"
 IMAGE, CONSOLE = "Lightpen.exe", r"bin\lightpen.exe"
 PATIENCE_S = 120.0
@@ -33,6 +34,16 @@ class Trial:
         return self.local / "Programs" / "Lightpen"
 
     @property
+    def folder_of_all(self) -> Path:
+        """Return where it is installed for all users."""
+        return self.machine.shared / "Program Files" / "Lightpen"
+
+    @property
+    def keys(self) -> Path:
+        """Return where the program keeps the keys of stations."""
+        return self.local / "lightpen-keys"
+
+    @property
     def local(self) -> Path:
         """Return the folder of the user's data of programs."""
         return self.machine.home / "AppData" / "Local"
@@ -41,6 +52,15 @@ class Trial:
     def data(self) -> Path:
         """Return where the program keeps records, results and settings."""
         return self.local / "lightpen"
+
+    def remains(self) -> list[str]:
+        """Return what of the program is on the machine: places and registry keys."""
+        keys = (UNINSTALL, UNINSTALL_ALL)
+        places = (self.folder, self.folder_of_all, self.data, self.keys)
+        return [
+            *(str(place) for place in places if place.exists()),
+            *(key for key in keys if self.value(key, "DisplayName")),
+        ]
 
     def expect(self, what: str, is_so: bool, otherwise: object = "") -> None:
         """Note whether something is as it must be, and print it."""

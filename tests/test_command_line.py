@@ -921,10 +921,11 @@ def test_the_menu_opens_the_window_without_a_file() -> None:
 
 
 @pytest.mark.parametrize("name", ["no/such.lightpen", "such.lightpen", "/tip.json"])
+@pytest.mark.parametrize("command", [(), ("open",)])
 def test_a_file_that_is_missing_is_named(
-    name: str, capsys: pytest.CaptureFixture[str]
+    name: str, command: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main([name], desktop := WitnessingDesktop()) == 2
+    assert main([*command, name], desktop := WitnessingDesktop()) == 2
     assert f"The file {name} does not exist." in capsys.readouterr().err
     assert desktop.opened == []
 

@@ -27,6 +27,7 @@ from lightpen.estimation.reports.summary import calibration_text
 from lightpen.formats.files import printable
 from lightpen.live.sources import SourceEnvironment
 from lightpen.logs import end_log, write_log_to
+from lightpen.record.signing.keys import KEYS
 from lightpen.simulator.camera import SERIAL
 from lightpen.streaming.server import StreamPlace
 from lightpen_app.crash import CrashHook, versions
@@ -231,6 +232,7 @@ def run_demo(make_pages: MakePages) -> int:
         EndSignals(application) as signals,
         TemporaryDirectory(prefix="lightpen-demo-") as folder,
     ):
+        os.environ[KEYS] = str(Path(folder) / "keys")
         settings = Settings(Path(folder) / "lightpen.json")
         users = Settings(settings_file()).preferences()
         settings.set_preferences(replace(users, streams=False))

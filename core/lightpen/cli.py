@@ -21,11 +21,17 @@ from typing_extensions import override
 from lightpen import __version__
 from lightpen.commands.archive import add_archive, usual_data_folder
 from lightpen.commands.console import BAD_INPUT, NO_TIP, Command, shown
-from lightpen.commands.desktop import Desktop, add_desktop, add_open, add_report
+from lightpen.commands.desktop import (
+    Desktop,
+    add_desktop,
+    add_open,
+    add_report,
+    is_absent,
+)
 from lightpen.commands.tips import add_tips
 from lightpen.errors import CalibrationError, LightpenError, UsageError
 from lightpen.logs import LEVEL_VARIABLE, LEVELS, log_level, running_log, write_log_to
-from lightpen.messages import Message, message
+from lightpen.messages import Message
 
 # Each with what adds its options, which is imported only for what was given.
 COMMANDS = (
@@ -103,9 +109,6 @@ def main(arguments: Sequence[str] | None = None, desktop: Desktop | None = None)
     given = sys.argv[1:] if arguments is None else arguments
     parser, commands = _parser(given, desktop)
     if desktop is not None and _names_file(given, commands):
-        if _is_absent(Path(given[0])):
-            _complain(message("cli.no-such-file", path=given[0]))
-            return BAD_INPUT
         given = ["open", *given]
     # argparse takes "-90." and "-9e1" for options, but not with a blank before them.
     options = parser.parse_args(
@@ -229,11 +232,4 @@ def _names_file(given: Sequence[str], commands: Collection[str]) -> bool:
     if len(given) != 1 or given[0] in commands or given[0].startswith("-"):
         return False
     path = Path(given[0])
-    return len(path.parts) > 1 or path.suffix in OPENED or not _is_absent(path)
-
-
-def _is_absent(path: Path) -> bool:
-    try:
-        return not path.exists()
-    except OSError:  # no access, which the window says
-        return False
+    return len(path.parts) > 1 or path.suffix in OPENED or not is_absent(path)

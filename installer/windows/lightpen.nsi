@@ -1,13 +1,15 @@
-; The installer of Lightpen for one user. Built by installer/build.py, which defines
-; VERSION, NUMBERS, PAYLOAD, OUTFILE, ICON, SIZE_KB and SLASH, for a quick build QUICK,
-; for the quickest STORED as well.
+; The installer of Lightpen for one user or for all. Built by installer/build.py, which
+; defines VERSION, ORDER, NUMBERS, PAYLOAD, OUTFILE, ICON, SIZE_KB and SLASH, for a quick
+; build QUICK, for the quickest STORED as well.
 ;
-; Options: /S silent, /D=FOLDER (last, without quotes), /DOWNGRADE over a newer version,
-; /DESKTOP an icon on the desktop. Of the uninstaller: /S, /PURGE the user's data, too.
+; Options: /S silent, /ALLUSERS for all users (the account SYSTEM always does so),
+; /D=FOLDER (last, without quotes), /DOWNGRADE over a newer version, /DESKTOP an icon on
+; the desktop. Of the uninstaller: /S, /PURGE the user's data, too.
 ;
 ; Exit status: 0 done, 1 cancelled, 4 unsuitable Windows, 5 the program runs, 6 a newer
 ; version is installed, 7 the folder holds something else, 8 it cannot be written,
-; 9 there is no space, 10 some files could not be written.
+; 9 there is no space, 10 some files could not be written, 11 /ALLUSERS without the
+; rights of an administrator.
 
 Unicode true
 !ifdef TARGET
@@ -33,12 +35,11 @@ Unicode true
 !define DATA      "$LOCALAPPDATA\lightpen"
 !define MENU      "$SMPROGRAMS\${NAME}"
 !define RESERVE   200 ; MB that stay free for the first swings
+!define OLDEST    17763 ; build of Windows 10 1809
 
 Name "${NAME} ${VERSION}"
 OutFile "${OUTFILE}"
 RequestExecutionLevel user
-InstallDir "$LOCALAPPDATA\Programs\${NAME}"
-InstallDirRegKey HKCU "${UNKEY}" "InstallLocation"
 !ifdef QUICK
   SetCompressor zlib
   !ifdef STORED
@@ -115,12 +116,14 @@ Function ${un}IsHeld
   ${EndIf}
 FunctionEnd
 
+; Waits until no program of the folder on the stack runs.
 Function ${un}AwaitEnd
+  Pop $R6
   ${Do}
-    Push "$INSTDIR\${EXE}"
+    Push "$R6\${EXE}"
     Call ${un}IsHeld
     ${If} $R9 = 0
-      Push "$INSTDIR\bin\lightpen.exe"
+      Push "$R6\bin\lightpen.exe"
       Call ${un}IsHeld
     ${EndIf}
     ${If} $R9 = 0
@@ -149,18 +152,67 @@ FunctionEnd
 
 ; ---- installing
 
-Function .onInit
+Var Before ; folder of an installation that is there already; empty if there is none
+
+; For all users if /ALLUSERS says so, and always for the account SYSTEM, whose own
+; programs nobody sees: Intune and SCCM install by it.
+Function ChooseUsers
   SetShellVarContext current
+  ${GetParameters} $2
+  ClearErrors
+  ${GetOptions} $2 "/ALLUSERS" $3
+  ${If} ${Errors}
+    StrCpy $3 "no"
+  ${Else}
+    StrCpy $3 "yes"
+  ${EndIf}
+  ${GetFileName} "$PROFILE" $4
+  ${If} $3 == "yes"
+  ${OrIf} $4 == "systemprofile"
+    UserInfo::GetAccountType
+    Pop $5
+    ${If} $5 != "Admin"
+      ${Refuse} 11 "$(NO_ADMINISTRATOR)"
+    ${EndIf}
+    SetShellVarContext all
+    StrCpy $6 "$PROGRAMFILES64\${NAME}"
+  ${Else}
+    StrCpy $6 "$LOCALAPPDATA\Programs\${NAME}"
+  ${EndIf}
+  ReadRegStr $Before SHCTX "${UNKEY}" "InstallLocation"
+  ${If} $INSTDIR == "" ; no /D
+    StrCpy $INSTDIR $6
+    ${If} $Before != ""
+      StrCpy $INSTDIR $Before
+    ${EndIf}
+  ${EndIf}
+FunctionEnd
+
+; One installation at a time: that in another folder goes when this one is whole.
+Function RemoveBefore
+  ${If} $Before != ""
+  ${AndIf} $Before != $INSTDIR
+  ${AndIf} ${FileExists} "$Before\${MARKER}"
+    ExecWait '"$Before\uninstall.exe" /S _?=$Before'
+    Delete "$Before\uninstall.exe"
+    RMDir "$Before"
+  ${EndIf}
+FunctionEnd
+
+Function .onInit
   ${IfNot} ${AtLeastWin10}
+  ${OrIfNot} ${AtLeastBuild} ${OLDEST}
     ${Refuse} 4 "$(OLD_WINDOWS)"
   ${EndIf}
   ${IfNot} ${RunningX64}
     ${Refuse} 4 "$(NOT_64_BIT)"
   ${EndIf}
   SetRegView 64
-  ReadRegStr $0 HKCU "${UNKEY}" "DisplayVersion"
+  Call ChooseUsers
+  ReadRegStr $0 SHCTX "${UNKEY}" "DisplayVersion"
+  ReadRegStr $1 SHCTX "${UNKEY}" "Order"
   ${If} $0 != ""
-    ${VersionCompare} "$0" "${VERSION}" $1
+    ${VersionCompare} "$1" "${ORDER}" $1
     ${If} $1 = 1
       ${GetParameters} $2
       ClearErrors
@@ -176,7 +228,12 @@ FunctionEnd
 
 Section "$(PROGRAM)" SecProgram
   SectionIn RO
+  Push "$INSTDIR"
   Call AwaitEnd
+  ${If} $Before != ""
+    Push "$Before"
+    Call AwaitEnd
+  ${EndIf}
 
   ; Only an empty folder, or one that this installer has made.
   ${If} ${FileExists} "$INSTDIR\*.*"
@@ -225,40 +282,45 @@ Section "$(PROGRAM)" SecProgram
   ${EndIf}
   WriteUninstaller "$INSTDIR\uninstall.exe"
   WriteINIStr "$INSTDIR\${MARKER}" "install" "version" "${VERSION}"
+  ${If} ${ShellVarContextAll}
+    WriteINIStr "$INSTDIR\${MARKER}" "install" "users" "all"
+  ${EndIf}
   FlushINI "$INSTDIR\${MARKER}"
 
+  Call RemoveBefore
   SetOutPath "$PROFILE" ; in which programs begin that are started from the menu
   CreateDirectory "${MENU}"
   CreateShortCut "${MENU}\${NAME}.lnk" "$INSTDIR\${EXE}" "" "$INSTDIR\${EXE}" 0
   CreateShortCut "${MENU}\$(CONSOLE).lnk" "$SYSDIR\cmd.exe" \
     '/k set "PATH=$INSTDIR\bin;%PATH%" && lightpen --help' "$INSTDIR\${EXE}" 0
 
-  WriteRegStr HKCU "${APPPATH}" "" "$INSTDIR\${EXE}"
-  WriteRegStr HKCU "${UNKEY}" "DisplayName" "${NAME}"
-  WriteRegStr HKCU "${UNKEY}" "DisplayVersion" "${VERSION}"
-  WriteRegStr HKCU "${UNKEY}" "Publisher" "${PUBLISHER}"
-  WriteRegStr HKCU "${UNKEY}" "DisplayIcon" "$INSTDIR\${EXE},0"
-  WriteRegStr HKCU "${UNKEY}" "InstallLocation" "$INSTDIR"
-  WriteRegStr HKCU "${UNKEY}" "UninstallString" '"$INSTDIR\uninstall.exe"'
-  WriteRegStr HKCU "${UNKEY}" "QuietUninstallString" '"$INSTDIR\uninstall.exe" /S'
-  WriteRegDWORD HKCU "${UNKEY}" "EstimatedSize" ${SIZE_KB}
-  WriteRegDWORD HKCU "${UNKEY}" "NoModify" 1
-  WriteRegDWORD HKCU "${UNKEY}" "NoRepair" 1
+  WriteRegStr SHCTX "${APPPATH}" "" "$INSTDIR\${EXE}"
+  WriteRegStr SHCTX "${UNKEY}" "DisplayName" "${NAME}"
+  WriteRegStr SHCTX "${UNKEY}" "DisplayVersion" "${VERSION}"
+  WriteRegStr SHCTX "${UNKEY}" "Order" "${ORDER}" ; candidates come before the release
+  WriteRegStr SHCTX "${UNKEY}" "Publisher" "${PUBLISHER}"
+  WriteRegStr SHCTX "${UNKEY}" "DisplayIcon" "$INSTDIR\${EXE},0"
+  WriteRegStr SHCTX "${UNKEY}" "InstallLocation" "$INSTDIR"
+  WriteRegStr SHCTX "${UNKEY}" "UninstallString" '"$INSTDIR\uninstall.exe"'
+  WriteRegStr SHCTX "${UNKEY}" "QuietUninstallString" '"$INSTDIR\uninstall.exe" /S'
+  WriteRegDWORD SHCTX "${UNKEY}" "EstimatedSize" ${SIZE_KB}
+  WriteRegDWORD SHCTX "${UNKEY}" "NoModify" 1
+  WriteRegDWORD SHCTX "${UNKEY}" "NoRepair" 1
 
   ; The file in the folder of each swing opens with a double click. Results are JSON,
   ; whose double click belongs to the user's editor: there Lightpen is in "Open with".
-  WriteRegStr HKCU "${CLASSES}\${SWING}" "" "$(SWING_FILE)"
-  WriteRegStr HKCU "${CLASSES}\${SWING}\DefaultIcon" "" "$INSTDIR\${EXE},0"
-  WriteRegStr HKCU "${CLASSES}\${SWING}\shell\open\command" "" '"$INSTDIR\${EXE}" open "%1"'
-  WriteRegStr HKCU "${CLASSES}\.lightpen\OpenWithProgids" "${SWING}" ""
-  ReadRegStr $0 HKCU "${CLASSES}\.lightpen" ""
+  WriteRegStr SHCTX "${CLASSES}\${SWING}" "" "$(SWING_FILE)"
+  WriteRegStr SHCTX "${CLASSES}\${SWING}\DefaultIcon" "" "$INSTDIR\${EXE},0"
+  WriteRegStr SHCTX "${CLASSES}\${SWING}\shell\open\command" "" '"$INSTDIR\${EXE}" open "%1"'
+  WriteRegStr SHCTX "${CLASSES}\.lightpen\OpenWithProgids" "${SWING}" ""
+  ReadRegStr $0 SHCTX "${CLASSES}\.lightpen" ""
   ${If} $0 == ""
-    WriteRegStr HKCU "${CLASSES}\.lightpen" "" "${SWING}"
+    WriteRegStr SHCTX "${CLASSES}\.lightpen" "" "${SWING}"
   ${EndIf}
-  WriteRegStr HKCU "${CLASSES}\${RESULT}" "" "$(RESULT_FILE)"
-  WriteRegStr HKCU "${CLASSES}\${RESULT}\DefaultIcon" "" "$INSTDIR\${EXE},0"
-  WriteRegStr HKCU "${CLASSES}\${RESULT}\shell\open\command" "" '"$INSTDIR\${EXE}" open "%1"'
-  WriteRegStr HKCU "${CLASSES}\.json\OpenWithProgids" "${RESULT}" ""
+  WriteRegStr SHCTX "${CLASSES}\${RESULT}" "" "$(RESULT_FILE)"
+  WriteRegStr SHCTX "${CLASSES}\${RESULT}\DefaultIcon" "" "$INSTDIR\${EXE},0"
+  WriteRegStr SHCTX "${CLASSES}\${RESULT}\shell\open\command" "" '"$INSTDIR\${EXE}" open "%1"'
+  WriteRegStr SHCTX "${CLASSES}\.json\OpenWithProgids" "${RESULT}" ""
   ${NotifyShell_AssocChanged}
 
   ${GetParameters} $0
@@ -286,9 +348,23 @@ Function un.onInit
   ${IfNot} ${FileExists} "$INSTDIR\${MARKER}"
     ${Refuse} 7 "$(NOT_INSTALLED)"
   ${EndIf}
+  ReadINIStr $0 "$INSTDIR\${MARKER}" "install" "users"
+  ${If} $0 == "all"
+    UserInfo::GetAccountType
+    Pop $1
+    ${If} $1 != "Admin"
+      ${IfNot} ${Silent} ; "Installed apps" starts it with the rights of the user
+        ExecShell "runas" "$INSTDIR\uninstall.exe"
+        Quit
+      ${EndIf}
+      ${Refuse} 11 "$(NO_ADMINISTRATOR)"
+    ${EndIf}
+    SetShellVarContext all
+  ${EndIf}
 FunctionEnd
 
 Section "Uninstall"
+  Push "$INSTDIR"
   Call un.AwaitEnd
   Call un.RemoveFiles
   Delete "$INSTDIR\${MARKER}"
@@ -298,38 +374,40 @@ Section "Uninstall"
   Delete "${MENU}\*.lnk" ; named in the language of the installation
   RMDir "${MENU}"
   Delete "$DESKTOP\${NAME}.lnk"
-  ReadRegStr $0 HKCU "${CLASSES}\.lightpen" ""
+  ReadRegStr $0 SHCTX "${CLASSES}\.lightpen" ""
   ${If} $0 == "${SWING}"
-    DeleteRegValue HKCU "${CLASSES}\.lightpen" ""
+    DeleteRegValue SHCTX "${CLASSES}\.lightpen" ""
   ${EndIf}
-  DeleteRegValue HKCU "${CLASSES}\.lightpen\OpenWithProgids" "${SWING}"
-  DeleteRegKey /ifempty HKCU "${CLASSES}\.lightpen\OpenWithProgids"
+  DeleteRegValue SHCTX "${CLASSES}\.lightpen\OpenWithProgids" "${SWING}"
+  DeleteRegKey /ifempty SHCTX "${CLASSES}\.lightpen\OpenWithProgids"
   ; "If empty" knows of keys only: what another program has set must stay.
-  ReadRegStr $0 HKCU "${CLASSES}\.lightpen" ""
+  ReadRegStr $0 SHCTX "${CLASSES}\.lightpen" ""
   ${If} $0 == ""
-    DeleteRegKey /ifempty HKCU "${CLASSES}\.lightpen"
+    DeleteRegKey /ifempty SHCTX "${CLASSES}\.lightpen"
   ${EndIf}
-  DeleteRegValue HKCU "${CLASSES}\.json\OpenWithProgids" "${RESULT}"
-  EnumRegValue $0 HKCU "${CLASSES}\.json\OpenWithProgids" 0
+  DeleteRegValue SHCTX "${CLASSES}\.json\OpenWithProgids" "${RESULT}"
+  EnumRegValue $0 SHCTX "${CLASSES}\.json\OpenWithProgids" 0
   ${If} $0 == ""
-    DeleteRegKey /ifempty HKCU "${CLASSES}\.json\OpenWithProgids"
-    ReadRegStr $0 HKCU "${CLASSES}\.json" ""
-    EnumRegValue $1 HKCU "${CLASSES}\.json" 0
+    DeleteRegKey /ifempty SHCTX "${CLASSES}\.json\OpenWithProgids"
+    ReadRegStr $0 SHCTX "${CLASSES}\.json" ""
+    EnumRegValue $1 SHCTX "${CLASSES}\.json" 0
     ${If} $0 == ""
     ${AndIf} $1 == ""
-      DeleteRegKey /ifempty HKCU "${CLASSES}\.json"
+      DeleteRegKey /ifempty SHCTX "${CLASSES}\.json"
     ${EndIf}
   ${EndIf}
-  DeleteRegKey HKCU "${CLASSES}\${SWING}"
-  DeleteRegKey HKCU "${CLASSES}\${RESULT}"
-  DeleteRegKey HKCU "${APPPATH}"
-  DeleteRegKey HKCU "${UNKEY}"
+  DeleteRegKey SHCTX "${CLASSES}\${SWING}"
+  DeleteRegKey SHCTX "${CLASSES}\${RESULT}"
+  DeleteRegKey SHCTX "${APPPATH}"
+  DeleteRegKey SHCTX "${UNKEY}"
   ${NotifyShell_AssocChanged}
 
   ${un.GetParameters} $0
   ClearErrors
   ${un.GetOptions} $0 "/PURGE" $1
   ${IfNot} ${Errors}
+    SetShellVarContext current
     RMDir /r "${DATA}"
+    RMDir /r "${DATA}-keys"
   ${EndIf}
 SectionEnd

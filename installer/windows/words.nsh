@@ -37,4 +37,7 @@ ${Words} NO_SPACE \
 ${Words} NOT_WRITTEN \
   "Not all files could be written to $INSTDIR. Make sure that the disk is not full and no other program holds them, then run this installer again: it repairs what is there." \
   "未能将全部文件写入 $INSTDIR。请确认磁盘未满、且没有其他程序占用这些文件，然后重新运行安装程序：它会修复现有内容。"
+${Words} NO_ADMINISTRATOR \
+  "The installation for all users takes the rights of an administrator. Start it as administrator; nothing was changed." \
+  "为所有用户安装需要管理员权限。请以管理员身份运行；未作任何更改。"
 ${Words} NOT_INSTALLED "$INSTDIR does not hold ${NAME}." "$INSTDIR 中没有安装 ${NAME}。"

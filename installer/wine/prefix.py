@@ -1,6 +1,6 @@
 """Windows on Linux: a Wine prefix that Windows' Python, NumPy and Qt run in.
 
-Debian's Wine 8 lacks some functions of Windows, or has them otherwise: three small
+Debian's Wine 8 lacks some functions of Windows, or has them otherwise: four small
 libraries stand in for them. They are for builds and tests; none is installed.
 """
 
@@ -28,6 +28,7 @@ BUILTIN = (
     "/usr/lib64/wine/x86_64-windows/ucrtbase.dll",
 )
 OVERRIDES = r"HKCU\Software\Wine\DllOverrides"
+BARE = ("mscms", "icuuc", "bcryptprimitives")  # of no library of C
 MARK = b"Wine builtin DLL"
 # That Wine links to the real home folder.
 LINKS = (
@@ -142,7 +143,7 @@ class Prefix:
         self.folder.mkdir(parents=True)
         self.run(["wineboot", "-i"]).require_success()
         self.run(["winecfg", "-v", "win10"])
-        for library in ("ucrtbase", "mscms", "icuuc"):
+        for library in ("ucrtbase", *BARE):
             self._override(library, "native,builtin")
         self._override("winemenubuilder.exe", "")  # writes into the real home folder
         self.await_end()
@@ -223,13 +224,13 @@ class Prefix:
         self.run(words).require_success()
 
     def _stand_in(self, builtin: Path) -> None:
-        """Put the three libraries into the system's folder."""
+        """Put the four libraries into the system's folder."""
         system = self.drive / "windows" / "system32"
         renamed = bytearray(builtin.read_bytes())
         mark = renamed.find(MARK)
         # Without the mark Wine loads it under its new name, like any library.
         renamed[mark : mark + len(MARK)] = bytes(len(MARK))
-        for name in ("ucrtbase", "ucrtwine", "mscms", "icuuc"):
+        for name in ("ucrtbase", "ucrtwine", *BARE):
             (system / f"{name}.dll").unlink(missing_ok=True)
         (system / "ucrtwine.dll").write_bytes(renamed)
         exports = self.folder / "ucrtbase.def"
@@ -237,8 +238,9 @@ class Prefix:
         sources: list[str | Path] = ["complex.c", "locking.c", exports]
         _compile(system / "ucrtbase.dll", sources, "-O2", "-static-libgcc")
         bare = ("-Os", "-nostdlib", "-e", "DllMainCRTStartup")
-        for name in ("mscms", "icuuc"):
-            _compile(system / f"{name}.dll", [f"{name}.c"], *bare)
+        for name in BARE:
+            sources = [f"{name}.c", "-ladvapi32"]
+            _compile(system / f"{name}.dll", sources, *bare)
 
 
 def _exports(builtin: Path) -> str:

@@ -6,7 +6,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from installer import runtime
-from installer.launchers import ICON_SIZES, icon, numbers_of
+from installer.launchers import ICON_SIZES, icon, numbers_of, order_of
 from installer.payload import all_files, set_times, write_file_list
 
 from lightpen_app.self_test.run import FILE_LIST, damaged_files
@@ -57,6 +57,14 @@ def test_every_file_of_the_runtime_is_pinned_by_its_digest() -> None:
 def test_a_version_is_written_as_the_four_numbers_of_windows() -> None:
     assert numbers_of("0.1.0") == "0,1,0,0"
     assert numbers_of("12.3") == "12,3,0,0"
+    assert numbers_of("1.2.0rc3") == "1,2,0,0"
+
+
+def test_a_release_comes_after_its_candidates_and_before_those_of_the_next() -> None:
+    versions = ("1.1.0", "1.2.0a1", "1.2.0b1", "1.2.0rc1", "1.2.0rc2", "1.2.0", "1.2.1")
+    orders = [tuple(map(int, order_of(version).split("."))) for version in versions]
+
+    assert orders == sorted(set(orders))
 
 
 def test_the_icon_has_every_size_and_is_always_the_same() -> None:

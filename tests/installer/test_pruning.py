@@ -19,7 +19,6 @@ from installer.pruning import is_kept
         "PySide6/plugins/platforms/qoffscreen.dll",
         "PySide6/translations/qtbase_zh_CN.qm",
         "PySide6/msvcp140.dll",
-        "cv2/opencv_videoio_ffmpeg500_64.dll",  # recorded videos are read by it
         "numpy/testing/__init__.py",
         "numpy/f2py/__init__.py",  # scipy imports all of numpy
         "scipy/special/_ufuncs.pyd",
@@ -40,6 +39,10 @@ def test_what_the_program_can_come_to_use_is_installed(name: str) -> None:
         "PySide6/QtQml.pyd",
         "PySide6/qml/QtQuick/qmldir",
         "PySide6/opengl32sw.dll",
+        "pyqtgraph/opengl/GLViewWidget.py",
+        "PySide6/QtOpenGL.pyd",  # for which windows/without_opengl.py stands in
+        "PySide6/Qt6OpenGL.dll",
+        "cv2/opencv_videoio_ffmpeg500_64.dll",  # OpenCV itself reads Motion JPEG
         "PySide6/designer.exe",
         "PySide6/plugins/sqldrivers/qsqlite.dll",
         "PySide6/translations/qtbase_es.qm",

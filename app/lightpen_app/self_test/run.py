@@ -43,7 +43,8 @@ def _digest(path: Path) -> str:
 LONGEST = 600.0  # s, after which something hangs
 UNWRITTEN, HUNG = 2, 3  # exit status
 NEAR = 0.005  # mm from the true tip
-MODULES = ("numpy", "cv2", "msgspec", "yaml", "argon2", "PySide6.QtWidgets",
+MODULES = ("numpy", "cv2", "msgspec", "yaml", "argon2",
+           "cryptography.hazmat.bindings._rust", "PySide6.QtWidgets",
            "PySide6.QtSvg", "pyqtgraph", "lightpen.cli", "lightpen_app.application",
            "lightpen_app.wizard_pages")  # fmt: skip
 # Drive cameras, and reach an archive on a server.
@@ -68,6 +69,7 @@ def test_program(file: Path) -> int:
         stack.callback(report.write)
         stack.callback(watchdog.cancel)
         folder = Path(stack.enter_context(TemporaryDirectory(prefix="lightpen-试 ")))
+        os.environ["LIGHTPEN_KEYS"] = str(folder / "keys")  # no key of the user's
         try:
             _test_all(report, folder, stack)
         except SelfTestError as failed:

@@ -38,8 +38,9 @@ class About(FittedWindow, QDialog):
         licences = text_label(TextSize.SMALL, Tone.QUIET)
         licences.setText(
             self.tr(
-                "Lightpen: MIT licence. Qt and PySide6: LGPL 3. Fonts: cut from Noto "
-                "Sans and Noto Sans CJK, SIL Open Font License 1.1."
+                "Lightpen: MIT licence. Qt, PySide6 and psycopg: LGPL 3. FFmpeg, "
+                "which some installations of OpenCV contain: LGPL 2.1. Fonts: cut from "
+                "Noto Sans and Noto Sans CJK, SIL Open Font License 1.1."
             )
         )
         for label in (self._versions, licences):

@@ -11,7 +11,7 @@ from lightpen.record.swings.names import Names
 from lightpen.swing.preparation import Preparation, SourceChoice
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import FilePaths, Station, preparation_of, station_of
+from lightpen_app.work.stations import FilePaths, preparation_of, station_of
 
 # Nothing that is chosen for a trial is remembered.
 TRIAL = Names("Trial", "Trial", "SIM-1", "T-1", "C-1", 10.0)
@@ -55,8 +55,9 @@ class Selection(QObject):
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._settings = settings
-        self._preparation = Preparation()
-        self._choices = VerificationChoices()
+        limits = settings.machine_limits()
+        self._preparation = Preparation(limits=limits.swing)
+        self._choices = VerificationChoices(limits=limits.verification)
         self._supervision = Supervision()
         self._unread = FilePaths()
 
@@ -86,7 +87,7 @@ class Selection(QObject):
 
     def choose_station(self, name: str) -> None:
         """Restore the last selection at a station; its files are read later."""
-        station = self._settings.station(name) if name else Station()
+        station = self._settings.station(name)
         before = self._preparation
         chosen = preparation_of(name, station, before)
         limits = self._limits_for(chosen)
@@ -134,7 +135,11 @@ class Selection(QObject):
         self._follow(before)
 
     def _limits_for(self, preparation: Preparation) -> StationLimits:
-        chosen = StationLimits(preparation.limits, due=self._settings.due_rule())
+        chosen = replace(
+            self._settings.machine_limits(),
+            swing=preparation.limits,
+            due=self._settings.due_rule(),
+        )
         return self._supervision.limits_at(preparation.names.station, chosen)
 
     def _follow(self, before: Preparation) -> None:

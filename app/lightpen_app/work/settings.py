@@ -20,12 +20,20 @@ from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import LightpenError
 from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.messages import Message
-from lightpen.model.limits import DueRule
+from lightpen.model.limits import DueRule, StationLimits
 from lightpen.record.exports.dcc import Laboratory
 from lightpen.streaming.server import StreamPlace
+from lightpen.verification.session.choices import VerificationChoices
 from lightpen_app.look.languages import system_language
 from lightpen_app.look.theme import Appearance
-from lightpen_app.work.settings_store import Changes, Content, load, save, with_changes
+from lightpen_app.work.settings_store import (
+    Changes,
+    Content,
+    load,
+    load_of_machine,
+    save,
+    with_changes,
+)
 from lightpen_app.work.stations import CameraFiles, Station
 from lightpen_resources import SOURCE_LANGUAGE, languages
 
@@ -81,7 +89,8 @@ class Settings(QObject):
         self._file = file
         loaded = load(file)
         self._content: Content = loaded.content
-        self._fault = loaded.trouble
+        self._machine, fault = load_of_machine()
+        self._fault = loaded.trouble or fault
         self._changes: Changes = {}  # that wait to be written
         self._is_writing = False
         self._why_unwritten: Message | None = None
@@ -102,8 +111,10 @@ class Settings(QObject):
         return self._fault
 
     def preferences(self) -> Preferences:
-        """Return the preferences; at first in the system's language."""
-        usual = Preferences(language=system_language())
+        """Return the preferences; at first in the computer's or system's language."""
+        named = self._machine.language
+        language = named if named in languages() else system_language()
+        usual = Preferences(language=language)
         read = _read(self._content.get("preferences", {}), usual)
         known = read.language if read.language in languages() else usual.language
         return replace(read, language=known)
@@ -118,7 +129,12 @@ class Settings(QObject):
 
     def station(self, name: str) -> Station:
         """Return the last selection at a station; defaults for a new one."""
-        return _read(self._content.get("stations", {}).get(name), Station())
+        limits = self.machine_limits()
+        usual = Station(
+            limits=limits.swing,
+            verification=VerificationChoices(limits=limits.verification),
+        )
+        return _read(self._content.get("stations", {}).get(name), usual)
 
     def set_station(self, name: str, station: Station) -> None:
         """Store the selection at a station."""
@@ -185,7 +201,15 @@ class Settings(QObject):
 
     def due_rule(self) -> DueRule:
         """Return the calibration interval."""
-        return _read(self._content.get("due"), DueRule())
+        return _read(self._content.get("due"), self.machine_limits().due)
+
+    def update_file(self) -> str:
+        """Return the file that names the newest version; empty for none."""
+        return self._machine.update_file
+
+    def machine_limits(self) -> StationLimits:
+        """Return the limits of this computer, which a station goes by at first."""
+        return self._machine.station_limits()
 
     def set_due_rule(self, rule: DueRule) -> None:
         """Store the calibration interval."""

@@ -1,14 +1,15 @@
 """The runner of a swing as a Qt object with signals."""
 
-import os
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
-from lightpen.archive.lazy_logbook import SERVER, LazyLogbook
+from lightpen.archive.lazy_logbook import LazyLogbook, server_address
+from lightpen.errors import FileError
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.simulator.follower import GuidedOperator
 from lightpen.swing.runner import SwingRunner
@@ -57,7 +58,10 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
     ) -> None:
         super().__init__(SwingStatus(), notifications, parent)
         self._folder = folder
-        self.logbook = LazyLogbook(folder, os.environ.get(SERVER, ""))
+        address = ""
+        with suppress(FileError):  # which `Settings.trouble` tells
+            address = server_address()
+        self.logbook = LazyLogbook(folder, address)
         self._archive = FolderArchive(folder, self.logbook.confirm)
         self.follower: GuidedOperator | None = None
         self.runner = SwingRunner(

@@ -1,17 +1,20 @@
 """What the pages share: made, connected, started and ended together."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import monotonic
 
 from PySide6.QtCore import QObject, QThreadPool
 
+from lightpen.formats.machine_settings import Update, read_update
 from lightpen.live.sources import SourceEnvironment
-from lightpen.messages import Message
+from lightpen.messages import Message, message
 from lightpen.record.folder.data_folder import sweep_leftovers
 from lightpen.record.library.supervision import Supervision, read_supervision
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen_app.look.sentences import worded
+from lightpen_app.look.theme import Tone
 from lightpen_app.work.archive_writer import ArchiveWriter
 from lightpen_app.work.camera_files import FilesOfCameras
 from lightpen_app.work.camera_setup import CameraSetup
@@ -30,7 +33,7 @@ from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.verification_run import VerificationRun
 
 LONGEST_FAREWELL = 2.0  # s that a camera may hold up the end of the program
-SETTINGS = "settings"  # cause of a notification
+SETTINGS, UPDATE = "settings", "update"  # causes of notifications
 
 
 class Workbench(QObject):
@@ -124,6 +127,7 @@ class Workbench(QObject):
             self._on_settings_troubled(self.settings.trouble)
         folder = self.folder  # a job that knew its parent would outlive it
         Job(lambda _: sweep_leftovers(folder), self).start()
+        self._look_for_update()
         self.run.runner.open_logbook()
         self._read_supervision()
         self.library.refresh()
@@ -200,6 +204,22 @@ class Workbench(QObject):
 
     def _on_settings_troubled(self, why: Message) -> None:
         self.notifications.tell(SETTINGS, worded(why))
+
+    def _look_for_update(self) -> None:
+        """Read the file that the administrator has named, if any."""
+        named = self.settings.update_file()
+        if named:
+            job = Job(lambda _: read_update(Path(named)), self)
+            job.succeeded.connect(self._on_update_read)
+            job.failed.connect(partial(self.notifications.tell, UPDATE))
+            job.start()
+
+    def _on_update_read(self, update: Update | None) -> None:
+        if update is not None:
+            newest = message(
+                "machine-settings.update", version=update.version, text=update.text
+            )
+            self.notifications.tell(UPDATE, worded(newest), Tone.GOOD)
 
     def _on_settings_relieved(self) -> None:
         self.notifications.withdraw(SETTINGS)

@@ -1,5 +1,6 @@
 """A logbook that is opened when something is entered first."""
 
+import os
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from lightpen.archive.uses import closed
 from lightpen.errors import AcceptanceError, ArchiveError
+from lightpen.formats.machine_settings import machine_settings
 from lightpen.messages import Message
 from lightpen.record.library.supervision import Supervision
 from lightpen.record.results.assessment import SwingAssessment
@@ -17,6 +19,17 @@ if TYPE_CHECKING:
     from lightpen.archive.logbook import Logbook
 
 SERVER = "LIGHTPEN_ARCHIVE"  # names the variable with the address of a server
+
+
+def server_address() -> str:
+    """Return the address of the server: of the variable, else that of the computer.
+
+    Raises
+    ------
+    FileError
+        The settings of the computer cannot be read.
+    """
+    return os.environ.get(SERVER, "") or machine_settings().archive_server
 
 
 class LazyLogbook:

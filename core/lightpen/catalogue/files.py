@@ -203,5 +203,6 @@ MESSAGES = {
     "video.too-many-frames": "The video {path} has more than {most} frames. Cut out the swing, or save its frames as images.",
     "image.frame-undecodable": "{name} cannot be decoded.",
     "video.codec": "The video {path} has the unsupported codec {codec}. Save it with FFV1 or MJPG, or save its frames as images.",
+    "video.motion-jpeg-only": "The video {path} cannot be read: this installation has no FFmpeg and reads Motion JPEG in .avi files only. Save the video so, or save its frames as images.",
     "video.path": "The path of the video {path} is no valid UTF-8, which the video decoder needs. Rename the video or its folder, or copy it elsewhere.",
 }

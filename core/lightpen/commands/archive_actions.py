@@ -1,7 +1,6 @@
 """What each ``lightpen archive ...`` does."""
 
 import argparse
-import os
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from datetime import date, datetime, time, timedelta
@@ -15,7 +14,7 @@ from lightpen.archive.entries import SHORT, Kind
 from lightpen.archive.exchange import deliver, export_entries, import_entries
 from lightpen.archive.fetching import fetch
 from lightpen.archive.history import Line, lines
-from lightpen.archive.lazy_logbook import SERVER
+from lightpen.archive.lazy_logbook import SERVER, server_address
 from lightpen.archive.listing import entries_csv
 from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.archive.queries import EntryFilter, newest
@@ -156,7 +155,7 @@ def _looked_into(data: Path) -> Iterator[Database]:
 
 @contextmanager
 def _server() -> Iterator[Database]:
-    address = os.environ.get(SERVER, "")
+    address = server_address()
     if not address:
         raise UsageError("archive.no-server", variable=SERVER)
     with closing(open_server(address)) as server:

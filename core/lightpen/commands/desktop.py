@@ -7,6 +7,7 @@ from typing import Protocol
 
 from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
+from lightpen.formats.files import printable
 
 
 class Desktop(Protocol):
@@ -64,7 +65,7 @@ def add_desktop(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
 
 def add_open(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
     """Add ``lightpen open``."""
-    parser.set_defaults(run=lambda options: desktop.show_window(options.swing))
+    parser.set_defaults(run=lambda options: _open(desktop, options.swing))
     parser.add_argument(
         "swing",
         nargs="?",  # the menu of a desktop starts the program without a file
@@ -111,3 +112,17 @@ def _start(desktop: Desktop, options: argparse.Namespace) -> int:
     if options.remove_desktop_entry:
         return desktop.remove_entry()
     return desktop.show_window(None)
+
+
+def _open(desktop: Desktop, swing: Path | None) -> int:
+    if swing is not None and is_absent(swing):
+        raise UsageError("cli.no-such-file", path=printable(str(swing)))
+    return desktop.show_window(swing)
+
+
+def is_absent(path: Path) -> bool:
+    """Return whether there is surely no such file or folder."""
+    try:
+        return not path.exists()
+    except OSError:  # no access, which the window says
+        return False

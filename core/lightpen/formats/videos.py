@@ -53,10 +53,12 @@ def count_frames_in_process(path: Path) -> int:
         n_frames = 0
         while n_frames <= MAX_VIDEO_FRAMES and stream.grab():
             n_frames += 1
-            if codec == MOTION_JPEG:  # each has a size of its own
+            if codec == MOTION_JPEG and _has_ffmpeg():  # each has a size of its own
                 _check_jpeg(stream.retrieve()[1].tobytes(), _name(n_frames))
     finally:
         stream.release()
+    if n_frames == 0 and not _has_ffmpeg():
+        raise FileError("video.motion-jpeg-only", path=printable(str(path)))
     if n_frames == 0:
         raise FileError("image.video", path=printable(str(path)))
     if n_frames > MAX_VIDEO_FRAMES:
@@ -86,11 +88,19 @@ def _opened_video(path: Path, *parameters: int) -> cv2.VideoCapture:
         name.encode()
     except UnicodeEncodeError as error:  # OpenCV would crash
         raise FileError("video.path", path=printable(str(path))) from error
-    # One thread: each takes the memory of some frames. Other backends than FFmpeg take
-    # a name for a pattern, or for a description of a pipeline.
+    # Other backends than these two take a name for a pattern, or for a description of a
+    # pipeline.
+    if not _has_ffmpeg():
+        return cv2.VideoCapture(name, cv2.CAP_OPENCV_MJPEG)
+    # One thread: each takes the memory of some frames.
     return cv2.VideoCapture(
         name, cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1, *parameters]
     )
+
+
+def _has_ffmpeg() -> bool:
+    """Return whether OpenCV has FFmpeg, which the Windows installer leaves out."""
+    return bool(cv2.videoio_registry.hasBackend(cv2.CAP_FFMPEG))
 
 
 def _codec(stream: cv2.VideoCapture) -> str:

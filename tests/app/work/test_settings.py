@@ -15,10 +15,12 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
+from lightpen.formats.machine_settings import machine_file
 from lightpen.record.swings.names import Names
 from lightpen.swing.preparation import SourceChoice
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.fixed_point import FixedPointOptions
+from lightpen_app.look.languages import system_language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.work.settings import Preferences, Settings, settings_file
 from lightpen_app.work.stations import Station, StoredCamera
@@ -61,7 +63,7 @@ RUBBISH = [
 
 
 def write(file: Path, content: object) -> None:
-    file.parent.mkdir()
+    file.parent.mkdir(parents=True)
     file.write_text(json.dumps(content))
 
 
@@ -90,6 +92,46 @@ def test_each_station_remembers_its_own(settings: Settings) -> None:
 def test_a_new_station_begins_with_the_simulated_pen(settings: Settings) -> None:
     assert settings.station("new") == Station()
     assert settings.station("new").camera.source.kind == "simulated"
+
+
+def test_what_the_administrator_set_is_below_what_the_user_chose(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_DIRS", str(tmp_path / "all"))
+    machine = machine_file()
+    if not machine.is_relative_to(tmp_path):
+        pytest.skip("This system has one folder for the settings of all users.")
+    limits = {"max_uncertainty_mm": 0.02, "max_tip_mm": 0.05, "due_max_days": 14}
+    write(machine, {"language": "zh_CN", "limits": limits})
+    before = machine.read_bytes()
+    settings = Settings(tmp_path / "own" / "lightpen.json")
+
+    assert settings.preferences().language == "zh_CN"
+    assert settings.station("new").limits.max_uncertainty == 0.02
+    assert settings.station("new").verification.limits.tip == 0.05
+    assert settings.due_rule().max_days == 14
+
+    settings.set_preferences(replace(settings.preferences(), language="en"))
+    settings.set_station("new", STATION)
+    assert reopened(settings).preferences().language == "en"
+    assert reopened(settings).station("new") == STATION
+    assert machine.read_bytes() == before
+
+
+def test_wrong_settings_of_the_administrator_are_told_and_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_DIRS", str(tmp_path / "all"))
+    machine = machine_file()
+    if not machine.is_relative_to(tmp_path):
+        pytest.skip("This system has one folder for the settings of all users.")
+    write(machine, {"langauge": "zh_CN"})
+
+    settings = Settings(tmp_path / "own" / "lightpen.json")
+
+    assert settings.trouble is not None
+    assert "'langauge' is none of" in settings.trouble.text()
+    assert settings.preferences() == Preferences(language=system_language())
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from lightpen.arrays import Image
 from lightpen.errors import FileError
 from lightpen.formats.decoding import decode_image, encode_png, read_image
 from lightpen.formats.images import find_images
+from lightpen.formats.videos import count_frames_in_process, frame_loaders_in_process
 
 RNG = np.random.default_rng(0)
 GREY = RNG.integers(0, 255, (48, 64), dtype=np.uint8)
@@ -226,6 +227,7 @@ from lightpen.cameras.protocol import DeviceNotFound
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.errors import FileError
 from lightpen.formats.images import find_images
+from lightpen.formats.videos import count_frames_in_process, frame_loaders_in_process
 try:
     find_images(sys.argv[1])
 except FileError as error:
@@ -291,6 +293,25 @@ def test_the_frames_of_a_video_are_counted_whatever_its_header_says(
 
     assert len(source.names) == 6
     assert [load().shape for load in source.open()] == [(48, 64)] * 6
+
+
+def test_without_ffmpeg_motion_jpeg_is_read_and_other_videos_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cv2.videoio_registry, "hasBackend", lambda backend: False)
+    good, other = tmp_path / "swing.avi", tmp_path / "other.avi"
+    write_video(good)
+    writer = cv2.VideoWriter(
+        str(other), cv2.VideoWriter.fourcc(*"FFV1"), 20.0, (64, 48), isColor=False
+    )
+    writer.write(GREY)
+    writer.release()
+
+    n_frames = count_frames_in_process(good)
+    frames = [load().shape for load in frame_loaders_in_process(good, n_frames)]
+    assert frames == [(48, 64)] * 6
+    with pytest.raises(FileError, match="reads Motion JPEG in"):
+        count_frames_in_process(other)
 
 
 def test_a_video_of_larger_frames_than_those_of_cameras_is_refused(

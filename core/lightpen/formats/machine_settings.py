@@ -1,0 +1,120 @@
+"""What an administrator has set for all users of a computer, in a read-only file.
+
+What a user chooses goes before it, and so do the limits of a supervisor.
+"""
+
+import re
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+
+import platformdirs
+
+from lightpen import __version__
+from lightpen.errors import FileError
+from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.own_json import DamagedError, in_shape, parse_own_json
+from lightpen.messages import message
+from lightpen.model.limits import LIMITS, StationLimits
+
+WHAT = message("file.machine-settings")
+
+
+@dataclass(frozen=True)
+class MachineSettings:
+    """What holds for those who have chosen nothing else.
+
+    Attributes
+    ----------
+    language : str
+        As of the preferences; empty for that of the system.
+    archive_server : str
+        Address of the archive's server; empty for none.
+    update_file : str
+        File that names the newest version; empty to tell of none.
+    limits : mapping of str to float
+        Limits of new stations, by `lightpen.model.limits.Limit.key`.
+    """
+
+    language: str = ""
+    archive_server: str = ""
+    update_file: str = ""
+    limits: Mapping[str, float] = field(default_factory=dict)
+
+    def station_limits(self) -> StationLimits:
+        """Return the limits of a new station."""
+        return StationLimits().with_values(self.limits)
+
+
+@dataclass(frozen=True)
+class Update:
+    """A newer version, and what an administrator says of it."""
+
+    version: str
+    text: str = ""
+
+
+def read_update(file: Path) -> Update | None:
+    """Return the version that an administrator names, if it is newer than this one.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, or names no version.
+    """
+    data = read_bytes(file, message("file.update"), MEGABYTE)
+    try:
+        update = parse_own_json(data, Update)
+        is_newer = _numbers(update.version) > _numbers(__version__)
+    except ValueError as error:
+        path = printable(str(file))
+        raise FileError("machine-settings.no-version", file=path) from error
+    return update if is_newer else None
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    """Return the numbers of a release, or those that its candidate leads to."""
+    release = re.match(r"\d+(?:\.\d+)*", version)
+    if release is None:
+        raise ValueError(version)
+    return tuple(map(int, release[0].split(".")))
+
+
+def machine_file() -> Path:
+    r"""Return where it is: ``/etc/xdg/lightpen``, or ``C:\ProgramData\lightpen``."""
+    return platformdirs.site_config_path("lightpen", appauthor=False) / "machine.json"
+
+
+def machine_settings() -> MachineSettings:
+    """Return what the file sets; nothing if there is none.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or sets what there is not.
+    """
+    file = machine_file()
+    if not file.exists():
+        return MachineSettings()
+    data = read_bytes(file, WHAT, MEGABYTE)
+    try:
+        entries = parse_own_json(data, dict[str, object])
+        _require_known(entries, [item.name for item in fields(MachineSettings)])
+        settings = in_shape(entries, MachineSettings)
+        ranges = {limit.key: limit.range for limit in LIMITS}
+        _require_known(settings.limits, ranges)
+        for key, value in settings.limits.items():
+            least, most = ranges[key]
+            if not least <= value <= most:
+                raise DamagedError(f"{key} is {value}, not {least:g} to {most:g}")
+        settings.station_limits()
+    except ValueError as error:
+        path = printable(str(file))
+        raise FileError("machine-settings.wrong", file=path, why=str(error)) from error
+    return settings
+
+
+def _require_known(names: Iterable[str], known: Collection[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise DamagedError(f"{name!r} is none of: {', '.join(known)}")
