@@ -22,7 +22,7 @@ from lightpen.simulator.image_plans import render_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.sensor import Sensor
 
-N_IMAGES = 2000
+N_IMAGES = 600
 N_FILES = 60
 SEEN = (320, 384)  # height, width; large enough for the LEDs of the pen
 SMALL = (72, 96)

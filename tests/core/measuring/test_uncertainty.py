@@ -13,7 +13,7 @@ from lightpen.measuring.quantities import Quantity, derive, quantity_of
 from lightpen.measuring.surfaces import FeatureKind
 from lightpen.model.rigid import rotation_from_vector
 
-N_RUNS = 200
+N_RUNS = 100
 NOISE, COMMON = 0.004, 0.02  # mm
 FAR = np.array([300.0, -200.0, 1500.0])
 R_CAM = rotation_from_vector(np.array([0.3, 0.8, -0.4]))
@@ -133,7 +133,7 @@ def test_predicted_covariance_is_that_of_many_runs(
     values, predicted = scatter[name]
     found = np.cov(values.T).reshape(predicted.shape)
     ratio = np.diag(found) / np.diag(predicted)
-    # The variance of N runs scatters by sqrt(2 / N): 10 %; four of them.
+    # The variance of N runs scatters by sqrt(2 / N): 14 %; four of them.
     assert np.abs(ratio - 1).max() < 4 * np.sqrt(2 / N_RUNS), ratio
 
 

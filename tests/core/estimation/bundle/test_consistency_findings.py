@@ -214,7 +214,7 @@ def test_several_wrong_numbers_are_told_as_the_images_want_them_together(
 
 def test_noise_that_lasts_contradicts_no_true_file() -> None:
     contradicted = 0
-    for seed in range(20):
+    for seed in range(8):
         rng = np.random.default_rng([seed, 5])
         swing = swing_poses(15, rng)
         errors = rng.standard_normal((15, PEN.n_leds, 2))

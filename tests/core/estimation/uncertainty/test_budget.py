@@ -142,16 +142,12 @@ def test_independent_noise_is_hardly_ever_raised() -> None:
     assert np.mean(np.array(factors) > 1) <= 0.1
 
 
-# The scatter is 2.5 and 11 times the independent one. 20 draws fix a variance to 32 %,
-# 10 to 45 %.
-@pytest.mark.parametrize(("correlation", "n_draws"), [(0.5, 20), (0.9, 10)])
-def test_correlated_noise_raises_the_uncertainty_to_the_scatter_it_has(
-    correlation: float, n_draws: int
-) -> None:
+# The scatter is 11 times the independent one. 10 draws fix a variance to 45 %.
+def test_correlated_noise_raises_the_uncertainty_to_the_scatter_it_has() -> None:
     swing = swing_poses(60, np.random.default_rng(0), "operator")
     errors, independent, raised = [], [], []
-    for seed in range(n_draws):
-        result = calibrated(0.05 * noise(seed, correlation, 60), swing)
+    for seed in range(10):
+        result = calibrated(0.05 * noise(seed, 0.9, 60), swing)
         errors.append(result.joint.tip_pen - swing.tip_pen)
         independent.append(np.diag(result.budget.independent_noise)[:3])
         # What seat and centres may do besides is counted, not drawn.
