@@ -12,8 +12,8 @@
         <translation>光笔测头的标定</translation>
     </message>
     <message>
-        <source>Lightpen: MIT licence. Qt and PySide6: LGPL 3. Fonts: cut from Noto Sans and Noto Sans CJK, SIL Open Font License 1.1.</source>
-        <translation>Lightpen：MIT 许可证。Qt 和 PySide6：LGPL 3。字体：截取自 Noto Sans 和 Noto Sans CJK，SIL 开放字体许可证 1.1。</translation>
+        <source>Lightpen: MIT licence. Qt, PySide6 and psycopg: LGPL 3. FFmpeg, which some installations of OpenCV contain: LGPL 2.1. Fonts: cut from Noto Sans and Noto Sans CJK, SIL Open Font License 1.1.</source>
+        <translation>Lightpen：MIT 许可证。Qt、PySide6 和 psycopg：LGPL 3。FFmpeg（部分 OpenCV 安装包含）：LGPL 2.1。字体：取自 Noto Sans 和 Noto Sans CJK，SIL 开放字体许可证 1.1。</translation>
     </message>
 </context>
 <context>
@@ -202,6 +202,10 @@
 <context>
     <name>BoardCalibration</name>
     <message>
+        <source>Saved: {0}. Print it at 100 % and mount it on a flat plate.</source>
+        <translation>已保存：{0}。请按 100 % 打印，并固定在平板上。</translation>
+    </message>
+    <message>
         <source>Calibrating: {0:.0%}</source>
         <translation>正在标定：{0:.0%}</translation>
     </message>
@@ -215,14 +219,120 @@
     </message>
 </context>
 <context>
-    <name>BoardWindow</name>
+    <name>BoardForm</name>
+    <message>
+        <source>Chessboard</source>
+        <translation>棋盘格</translation>
+    </message>
+    <message>
+        <source>Markers</source>
+        <translation>标记</translation>
+    </message>
+    <message>
+        <source>Circles</source>
+        <translation>圆点</translation>
+    </message>
+    <message>
+        <source>Asymmetric circles</source>
+        <translation>非对称圆点</translation>
+    </message>
+    <message>
+        <source>Square</source>
+        <translation>方格</translation>
+    </message>
+    <message>
+        <source>Marker</source>
+        <translation>标记</translation>
+    </message>
+    <message>
+        <source>Gap</source>
+        <translation>间隙</translation>
+    </message>
+    <message>
+        <source>Distance</source>
+        <translation>间距</translation>
+    </message>
+    <message>
+        <source>Diameter</source>
+        <translation>直径</translation>
+    </message>
     <message>
         <source>Board</source>
         <translation>标定板</translation>
     </message>
     <message>
+        <source>Dictionary</source>
+        <translation>字典</translation>
+    </message>
+    <message>
+        <source>Corners per row</source>
+        <translation>每行角点数</translation>
+    </message>
+    <message>
+        <source>Columns</source>
+        <translation>列数</translation>
+    </message>
+    <message>
+        <source>Corners per column</source>
+        <translation>每列角点数</translation>
+    </message>
+    <message>
+        <source>Rows</source>
+        <translation>行数</translation>
+    </message>
+</context>
+<context>
+    <name>BoardProgress</name>
+    <message>
+        <source>X</source>
+        <translation>水平</translation>
+    </message>
+    <message>
+        <source>Y</source>
+        <translation>垂直</translation>
+    </message>
+    <message>
+        <source>Size</source>
+        <translation>大小</translation>
+    </message>
+    <message>
+        <source>Skew</source>
+        <translation>倾斜</translation>
+    </message>
+    <message>
+        <source>at the left and right edges</source>
+        <translation>位于左右边缘</translation>
+    </message>
+    <message>
+        <source>at the top and bottom edges</source>
+        <translation>位于上下边缘</translation>
+    </message>
+    <message>
+        <source>closer to the camera</source>
+        <translation>更靠近相机</translation>
+    </message>
+    <message>
+        <source>tilted</source>
+        <translation>倾斜</translation>
+    </message>
+    <message>
+        <source>Add views {0}.</source>
+        <translation>请增加视图：{0}。</translation>
+    </message>
+    <message>
+        <source>Good: the views vary enough.</source>
+        <translation>良好：视图变化充分。</translation>
+    </message>
+</context>
+<context>
+    <name>BoardWindow</name>
+    <message>
         <source>Board images</source>
         <translation>标定板图像</translation>
+    </message>
+    <message>
+        <source>Save the board</source>
+        <translation>保存标定板</translation>
     </message>
     <message>
         <source>{0}: RMS {1:.4f} px, cross-validated {2:.4f} px</source>
@@ -237,8 +347,8 @@
         <translation>相机标定</translation>
     </message>
     <message>
-        <source>Type, columns x rows, lengths in mm: chessboard:11x8:20 (inner corners, square), charuco:12x9:20:15:DICT_5X5_100 (squares, square, marker), circles:9x7:20:10 (distance, diameter), asymmetric-circles:4x11:20:10</source>
-        <translation>类型、列数 x 行数、长度（mm）：chessboard:11x8:20（内角点、格边长），charuco:12x9:20:15:DICT_5X5_100（格数、格边长、标记边长），circles:9x7:20:10（圆心距、直径），asymmetric-circles:4x11:20:10</translation>
+        <source>Print (PDF)...</source>
+        <translation>打印 (PDF)...</translation>
     </message>
     <message>
         <source>From a folder...</source>
@@ -978,6 +1088,13 @@
     <message>
         <source>Shorten the exposure until no LED is saturated.</source>
         <translation>缩短曝光，直到没有 LED 饱和。</translation>
+    </message>
+</context>
+<context>
+    <name>FilesOfCameras</name>
+    <message>
+        <source>{0} is the intrinsics file of camera {1}, not of camera {2}. Open the file of this camera.</source>
+        <translation>{0} 是相机 {1} 的内参文件，不是相机 {2} 的。请打开此相机的文件。</translation>
     </message>
 </context>
 <context>
@@ -3218,8 +3335,8 @@
         <translation>理由</translation>
     </message>
     <message>
-        <source>Enter at least {0} letters; there are {1}.</source>
-        <translation>请至少输入 {0} 个字符；现有 {1} 个。</translation>
+        <source>Letters needed: {0}; entered: {1}.</source>
+        <translation>需要字符数：{0}；已输入：{1}。</translation>
     </message>
 </context>
 <context>
@@ -3302,12 +3419,12 @@
 <context>
     <name>ResultPanel</name>
     <message>
-        <source>Differences / µm</source>
-        <translation>差值 / µm</translation>
+        <source>Odd and even images / µm</source>
+        <translation>奇偶图像 / µm</translation>
     </message>
     <message>
-        <source>Differences</source>
-        <translation>差值</translation>
+        <source>Odd and even images</source>
+        <translation>奇偶图像</translation>
     </message>
     <message>
         <source>Postures of the included images</source>
@@ -3330,10 +3447,6 @@
         <translation>无更早结果</translation>
     </message>
     <message>
-        <source>No nominal tip</source>
-        <translation>无标称测头</translation>
-    </message>
-    <message>
         <source>Odd - even</source>
         <translation>奇数 - 偶数</translation>
     </message>
@@ -3352,14 +3465,6 @@
     <message>
         <source>Tip {0} in the frame of pen {1} / mm, U&#xa0;(k&#xa0;=&#xa0;2)</source>
         <translation>测头 {0}（光笔 {1} 坐标系）/ mm，U&#xa0;(k&#xa0;=&#xa0;2)</translation>
-    </message>
-    <message>
-        <source>Since {0}</source>
-        <translation>自 {0}</translation>
-    </message>
-    <message>
-        <source>From nominal</source>
-        <translation>相对标称值</translation>
     </message>
     <message>
         <source>Odd and even images agree</source>
@@ -3506,6 +3611,10 @@
     <message>
         <source>Tip accepted. Start the next calibration.</source>
         <translation>测头已接受。请开始下一次标定。</translation>
+    </message>
+    <message>
+        <source>These images gave no tip.</source>
+        <translation>这些图像未得出测头中心。</translation>
     </message>
     <message>
         <source>Acceptance revoked. The swing is saved; open it with the file swing.lightpen in {0}.</source>
@@ -4327,14 +4436,6 @@
         <translation>摆动进行中</translation>
     </message>
     <message>
-        <source>No tip to review. Choose other images.</source>
-        <translation>没有可复核的测头。请选择其他图像。</translation>
-    </message>
-    <message>
-        <source>No tip to review. Capture more images or start over.</source>
-        <translation>没有可复核的测头。请继续采集，或重新开始。</translation>
-    </message>
-    <message>
         <source>Tip not computed yet</source>
         <translation>测头尚未计算</translation>
     </message>
@@ -4703,6 +4804,43 @@
     <message>
         <source>No picture</source>
         <translation>无图片</translation>
+    </message>
+</context>
+<context>
+    <name>TipReadout</name>
+    <message>
+        <source>Value
+mm</source>
+        <translation>数值
+mm</translation>
+    </message>
+    <message>
+        <source>U
+mm</source>
+        <translation>U
+mm</translation>
+    </message>
+    <message>
+        <source>Previous</source>
+        <translation>上次</translation>
+    </message>
+    <message>
+        <source>Change
+µm</source>
+        <translation>变化
+µm</translation>
+    </message>
+    <message>
+        <source>Nominal
+mm</source>
+        <translation>标称
+mm</translation>
+    </message>
+    <message>
+        <source>Deviation
+µm</source>
+        <translation>偏差
+µm</translation>
     </message>
 </context>
 <context>
@@ -7682,6 +7820,10 @@
         <translation>文件 {file} 未由本工作站及其主管签名：它被更改或来自别处。请从副本恢复，或将其移走后继续。</translation>
     </message>
     <message>
+        <source>The file {file} names no version, such as {{&quot;version&quot;: &quot;1.1.0&quot;}}. Ask the administrator to correct it.</source>
+        <translation>文件 {file} 未给出版本，例如 {{&quot;version&quot;: &quot;1.1.0&quot;}}。请管理员更正。</translation>
+    </message>
+    <message>
         <source>The file {file} of entry {number} was modified after it was entered.</source>
         <translation>第 {number} 个条目的文件 {file} 与录入时不符。</translation>
     </message>
@@ -8030,6 +8172,10 @@
         <translation>服务器 {name} 没有本工作站的记录。请检查地址和用户。</translation>
     </message>
     <message>
+        <source>The settings for all users in {file} are wrong and were left out: {why}. Ask the administrator to correct the file.</source>
+        <translation>{file} 中所有用户的设置有误，未采用：{why}。请管理员更正此文件。</translation>
+    </message>
+    <message>
         <source>The settings {file} are damaged and were renamed to {aside}. Restore them from a copy, or enter the settings again.</source>
         <translation>设置文件 {file} 已损坏，已改名为 {aside}。请用备份恢复，或重新输入设置。</translation>
     </message>
@@ -8210,6 +8356,10 @@
         <translation>视频 {path} 无法打开，或没有帧。请检查能否播放，或把各帧保存为图像。</translation>
     </message>
     <message>
+        <source>The video {path} cannot be read: this installation has no FFmpeg and reads Motion JPEG in .avi files only. Save the video so, or save its frames as images.</source>
+        <translation>无法读取视频 {path}：此安装不含 FFmpeg，只能读取 .avi 文件中的 Motion JPEG。请以该格式保存视频，或将其帧保存为图像。</translation>
+    </message>
+    <message>
         <source>The video {path} has the unsupported codec {codec}. Save it with FFV1 or MJPG, or save its frames as images.</source>
         <translation>视频 {path} 的编码为 {codec}，此处不支持。请以 FFV1 或 MJPG 编码保存，或将各帧另存为图像。</translation>
     </message>
@@ -8386,6 +8536,10 @@
         <translation>可验证测头：{detectable:.4f} mm 的误差会以 95 % 的概率被发现。</translation>
     </message>
     <message>
+        <source>Version {version} of Lightpen is available. {text}</source>
+        <translation>Lightpen 版本 {version} 可用。{text}</translation>
+    </message>
+    <message>
         <source>Webcam (evaluation only)</source>
         <translation>网络摄像头（仅供试用）</translation>
     </message>
@@ -8452,6 +8606,14 @@
     <message>
         <source>file of an unfinished verification</source>
         <translation>未完成验证的文件</translation>
+    </message>
+    <message>
+        <source>file of settings for all users</source>
+        <translation>所有用户的设置文件</translation>
+    </message>
+    <message>
+        <source>file that names the newest version</source>
+        <translation>给出最新版本的文件</translation>
     </message>
     <message>
         <source>fixed-point verification</source>
@@ -8558,14 +8720,6 @@
         <translation>LED 文件。请更准确地测量 LED，并给出其不确定度</translation>
     </message>
     <message>
-        <source>the bending of the pen under its weight. Stiffen it, and tilt the pen further</source>
-        <translation>光笔因自重的弯曲。请提高其刚度，并将光笔进一步倾斜</translation>
-    </message>
-    <message>
-        <source>the camera, as it turns with the tilt of the pen. Put it on a firm stand</source>
-        <translation>随光笔倾斜而转动的相机。请将其放在稳固的支架上</translation>
-    </message>
-    <message>
         <source>the compliance of stylus, seat and stand. Make the press test, or use a stiffer stylus</source>
         <translation>测杆、锥座和支架的柔度。请进行按压试验，或使用刚性更好的测杆</translation>
     </message>
@@ -8584,10 +8738,6 @@
     <message>
         <source>the lens, beyond its distortion model. Calibrate the camera with views that fill the image; its file then states the lens field</source>
         <translation>镜头畸变模型之外的残差。请用布满图像的视图标定相机；其文件将给出镜头残差场</translation>
-    </message>
-    <message>
-        <source>the play of the stylus. Tighten it, and tilt the pen to all sides</source>
-        <translation>测杆的间隙。请拧紧，并将光笔向各侧倾斜</translation>
     </message>
     <message>
         <source>the scale of the LED file. Calibrate the LED coordinates against a better length standard and state the uncertainty, or swing in two cones at a known distance</source>
@@ -8652,10 +8802,6 @@
     <message>
         <source>{key} of {place} must contain the uncertainty of the rotation about x y z (rad) and of the translation (mm): 6 non-negative standard deviations, or a symmetric positive covariance matrix; up to 1 rad and 10 m. Correct or remove it.</source>
         <translation>{place}的 {key} 必须给出绕 x y z 的转角（rad）和平移（mm）的不确定度：6 个非负的标准差，或一个对称的正定协方差矩阵；最大为 1 rad 和 10 m。请更正或删除它。</translation>
-    </message>
-    <message>
-        <source>{misfit} Also: {why}</source>
-        <translation>{misfit} 此外：{why}</translation>
     </message>
     <message>
         <source>{n_copies} of {n_images} images are copies of others and count once. Check the recording, and give each image once.</source>
