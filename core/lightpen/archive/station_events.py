@@ -120,6 +120,10 @@ def _of_tip(
 ) -> Event:
     """Return the verification of a tip."""
     done = read_verification(content, file)
+    data = results.folder.parent
+    read_supervision(data).require_signed(
+        *(data, file, content), has_supervisor=bool(done.supervisor)
+    )
     verdict = done.verdict
     limits = {} if verdict is None else verdict.limits_mm
     settings: dict[str, Plain] = {

@@ -174,9 +174,10 @@ class VerificationWorkflow:
         if not is_open or tip is None or found is None or began is None or not reason:
             return
         supervision = self._archive.supervision()
-        supervisor = accepting_supervisor(supervision, found, signature)
+        supervisor, key = accepting_supervisor(supervision, found, signature)
         conclusion = Conclusion(
-            *(TrialOutcome.ACCEPTED, began, self._now(), found, reason, supervisor)
+            *(TrialOutcome.ACCEPTED, began, self._now(), found, reason),
+            *(supervisor, key),
         )
         self._keeping.accept(tip, conclusion)
         _logger.info("accepted, reason %r", reason)

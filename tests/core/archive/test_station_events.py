@@ -24,11 +24,16 @@ from lightpen.record.folder.camera_calibrations import CameraTrial, keep_camera_
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
 from lightpen.record.library.numbered_files import add_numbered
-from lightpen.record.library.supervision import Signature
-from lightpen.record.library.supervision_changes import save_limits
+from lightpen.record.library.supervision import (
+    Signature,
+    read_supervision,
+    require_supervisor,
+)
+from lightpen.record.library.supervision_changes import save_limits, set_password
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
 from lightpen.verification.reports.records import verification_record
+from lightpen.verification.storage.verification_files import keep_verification
 from lightpen.verification.tasks.assessment import VerificationAssessment
 
 NAMES = Names("Hall 2", "Ann")
@@ -196,3 +201,50 @@ def test_an_absurd_time_is_not_entered(tmp_path: Path, logbook: Logbook) -> None
 
     (trouble,) = logbook.enter_owed()
     assert trouble.code == "verification.damaged"
+
+
+def accepted_by_supervisor() -> dict[str, object]:
+    """The record of a tip that a supervisor accepts though it did not pass."""
+    return {
+        "program": {"name": "lightpen", "version": "1"},
+        "created": NOON.isoformat(),
+        "verification": CONCLUSION,
+        "outcome": "accepted",
+        "operator": "Ann",
+        "supervisor": "Eve",
+        "reason": "for a trial",
+    }
+
+
+def test_a_signed_conclusion_of_a_verification_is_entered(
+    tmp_path: Path, logbook: Logbook
+) -> None:
+    set_password(tmp_path, EVE, EVE.password, NOON)
+    key = require_supervisor(read_supervision(tmp_path), EVE)
+    keep_verification(tmp_path, accepted_by_supervisor(), key, is_simulated=False)
+
+    assert events(logbook)[-1].kind is Kind.VERIFICATION
+
+
+def test_conclusions_without_the_right_signatures_are_not_entered(
+    tmp_path: Path, logbook: Logbook
+) -> None:
+    set_password(tmp_path, EVE, EVE.password, NOON)
+    record = accepted_by_supervisor()
+    add_numbered(tmp_path / VERIFICATIONS, record_bytes(record))  # by hand
+    keep_verification(tmp_path, record, None, is_simulated=False)  # without password
+
+    troubles = logbook.enter_owed()
+    assert [each.code for each in troubles] == 2 * ["signing.unsigned-file"]
+    written = entries_of(logbook.database, logbook.chain)
+    assert [each.entry.event.kind for each in written] == [Kind.LIMITS]
+
+
+def test_verifications_from_before_the_password_need_no_signature(
+    tmp_path: Path, logbook: Logbook
+) -> None:
+    keep(tmp_path, Grade.PASS)
+    set_password(tmp_path, EVE, EVE.password, NOON)
+
+    kinds = {event.kind for event in events(logbook)}
+    assert kinds == {Kind.LIMITS, Kind.VERIFICATION}

@@ -42,7 +42,10 @@ from lightpen.record.signing.signed_text import Signers
 from lightpen.record.signing.station import remember, station_name
 
 LEAST_PASSWORD = 8  # characters
-SIGNED_FOLDERS = ("results", "simulated/results", "library")
+SIGNED_FOLDERS = (
+    *("results", "simulated/results", "library"),
+    *("verifications", "simulated/verifications"),
+)
 
 
 def set_password(data: Path, signature: Signature, new: str, now: datetime) -> None:

@@ -23,6 +23,7 @@ from lightpen.record.library.supervision import (
     Supervision,
     require_supervisor,
 )
+from lightpen.record.signing.keys import SigningKey
 from lightpen.record.swings.names import Names
 from lightpen.verification.tasks.assessment import VerificationAssessment
 
@@ -41,6 +42,8 @@ class Conclusion:
         Why the tip is used though something was found against it; else empty.
     supervisor : str
         Supervisor who approved it; empty if none was needed.
+    supervisor_key : SigningKey or None
+        Key of that supervisor, which signs the record.
     """
 
     outcome: TrialOutcome
@@ -49,6 +52,7 @@ class Conclusion:
     found: VerificationAssessment | None = None
     reason: str = ""
     supervisor: str = ""
+    supervisor_key: SigningKey | None = None
 
 
 def conclusion_record(
@@ -90,8 +94,10 @@ def conclusion_record(
 
 def accepting_supervisor(
     supervision: Supervision, found: VerificationAssessment, signature: Signature | None
-) -> str:
-    """Return the supervisor who accepts the tip; empty if none is needed.
+) -> tuple[str, SigningKey | None]:
+    """Return name and key of the supervisor who accepts the tip.
+
+    An empty name and no key if none is needed.
 
     Raises
     ------
@@ -99,8 +105,8 @@ def accepting_supervisor(
         A supervisor is needed, and none signs or the password is wrong.
     """
     if not supervision.is_guarded and found.grade is not Grade.REPEAT:
-        return ""
+        return "", None
     if signature is None:
         raise AcceptanceError("verification.no-supervisor", why=found.reason)
-    require_supervisor(supervision, signature)
-    return signature.name.strip()
+    key = require_supervisor(supervision, signature)
+    return signature.name.strip(), key

@@ -11,6 +11,7 @@ from lightpen.formats.hashes import InputFile, all_hashed
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.record.folder.verifications import TOUCHES
+from lightpen.record.signing.keys import SigningKey
 from lightpen.verification.probing.current_tip import CurrentTip
 from lightpen.verification.probing.drift_reference import LampDrift
 from lightpen.verification.session.choices import VerificationChoices
@@ -51,12 +52,15 @@ class PendingRecord:
         Task of the record; None for a conclusion.
     ends : CheckpointFile or None
         Checkpoint file of the session that this record concludes.
+    supervisor : SigningKey or None
+        Key of the supervisor whom the record names.
     """
 
     record_of: Callable[[tuple[InputFile, ...]], Mapping[str, Any]]
     is_simulated: bool
     task: AnyTask | None = None
     ends: CheckpointFile | None = None
+    supervisor: SigningKey | None = None
 
 
 class SessionRecords:
@@ -125,9 +129,10 @@ class SessionRecords:
 
     def _write(self, kept: PendingRecord, files: list[Path]) -> None:
         record = kept.record_of(all_hashed(files))
-        files.append(
-            keep_verification(self._data, record, is_simulated=kept.is_simulated)
+        file = keep_verification(
+            *(self._data, record, kept.supervisor), is_simulated=kept.is_simulated
         )
+        files.append(file)
         _logger.info("verification written: %s", files[-1])
         if kept.ends is not None:
             kept.ends.conclude()
@@ -143,6 +148,7 @@ def concluding(
         ),
         tip.origin is Origin.SIMULATED,
         ends=ends,
+        supervisor=conclusion.supervisor_key,
     )
 
 

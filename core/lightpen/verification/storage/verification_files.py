@@ -11,12 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from lightpen.formats.hashes import InputFile
-from lightpen.formats.json_records import file_entry, record_bytes
+from lightpen.formats.json_records import file_entry, json_bytes, record_bytes
+from lightpen.formats.own_json import with_checksum
 from lightpen.model.limits import rule_in_words
 from lightpen.model.origin import Origin
 from lightpen.record.folder.verifications import VERIFICATIONS
 from lightpen.record.library.numbered_files import add_numbered
+from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.result_folder import SIMULATED
+from lightpen.record.signing.keys import SigningKey
+from lightpen.record.signing.signed_text import place_in
 from lightpen.verification.probing.current_tip import CurrentTip
 from lightpen.verification.probing.drift_reference import LampDrift, lamp_drift_entries
 from lightpen.verification.probing.image_locations import PenCameras
@@ -55,17 +59,36 @@ class TaskImages:
 
 
 def keep_verification(
-    data: Path, record: Mapping[str, Any], *, is_simulated: bool
+    data: Path,
+    record: Mapping[str, Any],
+    supervisor: SigningKey | None = None,
+    *,
+    is_simulated: bool,
 ) -> Path:
     """Keep the record of a verification in a data folder, and return its file.
+
+    Where there is a supervisor password, it is signed by the station.
+
+    Parameters
+    ----------
+    supervisor : SigningKey, optional
+        Of the supervisor whom the record names.
 
     Raises
     ------
     FileError
-        It cannot be written.
+        It cannot be written, or not be signed.
     """
     folder = verifications_folder(data, is_simulated=is_simulated)
-    return add_numbered(folder, record_bytes(record))
+    supervision = read_supervision(data)
+    if not supervision.is_guarded:
+        return add_numbered(folder, record_bytes(record))
+    signers, text = supervision.signers(supervisor), json_bytes(record)
+
+    def signed(file: Path) -> bytes:
+        return with_checksum(signers.signed(text, place_in(data, file))) + b"\n"
+
+    return add_numbered(folder, signed)
 
 
 def verifications_folder(data: Path, *, is_simulated: bool) -> Path:
