@@ -84,7 +84,7 @@ def in_shape(tree: Any, shape: type[T], *, strict: bool = True) -> T:
     try:
         with _ONE_READER:
             return convert(tree, shape, strict=strict)
-    except (ValueError, RecursionError) as error:
+    except (ValueError, OverflowError, RecursionError) as error:
         raise DamagedError(str(error)) from error
 
 

@@ -4,8 +4,14 @@ import subprocess
 import sys
 
 import pytest
+from msgspec import Struct
 
-from lightpen.formats.own_json import DamagedError, parse_checked, with_checksum
+from lightpen.formats.own_json import (
+    DamagedError,
+    parse_checked,
+    parse_own_json,
+    with_checksum,
+)
 
 # A crash of the interpreter would end the tests with it.
 READERS = """
@@ -57,3 +63,17 @@ def test_what_stands_behind_a_checksum_is_damage() -> None:
 def test_an_entry_that_is_given_twice_is_damage() -> None:
     with pytest.raises(DamagedError, match="twice"):
         parse_checked(with_checksum(b'{"a": 1, "a": 2}'), dict)
+
+
+class Converted(Struct):
+    """A value that is made a float when it is read."""
+
+    length: int
+
+    def __post_init__(self) -> None:
+        float(self.length)
+
+
+def test_a_number_larger_than_any_float_is_damage() -> None:
+    with pytest.raises(DamagedError, match="too large"):
+        parse_own_json(b'{"length": 1%b}' % (b"0" * 400), Converted)
