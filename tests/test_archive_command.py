@@ -14,8 +14,13 @@ from tests.core.archive.conftest import accepted
 from lightpen.archive.chains import append, own_chain
 from lightpen.archive.database import open_file
 from lightpen.archive.lazy_logbook import SERVER
-from lightpen.archive.logbook import ARCHIVE
+from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.archive.seal import close_sealed
+from lightpen.commands.supervisor import PASSWORD
+from lightpen.local_time import local_now
+from lightpen.record.library.supervision import Signature, read_supervision
+from lightpen.record.library.supervision_changes import set_password
+from lightpen.record.signing.keys import key_folder
 
 Run = Callable[..., CompletedProcess[str]]
 
@@ -134,3 +139,55 @@ def test_delivering_needs_a_server(
     result = lightpen("archive", "deliver", "--data", data)
     assert result.returncode == 2
     assert f"Set the variable {SERVER}" in result.stderr
+
+
+EVE = Signature("Eve", "correct horse")
+
+
+@pytest.fixture
+def moved(tmp_path: Path) -> Path:
+    """A data folder with a supervisor password whose station key is lost."""
+    folder = tmp_path / "moved"
+    set_password(folder, EVE, EVE.password, local_now())
+    with closing(Logbook(folder)) as logbook:
+        assert logbook.enter_owed() == ()
+        (key_folder() / f"{logbook.chain}.key").unlink()
+    return folder
+
+
+def test_a_lost_station_key_is_replaced_with_the_approval_of_a_supervisor(
+    lightpen: Run, moved: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(PASSWORD, EVE.password)
+    result = lightpen("archive", "new-key", "--supervisor", "Eve", "--data", moved)
+
+    assert (result.stderr, result.returncode) == ("", 0)
+    public = read_supervision(moved).station_keys[-1]
+    assert result.stdout == f"The station key is {public} from now on.\n"
+    checked = lightpen("archive", "check", "--data", moved)
+    assert (checked.returncode, "Note" in checked.stdout) == (0, False)
+
+
+@pytest.mark.parametrize(
+    ("words", "password", "why"),
+    [
+        ((), "", "supervisor"),
+        (("--supervisor", "Eve"), "wrong", "password"),
+        (("--supervisor", " "), EVE.password, "name"),
+    ],
+)
+def test_a_new_station_key_without_approval_is_refused(
+    lightpen: Run,
+    moved: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    words: tuple[str, ...],
+    password: str,
+    why: str,
+) -> None:
+    before = read_supervision(moved)
+    monkeypatch.setenv(PASSWORD, password)
+    result = lightpen("archive", "new-key", *words, "--data", moved)
+
+    assert result.returncode == 2
+    assert why in result.stderr
+    assert read_supervision(moved) == before
