@@ -1,20 +1,22 @@
-"""Damaged limits, keys, results and imports: refused in words, never in force.
+"""Damaged limits, keys, verifications and imports: refused in words, never in force.
 
 Usage: python benchmarks/hostile_guard.py [N_MUTATIONS [SEED]]
 
 A data folder with a supervisor password is damaged, one file at a time, as a hand with
-write access but without password and key would. Whatever happens, the limits that are
-read are those that were set, or reading raises a `LightpenError`. Processes that set
-limits are killed at random: what is read afterwards are limits that were set.
+write access but without password and key would. Whatever happens, the limits, the
+key and the verification that are read are those that were kept, or reading raises a
+`LightpenError`. Processes that set limits, introduce station keys or import are killed
+at random: what is read afterwards is whole, and goes on.
 """
 
 import os
+import shutil
 import signal
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -31,37 +33,63 @@ from lightpen.archive.chains import heads
 from lightpen.archive.database import open_file
 from lightpen.archive.exchange import export_entries, import_entries
 from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.archive.station_events import account_of_station
 from lightpen.errors import LightpenError
 from lightpen.model.limits import StationLimits, SwingLimits
+from lightpen.record.folder.verifications import CONCLUSION
 from lightpen.record.library.guard_files import LIMITS_FOLDER
-from lightpen.record.library.supervision import Signature, read_supervision
+from lightpen.record.library.supervision import (
+    Signature,
+    read_supervision,
+    require_supervisor,
+)
 from lightpen.record.library.supervision_changes import (
     renew_station_key,
     set_limits,
     set_password,
 )
-from lightpen.record.signing.keys import KEYS
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.signing.keys import KEYS, chain_of, key_folder
 from lightpen.record.signing.station import memory_file
+from lightpen.verification.storage.verification_files import keep_verification
 
 N_MUTATIONS, N_KILLS, SEED = 10_000, 40, 7
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 EVE = Signature("Eve", "correct horse")
 STRICT = StationLimits(SwingLimits(0.0005))
 LONGEST = 0.4  # s that a process lives
+# A tip that a supervisor accepts though its verification did not pass.
+ACCEPTED = {
+    "program": {"name": "lightpen", "version": "1"},
+    "created": NOON.isoformat(),
+    "verification": CONCLUSION,
+    "outcome": "accepted",
+    "operator": "Ann",
+    "supervisor": EVE.name,
+    "reason": "for a trial",
+}
 
 
 @dataclass(frozen=True)
 class Guarded:
-    """A data folder with limits, its exported archive, and the keys."""
+    """A data folder with limits and a verification, its exported archive, and keys."""
 
     data: Path
     export: Path
+    verification: Path
+
+    @property
+    def key(self) -> Path:
+        """File of the present station key."""
+        public = read_supervision(self.data).station_keys[-1]
+        return key_folder() / f"{chain_of(public)}.key"
 
     @property
     def files(self) -> tuple[Path, ...]:
         """The files that are damaged."""
         limits = sorted((self.data / LIMITS_FOLDER).iterdir())
-        return (*limits, memory_file(self.data), self.export)
+        others = memory_file(self.data), self.key, self.verification
+        return (*limits, *others, self.export)
 
 
 @contextmanager
@@ -75,10 +103,12 @@ def guarded_folder() -> Iterator[Guarded]:
         set_limits(data, "Hall 2", STRICT, EVE, NOON)
         with closing(Logbook(data)) as logbook:
             renew_station_key(data, logbook.chain, None, NOON)
+            key = require_supervisor(read_supervision(data), EVE)
+            file = keep_verification(data, ACCEPTED, key, is_simulated=False)
             logbook.enter_owed()
             export_entries(logbook.database, export)
         try:
-            yield Guarded(data, export)
+            yield Guarded(data, export, file)
         finally:
             os.environ.pop(KEYS)
             if before is not None:
@@ -88,17 +118,26 @@ def guarded_folder() -> Iterator[Guarded]:
 def damage(guarded: Guarded, n_mutations: int, seed: int = SEED) -> Counter[str]:
     """Damage a folder many times; return what came of it, ``wrong`` if bad."""
     rng, outcomes = np.random.default_rng(seed), Counter[str]()
-    contents = {file: file.read_bytes() for file in guarded.files}
+    files, key_file = guarded.files, guarded.key
+    contents = {file: file.read_bytes() for file in files}
+    key = read_supervision(guarded.data).signers().station.public
+    results = FolderArchive(guarded.data)
     n_exported = contents[guarded.export].count(b"\n") - 2
     archive = guarded.export.with_name("other") / ARCHIVE
     with closing(open_file(archive)) as other:
         for _ in range(n_mutations):
-            file = guarded.files[int(rng.integers(len(contents)))]
+            file = files[int(rng.integers(len(files)))]
             file.write_bytes(mutated(contents[file], rng))
             try:
                 if file == guarded.export:
                     import_entries(other, file)
                     is_right = sum(head.number for head in heads(other)) <= n_exported
+                elif file == key_file:
+                    found = read_supervision(guarded.data)
+                    is_right = found.signers().station.public == key
+                elif file == guarded.verification:
+                    event = account_of_station(results, file).event
+                    is_right = event.reason == ACCEPTED["reason"]
                 else:
                     found = read_supervision(guarded.data)
                     is_right = found.limits_at("Hall 2", StationLimits()) == STRICT
@@ -112,46 +151,105 @@ def damage(guarded: Guarded, n_mutations: int, seed: int = SEED) -> Counter[str]
     return outcomes
 
 
-def killed_changes(guarded: Guarded, n_kills: int, seed: int = SEED) -> int:
-    """Kill processes that set limits; return after how many all was as it was set."""
+def killed_changes(guarded: Guarded, kind: str, n_kills: int, seed: int = SEED) -> int:
+    """Kill processes that change something; return after how many all was whole.
+
+    Parameters
+    ----------
+    kind : str
+        One of `CHANGES`.
+    """
+    change, is_whole = CHANGES[kind]
     rng, n_right = np.random.default_rng(seed), 0
     for _ in range(n_kills):
         child = os.fork()
         if child == 0:
-            for n in range(1, 1000):
-                limits = replace(STRICT, swing=SwingLimits(n / 1000))
-                set_limits(guarded.data, "Hall 3", limits, EVE, NOON)
-            os._exit(0)
+            try:
+                for n in range(1, 1000):
+                    change(guarded, n)
+            finally:
+                os._exit(0)
         time.sleep(float(rng.uniform(0, LONGEST)))
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         try:
-            n_right += read_supervision(guarded.data).limits["Hall 2"] == STRICT
+            n_right += is_whole(guarded)
         except LightpenError as error:
             print(error, flush=True)
     return n_right
+
+
+def _set_limits(guarded: Guarded, n: int) -> None:
+    limits = replace(STRICT, swing=SwingLimits(n / 1000))
+    set_limits(guarded.data, "Hall 3", limits, EVE, NOON)
+
+
+def _limits_are_whole(guarded: Guarded) -> bool:
+    return read_supervision(guarded.data).limits["Hall 2"] == STRICT
+
+
+def _introduce_key(guarded: Guarded, n: int) -> None:
+    chain = read_supervision(guarded.data).chain
+    renew_station_key(guarded.data, chain, None, NOON)
+
+
+def _key_is_there(guarded: Guarded) -> bool:
+    """Check that the present key signs, and that the archive goes on with it."""
+    found = read_supervision(guarded.data)
+    with closing(Logbook(guarded.data)) as logbook:
+        owed = logbook.enter_owed()
+    return found.signers().station.public == found.station_keys[-1] and owed == ()
+
+
+def _import(guarded: Guarded, n: int) -> None:
+    target = guarded.export.with_name("imported")
+    shutil.rmtree(target, ignore_errors=True)
+    with closing(open_file(target / ARCHIVE)) as other:
+        import_entries(other, guarded.export)
+
+
+def _import_goes_on(guarded: Guarded) -> bool:
+    """Check that the next import completes what was cut off."""
+    n_exported = guarded.export.read_bytes().count(b"\n") - 2
+    archive = guarded.export.with_name("imported") / ARCHIVE
+    with closing(open_file(archive)) as other:
+        n_before = sum(head.number for head in heads(other))
+        import_entries(other, guarded.export)
+        n_after = sum(head.number for head in heads(other))
+    return n_before <= n_exported == n_after
+
+
+CHANGES: dict[str, tuple[Callable[[Guarded, int], None], Callable[[Guarded], bool]]] = {
+    "limits are set": (_set_limits, _limits_are_whole),
+    "station keys are introduced": (_introduce_key, _key_is_there),
+    "entries are imported": (_import, _import_goes_on),
+}
 
 
 def hostile_guard_rows(
     n_mutations: int = N_MUTATIONS, n_kills: int = N_KILLS, seed: int = SEED
 ) -> list[Row]:
     """Return what becomes of damaged limits, keys and imports, and of kills."""
+    kinds = CHANGES if hasattr(os, "fork") else ()
     with guarded_folder() as guarded:
         outcomes = damage(guarded, n_mutations, seed)
-        n_right = killed_changes(guarded, n_kills, seed) if hasattr(os, "fork") else 0
+        right = {k: killed_changes(guarded, k, n_kills, seed) for k in kinds}
     return [
         Row(
-            f"{n_mutations} damaged files of limits, keys and imports: other limits in "
-            f"force, forged entries or tracebacks",
+            f"{n_mutations} damaged files of limits, keys, verifications and imports: "
+            "others in force, forged entries or tracebacks",
             str(outcomes["wrong"]),
             "0",
             met=not outcomes["wrong"],
         ),
-        Row(
-            f"killed {n_kills} times while limits are set: all limits as they were set",
-            str(n_right),
-            str(n_kills),
-            met=n_right == n_kills,
+        *(
+            Row(
+                f"killed {n_kills} times while {kind}: all is whole and goes on",
+                str(n_right),
+                str(n_kills),
+                met=n_right == n_kills,
+            )
+            for kind, n_right in right.items()
         ),
     ]
 

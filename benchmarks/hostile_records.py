@@ -1,6 +1,6 @@
 """Damage to results, records and settings: what is named, and what passes unseen.
 
-Usage: python benchmarks/hostile_records.py
+Usage: python benchmarks/hostile_records.py [N_MUTATIONS [SEED]]
 
 Bits are flipped in an accepted result and in every file of its swing, one at a time;
 each must be named, and none may put another tip, U, grade or date in force. Then the
@@ -122,9 +122,9 @@ def unnamed_flips(data: Data, n_flips: int) -> tuple[int, int]:
     return n_result, n_record
 
 
-def foreign_errors(data: Data, n_mutations: int) -> list[str]:
+def foreign_errors(data: Data, n_mutations: int, seed: int = SEED) -> list[str]:
     """Return the errors that are not the program's own, of all readers."""
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(seed)
     readers: dict[Path, Callable[[], object]] = {
         data.result: lambda: _read_results(data),
         data.swing / HEADER: lambda: _read_record(data),
@@ -145,12 +145,12 @@ def foreign_errors(data: Data, n_mutations: int) -> list[str]:
     return found
 
 
-def hostile_record_rows() -> list[Row]:
+def hostile_record_rows(n_mutations: int = N_MUTATIONS, seed: int = SEED) -> list[Row]:
     """Return what damage to results, records and settings leads to."""
     with tempfile.TemporaryDirectory(prefix="lightpen-hostile-") as folder:
         data = make_data(Path(folder))
         n_result, n_record = unnamed_flips(data, N_FLIPS)
-        errors = foreign_errors(data, N_MUTATIONS)
+        errors = foreign_errors(data, n_mutations, seed)
     for error in errors[:10]:
         print(error, file=sys.stderr)
     return [
@@ -167,7 +167,7 @@ def hostile_record_rows() -> list[Row]:
             met=n_record == 0,
         ),
         Row(
-            f"{N_MUTATIONS} damaged results, records and settings: errors that are "
+            f"{n_mutations} damaged results, records and settings: errors that are "
             "not the program's own",
             f"{len(errors)}",
             "0",
@@ -266,7 +266,7 @@ def _mutated_file(file: Path, content: bytes, rng: np.random.Generator) -> bytes
 
 def main() -> int:
     """Measure, print the table, and return the exit status."""
-    rows = hostile_record_rows()
+    rows = hostile_record_rows(*map(int, sys.argv[1:]))
     print(f"{description()}\n\n{table(rows)}")
     return 0 if all(row.met for row in rows) else 1
 

@@ -3,8 +3,8 @@
 Usage: python benchmarks/run.py [--update-docs] [SECTION ...]
 
 Figures on the image sets need LIGHTPEN_DATA. Nothing else should run meanwhile: the
-sections `files`, `hostile`, `archive` and `soak` take from ten minutes to an hour, all
-others together some thirty minutes. Exit status 1 if a limit is missed.
+sections `files`, `hostile`, `archive`, `soak` and `events` take from ten minutes to an
+hour, all others together some thirty minutes. Exit status 1 if a limit is missed.
 """
 
 import argparse
@@ -39,7 +39,7 @@ from benchmarks.tracker import tracker_rows
 from benchmarks.verification import verification_rows
 from benchmarks.verification_sessions import session_rows
 from benchmarks.whole_program import program_rows
-from benchmarks.wizard import idle_rows, link_rows, soak_rows, start_rows
+from benchmarks.wizard import event_rows, idle_rows, link_rows, soak_rows, start_rows
 from benchmarks.workers import Workers, one_core_workers
 from benchmarks.wrong_files import wrong_file_rows
 
@@ -74,6 +74,7 @@ SECTIONS: dict[str, Section] = {
     "idle": lambda workers, data: idle_rows(),
     "link": lambda workers, data: link_rows(),
     "soak": lambda workers, data: soak_rows(),
+    "events": lambda workers, data: event_rows(),
 }
 
 

@@ -121,7 +121,7 @@ class Soak(QObject):
 
     def _on_sample(self) -> None:
         elapsed = time.perf_counter() - self._start
-        self._memory.append((elapsed, _memory_mb()))
+        self._memory.append((elapsed, memory_mb()))
         if elapsed >= self._seconds:
             self._ticker.stop()
             self._sampler.stop()
@@ -134,7 +134,8 @@ class Soak(QObject):
             run.runner.begin(self._wizard.workbench.selection.preparation)
 
 
-def _memory_mb() -> float:
+def memory_mb() -> float:
+    """Return the memory of this process that is in use, MB."""
     text = Path("/proc/self/status").read_text(encoding="ascii")
     (line,) = [line for line in text.splitlines() if line.startswith("VmRSS")]
     return int(line.split()[1]) / 1024

@@ -31,6 +31,9 @@ LEAST_PLOT_RATE = 5.0  # Hz
 MOST_MEMORY = 500.0  # MB
 # Of Qt; the second opens real windows where there is an X server without a monitor.
 PLATFORMS = ("offscreen", "xcb") if shutil.which("xvfb-run") else ("offscreen",)
+EVENT_SECONDS = 600
+MOST_LATE_AT_EVENTS = 100.0  # ms
+EVENT_GROWTH = 30.0  # MB, from the third minute: by then every page was opened
 GROWTH = 10.0  # MB after the first minute that count as none: two images
 
 
@@ -157,6 +160,41 @@ def soak_rows(seconds: float = SOAK_SECONDS) -> list[Row]:
             f"{minutes_mb})",
             f"<= {MOST_MEMORY:.0f} MB, no growth (to {GROWTH:.0f} MB)",
             met=found["memory_mb"] <= MOST_MEMORY and growth <= GROWTH,
+        ),
+    ]
+
+
+def event_rows(seconds: float = EVENT_SECONDS) -> list[Row]:
+    """Return what random events do to the wizard with two cameras at 2448 x 2048."""
+    name = f"wizard, {seconds / 60:.0f} minutes of random events, two cameras"
+    if sys.platform != "linux":
+        return [Row(name, "needs Linux")]
+    command = [sys.executable, str(HERE / "random_events.py"), str(seconds)]
+    found = json.loads(_output(command).splitlines()[-1])
+    median, late, latest = found["lateness_ms"]
+    _, busy, busiest = found["busy_ms"]
+    sizes = found["memory_minutes_mb"]
+    growth = sizes[-1] - sizes[min(2, len(sizes) - 1)]
+    minutes_mb = ", ".join(f"{size:.0f}" for size in sizes)
+    return [
+        Row(
+            f"{name}: exceptions that nobody caught, of {found['events']} events",
+            str(found["errors"]),
+            "0",
+            met=not found["errors"],
+        ),
+        Row(
+            "- lateness of a 10 ms timer on the GUI thread, p99",
+            f"{late:.0f} ms (median {median:.1f}, most {latest:.0f}); processor time "
+            f"of that thread {busy:.0f} ms (most {busiest:.0f})",
+            f"< {MOST_LATE_AT_EVENTS:.0f} ms",
+            met=late < MOST_LATE_AT_EVENTS,
+        ),
+        Row(
+            "- memory, from the third minute to the last",
+            f"{growth:+.0f} MB (by the minute: {minutes_mb})",
+            f"<= {EVENT_GROWTH:.0f} MB",
+            met=growth <= EVENT_GROWTH,
         ),
     ]
 
