@@ -1,14 +1,18 @@
-"""Python's garbage collector, restricted to the GUI thread.
+"""Python's garbage collector, restricted to the GUI thread; freed memory.
 
 The collector runs in whatever thread happens to allocate. It may free a Qt object there
 whose thread is another one, and Qt ends the program (PYSIDE-810).
+
+Freed memory is returned to the system now and then, see `release_freed_memory`.
 """
 
 import gc
 
 from PySide6.QtCore import QObject, QTimer
 
-PERIOD_MS = 500
+from lightpen.formats.decoding import release_freed_memory
+
+PERIOD_MS, RELEASE_PERIOD_MS = 500, 20_000
 LIMITS = (700, 10, 10)  # of the generations: objects, and collections of the younger
 
 
@@ -20,10 +24,14 @@ class GarbageCollector(QObject):
         gc.disable()
         gc.collect()
         gc.freeze()  # what is there now stays: the window is not to wait for a search
-        self._timer = QTimer(self)
-        self._timer.setInterval(PERIOD_MS)
-        self._timer.timeout.connect(collect_if_due)
-        self._timer.start()
+        for period_ms, action in (
+            (PERIOD_MS, collect_if_due),
+            (RELEASE_PERIOD_MS, release_freed_memory),
+        ):
+            timer = QTimer(self)
+            timer.setInterval(period_ms)
+            timer.timeout.connect(action)
+            timer.start()
 
 
 def collect_if_due() -> None:
