@@ -156,7 +156,10 @@ def led_blocks(calibration: CalibrationRecord) -> Iterable[Block]:
         ],
         rows,
     )
-    yield subheading(translate("paper", "Camera parameters from the images"))
+    title = translate("paper", "Camera parameters from the images")
+    if calibration.inputs.cameras:  # of a rig; the record has those of the first
+        title = f"{title} ({calibration.inputs.cameras[0].file})"
+    yield subheading(title)
     yield from table(
         [
             Column(translate("paper", "Parameter")),

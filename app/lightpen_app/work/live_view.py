@@ -154,6 +154,7 @@ class LiveView(QObject):
         self._states = [_CameraState()]
         self._region = RegionOfInterest()
         self._is_watched = True
+        self._simulated: list[SimulatedCamera] = []
         self._operator: Operator | None = None
         self._listener: _QueuedListener | None = None
         self._closing: list[Thread] = []
@@ -188,7 +189,8 @@ class LiveView(QObject):
             stream=self._stream,
         )
         live.set_region(self._region)
-        live.set_watched(self._is_watched)
+        self._simulated = [c for c in cameras if isinstance(c, SimulatedCamera)]
+        self.set_watched(self._is_watched)
         live.start()
 
     def close(self) -> None:
@@ -206,7 +208,7 @@ class LiveView(QObject):
             self._withdraw(c, WITHOUT_IMAGES, SKIPPING)
         self.set_following(False)
         self.set_touching(False)
-        self._operator = None
+        self._operator, self._simulated = None, []
         self._closing = [thread for thread in self._closing if thread.is_alive()]
         thread = Thread(
             target=self._stop, args=(live, listener), name="closing", daemon=True
@@ -323,6 +325,8 @@ class LiveView(QObject):
     def set_watched(self, watched: bool) -> None:
         """Set whether images are displayed, for present and later cameras."""
         self._is_watched = watched
+        for camera in self._simulated:
+            camera.is_seen = watched
         if self._live is not None:
             self._live.set_watched(watched)
 

@@ -43,6 +43,7 @@ GAIN_DB = Range(0.0, 24.0, 0.1)
 FRAME_RATE = Range(0.1, 200.0)
 USUAL_EXPOSURE_US = 1000.0  # short, so that the swing hardly blurs
 USUAL_FRAME_RATE = 20.0
+UNSEEN = 2  # times the period, while no image is displayed
 BITS: dict[str, Literal[8, 12, 16]] = {"Mono8": 8, "Mono12": 12, "Mono16": 16}
 
 N_BUFFERED = 2  # images that wait for a late reader
@@ -68,6 +69,11 @@ class SimulatedCamera:
         The camera is the second of it, and the scene before the first.
     lamps : tuple of Lamp
         Foreign lights in the picture.
+
+    Attributes
+    ----------
+    is_seen : bool
+        Whether its images are displayed; else half as many are made.
     """
 
     def __init__(
@@ -96,6 +102,7 @@ class SimulatedCamera:
         self._faces = led_faces(self.scene)
         self._settings = self._usual_settings
         self._stats = Stats()
+        self.is_seen = True
         self._next_seq = 0
         self._is_open = self._is_streaming = False
         self._next_end = 0.0  # of the exposure of the next image
@@ -210,7 +217,9 @@ class SimulatedCamera:
 
     @property
     def _period(self) -> float:
-        return max(1 / (self._settings.frame_rate or USUAL_FRAME_RATE), self._exposure)
+        rate = self._settings.frame_rate or USUAL_FRAME_RATE
+        unseen = 1 if self.is_seen else UNSEEN
+        return unseen * max(1 / rate, self._exposure)
 
     def _check_open(self) -> None:
         if not self._is_open:

@@ -133,6 +133,18 @@ def test_images_come_at_the_frame_rate() -> None:
     )
 
 
+def test_half_as_many_images_are_made_while_none_is_displayed() -> None:
+    clock = SkippingClock()
+    camera = streaming_camera(clock=clock)
+    read(camera, 1)
+    camera.is_seen = False
+    frames = read(camera, 4)
+
+    np.testing.assert_allclose(
+        np.diff([frame.host_ts_ns for frame in frames[1:]]), 100e6, atol=10
+    )
+
+
 def test_an_exposure_longer_than_the_period_slows_the_camera() -> None:
     camera = seated_camera()
     camera.configure(CameraSettings(exposure_us=40_000, frame_rate=100))

@@ -216,7 +216,7 @@ class EntryPanel(Translated, QWidget):
         for each in self._messages:
             event = each.entry.event
             when = moment_text(event.at, "yyyy-MM-dd hh:mm")
-            head = [kind_text(event.kind), when, event.names.operator]
+            head = [kind_text(event.kind, event.grade), when, event.names.operator]
             told = PARTED.join(filter(None, head))
             lines.append(f"{told}: {event.reason}" if event.reason else told)
         return "\n".join(lines)

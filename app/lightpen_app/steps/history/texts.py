@@ -29,6 +29,7 @@ _KINDS: dict[Kind, str] = {
     Kind.CAMERA: QT_TRANSLATE_NOOP("history", "Camera calibration"),
     Kind.LIMITS: QT_TRANSLATE_NOOP("history", "Limits"),
 }
+_REPEATED = QT_TRANSLATE_NOOP("history", "Repeated")
 _OUTCOMES: dict[TrialOutcome, str] = {
     TrialOutcome.ACCEPTED: QT_TRANSLATE_NOOP("history", "accepted"),
     TrialOutcome.REFUSED: QT_TRANSLATE_NOOP("history", "rejected"),
@@ -57,8 +58,10 @@ _CHANGED = QT_TRANSLATE_NOOP("history", "Modified after entry")
 _KEPT = QT_TRANSLATE_NOOP("history", "saved")  # and in force for no pen
 
 
-def kind_text(kind: Kind) -> str:
-    """Return the name of an entry's kind."""
+def kind_text(kind: Kind, grade: str = "") -> str:
+    """Return the name of an entry's kind; a swing that passed was repeated only."""
+    if kind is Kind.REFUSED and grade == Grade.PASS:
+        return _translated(_REPEATED)
     return _translated(_KINDS[kind])
 
 
@@ -71,7 +74,7 @@ def what_text(line: Line) -> str:
     if event.origin in MARKED:
         words.append(origin_text(event.origin))
     if not words or event.kind is not Kind.ACCEPTED:
-        words.append(kind_text(event.kind))
+        words.append(kind_text(event.kind, event.grade))
     if line.state is TipState.IN_FORCE and event.is_simulated:
         words.append(_translated(_KEPT))
     elif line.state is not TipState.NONE:
@@ -92,7 +95,10 @@ def usual_words() -> tuple[str, ...]:
 
 def rare_words() -> tuple[str, ...]:
     """Return the remarks on a swing without a result."""
-    kinds = kind_text(Kind.REFUSED), kind_text(Kind.ABANDONED)
+    kinds = (
+        *(kind_text(Kind.REFUSED), kind_text(Kind.REFUSED, Grade.PASS)),
+        kind_text(Kind.ABANDONED),
+    )
     return tuple(listed([origin_text(o), kind]) for o in MARKED for kind in kinds)
 
 
@@ -126,7 +132,9 @@ def line_tone(line: Line, is_verdict: bool) -> Tone:
         return known.get(event.grade, Tone.PLAIN)
     if line.state is TipState.IN_FORCE and not line.is_foreign:
         return Tone.GOOD
-    is_refused = event.kind is Kind.REFUSED or event.outcome is TrialOutcome.REFUSED
+    is_refused = event.outcome is TrialOutcome.REFUSED or (
+        event.kind is Kind.REFUSED and event.grade != Grade.PASS
+    )
     return Tone.WARN if is_refused else Tone.PLAIN
 
 

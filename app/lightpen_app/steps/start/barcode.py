@@ -50,6 +50,13 @@ class BarcodeListener(QObject):
         if window is not None:
             window.installEventFilter(self)
 
+    def takes(self, event: QEvent) -> bool:
+        """Accept a key of a barcode before it is taken for a shortcut."""
+        if not (isinstance(event, QKeyEvent) and self.is_amid(event)):
+            return False
+        event.accept()
+        return True
+
     def is_amid(self, event: QKeyEvent) -> bool:
         """Return whether a key continues the held-back ones."""
         pressed = event.timestamp()

@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QCoreApplication, QObject, QTimer, Signal
 
 from lightpen.record.library.tip_library import ItemKind
 from lightpen.swing.preparation import Preparation
+from lightpen_app.look.phrases import missing_input_text
+from lightpen_app.look.words import shortened
 from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.library_control import LibraryControl
@@ -60,6 +62,21 @@ class EntryPresenter(QObject):
     def typed(self) -> Preparation:
         """Return the selection with the names being typed."""
         return replace(self._selection.preparation, names=self._names.value())
+
+    def why_not_on(self) -> str:
+        """Return what is missing, or that the tip is retired."""
+        typed = self.typed()
+        missing = typed.start_missing_inputs()
+        tip = self._library.tip(typed.names.tip)
+        if missing:
+            return missing_input_text(missing[0])
+        if tip is None or not tip.is_retired:
+            return ""
+        return QCoreApplication.translate(
+            "StartPage",
+            "Tip {0} is retired. Choose another tip, or reactivate it in the tip "
+            "library.",
+        ).format(shortened(tip.id))
 
     def _on_edited(self) -> None:
         self._typing.start()

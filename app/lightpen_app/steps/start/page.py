@@ -1,16 +1,14 @@
 """The step Start: the tips of a station each day, and how the station is set up."""
 
 from PySide6.QtCore import QEvent, QSize
-from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
+from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QStackedWidget, QWidget
 from typing_extensions import override
 
 from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen_app.look.layouts import fill, vertical_layout
-from lightpen_app.look.phrases import missing_input_text
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
-from lightpen_app.look.words import shortened
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.start.day_control import DayControl
 from lightpen_app.steps.start.day_view import DayView
@@ -58,7 +56,7 @@ class StartPage(ResponsiveLayout, Page):
         self._all_limits = LimitsControl(workbench, self)
         self._library = LibraryControl(workbench, setup.names, self._unknown_code, self)
         self._unfinished = InterruptedControl(
-            workbench, self._interrupted, self._settle, self
+            workbench, self._interrupted, lambda: self._entries.settle(), self
         )
         self._last = LastResultPresenter(
             *(self._selection, self._run, self._tips, self._result, self._large)
@@ -124,18 +122,18 @@ class StartPage(ResponsiveLayout, Page):
 
     @override
     def is_complete(self) -> bool:
-        return not self._why_not_on()
+        return not self._entries.why_not_on()
 
     @override
     def main_action(self) -> MainAction:
-        why_not = self._why_not_on()
+        why_not = self._entries.why_not_on()
         if not self.is_day:
             return MainAction(self.tr("Continue to the camera"), why_not)
         return MainAction(self._control.main_action().text, why_not)
 
     @override
     def run_main_action(self) -> None:
-        self._settle()
+        self._entries.settle()
         if self.is_day:
             self._control.run_main_action()
         else:
@@ -164,7 +162,7 @@ class StartPage(ResponsiveLayout, Page):
     @override
     def left(self) -> None:
         self._control.stop()
-        self._settle()
+        self._entries.settle()
         self._setup.sound_test.stop()
 
     @override
@@ -211,13 +209,8 @@ class StartPage(ResponsiveLayout, Page):
     @override
     def event(self, event: QEvent) -> bool:
         """Let no key of a barcode be taken for a shortcut."""
-        if (
-            event.type() == QEvent.Type.ShortcutOverride
-            and isinstance(event, QKeyEvent)
-            and self._library.barcodes.is_amid(event)
-        ):
-            event.accept()
-            return True
+        if event.type() == QEvent.Type.ShortcutOverride:
+            return self._library.barcodes.takes(event) or super().event(event)
         return super().event(event)
 
     @override
@@ -229,27 +222,8 @@ class StartPage(ResponsiveLayout, Page):
         self._refresh()
 
     def _refresh(self) -> None:
-        self._setup.set_why_not_done(self._why_not_on())
+        self._setup.set_why_not_done(self._entries.why_not_on())
         self.changed.emit()
-
-    def _why_not_on(self) -> str:
-        """Return what is missing, or that the tip is retired."""
-        typed = self._entries.typed()
-        missing, tip = (
-            typed.start_missing_inputs(),
-            self._library.tip(typed.names.tip),
-        )
-        if missing:
-            return missing_input_text(missing[0])
-        if tip is None or not tip.is_retired:
-            return ""
-        return self.tr(
-            "Tip {0} is retired. Choose another tip, or reactivate it in the tip "
-            "library."
-        ).format(shortened(tip.id))
-
-    def _settle(self) -> None:
-        self._entries.settle()
 
     def _on_selected(self, before: Preparation) -> None:
         now = self._selection.preparation
@@ -273,5 +247,5 @@ class StartPage(ResponsiveLayout, Page):
         self._setup.newcomer.set_why_not(why_not)
 
     def _on_verification_requested(self) -> None:
-        self._settle()
+        self._entries.settle()
         self.step_requested.emit("verify")

@@ -55,11 +55,8 @@ class SwingPage(Page):
         self._face = SwingView(self)
         self._hand = SwingSimulatorControls(self._live, self)
         self._question = QuestionBar()
-        self._showing = QTimer(self)
-        self._showing.setSingleShot(True)
-        self._showing.setInterval(SHOWING_MS)
-        self._plotting = QTimer(self)
-        self._plotting.setInterval(PLOTTING_MS)
+        self._showing = QTimer(self, singleShot=True, interval=SHOWING_MS)
+        self._plotting = QTimer(self, interval=PLOTTING_MS)
 
         # Layout
         vertical_layout(self, self._question, (self._face, 1), self._hand)
@@ -115,10 +112,8 @@ class SwingPage(Page):
 
     @override
     def toggle_pause(self) -> None:
-        if self._run.status.is_paused_by_user:
-            self._runner.resume()
-        else:
-            self._runner.pause()
+        is_paused = self._run.status.is_paused_by_user
+        (self._runner.resume if is_paused else self._runner.pause)()
 
     @override
     def first_control(self) -> QWidget:
@@ -145,9 +140,7 @@ class SwingPage(Page):
 
     @override
     def unsaved(self) -> str:
-        return unsaved_swing_text(
-            self._runner.status
-        )  # also what the window is not told yet
+        return unsaved_swing_text(self._runner.status)  # which the window may not have
 
     @override
     def shut_down(self) -> None:
@@ -187,7 +180,7 @@ class SwingPage(Page):
             self._sounds.play(Sound.LOST)
         if now.is_capturing is not before.is_capturing:
             self._question.hide()
-        self._question.refresh()  # of what is missing there is less by now
+        self._question.refresh()
         if (now.main, now.is_complete) != (before.main, before.is_complete):
             self.changed.emit()
 
@@ -223,20 +216,16 @@ class SwingPage(Page):
         self._show_soon()
 
     def _on_act_clicked(self) -> None:
-        match self._shown.side:
-            case SideAction.OPEN_CAMERA:
-                self._camera.open()
-                self._runner.try_again()
-            case SideAction.TRY_AGAIN:
-                self._runner.try_again()
-            case SideAction.RESUME | SideAction.PAUSE:
-                self.toggle_pause()
-            case SideAction.STOP_COMPUTING:
-                self._runner.cancel()
-            case SideAction.COMPUTE:
-                self._runner.solve()
-            case SideAction.CAPTURE_MORE:
-                self._runner.capture_more()
+        if self._shown.side is SideAction.OPEN_CAMERA:
+            self._camera.open()
+        runner, pause = self._runner, self.toggle_pause
+        acts = {
+            **dict.fromkeys(PAUSES, pause),
+            SideAction.STOP_COMPUTING: runner.cancel,
+            SideAction.COMPUTE: runner.solve,
+            SideAction.CAPTURE_MORE: runner.capture_more,
+        }
+        acts.get(self._shown.side, runner.try_again)()
 
     def _on_start_over_clicked(self) -> None:
         status = self._run.status

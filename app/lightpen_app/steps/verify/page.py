@@ -14,10 +14,11 @@ from lightpen_app.look.sounds import Sound, Sounds
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.verify.listed_pages import ListedPages
-from lightpen_app.steps.verify.presenter import VerifyPresenter, VerifyView
+from lightpen_app.steps.verify.presenter import VerifyPresenter
 from lightpen_app.steps.verify.progress_panel import ProgressPanel
 from lightpen_app.steps.verify.simulator_controls import ProbingSimulatorControls
 from lightpen_app.steps.verify.task_panel import TaskPanel
+from lightpen_app.steps.verify.view_state import VerifyView
 from lightpen_app.widgets.image_view import ImageView
 from lightpen_app.widgets.lazy import LazyWidget
 from lightpen_app.widgets.live_markers import live_markers

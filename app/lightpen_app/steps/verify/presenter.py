@@ -1,16 +1,13 @@
 """What the step Verify shows, computed from the status of the verification."""
 
-from dataclasses import dataclass, field
-
 from PySide6.QtCore import QObject
 
 from lightpen.cameras.worker_events import Connection
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.messages import Message
 from lightpen.model.limits import rule_in_words
 from lightpen.model.origin import Origin
 from lightpen.record.library.calibration_status import TipStatus
-from lightpen.verification.probing.probing import HELD_ENOUGH, ProbingPhase
+from lightpen.verification.probing.probing import ProbingPhase
 from lightpen.verification.session.session import BROKEN_OFF, rules_of
 from lightpen.verification.session.session_state import (
     SessionSetup,
@@ -29,56 +26,16 @@ from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.verify.findings import posture_value
+from lightpen_app.steps.verify.view_state import (
+    Headline,
+    VerifyView,
+    is_held,
+    lamps_message,
+)
 from lightpen_app.widgets.operator_view import OperatorValue
-from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.state_banner import State
 from lightpen_app.widgets.status_mark import status_text
 from lightpen_app.work.workbench import Workbench
-
-
-@dataclass(frozen=True)
-class Headline:
-    """Status of the page for the window.
-
-    Attributes
-    ----------
-    lead : str
-        Below its title.
-    """
-
-    lead: str = ""
-    tone: Tone = Tone.QUIET
-    action: MainAction = field(default_factory=lambda: MainAction(""))
-    is_complete: bool = False
-    is_doubtful: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class VerifyView:
-    """All that the page shows of a verification, except the results.
-
-    Attributes
-    ----------
-    operator : OperatorValue
-        Content of the operator view.
-    lamps : StatusMessage
-        The drift of fixed lamps, unless it is the verdict.
-    titles : tuple of str
-        Titles of the tasks with their progress.
-    task : VerificationTask or None
-        Current task.
-    reading : float or None
-        How much of recorded images is read, 0 to 1; None while none are.
-    """
-
-    headline: Headline = field(default_factory=Headline)
-    operator: OperatorValue = field(default_factory=OperatorValue)
-    lamps: StatusMessage = field(default_factory=StatusMessage)
-    titles: tuple[str, ...] = ()
-    task: AnyTask | None = None
-    reading: float | None = None
-    pause: str = ""
-    can_be_accepted: bool = False
 
 
 class VerifyPresenter(QObject):
@@ -97,7 +54,7 @@ class VerifyPresenter(QObject):
         return VerifyView(
             headline=headline,
             operator=self.operator_value(),
-            lamps=_lamps_message(status),
+            lamps=lamps_message(status),
             titles=tuple(self._title(task) for task in TASKS),
             task=status.task,
             reading=self._verification.progress if is_reading else None,
@@ -244,22 +201,18 @@ class VerifyPresenter(QObject):
     def _short(self, setup: SessionSetup, state: SessionState) -> str:
         """Return in a few words what to do."""
         task, touching = state.task(setup), state.touching
-        if _is_held(state):
+        if is_held(state):
             return self.tr("Hold still")
         if touching.phase is ProbingPhase.KNOWN:
             return self.tr("Probed before")
         if state.trouble is not None:
-            return self._fault(state.trouble)
+            is_broken = state.trouble.code == BROKEN_OFF.code
+            return self.tr("Not recorded") if is_broken else self.tr("Not counted")
         if task is None:
             return ""
         progress = state.progress(setup, task)
         is_next = touching.phase is ProbingPhase.RECORDED
         return worded(task.headline(progress, is_next=is_next))
-
-    def _fault(self, trouble: Message) -> str:
-        if trouble.code == BROKEN_OFF.code:
-            return self.tr("Not recorded")
-        return self.tr("Not counted")
 
     def _banner(self) -> State:
         status = self._status
@@ -286,7 +239,7 @@ class VerifyPresenter(QObject):
             return State(self.tr("POINT RECORDED"), "", Sign.CHECK, Tone.GOOD)
         if touching.phase is ProbingPhase.KNOWN:
             return State(self.tr("PROBED BEFORE"), "", Sign.WARNING, Tone.WARN)
-        if _is_held(state):
+        if is_held(state):
             fraction = touching.progress(rules_of(setup, task))
             return State(self.tr("STEADY"), "", Sign.RECORD, Tone.ACTIVE, fraction)
         if state.trouble is not None:
@@ -294,17 +247,3 @@ class VerifyPresenter(QObject):
         if touching.n_lost or not (touching.held or touching.path):
             return State(self.tr("WAITING"), "", Sign.WAIT, Tone.QUIET)
         return State(self.tr("PEN DETECTED"), "", Sign.EYE, Tone.ACTIVE)
-
-
-def _is_held(state: SessionState) -> bool:
-    """Return whether the pen is held still on a point that is not recorded yet."""
-    touching = state.touching
-    is_holding = touching.phase is ProbingPhase.HOLDING
-    return is_holding and len(touching.held) >= HELD_ENOUGH
-
-
-def _lamps_message(status: VerificationStatus) -> StatusMessage:
-    said = None if status.lamp_drift is None else status.lamp_drift.assessment
-    if said is None or (status.is_done and said is status.assessment):
-        return StatusMessage()
-    return StatusMessage(worded(said.reason), *GRADE_MARKS[said.grade])

@@ -7,7 +7,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.library.supervision import Signature
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize
-from lightpen_app.steps.verify.presenter import VerifyView
+from lightpen_app.steps.verify.view_state import VerifyView
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import Question, QuestionBar

@@ -1,0 +1,74 @@
+"""The values that the step Verify shows."""
+
+from dataclasses import dataclass, field
+
+from lightpen.verification.probing.probing import HELD_ENOUGH, ProbingPhase
+from lightpen.verification.session.session_state import SessionState
+from lightpen.verification.session.status import VerificationStatus
+from lightpen.verification.tasks.registry import AnyTask
+from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.theme import Tone
+from lightpen_app.steps.page import MainAction
+from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.sign_label import StatusMessage
+
+
+@dataclass(frozen=True)
+class Headline:
+    """Status of the page for the window.
+
+    Attributes
+    ----------
+    lead : str
+        Below its title.
+    """
+
+    lead: str = ""
+    tone: Tone = Tone.QUIET
+    action: MainAction = field(default_factory=lambda: MainAction(""))
+    is_complete: bool = False
+    is_doubtful: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class VerifyView:
+    """All that the page shows of a verification, except the results.
+
+    Attributes
+    ----------
+    operator : OperatorValue
+        Content of the operator view.
+    lamps : StatusMessage
+        The drift of fixed lamps, unless it is the verdict.
+    titles : tuple of str
+        Titles of the tasks with their progress.
+    task : VerificationTask or None
+        Current task.
+    reading : float or None
+        How much of recorded images is read, 0 to 1; None while none are.
+    """
+
+    headline: Headline = field(default_factory=Headline)
+    operator: OperatorValue = field(default_factory=OperatorValue)
+    lamps: StatusMessage = field(default_factory=StatusMessage)
+    titles: tuple[str, ...] = ()
+    task: AnyTask | None = None
+    reading: float | None = None
+    pause: str = ""
+    can_be_accepted: bool = False
+
+
+def is_held(state: SessionState) -> bool:
+    """Return whether the pen is held still on a point that is not recorded yet."""
+    touching = state.touching
+    is_holding = touching.phase is ProbingPhase.HOLDING
+    return is_holding and len(touching.held) >= HELD_ENOUGH
+
+
+def lamps_message(status: VerificationStatus) -> StatusMessage:
+    """Return the drift of fixed lamps, unless it is the verdict."""
+    said = None if status.lamp_drift is None else status.lamp_drift.assessment
+    if said is None or (status.is_done and said is status.assessment):
+        return StatusMessage()
+    return StatusMessage(worded(said.reason), *GRADE_MARKS[said.grade])
