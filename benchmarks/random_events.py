@@ -52,6 +52,7 @@ LONGEST_DIALOG_S = 2.0
 LONGEST_WITHOUT = 5  # samples without an image, until the cameras are chosen again
 LATE_MS, SAMPLE_S = 80.0, 0.02  # how late the window is when its stack is noted
 N_CALLERS, N_CAUSES = 9, 12
+N_POINTS = 50
 KEYS = (
     *(Qt.Key.Key_Tab, Qt.Key.Key_Return, Qt.Key.Key_Space, Qt.Key.Key_Escape),
     *(Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down),
@@ -79,6 +80,8 @@ class RandomUser(QObject):
         self._lateness = array("f")
         self._memory: list[tuple[float, float]] = []
         self._dialog: tuple[QWidget, float] | None = None
+        self._unqueued = array("f")
+        self._last_queued = _queued_ms()
         self._busy = array("f")
         self._last_busy = time.thread_time()
         self._causes = Counter[str]()
@@ -109,6 +112,10 @@ class RandomUser(QObject):
             "errors": len(self.errors),
             "images": self._n_images,  # of one camera
             "lateness_ms": [float(np.percentile(late, s)) for s in (50, 99, 100)],
+            # Without what other threads and programs kept from a processor core.
+            "lateness_on_core_ms": [
+                float(np.percentile(self._unqueued, s)) for s in (50, 99, 100)
+            ],
             "busy_ms": [float(np.percentile(self._busy, s)) for s in (50, 99, 100)],
             "causes": dict(self._causes.most_common(N_CAUSES)),
             "memory_minutes_mb": _by_minute(self._memory),
@@ -116,7 +123,11 @@ class RandomUser(QObject):
 
     def _on_tick(self) -> None:
         now = time.perf_counter()
-        self._lateness.append(max(1000 * (now - self._last_tick) - TICK_MS, 0.0))
+        late = max(1000 * (now - self._last_tick) - TICK_MS, 0.0)
+        self._lateness.append(late)
+        queued = _queued_ms()
+        self._unqueued.append(max(late - (queued - self._last_queued), 0.0))
+        self._last_queued = queued
         self._last_tick = now
         busy = time.thread_time()
         self._busy.append(1000 * (busy - self._last_busy))
@@ -169,8 +180,7 @@ class RandomUser(QObject):
         if chance < 0.05 and root is self._wizard.window:
             root.go_to(self._random.randrange(len(root.pages())))
             return
-        controls = [w for w in root.findChildren(QWidget) if _is_usable(w)] or [root]
-        control = self._random.choice(controls)
+        control = self._control_in(root)
         middle = control.rect().center()
         if chance < 0.6:
             QTest.mouseClick(control, Qt.MouseButton.LeftButton, pos=middle)
@@ -187,6 +197,15 @@ class RandomUser(QObject):
                 *(Qt.ScrollPhase.NoScrollPhase, False),
             )
             QApplication.sendEvent(control, event)
+
+    def _control_in(self, root: QWidget) -> QWidget:
+        """Return what can be used at a random point; the window after many misses."""
+        for _ in range(N_POINTS):
+            x = self._random.randrange(max(root.width(), 1))
+            found = root.childAt(x, self._random.randrange(max(root.height(), 1)))
+            if found is not None and _is_usable(found):
+                return found
+        return root
 
     def _watch(self) -> None:
         """Note what the thread of the window does while it is late."""
@@ -226,6 +245,11 @@ def _close_all(window: QWidget) -> None:
     for each in QApplication.topLevelWidgets():
         if each is not window:
             each.close()
+
+
+def _queued_ms() -> float:
+    """Return for how long this thread has waited for a processor core."""
+    return int(Path("/proc/thread-self/schedstat").read_text().split()[1]) / 1e6
 
 
 def _by_minute(memory: list[tuple[float, float]]) -> list[float]:
