@@ -128,7 +128,7 @@ def pack(tree: Path, out: Path) -> Path:
         "utf-8",
     )
     package = out / f"lightpen_{version}_amd64.deb"
-    run("dpkg-deb", "--root-owner-group", "-Zxz", "--build", tree, package)
+    run("dpkg-deb", "--root-owner-group", "-Zzstd", "--build", tree, package)
     return package
 
 

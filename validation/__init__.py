@@ -1,0 +1,1 @@
+"""Requirements, the tests that prove them, and the dossier of a release."""
