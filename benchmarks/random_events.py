@@ -215,7 +215,8 @@ class RandomUser(QObject):
             time.sleep(SAMPLE_S)
             if 1000 * (time.perf_counter() - self._last_tick) < TICK_MS + LATE_MS:
                 continue
-            frame, names = sys._current_frames().get(window), []
+            frame = sys._current_frames().get(window)
+            names: list[str] = []
             while frame is not None and len(names) < N_CALLERS:
                 code = frame.f_code
                 names.append(f"{Path(code.co_filename).stem}.{code.co_name}")

@@ -101,7 +101,7 @@ def _n_for_uncertainty(state: SwingState, limits: SwingLimits) -> int:
     # known more slowly.
     ratio = (state.kept.uncertainty**2 - floor**2) / (limit**2 - floor**2)
     times = float(ratio) ** (1 / DECAY) - 1
-    bounded = min(times * max(state.n_kept, 1), limits.max_images)
+    bounded: float = min(times * max(state.n_kept, 1), limits.max_images)
     return max(ceil(bounded), 1)
 
 

@@ -75,7 +75,9 @@ def test_a_target_is_told_once_and_the_next_one_anew(
 def test_the_first_lean_goes_to_the_operators_right(
     operator: ToldOperator, state: SwingState
 ) -> None:
-    GuidedOperator(operator, heading=np.pi / 2).follow(replace(state, heading=None, was_upright=True))
+    GuidedOperator(operator, heading=np.pi / 2).follow(
+        replace(state, heading=None, was_upright=True)
+    )
 
     assert operator.told == [replace(FIRST_LEAN, direction=np.pi / 2)]
 

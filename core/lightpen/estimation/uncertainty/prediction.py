@@ -3,9 +3,9 @@
 During a swing tip and cone are fitted with the parameters of the files held. U is that
 of the whole budget all the same (`budget.contributions_of`), by one step of the bundle
 adjustment about the joint fit: its normal equations are kept, and a new image adds its
-own. What lens, sag, loose stylus and camera tilt may add is searched for when all images
-are linearised anew, as it needs the LEDs one by one. Correlated noise is left to the
-calibration.
+own. What lens, sag, loose stylus and camera tilt may add is searched for when all
+images are linearised anew, as it needs the LEDs one by one. Correlated noise is left to
+the calibration.
 """
 
 from collections.abc import Sequence
