@@ -166,7 +166,8 @@ Function ChooseUsers
   ${Else}
     StrCpy $3 "yes"
   ${EndIf}
-  ${GetFileName} "$PROFILE" $4
+  ReadEnvStr $4 "USERPROFILE"
+  ${GetFileName} "$4" $4
   ${If} $3 == "yes"
   ${OrIf} $4 == "systemprofile"
     UserInfo::GetAccountType
