@@ -5724,6 +5724,10 @@ mm</translation>
         <translation>触测圆环</translation>
     </message>
     <message>
+        <source>Probe the ring all round and hold still on each point. Points: {n_touches}; covered: {covered:.0f} of {needed:.0f} degrees.</source>
+        <translation>沿环规整圈测量，并在每个点保持静止。点数：{n_touches}；已覆盖：{covered:.0f} / {needed:.0f} 度。</translation>
+    </message>
+    <message>
         <source>Probed points in the camera frame / mm</source>
         <translation>相机坐标系中的测点 / mm</translation>
     </message>
@@ -7512,10 +7516,6 @@ mm</translation>
         <translation>以同一姿态触测锥孔 {needed} 次，每次之间抬起测头：{n_touches} / {needed}。第 {posture} / {n_postures} 个姿态：竖直，以及向四个方向倾斜。</translation>
     </message>
     <message>
-        <source>Probe the ring all round and hold still on each point: {covered:.0f} of {needed:.0f} degrees with {n_touches} points.</source>
-        <translation>沿环一周触测，在每个点上保持不动：{n_touches} 个测点，{covered:.0f}° / {needed:.0f}°。</translation>
-    </message>
-    <message>
         <source>Processing cannot keep up: {n_missed} of {n_offered} images skipped. Close other programs, or the swing takes longer.</source>
         <translation>处理速度不足：{n_offered} 幅图像中有 {n_missed} 幅未处理。请关闭其他程序，否则摆动会更久。</translation>
     </message>
@@ -9137,6 +9137,10 @@ mm</translation>
     <message>
         <source>Limits</source>
         <translation>限值</translation>
+    </message>
+    <message>
+        <source>Repeated</source>
+        <translation>已重复</translation>
     </message>
     <message>
         <source>accepted</source>
