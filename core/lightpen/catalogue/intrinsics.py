@@ -10,6 +10,7 @@ MESSAGES = {
     "board.dictionary": "The board {text} names markers that are not known here. Name the dictionary as OpenCV does, such as DICT_5X5_100.",
     "board.markers": "The board {text} needs {needed} markers, {dictionary} has {known}. Name the dictionary that it was printed from.",
     "board.scale-check": "The measured length {measured:g} mm (stated {stated:g}, U {u:g} mm) is not valid: all must be above 0, and U at most a twentieth of the length. Measure over as many squares as possible.",
+    "board.scale-check-form": "{text} is no scale check. Enter the stated length, the measured length and its U (k = 2) in mm, such as 200 200.12 0.04; for a screen the pixel pitch and its U, such as 0.2331 0.0002.",
     "intrinsics.few-views": "The board is seen in {n_views} images; at least {least} are needed, {enough} are better. Add views with the board tilted by 20 to 40 degrees to each side, and in each corner of the image.",
     "intrinsics.misfit": "The points lie {rms:.2f} px from where a flat board {board} has them: it has other squares than said, is bent, or the images are not of one camera with one focus. Count and measure its squares again.",
     "intrinsics.board-stretched": "The board does not match {board}: lengths along the rows are {stretch:+.2%} longer than along the columns, and right angles deviate by {shear:+.2f}°. It may have been scaled in printing. Print it at true scale, or measure it again.",

@@ -188,9 +188,12 @@ def _add_temperature(parser: argparse.ArgumentParser) -> None:
 def _board(options: argparse.Namespace) -> tuple[Board, BoardTolerances]:
     """Return the board in mm, as far as it was measured, and its tolerances."""
     board, scale = parse_board(options.board), options.scale_sigma
-    checked = options.measured or (options.pixel_pitch and (1.0, *options.pixel_pitch))
-    if checked:
-        check = ScaleCheck(*checked)
+    check = None
+    if options.measured:
+        check = ScaleCheck(*options.measured)
+    elif options.pixel_pitch:
+        check = ScaleCheck.of_pixels(*options.pixel_pitch)
+    if check is not None:
         board, scale = check.scaled(board), check.sigma
     return board, BoardTolerances(options.flatness, options.squareness, scale)
 

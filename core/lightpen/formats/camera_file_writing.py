@@ -97,12 +97,12 @@ def _further_lines(camera: Camera, n: int | None = None) -> list[str]:
     if camera.temperature_c is not None:
         lines.append(f"calibration_temperature: {_decimal(camera.temperature_c)}")
     if camera.lens_field is not None:
-        lines += ["lens_field:", *_field_lines(camera.lens_field)]
+        lines += ["lens_field:", *_field_lines(camera.lens_field, n)]
     return lines
 
 
-def _field_lines(field: LensField) -> list[str]:
-    """Return the lines below ``lens_field``."""
+def _field_lines(field: LensField, n: int | None) -> list[str]:
+    """Return the lines below ``lens_field``, of the first n intrinsics."""
     lines = [
         f"amplitude: {_decimal(field.amplitude)}",
         f"correlation_length: {_decimal(field.length)}",
@@ -111,6 +111,9 @@ def _field_lines(field: LensField) -> list[str]:
         *_matrix_lines("values", field.values),
         *_matrix_lines("covariance", field.covariance),
     ]
+    if field.intrinsics_covariance is not None:
+        own = field.intrinsics_covariance[:n, :n]
+        lines += _matrix_lines("intrinsics_covariance", own)
     return ["   " + line.replace("\n", "\n   ") for line in lines]
 
 

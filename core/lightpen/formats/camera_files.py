@@ -29,7 +29,8 @@ serial number of the camera, ``camera_serial``; how warm it was,
 ``calibration_temperature``, in degrees Celsius; and the residual field of the lens,
 ``lens_field``, see `lightpen.model.lens_field`: ``amplitude`` and
 ``correlation_length``, px, and where it was measured ``columns``, ``rows``, ``values``
-(a row u v for each node) and ``covariance``.
+(a row u v for each node), ``covariance``, and ``intrinsics_covariance`` of what does
+not go with the field.
 """
 
 import re
@@ -83,6 +84,7 @@ _TEMPERATURE = ("calibration_temperature",)
 _FIELD = ("lens_field",)
 _FIELD_ENTRIES = (
     *("amplitude", "correlation_length", "columns", "rows", "values", "covariance"),
+    *_COVARIANCE,
 )
 _MODELS = {"plumb_bob", "rational_polynomial", "radtan", "none"}
 _FISHEYE = {"equidistant", "fisheye", "kannala_brandt", "kannala_brandt4"}
@@ -242,7 +244,9 @@ def _camera(
         calibrated_on=_day(entries),
         serial=_serial(entries),
         temperature_c=_temperature(entries),
-        lens_field=_lens_field(entries, width, height),
+        lens_field=_lens_field(
+            entries, width, height, len(coefficients), len(distortion)
+        ),
         lens=lens,
     )
     check_fold(camera, entries)
@@ -321,7 +325,9 @@ def _temperature(entries: Entries) -> float | None:
     return celsius
 
 
-def _lens_field(entries: Entries, width: int, height: int) -> LensField | None:
+def _lens_field(
+    entries: Entries, width: int, height: int, given: int, kept: int
+) -> LensField | None:
     if not entries.has(*_FIELD):
         return None
     part = entries.part(*_FIELD)
@@ -357,5 +363,10 @@ def _lens_field(entries: Entries, width: int, height: int) -> LensField | None:
         raise FileError("camera-file.lens-field-covariance", name=entries.name)
     values = part.counted(2 * n_nodes, "values").reshape(n_nodes, 2)
     return replace(
-        prior, columns=columns, rows=rows, values=values, covariance=covariance
+        prior,
+        columns=columns,
+        rows=rows,
+        values=values,
+        covariance=covariance,
+        intrinsics_covariance=_covariance(part, given, kept),
     )

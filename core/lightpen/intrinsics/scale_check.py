@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.errors import UsageError
+from lightpen.formats.files import printable
 from lightpen.intrinsics.boards import Board
 
 COVERAGE_FACTOR = 2.0
+PIXEL = 1.0  # length of a screen that its pixel pitch measures
 LARGEST_U = 0.05  # of the length
 
 
@@ -49,6 +51,31 @@ class ScaleCheck:
     def sigma(self) -> float:
         """Relative standard uncertainty of all lengths of the board."""
         return self.expanded_uncertainty / COVERAGE_FACTOR / self.measured
+
+    @classmethod
+    def of_pixels(cls, pitch: float, expanded_uncertainty: float) -> "ScaleCheck":
+        """Return the check of a screen by its pixel pitch and U, mm."""
+        return cls(PIXEL, pitch, expanded_uncertainty)
+
+    @classmethod
+    def parse(cls, text: str) -> "ScaleCheck":
+        """Return the check of a text: stated, measured, U; or pixel pitch, U.
+
+        Raises
+        ------
+        UsageError
+            It is neither.
+        """
+        try:
+            values = [float(word) for word in text.replace(";", " ").split()]
+        except ValueError:
+            values = []
+        match values:
+            case [stated, measured, u]:
+                return cls(stated, measured, u)
+            case [pitch, u]:
+                return cls.of_pixels(pitch, u)
+        raise UsageError("board.scale-check-form", text=printable(text))
 
     def scaled(self, board: Board) -> Board:
         """Return the board with its lengths as they were measured, mm."""

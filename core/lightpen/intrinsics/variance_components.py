@@ -31,9 +31,9 @@ from lightpen.intrinsics.views import Views
 from lightpen.model.lens_field import LensField
 
 LENGTHS = (0.15, 0.3, 0.6)  # of the image's longer side
-SPREADS = (0.35, 0.6, 1.0, 1.7, 3.0)  # of the most likely amplitude
+SPREADS = (0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 8.0)  # of the most likely amplitude
 LEAST = 1e-3  # of the noise: a component of no effect
-LEAST_SPREAD = 0.1  # of the noise: an amplitude that may yet be
+LEAST_SPREAD = 0.3  # of the noise: an amplitude that may yet be
 MAX_ROUNDS = 20
 CONVERGED = 0.1  # of twice the logarithm of the likelihood
 FIRST = 0.2  # of the noise: a component to begin with
@@ -312,6 +312,7 @@ def _averaged(
     n_kept = n + 3 * views.board.n_points
     deviances = np.array([each.deviance for _, each in found])
     weights = np.exp(-0.5 * (deviances - deviances.min()))
+    weights *= [np.mean(each.components.lenses) for _, each in found]  # steps of a grid
     weights /= weights.sum()
     x = np.sum([w * s.x[:n_kept] for w, (_, s) in zip(weights, found, strict=True)], 0)
     covariance, repeated = np.zeros((n, n)), np.zeros((n, n))
@@ -332,7 +333,9 @@ def _averaged(
     state = moved_state(fitted.state, x[:n], poses)
     state = replace(state, offsets=fitted.state.offsets + x[n:].reshape(-1, 3))
     fields = tuple(
-        _field(design, likeliest, c) if gain > SIGNIFICANT else None
+        _field(design, reduced, likeliest, fitted, c, factor, off[:n])
+        if gain > SIGNIFICANT
+        else None
         for c in range(len(state.cameras))
     )
     adjustment = replace(
@@ -384,16 +387,39 @@ def _own_normal(design: Design, components: VarianceComponents) -> FloatArray:
     return np.asarray(normal + 1e-12 * np.eye(n_own))
 
 
-def _field(design: Design, solution: _Solution, camera: int) -> LensField:
-    """Return the residual field of a lens, the intrinsics being as they were found."""
-    at, n = design.of_field(camera), design.n_shared
-    C = solution.covariance
-    known = C[at, at] - C[at, :n] @ np.linalg.solve(C[:n, :n], C[:n, at])
-    values = solution.x[at].reshape(-1, 2)
-    field = design.fields[camera]
+def _field(
+    design: Design,
+    reduced: _Reduced,
+    solution: _Solution,
+    fitted: BoardFit,
+    c: int,
+    factor: float,
+    off: FloatArray,
+) -> LensField:
+    """Return the residual field of a lens, and the intrinsics' covariance beside it.
+
+    Its values are those that belong to intrinsics (and what else views share) that are
+    off by that from the solution.
+
+    Its covariance is that of the image: an error of the field draws the intrinsics
+    along, and most of it cancels.
+    """
+    at, own, field = design.of_field(c), fitted.of_intrinsics(c), design.fields[c]
+    C, n = solution.covariance, len(off)
+    values = solution.x[at] + C[at, :n] @ np.linalg.solve(C[:n, :n], off)
+    normal = reduced.normal + design.prior(solution.components)
+    others = np.delete(np.arange(len(normal)), at)
+    among = normal[np.ix_(others, others)]
+    beside = np.linalg.inv(0.5 * (among + among.T))[own]  # before the fields' indices
+    drawn = -beside @ normal[others, at]
+    camera = fitted.state.cameras[c]
+    J = camera.intrinsics_jacobian(camera.unproject(field.nodes))
+    by_field = np.eye(len(drawn.T)) + J.reshape(len(drawn.T), -1) @ drawn
+    known = factor * by_field @ C[at, at] @ by_field.T
     return replace(
         field,
-        amplitude=solution.components.lenses[camera],
-        values=values,
+        amplitude=solution.components.lenses[c],
+        values=values.reshape(-1, 2),
         covariance=0.5 * (known[0::2, 0::2] + known[1::2, 1::2]),
+        intrinsics_covariance=factor * beside[:, own],
     )

@@ -42,6 +42,10 @@ class LensField:
         Mean of the field (u, v) at the M nodes, row by row, px; 0 where not measured.
     covariance : (M, M) array
         Covariance of each component at the nodes, px^2. The components are independent.
+    intrinsics_covariance : (4 + n, 4 + n) array or None
+        Of the camera's intrinsics without what of their errors goes with the field:
+        ``covariance`` contains that, as the two cancel in the image. None where the
+        errors are independent.
     """
 
     width: int
@@ -52,6 +56,7 @@ class LensField:
     length: float
     values: FloatArray = field(repr=False)
     covariance: FloatArray = field(repr=False)
+    intrinsics_covariance: FloatArray | None = field(default=None, repr=False)
 
     @classmethod
     def of(

@@ -507,6 +507,7 @@ def measured_field() -> LensField:
         field,
         values=rng.normal(size=(len(field.nodes), 2)),
         covariance=root @ root.T / 1e4,
+        intrinsics_covariance=root[:9] @ root[:9].T / 1e3,
     )
 
 
@@ -517,6 +518,8 @@ def test_a_lens_field_is_read_back_to_the_last_digit(tmp_path: Path) -> None:
     assert found is not None
     np.testing.assert_array_equal(found.values, expected.values)
     np.testing.assert_array_equal(found.covariance, expected.covariance)
+    beside = found.intrinsics_covariance, expected.intrinsics_covariance
+    np.testing.assert_array_equal(*beside)
     assert (found.columns, found.rows) == (expected.columns, expected.rows)
     assert (found.amplitude, found.length) == (0.02, 700.0)
 

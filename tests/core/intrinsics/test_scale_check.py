@@ -25,6 +25,25 @@ def test_a_board_on_a_screen_is_scaled_by_its_pixel_pitch() -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("200 200.12 0.04", ScaleCheck(200, 200.12, 0.04)),
+        (" 0.2331; 0.0002 ", ScaleCheck.of_pixels(0.2331, 0.0002)),
+    ],
+)
+def test_a_check_is_entered_as_two_or_three_numbers(
+    text: str, expected: ScaleCheck
+) -> None:
+    assert ScaleCheck.parse(text) == expected
+
+
+@pytest.mark.parametrize("text", ["200", "200 mm", "200,12 200 1", "1 2 3 4"])
+def test_another_text_is_refused_with_what_is_needed(text: str) -> None:
+    with pytest.raises(UsageError, match="such as 200"):
+        ScaleCheck.parse(text)
+
+
+@pytest.mark.parametrize(
     "values", [(0, 1, 0.01), (1, -1, 0.01), (1, 1, 0.2), (1, 1, 0)]
 )
 def test_impossible_lengths_are_refused(values: tuple[float, float, float]) -> None:

@@ -12,6 +12,7 @@ from typing_extensions import override
 from lightpen.errors import UsageError
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.calibration import MIN_VIEWS
+from lightpen.intrinsics.scale_check import ScaleCheck
 from lightpen.intrinsics.view_progress import ViewProgress, view_progress
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -27,6 +28,7 @@ from lightpen_app.steps.camera.board_progress import BoardProgress
 from lightpen_app.steps.camera.board_view import BoardView
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.page_scroll import PageScroll
+from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -62,6 +64,8 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._image = BoardView()
         self._remark = SignLabel()
         self.board, self._progress = BoardForm(), BoardProgress()
+        self._measured_name = text_label(TextSize.BODY)
+        self._measured = EnterEdit()
         self._print = PushButton()
         self._begin = PushButton()
         self._folder = PushButton()
@@ -81,6 +85,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         # Layout
         panel = QWidget()
         side = vertical_layout(panel, self.board, self._print, margins=None)
+        fill(side, self._measured_name, self._measured)
         horizontal_layout(side, self._begin, self._folder, spacing=-1)
         fill(side, self._progress, self._count, self._compute, self._facts)
         horizontal_layout(
@@ -146,6 +151,8 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         """Return the board of the fields, or report why there is none."""
         try:
             board = self.board.board()
+            if self._measured.text().strip():
+                board = ScaleCheck.parse(self._measured.text()).scaled(board)
         except UsageError as error:
             self._calibration.tell(partial(fault_message, error.message))
             return None
@@ -219,6 +226,16 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Camera calibration"))
         self._print.setText(self.tr("Print (PDF)..."))
+        self._measured_name.setText(self.tr("Scale check (optional)"))
+        self._measured.setAccessibleName(self.tr("Scale check (optional)"))
+        self._measured.setPlaceholderText("200 200.12 0.04")
+        self._measured.setToolTip(
+            self.tr(
+                "Measured with a caliper: stated length, measured length and its U "
+                "(k = 2) in mm. Screen: pixel pitch and its U in mm; the board is then "
+                "in pixels. The scale does not affect the intrinsics of one camera."
+            )
+        )
         self._folder.setText(self.tr("From a folder..."))
         self._compute.setText(self.tr("Calibrate"))
         self._worst_title.setText(self.tr("Views (worst first)"))

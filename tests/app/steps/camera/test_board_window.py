@@ -31,6 +31,7 @@ from lightpen_app.look.pooling import pooled
 from lightpen_app.steps.camera.board_progress import BoardProgress
 from lightpen_app.steps.camera.board_view import BoardView
 from lightpen_app.steps.camera.board_window import BoardWindow
+from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
@@ -368,3 +369,19 @@ def test_what_was_calibrated_is_told_in_the_language_that_is_chosen(
     assert "cross-validated" in english
     assert "cross-validated" not in window.findChildren(QListWidget)[0].item(0).text()
     assert not remark(window).isascii()
+
+
+def test_a_scale_check_by_caliper_is_asked_for_and_its_form_is_told(
+    window: BoardWindow, tmp_path: Path, images: list[Image], qtbot: QtBot
+) -> None:
+    (measured,) = window.findChildren(EnterEdit)
+    measured.setText("100")
+    window.read_folder(written(tmp_path, images))
+    assert "such as 200 200.12 0.04" in remark(window)
+
+    measured.setText("100 200.4 0.1")
+    with qtbot.waitSignal(window.concluded) as concluded:
+        window.read_folder(str(tmp_path))
+        qtbot.waitUntil(lambda: views_listed(window) == 7)
+        window.close()
+    assert "40.08" in concluded.args[0].board

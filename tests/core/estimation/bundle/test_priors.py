@@ -8,6 +8,7 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.priors import priors_of, thermal_growth
 from lightpen.model.assumptions import USUAL, Assumptions
+from lightpen.model.lens_field import LensField
 from lightpen.model.rig import Rig, rig_of
 from lightpen.simulator.swings import paper_camera, paper_pen
 
@@ -22,6 +23,18 @@ BARE = replace(
 def pair(covariance: FloatArray | None) -> Rig:
     places = np.array([[0.0, 0, 0], [-1000.0, 0, 0]])
     return Rig((CAMERA, CAMERA), np.tile(np.eye(3), (2, 1, 1)), places, covariance)
+
+
+def test_intrinsics_beside_a_field_are_without_what_goes_with_the_field() -> None:
+    field = LensField.of(CAMERA.width, CAMERA.height, 0.02, 500.0)
+    own = np.diag(np.full(len(CAMERA.intrinsics), 1e-6))
+    with_field = replace(
+        CAMERA, lens_field=replace(field, intrinsics_covariance=own)
+    )
+
+    (found,) = priors_of(rig_of(with_field), PEN, USUAL).cameras
+    np.testing.assert_array_equal(found.covariance, own)
+    assert not found.assumed
 
 
 def test_what_files_state_is_taken_as_stated() -> None:
