@@ -147,11 +147,14 @@ class BoardWindow(FittedWindow, Translated, QWidget):
             self._calibration.conclude()
             self._capture.start(self._named_board())
 
-    def _named_board(self) -> Board | None:
-        """Return the board of the fields, or report why there is none."""
+    def _named_board(self, *, measured: bool = True) -> Board | None:
+        """Return the board of the fields, or report why there is none.
+
+        Scaled as it was measured, if it was, unless that is not wanted.
+        """
         try:
             board = self.board.board()
-            if self._measured.text().strip():
+            if measured and self._measured.text().strip():
                 board = ScaleCheck.parse(self._measured.text()).scaled(board)
         except UsageError as error:
             self._calibration.tell(partial(fault_message, error.message))
@@ -174,7 +177,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
 
     def print_board(self, path: str) -> None:
         """Write the board as a page at true scale."""
-        board = self._named_board()
+        board = self._named_board(measured=False)
         if board is not None:
             self._calibration.print_board(board, Path(path))
 
