@@ -8,7 +8,7 @@ independent noise. Their variances follow from restricted maximum likelihood [1]
 the fixed point of [2]_. The cameras are estimated together with the effects, so what
 the views cannot tell from an effect is in their covariance. Amplitude and length of the
 fields are hardly known by one set of views: the estimate is the mean over a grid of
-both, weighed by the likelihood.
+both, weighed by the likelihood, all amplitudes being as likely before [3]_.
 
 References
 ----------
@@ -16,6 +16,8 @@ References
    sizes are unequal", Biometrika 58 (1971) 545-554.
 .. [2] D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4 (1992) 415-447,
    equation 27.
+.. [3] A. Gelman, "Prior distributions for variance parameters in hierarchical models",
+   Bayesian Analysis 1 (2006) 515-534.
 """
 
 from dataclasses import dataclass, replace
@@ -27,6 +29,7 @@ from lightpen.arrays import FloatArray
 from lightpen.intrinsics.adjustment import board_residuals, moved_state
 from lightpen.intrinsics.board_fit import N_POSE, BoardFit
 from lightpen.intrinsics.effects import Design, VarianceComponents, design_of
+from lightpen.intrinsics.view_scores import ViewScores
 from lightpen.intrinsics.views import Views
 from lightpen.model.lens_field import LensField
 
@@ -39,59 +42,6 @@ CONVERGED = 0.1  # of twice the logarithm of the likelihood
 FIRST = 0.2  # of the noise: a component to begin with
 KNOWN = 1e-2  # least number of effects that a variance is estimated from
 SIGNIFICANT = 6.0  # twice the gain of log-likelihood by a field, of two parameters
-
-
-@dataclass(frozen=True, eq=False)
-class ViewScores:
-    """Scores of the views about all but poses and effects.
-
-    Attributes
-    ----------
-    scores : (V, s) array
-    information : (V, q, s) array
-        Of each view, its columns of these.
-    covariance : (q, q) array
-        Of these and of the effects of board and lens, by all views.
-    """
-
-    scores: FloatArray
-    information: FloatArray
-    covariance: FloatArray
-
-    def change(self, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return score and information of a change that views have a share in.
-
-        Parameters
-        ----------
-        weights : (V,) array
-            The share.
-
-        Returns
-        -------
-        (s,) and (s, s) array
-        """
-        score = weights @ self.scores
-        first = np.einsum("v,vqs->qs", weights, self.information)
-        own = np.einsum("v,vqs->qs", weights**2, self.information)
-        n = len(score)
-        known = own[:n] - first.T @ self.covariance @ first
-        return score, 0.5 * (known + known.T)
-
-    @property
-    def clustering(self) -> float:
-        """Scatter of the scores, over what the components make of it."""
-        n = self.scores.shape[1]
-        S = self.covariance[:n, :n]
-        found = np.einsum("vi,ij,vj->", self.scores, S, self.scores)
-        own = self.information[:, :n]
-        leverage = np.einsum(
-            "vqi,qr,vrj->ij",
-            self.information,
-            self.covariance,
-            self.information,
-            optimize=True,
-        )
-        return float(found / np.sum(S * (own.sum(axis=0) - leverage)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -410,7 +360,10 @@ def _field(
     normal = reduced.normal + design.prior(solution.components)
     others = np.delete(np.arange(len(normal)), at)
     among = normal[np.ix_(others, others)]
-    beside = np.linalg.inv(0.5 * (among + among.T))[own]  # before the fields' indices
+    # The intrinsics have their indices before those of all fields.
+    beside: FloatArray = np.asarray(
+        np.linalg.inv(0.5 * (among + among.T))[own], dtype=np.float64
+    )
     drawn = -beside @ normal[others, at]
     camera = fitted.state.cameras[c]
     J = camera.intrinsics_jacobian(camera.unproject(field.nodes))

@@ -103,6 +103,14 @@ def test_a_lens_field_is_found(make_views: MakeViews) -> None:
     assert found.components.noise == pytest.approx(NOISE, rel=0.05)
     assert found.adjustment.rms == pytest.approx(2**0.5 * NOISE, rel=0.05)
 
+    # Most of what leaves the principal point open goes with the field.
+    at = found.adjustment.of_intrinsics(0)
+    shared, beside = found.adjustment.covariance[at, at], field.intrinsics_covariance
+    assert beside is not None
+    share = np.diag(beside) / np.diag(shared)
+    assert np.all(share < 1.0)
+    assert np.all(share[2:4] < 0.3), share
+
 
 def test_smooth_errors_of_single_views_are_found(make_views: MakeViews) -> None:
     views = make_views(n_views=20)

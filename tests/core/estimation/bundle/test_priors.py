@@ -28,9 +28,7 @@ def pair(covariance: FloatArray | None) -> Rig:
 def test_intrinsics_beside_a_field_are_without_what_goes_with_the_field() -> None:
     field = LensField.of(CAMERA.width, CAMERA.height, 0.02, 500.0)
     own = np.diag(np.full(len(CAMERA.intrinsics), 1e-6))
-    with_field = replace(
-        CAMERA, lens_field=replace(field, intrinsics_covariance=own)
-    )
+    with_field = replace(CAMERA, lens_field=replace(field, intrinsics_covariance=own))
 
     (found,) = priors_of(rig_of(with_field), PEN, USUAL).cameras
     np.testing.assert_array_equal(found.covariance, own)

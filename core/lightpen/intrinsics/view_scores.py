@@ -1,0 +1,60 @@
+"""Scores of single views, by which groups of views are compared."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ViewScores:
+    """Scores of the views about all but poses and effects.
+
+    Attributes
+    ----------
+    scores : (V, s) array
+    information : (V, q, s) array
+        Of each view, its columns of these.
+    covariance : (q, q) array
+        Of these and of the effects of board and lens, by all views.
+    """
+
+    scores: FloatArray
+    information: FloatArray
+    covariance: FloatArray
+
+    def change(self, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return score and information of a change that views have a share in.
+
+        Parameters
+        ----------
+        weights : (V,) array
+            The share.
+
+        Returns
+        -------
+        (s,) and (s, s) array
+        """
+        score = weights @ self.scores
+        first = np.einsum("v,vqs->qs", weights, self.information)
+        own = np.einsum("v,vqs->qs", weights**2, self.information)
+        n = len(score)
+        known = own[:n] - first.T @ self.covariance @ first
+        return score, 0.5 * (known + known.T)
+
+    @property
+    def clustering(self) -> float:
+        """Scatter of the scores, over what the components make of it."""
+        n = self.scores.shape[1]
+        S = self.covariance[:n, :n]
+        found = np.einsum("vi,ij,vj->", self.scores, S, self.scores)
+        own = self.information[:, :n]
+        leverage = np.einsum(
+            "vqi,qr,vrj->ij",
+            self.information,
+            self.covariance,
+            self.information,
+            optimize=True,
+        )
+        return float(found / np.sum(S * (own.sum(axis=0) - leverage)))
