@@ -351,6 +351,14 @@
         <translation>打印 (PDF)...</translation>
     </message>
     <message>
+        <source>Scale check (optional)</source>
+        <translation>比例核查（可选）</translation>
+    </message>
+    <message>
+        <source>Measured with a caliper: stated length, measured length and its U (k = 2) in mm. Screen: pixel pitch and its U in mm; the board is then in pixels. The scale does not affect the intrinsics of one camera.</source>
+        <translation>用卡尺测量：标称长度、实测长度及其 U (k = 2)，单位 mm。屏幕：像素间距及其 U，单位 mm；此时标定板以像素为单位。比例不影响单台相机的内参。</translation>
+    </message>
+    <message>
         <source>From a folder...</source>
         <translation>从文件夹...</translation>
     </message>
@@ -8894,6 +8902,10 @@ mm</translation>
     <message>
         <source>{reason} {power}</source>
         <translation>{reason} {power}</translation>
+    </message>
+    <message>
+        <source>{text} is no scale check. Enter the stated length, the measured length and its U (k = 2) in mm, such as 200 200.12 0.04; for a screen the pixel pitch and its U, such as 0.2331 0.0002.</source>
+        <translation>{text} 不是比例核查。请输入标称长度、实测长度及其 U (k = 2)，单位 mm，例如 200 200.12 0.04；屏幕则输入像素间距及其 U，例如 0.2331 0.0002。</translation>
     </message>
     <message>
         <source>{unit} is not a supported unit of length. Choose one of {known}.</source>
