@@ -155,16 +155,16 @@ class Settings(QObject):
 
     def camera_files(self, serials: str) -> CameraFiles:
         """Return what is stored for the camera of a serial number, or for a pair."""
-        kept = self._content.get("camera files", {}).get(serials)
+        kept = self._content.get("camera_files", {}).get(serials)
         return _read(kept, CameraFiles())
 
     def set_camera_files(self, serials: str, files: CameraFiles) -> None:
         """Remember the files of a camera, or of a pair."""
-        self._save("camera files", {serials: _entries(files)})
+        self._save("camera_files", {serials: _entries(files)})
 
     def camera_of_file(self, sha256: str) -> str:
         """Return the serial number of the camera that a file is stored for."""
-        kept = self._content.get("camera files", {})
+        kept = self._content.get("camera_files", {})
         for serial in kept:
             if sha256 and self.camera_files(serial).sha256 == sha256:
                 return serial

@@ -54,9 +54,9 @@ class TipReadout(Translated, QWidget):
         self._value: TipValue | None = None
 
         # Widgets
-        self._names = [text_label(TextSize.LEAD, Tone.QUIET) for _ in AXES]
-        self._numbers = [_number_label(TextSize.LEAD) for _ in AXES]
-        self._uncertainties = [_number_label(TextSize.BODY, Tone.QUIET) for _ in AXES]
+        self._names = [text_label(TextSize.BODY, Tone.QUIET) for _ in AXES]
+        self._numbers = [_number_label(TextSize.BODY) for _ in AXES]
+        self._uncertainties = [_number_label(TextSize.SMALL, Tone.QUIET) for _ in AXES]
         self._compared = [
             [_number_label(TextSize.SMALL) for _ in AXES] for _ in range(4)
         ]
@@ -82,9 +82,9 @@ class TipReadout(Translated, QWidget):
     def set_large(self, large: bool) -> None:
         """Show the figures larger, where there is the room, or no longer."""
         for label in (*self._names, *self._numbers):
-            set_size(label, TextSize.TITLE if large else TextSize.LEAD)
+            set_size(label, TextSize.TITLE if large else TextSize.BODY)
         for label in self._uncertainties:
-            set_size(label, TextSize.LEAD if large else TextSize.BODY)
+            set_size(label, TextSize.LEAD if large else TextSize.SMALL)
         for label in chain(self._heads, *self._compared):
             set_size(label, TextSize.BODY if large else TextSize.SMALL)
 
@@ -123,14 +123,14 @@ class TipReadout(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        since = "" if self._value is None else self._value.since
         words = (
             *(self.tr("Value\nmm"), self.tr("U\nmm")),
-            *(self.tr("Previous") + f"\n{since}", self.tr("Change\n\xb5m")),
+            *(self.tr("Previous\nmm"), self.tr("Change\n\xb5m")),
             *(self.tr("Nominal\nmm"), self.tr("Deviation\n\xb5m")),
         )
         for head, text in zip(self._heads, words, strict=True):
             head.setText(text)
+        self._heads[2].setToolTip("" if self._value is None else self._value.since)
 
 
 def _number_label(size: TextSize, tone: Tone = Tone.PLAIN) -> QLabel:
