@@ -4829,14 +4829,16 @@ mm</source>
 mm</translation>
     </message>
     <message>
-        <source>Previous</source>
-        <translation>上次</translation>
-    </message>
-    <message>
         <source>Change
 µm</source>
         <translation>变化
 µm</translation>
+    </message>
+    <message>
+        <source>Previous
+mm</source>
+        <translation>上次
+mm</translation>
     </message>
     <message>
         <source>Nominal
