@@ -26,7 +26,7 @@ NAMES = {
     "Cone": "C-1",
 }
 FEW = {
-    "Max. expanded uncertainty U (k = 2)": "0.012",
+    "Max. expanded uncertainty U (k = 2)": "0.02",
     "Min. images": "20",
     "Max. images": "150",
 }

@@ -6,6 +6,7 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -349,6 +350,7 @@ def test_the_newcomer_leads_the_pen_by_the_dial(qtbot: QtBot, desk: Desk) -> Non
     until(qtbot, lambda: "press Seat" in desk.value.hint)
     desk.click("Seat")
     until(qtbot, lambda: desk.value.instruction == "Tilt RIGHT")
+    until(qtbot, lambda: desk.state.was_upright)
     dial = desk.page.findChild(LeaningDial)
     assert isinstance(dial, LeaningDial)
 
@@ -356,7 +358,8 @@ def test_the_newcomer_leads_the_pen_by_the_dial(qtbot: QtBot, desk: Desk) -> Non
     for _ in range(10):
         QTest.keyClick(dial, Key.Key_Right)
 
-    until(qtbot, lambda: desk.state.heading == 0)
+    until(qtbot, lambda: desk.state.heading is not None)
+    assert np.cos(desk.state.heading or 0.0) > 0.7  # the hand trembles
     until(qtbot, lambda: (desk.posture or UPRIGHT).tilt > 0.2)
 
 
