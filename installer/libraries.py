@@ -58,6 +58,7 @@ _OPENBLAS = (
 )
 _MICROSOFT = ("Microsoft", "LicenseRef-Microsoft-Visual-C-Runtime")
 LIBRARIES = (
+    Library("OpenSSL", "runtime/libcrypto-3.dll", *_OPENSSL),
     Library("OpenSSL", f"{PACKAGES}/psycopg_binary.libs/libcrypto-*.dll", *_OPENSSL),
     Library("OpenSSL", f"{PACKAGES}/cryptography/hazmat/bindings/_rust.pyd", *_OPENSSL),
     Library(

@@ -25,9 +25,6 @@ FOLDER = "cp313/"
 LIBRARY = "python313.zip"
 # Compiled modules whose sources were not at hand to compare them with.
 UNPROVEN = ("__phello__/", "_pydecimal.pyc", "pydoc_data/topics.pyc")
-# OpenSSL 3.0.15, which is old: nothing here needs it. hashlib has digests of its own,
-# libpq and cryptography bring newer versions of OpenSSL.
-LEFT_OUT = {"_hashlib.pyd", "_ssl.pyd", "libcrypto-3.dll", "libssl-3.dll"}
 # Paths from the folder of the runtime in which modules are looked for, and no others.
 PATHS = "python313.zip\r\n.\r\nLib\\site-packages\r\n"
 
@@ -70,8 +67,6 @@ def unpack(distribution: Path, folder: Path) -> None:
                 raise RuntimeFileError(
                     f"{name} in {distribution} is not the one that was proven."
                 )
-            if name in LEFT_OUT:
-                continue
             if name == LIBRARY:
                 content = without_unproven(content)
             (folder / name).write_bytes(content)
