@@ -6,7 +6,7 @@ A data folder with a supervisor password is damaged, one file at a time, as a ha
 write access but without password and key would. Whatever happens, the limits, the
 key and the verification that are read are those that were kept, or reading raises a
 `LightpenError`. Processes that set limits, introduce station keys or import are killed
-at random: what is read afterwards is whole, and goes on.
+at random: afterwards all files are complete and can be used further.
 """
 
 import os
@@ -194,7 +194,7 @@ def _introduce_key(guarded: Guarded, n: int) -> None:
 
 
 def _key_is_there(guarded: Guarded) -> bool:
-    """Check that the present key signs, and that the archive goes on with it."""
+    """Check that the present key signs, and that the archive takes its entries."""
     found = read_supervision(guarded.data)
     with closing(Logbook(guarded.data)) as logbook:
         owed = logbook.enter_owed()
@@ -244,7 +244,7 @@ def hostile_guard_rows(
         ),
         *(
             Row(
-                f"killed {n_kills} times while {kind}: all is whole and goes on",
+                f"killed {n_kills} times while {kind}: all files complete and usable",
                 str(n_right),
                 str(n_kills),
                 met=n_right == n_kills,

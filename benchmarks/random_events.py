@@ -69,7 +69,7 @@ class RandomUser(QObject):
     Attributes
     ----------
     errors : list of str
-        Reports of exceptions that nobody caught.
+        Reports of uncaught exceptions.
     """
 
     def __init__(self, wizard: Wizard, seconds: float, seed: int) -> None:

@@ -178,7 +178,7 @@ def event_rows(seconds: float = EVENT_SECONDS) -> list[Row]:
     minutes_mb = ", ".join(f"{size:.0f}" for size in sizes)
     return [
         Row(
-            f"{name}: exceptions that nobody caught, of {found['events']} events",
+            f"{name}: uncaught exceptions, of {found['events']} events",
             str(found["errors"]),
             "0",
             met=not found["errors"],

@@ -1,4 +1,4 @@
-"""Scores of single views, by which groups of views are compared."""
+"""Score (gradient of the likelihood) of each view, to compare groups of views."""
 
 from dataclasses import dataclass
 

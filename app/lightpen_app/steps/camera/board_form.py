@@ -1,7 +1,5 @@
 """The board in fields, with a picture of it."""
 
-from dataclasses import replace
-
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
@@ -103,7 +101,7 @@ class BoardForm(Translated, QWidget):
     Signals
     -------
     changed()
-        Another board is told.
+        The board in the fields has changed.
     """
 
     changed = Signal()
@@ -162,7 +160,7 @@ class BoardForm(Translated, QWidget):
             There is no such board.
         """
         kind = BoardKind(self._kind.currentData())
-        told = Board(
+        entered = Board(
             kind=kind,
             columns=self._columns.value(),
             rows=self._rows.value(),
@@ -170,7 +168,7 @@ class BoardForm(Translated, QWidget):
             detail=0.0 if kind is BoardKind.CHESSBOARD else self._detail.value(),
             dictionary=self._dictionary.currentText() if kind.has_markers else "",
         )
-        return parse_board(told.name)
+        return parse_board(entered.name)
 
     def set_board(self, board: Board) -> None:
         """Show another board."""
@@ -192,13 +190,13 @@ class BoardForm(Translated, QWidget):
 
     def _on_kind_chosen(self) -> None:
         kind = BoardKind(self._kind.currentData())
-        self.set_board(replace(USUAL[kind]))
+        self.set_board(USUAL[kind])
 
     def _on_changed(self) -> None:
         try:
             board = self.board()
         except UsageError:
-            board = None  # it is told when the board is used
+            board = None  # the reason is shown when the board is used
         self._picture.set_value(board)
         self._retranslate()
         self.changed.emit()

@@ -134,7 +134,7 @@ class UncertaintyPrediction:
         ]
         return PredictedUncertainty(_weakest(now), _weakest(stays))
 
-    def with_effects(
+    def _with_effects(
         self, pixels: FloatArray, joint: JointFit, sigma: float, assumed: Assumptions
     ) -> "UncertaintyPrediction":
         """Search images, pixels (N, C, L, 2), for the effects of a station."""
@@ -187,7 +187,7 @@ def predict_uncertainty(
         whole = UncertaintyPrediction(
             state, _equations_of(state, pixels, joint, 0), n_images
         )
-        return whole.with_effects(pixels, joint, sigma, assumed)
+        return whole._with_effects(pixels, joint, sigma, assumed)
     n_before = len(before.state.rotations)
     fresh = _equations_of(state, pixels, joint, n_before)
     return UncertaintyPrediction(
