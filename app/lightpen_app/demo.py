@@ -17,7 +17,7 @@ NAMES = Names(
 )  # fmt: skip
 TICK_MS = 100
 WATCHED_S, UNWATCHED_S = 5.0, 0.1  # spent on each page, s
-LONGEST_S = 300.0  # on a page, s; a slow machine takes a minute for the swing
+LONGEST_S = 200.0  # on a page, s; a slow machine takes a minute for the swing
 
 
 class Demo(QObject):

@@ -143,6 +143,10 @@ class LedFilePanel(Translated, QWidget):
             self._question.hide()
             self._on_declined()
 
+    def refresh_question(self) -> None:
+        """Word the question anew; it ends where its words are empty by now."""
+        self._question.refresh()
+
     def question(self) -> str:
         """Return the present question, or an empty text."""
         return self._question.words()

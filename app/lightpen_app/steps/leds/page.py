@@ -226,6 +226,7 @@ class LedsPage(ResponsiveLayout, Page):
         rms = () if match is None else enumerate(match.rms.tolist(), 1)
         misfits = {led: each for led, each in rms if each == each}  # px, of LEDs seen
         self._table.set_misfits(misfits)
+        self._file.refresh_question()  # the pen may only have entered the image
         self.changed.emit()
         self._table.set_marked(self._match.reasons())
         self._refresh()

@@ -999,6 +999,25 @@ def test_a_file_that_misfits_leaves_the_step_amber_and_asks_before_the_swing(
     assert len(asked) == 1
 
 
+def test_the_question_ends_when_the_pen_fits_after_all(
+    seen: "Seen", workbench: Workbench, small_scene: Scene, qtbot: QtBot
+) -> None:
+    camera = FaultyCamera(small_scene, workbench.around.clock)
+    camera.operator.cover(leds=[8, 9, 10])
+    camera.operator.seat()
+    workbench.live.open([camera], CameraSettings(), workbench.around.clock)
+    seen.page.entered()
+    qtbot.waitUntil(seen.page.is_doubtful)
+    seen.page.run_main_action()
+    assert seen.child(QuestionBar).isVisible()
+
+    camera.operator.uncover()
+    camera.operator.swing()
+    qtbot.waitUntil(lambda: not seen.page.is_doubtful())
+
+    assert not seen.child(QuestionBar).isVisible()
+
+
 def test_a_pen_that_is_away_is_not_found(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
