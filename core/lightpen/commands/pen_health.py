@@ -10,8 +10,8 @@ from lightpen.commands.console import (
     require_other_file,
     shown,
     verdict_status,
-    write_record,
 )
+from lightpen.commands.entering import add_entering, keep_record
 from lightpen.errors import UsageError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import sha256
@@ -35,6 +35,7 @@ def add_verify_pen(parser: argparse.ArgumentParser) -> None:
     _add_swings(parser)
     add_exit_by_verdict(parser)
     add_json(parser)
+    add_entering(parser)
 
 
 def add_improve_pen(parser: argparse.ArgumentParser) -> None:
@@ -77,15 +78,14 @@ def _verify_pen(options: argparse.Namespace) -> int:
     pen = read_pen(options.pen, options.units, options.led_diameter, None)
     found = examine_pen(swings, read_camera(options.camera), pen.leds)
     print(shown(pen_health_text(found)))
-    if options.json is not None:
-        record = verification_record(
-            "pen",
-            pen_health_entries(found),
-            found.assessment,
-            {"led_moved": MOVED, "relative_growth": GROWN},
-            {"files": [file_entry(file) for file in all_hashed(files)]},
-        )
-        write_record(options.json, record)
+    record = verification_record(
+        "pen",
+        pen_health_entries(found),
+        found.assessment,
+        {"led_moved": MOVED, "relative_growth": GROWN},
+        {"files": [file_entry(file) for file in all_hashed(files)]},
+    )
+    keep_record(options, record, swings[0])
     return verdict_status(options, found.assessment.grade)
 
 

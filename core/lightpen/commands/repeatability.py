@@ -18,8 +18,8 @@ from lightpen.commands.console import (
     require_other_file,
     shown,
     verdict_status,
-    write_record,
 )
+from lightpen.commands.entering import add_entering, keep_record
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import calibrate
@@ -31,7 +31,7 @@ from lightpen.formats.json_records import file_entry
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import VerificationLimits
-from lightpen.record.calibrations.calibrations import read_calibration
+from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.verification.history.pen_health import require_one_pen
 from lightpen.verification.history.recorded_tasks import read_fixed_point
 from lightpen.verification.reports.charts import write_chart
@@ -100,6 +100,7 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
     )
     add_exit_by_verdict(parser)
     add_json(parser)
+    add_entering(parser)
 
 
 @printing
@@ -107,7 +108,7 @@ def _repeatability(options: argparse.Namespace) -> int:
     inputs = [*options.results, options.fixed_point, options.camera, options.pen]
     require_other_file(options.json, *inputs)
     require_other_file(options.chart, *inputs)
-    tips = _tips(options)
+    tips, first = _tips(options)
     limits = VerificationLimits(repeatability=options.limit)
     found = measure_repeatability(
         tips,
@@ -123,20 +124,22 @@ def _repeatability(options: argparse.Namespace) -> int:
     print(shown(repeatability_text(found)))
     if options.chart is not None:
         write_chart(found, options.chart)
-    if options.json is not None:
-        files = [each for each in inputs if each is not None]
-        record = verification_record(
-            "repeatability",
-            repeatability_entries(found),
-            found.assessment,
-            {"repeatability": limits.repeatability},
-            {"files": [file_entry(file) for file in all_hashed(files)]},
-        )
-        write_record(options.json, record)
+    files = [each for each in inputs if each is not None]
+    record = verification_record(
+        "repeatability",
+        repeatability_entries(found),
+        found.assessment,
+        {"repeatability": limits.repeatability},
+        {"files": [file_entry(file) for file in all_hashed(files)]},
+    )
+    keep_record(options, record, first)
     return verdict_status(options, found.assessment.grade)
 
 
-def _tips(options: argparse.Namespace) -> list[TipEstimate]:
+def _tips(
+    options: argparse.Namespace,
+) -> tuple[list[TipEstimate], CalibrationFile | None]:
+    """Return the tips, and the first calibration unless they are LED centres."""
     tables = [path for path in options.results if path.suffix.lower() == ".csv"]
     if tables and len(tables) < len(options.results):
         raise UsageError(
@@ -144,10 +147,8 @@ def _tips(options: argparse.Namespace) -> list[TipEstimate]:
             one=str(next(each for each in options.results if each not in tables)),
             other=str(tables[0]),
         )
-    return _from_centers(options, tables) if tables else _from_results(options)
-
-
-def _from_results(options: argparse.Namespace) -> list[TipEstimate]:
+    if tables:
+        return _from_centers(options, tables), None
     calibrations = [read_calibration(path) for path in options.results]
     require_one_pen(calibrations)
     for each in calibrations[1:]:
@@ -159,10 +160,11 @@ def _from_results(options: argparse.Namespace) -> list[TipEstimate]:
                 first=str(calibrations[0].path),
                 tip=printable(calibrations[0].names.tip),
             )
-    return [
+    tips = [
         TipEstimate(each.path.name, each.tip_pen, each.uncertainty, each.when)
         for each in calibrations
     ]
+    return tips, calibrations[0]
 
 
 def _from_centers(options: argparse.Namespace, tables: list[Path]) -> list[TipEstimate]:

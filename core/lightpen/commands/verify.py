@@ -28,6 +28,7 @@ from lightpen.commands.console import (
     verdict_status,
     write_record,
 )
+from lightpen.commands.entering import add_entering, keep_record
 from lightpen.commands.pen_health import add_verify_pen
 from lightpen.detection.observations import Observations, observe_centers
 from lightpen.errors import CalibrationError, UsageError
@@ -37,6 +38,7 @@ from lightpen.formats.json_records import file_entry
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import rule_in_words
+from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.verification.history.recorded_tasks import read_drift
@@ -135,6 +137,7 @@ def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
         )
     _add_common(parser, *task.limits)
     add_verdict(parser)
+    add_entering(parser)
 
 
 def _add_ball(parser: argparse.ArgumentParser, what: str) -> None:
@@ -224,11 +227,14 @@ class _Measured:
 
     Attributes
     ----------
+    origin : Origin
+        Of the images or centres; simulated if some of them are.
     lamp_drift : LampDrift or None
         The drift of fixed lamps in view.
     """
 
     calibration: CalibrationFile
+    origin: Origin
     conditions: Conditions
     runs: tuple[ProbingRun, ...]
     files: tuple[Path, ...]
@@ -261,9 +267,9 @@ def _verify_task(given: argparse.Namespace) -> int:
     tables = task.tables(found, conditions)
     print(shown(found_text(tables, judged, measured.rejected, rule)))
     _print_lamp_drift(measured, judged)
-    if given.json is not None:
-        entries = task.entries(found, measured.instrument)
-        _write(given, measured, task.kind, entries, judged)
+    entries = task.entries(found, measured.instrument)
+    record = _record(given, measured, task.kind, entries, judged)
+    keep_record(given, record, measured.calibration, measured.origin)
     return verdict_status(given, judged.grade)
 
 
@@ -293,7 +299,7 @@ def _touches(options: argparse.Namespace) -> None:
     _print_lamp_drift(measured)
     if options.json is not None:
         entries = {"touches": point_entries(touches, measured.instrument)}
-        _write(options, measured, "touches", entries, None)
+        write_record(options.json, _record(options, measured, "touches", entries, None))
 
 
 def _measure(
@@ -326,6 +332,7 @@ def _measure(
     moved = NO_DRIFT if drift is None else read_drift(drift)
     return _Measured(
         calibration=calibration,
+        origin=_origin(found),
         conditions=Conditions(
             instrument=instrument,
             limits=limits,
@@ -407,6 +414,11 @@ def _pen(
     return place.pen, place.pen_file
 
 
+def _origin(places: Sequence[ImageLocation]) -> Origin:
+    origins = {place.origin for place in places}
+    return Origin.SIMULATED if Origin.SIMULATED in origins else Origin.RECORDED
+
+
 def _print_lamp_drift(
     measured: _Measured, judged: VerificationAssessment | None = None
 ) -> None:
@@ -416,15 +428,15 @@ def _print_lamp_drift(
         print(shown(str(told.reason)))
 
 
-def _write(
+def _record(
     options: argparse.Namespace,
     measured: _Measured,
     kind: str,
     entries: Mapping[str, Any],
     assessment: VerificationAssessment | None,
-) -> None:
+) -> dict[str, Any]:
     drift: Path | None = getattr(options, "drift", None)
-    record = verification_record(
+    return verification_record(
         kind,
         {
             **entries,
@@ -442,4 +454,3 @@ def _write(
         },
         rule_in_words(measured.conditions.limits),
     )
-    write_record(options.json, record)

@@ -77,14 +77,21 @@ class TipEvidence:
         return np.asarray(COVERAGE_FACTOR * np.sqrt(np.diag(self.covariance)))
 
     @property
-    def distance(self) -> float:
-        """Length of the change, mm."""
-        return float(np.linalg.norm(self.change))
+    def known_change(self) -> FloatArray:
+        """The component of the change that is known best for its size, (3,), mm.
+
+        It lies along ``C^-1 d``, the direction in which the change is most standard
+        deviations long; what the points do not determine is left out.
+        """
+        along = np.linalg.solve(self.covariance, self.change)
+        squared = max(float(along @ along), np.finfo(float).tiny)
+        return np.asarray(along * (float(along @ self.change) / squared))
 
     @property
-    def distance_uncertainty(self) -> float:
-        """U (k = 2) of the change along itself, mm."""
-        along = self.change / max(self.distance, np.finfo(float).tiny)
+    def known_uncertainty(self) -> float:
+        """U (k = 2) of the length of that component, mm."""
+        along = np.linalg.solve(self.covariance, self.change)
+        along /= max(float(np.linalg.norm(along)), np.finfo(float).tiny)
         return COVERAGE_FACTOR * float(np.sqrt(along @ self.covariance @ along))
 
     def verifies_tip(self, limits: VerificationLimits) -> bool:
@@ -157,12 +164,12 @@ def judged_tip(
     found: TipEvidence, limits: VerificationLimits
 ) -> VerificationAssessment | None:
     """Return what is found against the tip; None if nothing is."""
-    distance, uncertainty = found.distance, found.distance_uncertainty
+    change, uncertainty = found.known_change, found.known_uncertainty
+    distance = float(np.linalg.norm(change))
     if not found.is_significant or distance <= RELEVANT * limits.tip:
         return None
-    x, y, z = found.change.tolist()
-    decision = limits.decision(distance, uncertainty, limits.tip)
-    if decision is Decision.REJECTED:
+    x, y, z = change.tolist()
+    if limits.decision(distance, uncertainty, limits.tip) is Decision.REJECTED:
         another = message(
             "tip.another",
             x=x,

@@ -1,0 +1,87 @@
+"""A verification by command, kept and entered where its tip was accepted."""
+
+import argparse
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from lightpen.commands.console import shown, write_record
+from lightpen.model.origin import Origin
+from lightpen.record.calibrations.calibrations import NOBODY, CalibrationFile
+from lightpen.record.results.opening import data_folder_of
+from lightpen.verification.storage.verification_files import keep_verification
+
+
+def add_entering(parser: argparse.ArgumentParser) -> None:
+    """Add whether and where a verification is entered."""
+    place = parser.add_mutually_exclusive_group()
+    place.add_argument(
+        "--data",
+        type=Path,
+        metavar="FOLDER",
+        help="data folder in whose archive the result is entered (default: that of an "
+        "accepted result)",
+    )
+    place.add_argument(
+        "--no-entry", action="store_true", help="do not enter the result in an archive"
+    )
+    parser.add_argument(
+        "--operator",
+        metavar="NAME",
+        help="operator of the entry (default: of the result)",
+    )
+
+
+def keep_record(
+    options: argparse.Namespace,
+    record: Mapping[str, Any],
+    tip: CalibrationFile | None,
+    origin: Origin | None = None,
+) -> None:
+    """Write a verification as JSON where asked for, and enter it in the archive.
+
+    Parameters
+    ----------
+    tip : CalibrationFile or None
+        The tip, whose data folder has the archive; None of LED centres alone.
+    origin : Origin, optional
+        Of the images; by default of the tip.
+
+    Raises
+    ------
+    ArchiveError, FileError
+        It cannot be written, or not be entered.
+    """
+    names = NOBODY if tip is None else tip.names
+    own = None if tip is None else tip.origin
+    is_simulated = Origin.SIMULATED in (origin, own)
+    if is_simulated:
+        origin = Origin.SIMULATED
+    if options.operator is not None:
+        names = replace(names, operator=options.operator)
+    record = {
+        **record,
+        "session": record["created"],
+        "station": names.station,
+        "operator": names.operator,
+        "pen": names.pen,
+        "tip": names.tip,
+        "origin": origin or own,
+    }
+    if options.json is not None:
+        write_record(options.json, record)
+    data = options.data or (None if tip is None else data_folder_of(tip.path))
+    if options.no_entry or data is None:
+        print("This result is not entered in an archive.")
+        return
+    # A fifth of a second, which a result without an entry need not take.
+    from lightpen.archive.lazy_logbook import server_address
+    from lightpen.archive.logbook import Logbook
+
+    kept = keep_verification(data, record, is_simulated=is_simulated)
+    with closing(Logbook(data, server_address())) as logbook:
+        for trouble in logbook.enter_owed():
+            print(shown(str(trouble)))
+    print(shown(f"Entered in the archive: {kept}"))
