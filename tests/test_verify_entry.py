@@ -134,7 +134,9 @@ def test_repeatability_is_entered_with_the_tips_it_is_of(
     assert outcome.returncode == 0, outcome.stderr
     last = entered(tmp_path / "data")[-1]
     assert last.settings["verified"] == "repeatability"
-    content = json.loads((tmp_path / "data/simulated/verifications/000001.json").read_bytes())
+    content = json.loads(
+        (tmp_path / "data/simulated/verifications/000001.json").read_bytes()
+    )
     assert [each["file"] for each in content["inputs"]["files"]] == [
         *(result.name, other.name)
     ]
