@@ -16,7 +16,7 @@ from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed
+from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, with_content
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import read_rig
@@ -70,7 +70,7 @@ def accept_tip(
         None if rig_file is None else rig_file.path,
     )
     inputs = Inputs(
-        *(hashed(camera_file), hashed(pen.path), (), None),
+        *(with_content(camera_file), with_content(pen.path), (), None),
         origin=origin,
         rig=rig_inputs,
     )

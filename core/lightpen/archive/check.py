@@ -43,12 +43,15 @@ class ArchiveCheckResult:
         Differences from the entries; empty if there are none.
     notes : tuple of Message
         What may be honest and is to be known, see `lightpen.archive.check_notes`.
+    n_tips : int
+        Tips computed again, see `lightpen.archive.recompute_check`.
     """
 
     n_entries: int
     n_files: int
     findings: tuple[Message, ...]
     notes: tuple[Message, ...] = ()
+    n_tips: int = 0
 
 
 def check_archive(

@@ -56,5 +56,8 @@ MESSAGES = {
     "archive.file-not-entered": "The file {file} has no entry in the archive yet. Start the program to enter it.",
     "archive.clock-back": "The tip of entry {number} was accepted earlier than the one before: the clock of the station was set back.",
     "archive.accepted-too-early": "The tip of entry {number} was accepted before it was computed: the clock of the station was set back, or the entry is not what happened.",
+    "archive.other-tip-again": "The tip of entry {number} does not follow from the LED centres of its record: computed again it is {distance:.4f} mm off, and U is {uncertainty:.4f} mm instead of {stated:.4f} mm. It was computed by {program}. Recompute it by that version, and calibrate the tip again.",
+    "archive.no-tip-again": "The tip of entry {number} does not follow from the LED centres of its record: {why}",
+    "archive.not-recomputed": "The tip of entry {number} was not recomputed: {why}",
     "archive.closed": "The archive is closed: the program ends.",
 }

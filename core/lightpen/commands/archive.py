@@ -11,6 +11,7 @@ import platformdirs
 from lightpen.commands.arguments import whole_number
 from lightpen.formats.own_json import FIRST_YEAR, LAST_YEAR
 
+SAMPLE = 3  # tips that a check recomputes
 USUAL_LENGTH = 50  # entries that are listed
 
 DataFolder: TypeAlias = Callable[[], Path]
@@ -44,6 +45,14 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         "--server",
         action="store_true",
         help="check the copy on the server set by LIGHTPEN_ARCHIVE, too",
+    )
+    check.add_argument(
+        "--recompute",
+        type=number_of_tips,
+        default=SAMPLE,
+        metavar="N",
+        help="accepted tips, chosen at random, to compute again from their LED "
+        f"centres: a number, or all ({SAMPLE})",
     )
     delivered.add_argument(
         "--again",
@@ -98,6 +107,11 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
     listed.add_argument(
         "--csv", action="store_true", help="write a table for other programs"
     )
+
+
+def number_of_tips(text: str) -> int | None:
+    """Return a number of tips from 0; None for all."""
+    return None if text == "all" else whole_number(text)
 
 
 def parse_date(text: str) -> date:

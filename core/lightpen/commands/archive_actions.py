@@ -18,6 +18,7 @@ from lightpen.archive.lazy_logbook import SERVER, server_address
 from lightpen.archive.listing import entries_csv
 from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.archive.queries import EntryFilter, newest
+from lightpen.archive.recompute_check import with_recomputed
 from lightpen.archive.seal import close_sealed
 from lightpen.archive.server import open_server
 from lightpen.archive.server_setup import server_sql
@@ -40,6 +41,10 @@ def _check(options: argparse.Namespace) -> int:
         data = _data(options)
         with progress("Checking") as report:
             checked = check_file(data / ARCHIVE, data, report)
+        with progress("Recomputing") as report, _looked_into(data) as database:
+            checked = with_recomputed(
+                checked, database, data, options.recompute, report
+            )
         findings, told = checked.findings, ""
         if options.server:
             with _looked_into(data) as database, _server() as server:
@@ -54,7 +59,8 @@ def _check(options: argparse.Namespace) -> int:
         has_findings = bool(findings)
         outcome = "Something was changed" if has_findings else "No change was found"
         n_files = checked.n_files
-        print(f"{outcome}: {checked.n_entries} entries, {n_files} files.{told}")
+        n_tips = f", tips recomputed: {checked.n_tips}" if checked.n_tips else ""
+        print(f"{outcome}: {checked.n_entries} entries, {n_files} files{n_tips}.{told}")
 
     return run(options) or (CHANGED if has_findings else 0)
 

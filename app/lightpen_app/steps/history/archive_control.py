@@ -11,6 +11,7 @@ from lightpen.archive.chains import CopyResult
 from lightpen.archive.check import ArchiveCheckResult, check_archive
 from lightpen.archive.exchange import export_entries, import_entries
 from lightpen.archive.listing import save_entries
+from lightpen.archive.recompute_check import with_recomputed
 from lightpen_app.steps.history.archive_panel import ArchivePanel, SaveFormat
 from lightpen_app.steps.history.filter_bar import FilterBar
 from lightpen_app.work.job import Job, Report
@@ -57,10 +58,13 @@ class ArchiveControl(QObject):
 
     def _check(self) -> None:
         logbook, folder = self._logbook, self._folder
-        self._do(
-            lambda report: check_archive(logbook.opened().database, folder, report),
-            self._on_checked,
-        )
+
+        def check(report: Report) -> ArchiveCheckResult:
+            database = logbook.opened().database
+            checked = check_archive(database, folder, report)
+            return with_recomputed(checked, database, folder)
+
+        self._do(check, self._on_checked)
 
     def _on_checked(self, checked: ArchiveCheckResult) -> None:
         self._panel.set_checked(checked)

@@ -1,0 +1,104 @@
+"""Tests of `lightpen.archive.recompute_check`: whoever has the key can still lie."""
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from msgspec import structs
+from tests.accepted_tip import accept_tip
+
+from lightpen.archive.check import ArchiveCheckResult, check_archive
+from lightpen.archive.logbook import Logbook
+from lightpen.archive.recompute_check import with_recomputed
+from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.names import Names
+from lightpen.swing.preparation import Preparation
+
+NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
+
+
+@pytest.fixture
+def result(tmp_path: Path, shared_data: Path) -> Result:
+    """An accepted tip in the data folder."""
+    files = shared_data / "fixed-point"
+    prepared = Preparation(
+        names=NAMES,
+        camera_file=CameraFile.read(files / "camera.yaml"),
+        pen_file=PenFile.read(files / "leds.csv"),
+    )
+    file = accept_tip(tmp_path, prepared)
+    found = FolderArchive(tmp_path).content(file)
+    assert isinstance(found, Result)
+    return found
+
+
+def entered_and_recomputed(data: Path, n_tips: int | None = None) -> ArchiveCheckResult:
+    with closing(Logbook(data)) as logbook:
+        assert logbook.enter_owed() == ()
+        checked = check_archive(logbook.database, data)
+        assert checked.findings == ()
+        return with_recomputed(checked, logbook.database, data, n_tips)
+
+
+def test_honest_tips_follow_from_their_centres(tmp_path: Path, result: Result) -> None:
+    checked = entered_and_recomputed(tmp_path)
+
+    assert (checked.n_tips, checked.findings, checked.notes) == (1, (), ())
+
+
+def test_no_more_tips_are_recomputed_than_asked_for(
+    tmp_path: Path, result: Result
+) -> None:
+    FolderArchive(tmp_path).store(result)
+
+    assert entered_and_recomputed(tmp_path, 1).n_tips == 1
+    assert entered_and_recomputed(tmp_path, 0).n_tips == 0
+
+
+@pytest.mark.parametrize("what", ["tip", "uncertainty"])
+def test_a_forged_tip_or_u_that_is_entered_and_signed_is_found(
+    what: str, tmp_path: Path, result: Result, shifted: Callable[..., Result]
+) -> None:
+    FolderArchive(tmp_path).store(shifted(result, what))
+    found = entered_and_recomputed(tmp_path)
+
+    (finding,) = found.findings
+    assert finding.code == "archive.other-tip-again"
+    assert finding.values["number"] == 2
+
+
+@pytest.fixture
+def shifted() -> Callable[..., Result]:
+    """Return a function that forges a result: another tip, or half of its U."""
+
+    def forge(result: Result, what: str) -> Result:
+        calibration = result.calibration
+        x, y, z = calibration.tip_pen_mm
+        a, b, c = calibration.expanded_uncertainty_mm
+        forged = (
+            structs.replace(calibration, tip_pen_mm=(x + 0.01, y, z))
+            if what == "tip"
+            else structs.replace(
+                calibration, expanded_uncertainty_mm=(a / 2, b / 2, c / 2)
+            )
+        )
+        return replace(result, calibration=forged)
+
+    return forge
+
+
+def test_a_tip_that_cannot_be_recomputed_is_noted(
+    tmp_path: Path, result: Result
+) -> None:
+    inputs = result.calibration.inputs
+    without = structs.replace(inputs, pen=structs.replace(inputs.pen, base64=""))
+    calibration = structs.replace(result.calibration, inputs=without)
+    FolderArchive(tmp_path).store(replace(result, calibration=calibration))
+    found = entered_and_recomputed(tmp_path)
+
+    assert (found.n_tips, found.findings) == (1, ())
+    assert [each.code for each in found.notes] == ["archive.not-recomputed"]
