@@ -196,26 +196,46 @@ def _qdas(file: CalibrationFile) -> str:
     """Return a file of Q-DAS (AQDEF): x, y and z of the tip, and U of each.
 
     Each calibration is one value of six characteristics of a part, the pen with its
-    tip, so that the files of many make the series.
+    tip, so that the files of many make the series. Operator, station and pen are those
+    of the catalogues of operators, machines and gauges. Where the tip has a limit of
+    change, the specification limits lie that far from the tip as found.
     """
-    calibration = file.calibration
-    pen, tip = (printable(file.names.pen), printable(file.names.tip))
-    when = f"{local_time(file.when):%d.%m.%Y/%H:%M:%S}"
+    calibration, names, change = file.calibration, file.names, file.change
+    pen, tip = printable(names.pen), printable(names.tip)
     values = [*calibration.tip_pen_mm, *calibration.expanded_uncertainty_mm]
     titles = map("".join, product(("Tip ", "U (k=2) of tip "), AXES))
+    nominal = calibration.nominal_tip_mm or (None,) * 3
+    limits: list[tuple[float, float] | None] = [None] * 3
+    if change is not None and change.limit_mm is not None:
+        limit = change.limit_mm
+        limits = [(x - limit, x + limit) for x in change.as_found_mm]
+    limits += [(0.0, calibration.verdict.limits.max_uncertainty_mm)] * 3
     lines = [
         f"K0100 {len(values)}",
         f"K1001 {pen}",
         f"K1002 Light pen {pen}, tip {tip}",
         f"K1003 {tip}",
         f"K1900 {_remark(file)}",
+        f"K4062/1 {printable(names.station)}",
+        f"K4063/1 Station {printable(names.station)}",
+        f"K4072/1 {pen}",
+        f"K4073/1 Light pen {pen}",
+        f"K4092/1 {printable(names.operator)}",
     ]
-    for i, title in enumerate(titles, start=1):
+    each = zip(titles, (*nominal, None, None, None), limits, strict=True)
+    for i, (title, target, bounds) in enumerate(each, start=1):
         lines += [f"K2001/{i} {i}", f"K2002/{i} {title}"]
         lines += [f"K2022/{i} {N_DECIMALS}", f"K2142/{i} mm"]
+        if target is not None:
+            lines.append(f"K2101/{i} {target:.{N_DECIMALS}f}")
+        if bounds is not None:
+            lower, upper = bounds
+            lines.append(f"K2110/{i} {lower:.{N_DECIMALS}f}")
+            lines.append(f"K2111/{i} {upper:.{N_DECIMALS}f}")
+    when = f"{local_time(file.when):%d.%m.%Y/%H:%M:%S}"
     for i, value in enumerate(values, start=1):
         lines += [f"K0001/{i} {value:.{N_DECIMALS}f}", f"K0002/{i} 0"]  # 0: valid
-        lines.append(f"K0004/{i} {when}")
+        lines += [f"K0004/{i} {when}", f"K0008/{i} 1", f"K0010/{i} 1", f"K0012/{i} 1"]
     return _lines(*lines)
 
 

@@ -12,6 +12,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import yaml
+from msgspec import structs
+from tests.aqdef import read_aqdef
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.json_records import record_bytes
@@ -28,7 +30,7 @@ from lightpen.record.exports.formats import FORMATS
 from lightpen.record.library.library_changes import Author, add_item, retire_item
 from lightpen.record.library.tip_library import ItemKind, ListedTip
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen.record.results.results import Result
+from lightpen.record.results.results import Result, TipChange
 from lightpen.record.swings.names import Names
 
 ACCEPTED = datetime(2026, 8, 14, 9, 30, tzinfo=UTC)
@@ -113,13 +115,34 @@ def test_ros_reads_metres(exported: CalibrationFile) -> None:
 def test_statistics_get_each_axis_and_its_uncertainty(
     exported: CalibrationFile,
 ) -> None:
-    fields = dict(line.split(" ", 1) for line in text("qdas", exported).splitlines())
+    read = read_aqdef(text("qdas", exported))
 
-    n_characteristics = int(fields["K0100"])
-    values = [float(fields[f"K0001/{i + 1}"]) for i in range(n_characteristics)]
+    values = [each["K0001"] for each in read.values]
     np.testing.assert_allclose(values, [*TIP, *U], atol=5e-7)  # as many decimals
-    assert (fields["K1001"], fields["K1003"]) == ("LP-04", "T-10")
-    assert {fields[f"K2142/{i + 1}"] for i in range(n_characteristics)} == {"mm"}
+    assert (read.part["K1001"], read.part["K1003"]) == ("LP-04", "T-10")
+    assert {each["K2142"] for each in read.characteristics} == {"mm"}
+
+
+def test_statistics_get_operator_station_pen_nominal_and_limits(
+    exported: CalibrationFile,
+) -> None:
+    names = Names("Hall 2", "Ann", "LP-04", "T-10")
+    as_found = (-1.4, -90.3, -23.8)
+    change = TipChange(ACCEPTED, (0.0,) * 3, (0.0,) * 3, as_found, (0.0,) * 3, 0.2)
+    nominal = structs.replace(exported.calibration, nominal_tip_mm=(0.0, -90.0, -25.0))
+    whole = replace(exported, names=names, change=change, calibration=nominal)
+    read = read_aqdef(text("qdas", whole))
+
+    assert read.catalogues["K4092", 1] == "Ann"
+    assert read.catalogues["K4062", 1] == "Hall 2"
+    assert read.catalogues["K4072", 1] == "LP-04"
+    tip, of_tip = read.characteristics[:3], read.characteristics[3:]
+    np.testing.assert_allclose([each["K2101"] for each in tip], [0.0, -90.0, -25.0])
+    lower, upper = ([each[key] for each in tip] for key in ("K2110", "K2111"))
+    np.testing.assert_allclose(lower, np.array(as_found) - 0.2)
+    np.testing.assert_allclose(upper, np.array(as_found) + 0.2)
+    largest = nominal.verdict.limits.max_uncertainty_mm
+    assert {(each["K2110"], each["K2111"]) for each in of_tip} == {(0.0, largest)}
 
 
 def test_names_cannot_break_the_lines_of_a_file(exported: CalibrationFile) -> None:
