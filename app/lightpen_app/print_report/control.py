@@ -8,11 +8,13 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.result_entry import ArchivePlace, entry_of_file
+from lightpen.local_time import local_now
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.record.calibrations.reestimated_poses import (
     ReestimatedPoses,
     reestimate_poses,
 )
+from lightpen.record.exports.export_status import with_status
 from lightpen_app.work.job import Job
 from lightpen_app.work.save_place import SavePlace
 
@@ -46,7 +48,7 @@ def read_calibration_file(file: Path) -> ReportContent:
     UsageError
         The file holds no calibration, or not all that is put on paper.
     """
-    calibration_file = read_calibration(file)
+    calibration_file = with_status(read_calibration(file), local_now())
     reestimated = reestimate_poses(calibration_file.calibration)
     return ReportContent(
         calibration_file, reestimated, entry_of_file(file, calibration_file.sha256)

@@ -11,6 +11,7 @@ from lightpen.archive.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
+from lightpen.record.exports.export_status import OVERDUE, RETIRED
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import LIGHT
@@ -118,7 +119,8 @@ def _verdict(calibration_file: CalibrationFile) -> Block:
 
 def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
     names, calibration = calibration_file.names, calibration_file.calibration
-    accepted = calibration_file.accepted
+    accepted, due = calibration_file.accepted, calibration_file.due
+    measured = calibration_file.measured
     diameter = names.ball_diameter
     temperature = calibration.assumptions.temperature_c
     yield heading(translate("paper", "Item under calibration"))
@@ -131,6 +133,10 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
             (
                 translate("paper", "Ball diameter"),
                 _stated("" if diameter is None else f"{diameter:g} mm"),
+            ),
+            (
+                translate("paper", "Measured"),
+                _stated("" if measured is None else zoned_moment_text(measured)),
             ),
             (translate("paper", "Computed"), zoned_moment_text(calibration.created)),
             (translate("paper", "Cone"), _stated(names.cone)),
@@ -148,6 +154,11 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
                 else f"{temperature:.1f} \xb0C",
             ),
             (translate("paper", "Method"), _method(calibration.method)),
+            (
+                translate("paper", "Next due"),
+                _stated("" if due is None else due.isoformat()),
+            ),
+            (translate("paper", "Status"), _status(calibration_file)),
             (
                 translate("paper", "Program"),
                 f"{calibration.program.name} {calibration.program.version}",
@@ -220,6 +231,18 @@ def _signatures() -> Iterable[Block]:
     yield Block(paint, height, space=200, keeps=True)
     end = translate("paper", "End of report")
     yield paragraph(f"\u2014 {end} \u2014", PrintSize.SMALL, LIGHT.muted)
+
+
+def _status(calibration_file: CalibrationFile) -> str:
+    """Return what the library says of pen and tip."""
+    if calibration_file.due is None:
+        return _stated("")
+    words = {
+        RETIRED: translate("paper", "RETIRED"),
+        OVERDUE: translate("paper", "OVERDUE"),
+    }
+    status = [words[each] for each in calibration_file.library_status]
+    return ", ".join(status) or translate("paper", "valid")
 
 
 def _method(method: str) -> str:

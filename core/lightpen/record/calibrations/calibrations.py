@@ -57,6 +57,10 @@ class CalibrationFile:
         Since the tip that was in force before.
     restores : str or None
         Hash of the entry of the archive whose tip is in force again by it.
+    swing : Path or None
+        Folder of the swing as a result names it.
+    measured : datetime or None
+        When its swing began, where that was looked up.
     library_status : tuple of str
         Whether pen or tip are retired or overdue, where that was looked up.
     due : date or None
@@ -75,6 +79,8 @@ class CalibrationFile:
     reason: str = ""
     change: TipChange | None = None
     restores: str | None = None
+    swing: Path | None = None
+    measured: datetime | None = None
     library_status: tuple[str, ...] = ()
     due: date | None = None
 
@@ -225,6 +231,7 @@ def parse_calibration(data: bytes, path: Path) -> CalibrationFile:
             reason=result.reason,
             change=result.change,
             restores=result.restores,
+            swing=result.record,
         )
     record = _parse_record(data, path)
     verdict = record.verdict

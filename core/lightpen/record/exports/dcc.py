@@ -88,7 +88,7 @@ def _add_administrative_data(
     identified = _sub(core, "identifications")
     _identify(identified, "SHA-256 of the JSON record", file.sha256)
     _identify(identified, "JSON record", file.name)
-    calibrated = f"{file.calibration.created:%Y-%m-%d}"
+    calibrated = f"{file.measured or file.calibration.created:%Y-%m-%d}"
     _value(core, "beginPerformanceDate", calibrated)
     _value(core, "endPerformanceDate", calibrated)
     _value(core, "performanceLocation", "laboratory")

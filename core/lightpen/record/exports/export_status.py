@@ -1,8 +1,11 @@
-"""What an exported tip is besides valid: simulated, not passed, retired or overdue."""
+"""What an exported tip is besides valid, when it was measured, and when it is due."""
 
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
+from pathlib import Path
 
+from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.local_time import local_time
 from lightpen.model.limits import StationLimits
@@ -11,12 +14,13 @@ from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.library.tip_library import ItemKind
 from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.swings.reading import open_record
 
 RETIRED, OVERDUE = "RETIRED", "OVERDUE"
 
 
 def with_status(file: CalibrationFile, now: datetime) -> CalibrationFile:
-    """Return a calibration with what its data folder says of its pen and tip.
+    """Return a calibration with what its data folder says of it, its pen and its tip.
 
     Raises
     ------
@@ -40,7 +44,20 @@ def with_status(file: CalibrationFile, now: datetime) -> CalibrationFile:
         found.append(RETIRED)
     if now > due or any(item.is_overdue(today) for item in items):
         found.append(OVERDUE)
-    return replace(file, library_status=tuple(found), due=local_time(due).date())
+    return replace(
+        file,
+        measured=_measured(data, file),
+        library_status=tuple(found),
+        due=local_time(due).date(),
+    )
+
+
+def _measured(data: Path, file: CalibrationFile) -> datetime | None:
+    """Return when the swing of a calibration began; None where it is not there."""
+    if file.swing is not None:
+        with suppress(FileError):
+            return open_record(data / file.swing).header.created
+    return None
 
 
 def status_of(file: CalibrationFile) -> tuple[str, ...]:

@@ -2,7 +2,8 @@
 
 import csv
 import io
-from collections.abc import Mapping
+import shutil
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -32,6 +33,7 @@ from lightpen.record.library.tip_library import ItemKind, ListedTip
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result, TipChange
 from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import open_record
 
 ACCEPTED = datetime(2026, 8, 14, 9, 30, tzinfo=UTC)
 TIP, U = [-1.5, -90.25, -23.875], [0.001, 0.0025, 0.002]
@@ -226,3 +228,28 @@ def test_images_are_a_table_with_a_row_each(
     assert [int(row["image"]) for row in rows] == list(range(1, len(rows) + 1))
     assert [row["file"] for row in rows] == [each["file"] for each in stated["frames"]]
     assert [row["reason"] for row in rows].count("") == stated["images"]["used"]
+
+
+def test_a_result_states_when_it_was_measured_and_when_it_is_due(
+    swung: Callable[..., Path], tmp_path: Path
+) -> None:
+    from benchmarks.small_records import small_record
+
+    swing = Path(shutil.copytree(swung(), tmp_path / "records" / "swing"))
+    names = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1")
+    results, calibration = FolderArchive(tmp_path), small_record()
+    results.store(
+        Result(
+            *(names, ACCEPTED, Grade.PASS, swing, ()),
+            calibration=calibration,
+            origin=Origin.LIVE,
+        )
+    )
+    (path,) = results.all_files()
+    file = with_status(read_calibration(path), calibration.created)
+
+    assert file.measured == open_record(swing).header.created
+    assert file.due is not None
+    laboratory = Laboratory("Hall 2", "hall2@example.com", "Berlin", "DE")
+    begun = f"<dcc:beginPerformanceDate>{file.measured:%Y-%m-%d}<"
+    assert begun in text("dcc", file, laboratory)
