@@ -211,6 +211,14 @@ def budget_blocks(calibration: CalibrationRecord) -> Iterable[Block]:
     if parts.correlation_factor > 1:
         text = translate("paper", "Images are correlated: noise variance \u00d7 {0}")
         texts.append(text.format(f"{parts.correlation_factor:.2f}"))
+    check = calibration.self_check
+    if check is not None:
+        text = translate(
+            "paper",
+            "Self-check: half of the LEDs predict the others to {0} times their "
+            "uncertainty; at most {1} by chance.",
+        )
+        texts.append(text.format(f"{check.value:.2f}", f"{check.limit:.2f}"))
     yield paragraph(" ".join(texts))
     yield row_of_charts([budget_chart(calibration)], CHART)
 

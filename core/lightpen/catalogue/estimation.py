@@ -55,6 +55,7 @@ MESSAGES = {
     "warning.effect-sag": "The pen bends under its weight by {size:.4f} mm at its upper end when horizontal; the result is corrected and U includes the rest. Hold it near its middle, or stiffen it.",
     "warning.effect-camera-tilt": "The image shifts by {size:.3f} px with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand, apart from where you step.",
     "warning.led-noise": "LED {led} is noisier than the others: {sigma:.3f} px, usual is {usual:.3f} px; it counts accordingly less. Clean it, and check its brightness and its supply.",
+    "warning.self-check": "Half of the LEDs predict the others only to {value:.2f} times their uncertainty (at most {limit:.2f} by chance), depending on the posture: LEDs, pen or lens do what the model does not contain, and U may be too small. Check for bent or unevenly bright LEDs, a loose pen and a window before the lens, then verify the tip on an artefact.",
     "warning.copies": "{n_copies} of {n_images} images are copies of others and count once. Check the recording, and give each image once.",
     "warning.no-partner": "Camera {camera} has no image at {n_absent} of {n_moments} instants, such as {example}. The images of the other cameras are used there.",
     "warning.other-moment": "Camera {camera} shows another posture of the pen than the other cameras at {n_apart} of {n_moments} instants, such as {example}; these images are excluded. Check that simultaneous images have the same name, and check the trigger.",

@@ -59,6 +59,8 @@ from lightpen.estimation.rigs.initial_extrinsics import find_initial_extrinsics
 from lightpen.estimation.rigs.rig_conventions import require_usual_rig
 from lightpen.estimation.rigs.rig_poses import RigPoses, join_poses
 from lightpen.estimation.rigs.synchrony import TimeLag
+from lightpen.estimation.self_check import SelfCheck, check_prediction
+from lightpen.estimation.tip_frames import TipFrames, tip_frames
 from lightpen.estimation.uncertainty.budget import (
     Budget,
     SplitHalfCheck,
@@ -201,6 +203,20 @@ class Calibration:
     def effects(self) -> tuple[FoundEffect, ...]:
         """Effects of lens and mechanics that the images support."""
         return found_effects(self.bundle)
+
+    @cached_property
+    def self_check(self) -> SelfCheck | None:
+        """How well parts of the LEDs predict the others."""
+        bundle = self.bundle
+        return check_prediction(
+            *(bundle.state, bundle.residuals, bundle.used, bundle.unknowns.noise),
+            self.budget.correlation_factor,
+        )
+
+    @cached_property
+    def tip_frames(self) -> TipFrames | None:
+        """The tip in the frame of the file and in that of the LEDs as they are."""
+        return tip_frames(self.bundle, self.leds, self.joint.tip_pen)
 
     @property
     def led_sigma(self) -> float:

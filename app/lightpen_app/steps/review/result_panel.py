@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QFrame, QSizePolicy, QWidget
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.verdict import halves_agree
+from lightpen.estimation.self_check import SelfCheck
 from lightpen.local_time import local_time
 from lightpen.model.coverage import Coverage
 from lightpen.record.results.assessment import SwingAssessment
@@ -66,6 +67,7 @@ class ResultPanel(Translated, QFrame):
         self._table = NumberTable()
         self._as_found = SignLabel()
         self._halves = SignLabel()
+        self._self_check = SignLabel()
         self._images = SignLabel()
         self._postures = text_label(TextSize.LEAD, Tone.QUIET)
         self._dial = PostureDial()
@@ -82,7 +84,7 @@ class ResultPanel(Translated, QFrame):
         layout.addSpacing(GRID)
         fill(layout, self._comparison, self._table)
         layout.addSpacing(GRID // 2)
-        fill(layout, self._as_found, self._halves, self._images)
+        fill(layout, self._as_found, self._halves, self._self_check, self._images)
         layout.addSpacing(GRID)
         fill(layout, self._postures, (self._dial, 100), 1)
 
@@ -121,6 +123,7 @@ class ResultPanel(Translated, QFrame):
             self._table.set_value(Figures())
             self._as_found.set_value(StatusMessage())
             self._halves.set_value(StatusMessage())
+            self._self_check.set_value(StatusMessage())
             self._images.set_value(StatusMessage())
             self._dial.set_value(DialValue())
             return
@@ -129,6 +132,9 @@ class ResultPanel(Translated, QFrame):
         self._table.set_value(self._halves_figures(outcome.solution))
         self._as_found.set_value(self._as_found_message(outcome.assessment))
         self._halves.set_value(self._halves_message(outcome.solution))
+        check = outcome.solution.calibration.self_check
+        self._self_check.set_value(self._self_check_message(check))
+        self._self_check.setVisible(check is not None)
         used = outcome.solution.calibration.used
         text = self.tr("{0} of {1} images included").format(int(used.sum()), len(used))
         whole = bool(used.all())
@@ -177,6 +183,16 @@ class ResultPanel(Translated, QFrame):
             text = self.tr("Odd and even images agree")
             return StatusMessage(text, Sign.CHECK, Tone.GOOD)
         text = self.tr("Odd and even images differ significantly")
+        return StatusMessage(text, Sign.WARNING, Tone.WARN)
+
+    def _self_check_message(self, check: SelfCheck | None) -> StatusMessage:
+        """Return how well parts of the LEDs predict the others."""
+        if check is None:
+            return StatusMessage()
+        text = self.tr("LEDs predict each other: {0} (by chance up to {1})")
+        text = text.format(f"{check.value:.2f}", f"{check.limit:.2f}")
+        if check.is_passed:
+            return StatusMessage(text, Sign.CHECK, Tone.GOOD)
         return StatusMessage(text, Sign.WARNING, Tone.WARN)
 
 

@@ -204,6 +204,39 @@ class AdjustmentRecord(Struct, frozen=True):
     effects: tuple[EffectRecord, ...]
 
 
+class TipFramesRecord(Struct, frozen=True):
+    """The tip where LEDs are displaced, so that the pen frame is ambiguous.
+
+    Attributes
+    ----------
+    of_file_mm
+        In the frame of the LED file by the LEDs that are not displaced.
+    of_all_leds_mm
+        In the frame of all LEDs as they are.
+    result_is_of_file
+        Whether the result and its U refer to the former.
+    """
+
+    of_file_mm: Vector
+    of_all_leds_mm: Vector
+    result_is_of_file: bool
+
+
+class SelfCheckRecord(Struct, frozen=True):
+    """Errors that half of the LEDs predict the others with, where they follow posture.
+
+    Attributes
+    ----------
+    value
+        Over those that differ from image to image: 1 by chance.
+    limit
+        Which chance exceeds in one of a hundred swings.
+    """
+
+    value: float
+    limit: float
+
+
 class LampRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The fixed lamps in view of a camera."""
 
@@ -399,6 +432,10 @@ class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
         Values in place of what the files do not state.
     fixed_lamps
         Of each camera with fixed lamps in view.
+    tip_frames
+        Where LEDs are displaced.
+    self_check
+        Parts of the LEDs against the others.
     instrument
         Input of verification and measuring.
     inputs
@@ -435,6 +472,8 @@ class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     weakest_direction: DirectionRecord
     coverage: CoverageRecord
     leds: tuple[LedRecord, ...]
+    tip_frames: TipFramesRecord | None = None
+    self_check: SelfCheckRecord | None = None
     rig: RigRecord | None = None
     inputs: InputsRecord
     frames: tuple[FrameRecord, ...]

@@ -30,7 +30,9 @@ from lightpen.estimation.reports.calibration_record import (
     OtherCameraRecord,
     RigRecord,
     SecondConeRecord,
+    SelfCheckRecord,
     SpotRecord,
+    TipFramesRecord,
     UncertaintyRecord,
     VerdictLimits,
     VerdictRecord,
@@ -38,6 +40,8 @@ from lightpen.estimation.reports.calibration_record import (
 from lightpen.estimation.reports.methods import METHODS, Method, result_of
 from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
 from lightpen.estimation.reports.verdict import judge
+from lightpen.estimation.self_check import SelfCheck
+from lightpen.estimation.tip_frames import TipFrames
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR, ContributionName
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.estimation.uncertainty.second_cone import SecondCone
@@ -99,6 +103,8 @@ def calibration_record(
         ),
         coverage=_coverage(calibration),
         leds=_leds(calibration),
+        tip_frames=_tip_frames(calibration.tip_frames),
+        self_check=_self_check(calibration.self_check),
         rig=_rig(calibration) if several else None,
         inputs=_inputs(inputs),
         frames=tuple(_frames(calibration)),
@@ -228,6 +234,14 @@ def _adjusted(calibration: Calibration) -> AdjustmentRecord:
             for each in calibration.effects
         ),
     )
+
+
+def _self_check(check: SelfCheck | None) -> SelfCheckRecord | None:
+    return None if check is None else SelfCheckRecord(*check)
+
+
+def _tip_frames(frames: TipFrames | None) -> TipFramesRecord | None:
+    return None if frames is None else TipFramesRecord(*plain(tuple(frames)))
 
 
 def _lamps(calibration: Calibration) -> tuple[LampRecord, ...]:

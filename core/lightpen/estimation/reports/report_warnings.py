@@ -43,6 +43,7 @@ def warnings_of(calibration: Calibration) -> list[Message]:
         *(each.message for each in calibration.effects if each.is_certain),
         *_copy_warnings(calibration),
         *_noise_warnings(calibration),
+        *_self_check_warnings(calibration),
     ]
     warnings += [
         message("warning.led-unseen", led=int(led) + 1)
@@ -84,6 +85,13 @@ def _noise_warnings(calibration: Calibration) -> list[Message]:
         )
         for led in np.flatnonzero(noise > NOISY)
     ]
+
+
+def _self_check_warnings(calibration: Calibration) -> list[Message]:
+    check = calibration.self_check
+    if check is None or check.is_passed:
+        return []
+    return [message("warning.self-check", value=check.value, limit=check.limit)]
 
 
 def _seat_warnings(calibration: Calibration) -> list[Message]:
