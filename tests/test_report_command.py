@@ -8,7 +8,17 @@ from typing import Any
 import pytest
 
 from lightpen.errors import FileError
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import record_bytes
+from lightpen.record.folder.verifications import read_verification
+from lightpen.verification.reports.records import verification_record
+from lightpen.verification.tasks.assessment import (
+    USE_TIP,
+    VERIFY_AGAIN,
+    VerificationAssessment,
+)
+from lightpen_app.print_report.verification import verification_paper
 from lightpen_app.reporting import write_paper
 
 UNSEEN = {"QT_QPA_PLATFORM": "", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
@@ -26,6 +36,50 @@ def test_a_record_is_put_on_paper_without_a_display(
     assert (outcome.returncode, outcome.stderr) == (0, "")
     assert "tip.pdf" in outcome.stdout
     assert out.read_bytes().startswith(b"%PDF-1.4")
+
+
+@pytest.fixture
+def verification(tmp_path: Path) -> Path:
+    """A verification with all kinds of figures."""
+    verdict = VerificationAssessment(Grade.CHECK, USE_TIP, VERIFY_AGAIN)
+    entries = {
+        "pen": "LP-04",
+        "tip": "T-10",
+        "origin": "simulated",
+        "moved_mm": [0.001, 0.002, 0.003],
+        "wants_other_tip": False,
+        "runs": [{"name": "before", "radius_mm": 31.751, "points": [1.0] * 5}],
+        "calibrated": {"points_cam_mm": [[1.0, 2.0, 3.0]] * 4},
+    }
+    record = verification_record("drift", entries, verdict, {"drift": 0.02}, {})
+    file = tmp_path / "drift.json"
+    file.write_bytes(record_bytes(record))
+    return file
+
+
+def test_a_verification_is_put_on_paper(verification: Path, tmp_path: Path) -> None:
+    out = tmp_path / "drift.pdf"
+    write_paper(verification, out, "en")
+    pages = out.read_bytes()
+
+    assert pages.startswith(b"%PDF-1.4")
+    content, file = verification.read_bytes(), InputFile(verification, "0" * 64)
+    paper = verification_paper(
+        InputFile(verification, file.sha256, content),
+        read_verification(content, verification),
+        None,
+    )
+    assert paper.margins.badges == ("SIMULATED", "CHECK")
+    assert paper.margins.subject == "Pen LP-04, tip T-10, drift"
+
+
+def test_a_tampered_verification_is_not_put_on_paper(
+    verification: Path, tmp_path: Path
+) -> None:
+    verification.write_bytes(verification.read_bytes().replace(b"0.003", b"0.001"))
+
+    with pytest.raises(FileError, match="damaged"):
+        write_paper(verification, tmp_path / "drift.pdf", "en")
 
 
 def test_a_tampered_record_is_not_put_on_paper(

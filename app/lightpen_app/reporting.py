@@ -1,25 +1,34 @@
-"""The record on paper of a calibration, without a window."""
+"""The report of a calibration or a verification, without a window."""
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
 
-from lightpen.formats.files import write_whole
+from lightpen.archive.result_entry import entry_of_file
+from lightpen.formats.files import A_FILE, MEGABYTE, read_bytes, write_whole
+from lightpen.formats.hashes import InputFile
 from lightpen.record.exports.exports import save_new
+from lightpen.record.folder.verifications import is_verification, read_verification
 from lightpen_app.application import has_display, make_application
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import load_fonts
 from lightpen_app.print_report.control import read_calibration_file
 from lightpen_app.print_report.printing import paper_of, paper_stem, pdf_of
 
+LIMIT = 64 * MEGABYTE
+
 
 def write_paper(result: Path, out: Path | None, language: str) -> Path:
-    """Write the record on paper of a calibration as PDF.
+    """Write the report of a calibration or a verification as PDF.
 
     Parameters
     ----------
     result : Path
-        An accepted result, or what ``lightpen calibrate`` wrote.
+        An accepted result, or what ``lightpen calibrate``, ``verify`` or
+        ``repeatability`` wrote.
     out : Path or None
         Output file; None for a default name in the current folder.
 
@@ -37,15 +46,46 @@ def write_paper(result: Path, out: Path | None, language: str) -> Path:
     UsageError
         The file holds no calibration, or not all that is put on paper.
     """
+    content = read_bytes(result, A_FILE, LIMIT)
+    if is_verification(content):
+        return _write_verification(result, content, out, language)
     found = read_calibration_file(result)
+    with _speaking(language):
+        pdf = pdf_of(paper_of(found.calibration_file, found.reestimated, found.entered))
+    return _written(pdf, paper_stem(found.calibration_file), out)
+
+
+def _write_verification(
+    file: Path, content: bytes, out: Path | None, language: str
+) -> Path:
+    # Few reports are of one.
+    from lightpen_app.print_report.verification import (
+        verification_paper,
+        verification_stem,
+    )
+
+    done = read_verification(content, file)
+    kept = InputFile(file, sha256(content).hexdigest(), content)
+    entered = entry_of_file(file, kept.sha256)
+    with _speaking(language):
+        pdf = pdf_of(verification_paper(kept, done, entered))
+    return _written(pdf, verification_stem(file, done), out)
+
+
+@contextmanager
+def _speaking(language: str) -> Iterator[None]:
+    """Have an application, without a display if need be, in a language."""
     if not has_display():
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
     application = make_application(sys.argv[:1])
     languages = LanguageSwitch(application)
     languages.set_language(language)
     load_fonts()
-    pdf = pdf_of(paper_of(found.calibration_file, found.reestimated, found.entered))
+    yield
+
+
+def _written(pdf: bytes, stem: str, out: Path | None) -> Path:
     if out is None:
-        return save_new(Path(), f"{paper_stem(found.calibration_file)}.pdf", pdf)
+        return save_new(Path(), f"{stem}.pdf", pdf)
     write_whole(out, pdf)
     return out

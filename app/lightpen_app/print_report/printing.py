@@ -23,12 +23,16 @@ from lightpen.record.exports.exports import export_stem
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.print_report.blocks import DOTS_AN_INCH
 from lightpen_app.print_report.pages import Margins, PrintReport, lay_out, paint_page
-from lightpen_app.print_report.sections import all_sections, title_text, translate
+from lightpen_app.print_report.sections import (
+    all_sections,
+    record_number,
+    title_text,
+    translate,
+)
 
 # Qt names it among the colours of each page and draws in none of it; PDF/A-1 has no
 # place for it beside colours of a screen. Of equal length, as a PDF counts its bytes.
 CMYK, IN_ITS_PLACE = b"/DeviceCMYK", b"/DeviceRGB "
-NUMBER_LENGTH = 12  # digits of the SHA-256 that name a record
 A4 = QPageLayout(
     QPageSize(QPageSize.PageSizeId.A4),
     QPageLayout.Orientation.Portrait,
@@ -97,13 +101,11 @@ def _margins(calibration_file: CalibrationFile) -> Margins:
     names = calibration_file.names
     items = (each or "\u2013" for each in (names.pen, names.tip, names.cone))
     subject = translate("paper", "Pen {0}, tip {1}, cone {2}").format(*items)
-    digits = calibration_file.sha256[:NUMBER_LENGTH]
-    number = " ".join(digits[i : i + 4] for i in range(0, NUMBER_LENGTH, 4))
     foot = translate("paper", "SHA-256 of the JSON file: {0}")
     return Margins(
         title=title_text(),
         subject=subject,
-        number=translate("paper", "No. {0}").format(number),
+        number=record_number(calibration_file.sha256),
         badges=_badges(calibration_file),
         foot=foot.format(calibration_file.sha256),
     )

@@ -33,6 +33,7 @@ from lightpen_app.print_report.findings import budget_blocks, result_blocks, rul
 
 translate = QCoreApplication.translate
 
+NUMBER_LENGTH = 12  # digits of the SHA-256 that name a record
 GRADE_COLORS = {
     Grade.PASS: LIGHT.good,
     Grade.CHECK: LIGHT.warn,
@@ -55,8 +56,8 @@ def all_sections(
         *image_blocks(calibration_file.calibration, reestimated),
         *led_blocks(calibration_file.calibration),
         *file_blocks(calibration_file.calibration),
-        *_proof(calibration_file, entered),
-        *_signatures(),
+        *proof_blocks(calibration_file.name, calibration_file.sha256, entered),
+        *signature_blocks(translate("paper", "Calibrated by")),
     )
 
 
@@ -126,20 +127,20 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
     yield heading(translate("paper", "Item under calibration"))
     yield from facts(
         [
-            (translate("paper", "Pen serial number"), _stated(names.pen)),
-            (translate("paper", "Station"), _stated(names.station)),
-            (translate("paper", "Probe tip"), _stated(names.tip)),
-            (translate("paper", "Operator"), _stated(names.operator)),
+            (translate("paper", "Pen serial number"), stated(names.pen)),
+            (translate("paper", "Station"), stated(names.station)),
+            (translate("paper", "Probe tip"), stated(names.tip)),
+            (translate("paper", "Operator"), stated(names.operator)),
             (
                 translate("paper", "Ball diameter"),
-                _stated("" if diameter is None else f"{diameter:g} mm"),
+                stated("" if diameter is None else f"{diameter:g} mm"),
             ),
             (
                 translate("paper", "Measured"),
-                _stated("" if measured is None else zoned_moment_text(measured)),
+                stated("" if measured is None else zoned_moment_text(measured)),
             ),
             (translate("paper", "Computed"), zoned_moment_text(calibration.created)),
-            (translate("paper", "Cone"), _stated(names.cone)),
+            (translate("paper", "Cone"), stated(names.cone)),
             (
                 translate("paper", "Accepted"),
                 translate("paper", "no")
@@ -156,7 +157,7 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
             (translate("paper", "Method"), _method(calibration.method)),
             (
                 translate("paper", "Next due"),
-                _stated("" if due is None else due.isoformat()),
+                stated("" if due is None else due.isoformat()),
             ),
             (translate("paper", "Status"), _status(calibration_file)),
             (
@@ -165,8 +166,8 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
             ),
         ]
     )
-    stated = (names.pen, names.tip, names.cone, names.station, names.operator)
-    if any(printed_text(each) != each for each in (*stated, calibration_file.reason)):
+    given = (names.pen, names.tip, names.cone, names.station, names.operator)
+    if any(printed_text(each) != each for each in (*given, calibration_file.reason)):
         yield paragraph(
             translate(
                 "paper",
@@ -176,21 +177,23 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
         )
 
 
-def _proof(
-    calibration_file: CalibrationFile, entered: ArchivePlace | None
-) -> Iterable[Block]:
-    """Return the hashes that bind the report to its file, and the signature fields."""
-    return (replace(block, keeps=True) for block in _binding(calibration_file, entered))
+def record_number(sha256: str) -> str:
+    """Return the number of a report, by the hash of its file."""
+    digits = sha256[:NUMBER_LENGTH]
+    number = " ".join(digits[i : i + 4] for i in range(0, NUMBER_LENGTH, 4))
+    return translate("paper", "No. {0}").format(number)
 
 
-def _binding(
-    calibration_file: CalibrationFile, entered: ArchivePlace | None
+def proof_blocks(
+    name: str, sha256: str, entered: ArchivePlace | None
 ) -> Iterable[Block]:
+    """Return the hashes that bind the report to its file."""
+    return (replace(block, keeps=True) for block in _binding(name, sha256, entered))
+
+
+def _binding(name: str, sha256: str, entered: ArchivePlace | None) -> Iterable[Block]:
     yield heading(translate("paper", "Source of this report"))
-    rows = [
-        (translate("paper", "JSON file"), calibration_file.name),
-        ("SHA-256", calibration_file.sha256),
-    ]
+    rows = [(translate("paper", "JSON file"), name), ("SHA-256", sha256)]
     if entered is None:
         nowhere = translate("paper", "none")
         rows.append((translate("paper", "Entry in the archive"), nowhere))
@@ -206,14 +209,21 @@ def _binding(
             "paper",
             "All figures are taken from this file, which is the complete original. "
             "They relate only to the items named, in their condition at the time. "
-            "This is a calibration report, not a certificate of an accredited "
+            "This is a report, not a certificate of an accredited "
             "laboratory. It must not be reproduced except in full.",
         )
     )
 
 
-def _signatures() -> Iterable[Block]:
-    names = (translate("paper", "Calibrated by"), translate("paper", "Checked by"))
+def signature_blocks(by: str) -> Iterable[Block]:
+    """Return the fields for signatures, and the end mark.
+
+    Parameters
+    ----------
+    by : str
+        Title of the first field.
+    """
+    names = (by, translate("paper", "Checked by"))
     below = translate("paper", "Name, date, signature")
     width, height = WIDTH / 2 - 100, 24 * MM
 
@@ -236,7 +246,7 @@ def _signatures() -> Iterable[Block]:
 def _status(calibration_file: CalibrationFile) -> str:
     """Return what the library says of pen and tip."""
     if calibration_file.due is None:
-        return _stated("")
+        return stated("")
     words = {
         RETIRED: translate("paper", "RETIRED"),
         OVERDUE: translate("paper", "OVERDUE"),
@@ -251,5 +261,6 @@ def _method(method: str) -> str:
     return translate("paper", "two-stage, as published by S. Liu et al. (2013)")
 
 
-def _stated(text: str) -> str:
+def stated(text: str) -> str:
+    """Return a text, or that it is not stated."""
     return text or translate("paper", "not stated")

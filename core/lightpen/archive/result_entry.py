@@ -6,8 +6,9 @@ from pathlib import Path
 
 from lightpen.errors import FileError, NoArchiveError
 from lightpen.formats.files import printable
+from lightpen.record.folder.verifications import VERIFICATIONS
 from lightpen.record.results.opening import data_folder_of
-from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class ArchivePlace:
 
 
 def entry_of_file(result: Path, sha256: str) -> ArchivePlace | None:
-    """Return where a result is entered.
+    """Return where a result or a verification is entered.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ def entry_of_file(result: Path, sha256: str) -> ArchivePlace | None:
     FileError
         It is not the file that was entered.
     """
-    data = data_folder_of(result)
+    data = _verifying(result) or data_folder_of(result)
     if data is None:
         return None
     # A fifth of a second, which a file in no data folder need not take.
@@ -66,3 +67,11 @@ def entry_of_file(result: Path, sha256: str) -> ArchivePlace | None:
     if entered is None or entered.sha256 != sha256:
         raise FileError("archive.another-result", file=printable(str(result)))
     return ArchivePlace(found.entry.number, found.sha256, found.entry.previous)
+
+
+def _verifying(file: Path) -> Path | None:
+    """Return the data folder of a verification; None of other files."""
+    folder = file.absolute().parent
+    if folder.name != VERIFICATIONS:
+        return None
+    return folder.parents[folder.parent.name == SIMULATED]

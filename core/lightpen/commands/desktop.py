@@ -83,7 +83,7 @@ def add_report(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
         "result",
         type=Path,
         metavar="RESULT.json",
-        help="accepted result, or record written by calibrate --json",
+        help="accepted result or verification, or record written with --json",
     )
     parser.add_argument(
         "--out",

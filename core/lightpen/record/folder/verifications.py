@@ -11,6 +11,7 @@ from lightpen.formats.own_json import (
     DamagedError,
     ZonedTime,
     parse_checked,
+    parse_own_json,
     require_usual,
 )
 from lightpen.formats.stored_messages import StoredMessage
@@ -82,6 +83,18 @@ class StoredVerification(Struct, frozen=True):
         if verdict is None:
             return None
         return StoredMessage(verdict.code, verdict.text, verdict.values)
+
+
+class _Kind(Struct):
+    verification: str = ""
+
+
+def is_verification(content: bytes) -> bool:
+    """Return whether a JSON file says that it is a verification."""
+    try:
+        return parse_own_json(content, _Kind).verification != ""
+    except DamagedError:
+        return False
 
 
 def read_verification(content: bytes, file: Path) -> StoredVerification:

@@ -1,0 +1,238 @@
+"""The report of a verification, a repeatability study or a drift.
+
+The figures are those of the JSON record, under the names that they have there, so that
+a task that is added needs nothing here.
+"""
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QCoreApplication
+
+from lightpen.archive.result_entry import ArchivePlace
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.hashes import InputFile
+from lightpen.model.origin import Origin
+from lightpen.record.folder.verifications import StoredVerification
+from lightpen_app.look.phrases import grade_text, origin_text
+from lightpen_app.look.sentences import worded
+from lightpen_app.print_report.blocks import (
+    RIGHT,
+    Block,
+    Column,
+    PrintSize,
+    facts,
+    heading,
+    paragraph,
+    subheading,
+    table,
+)
+from lightpen_app.print_report.pages import Margins, PrintReport, lay_out
+from lightpen_app.print_report.sections import (
+    proof_blocks,
+    record_number,
+    signature_blocks,
+    stated,
+    zoned_moment_text,
+)
+
+translate = QCoreApplication.translate
+
+# Of the record: what stands elsewhere in the report, and what is too long for it.
+ELSEWHERE = {
+    *("program", "created", "verification", "verdict", "session", "station"),
+    *("operator", "pen", "tip", "origin", "inputs", "records", "checksum"),
+    *("touches", "left_out", "rejected", "witness", "images", "covariance"),
+}
+N_DECIMALS = 4  # of a length in mm
+N_DIGITS = 6  # of another number
+LONGEST_TABLE = 50  # rows
+
+
+def verification_paper(
+    file: InputFile, done: StoredVerification, entered: ArchivePlace | None
+) -> PrintReport:
+    """Return the pages of a verification, in the language that is chosen.
+
+    Parameters
+    ----------
+    file : InputFile
+        Its file with the content.
+    """
+    record: dict[str, Any] = json.loads(file.content or b"{}")
+    title = translate("paper", "Verification report")
+    blocks = (
+        paragraph(title, PrintSize.TITLE, bold=True),
+        *_items(done),
+        *_verdict(done, record.get("verdict")),
+        *_figures(record),
+        *_inputs(record.get("inputs", {})),
+        *proof_blocks(file.path.name, file.sha256, entered),
+        *signature_blocks(translate("paper", "Verified by")),
+    )
+    items = (each or "\u2013" for each in (done.pen, done.tip, done.verification))
+    foot = translate("paper", "SHA-256 of the JSON file: {0}")
+    margins = Margins(
+        title=title,
+        subject=translate("paper", "Pen {0}, tip {1}, {2}").format(*items),
+        number=record_number(file.sha256),
+        badges=_badges(done),
+        foot=foot.format(file.sha256),
+    )
+    return PrintReport(done.operator, margins, lay_out(blocks))
+
+
+def verification_stem(file: Path, done: StoredVerification) -> str:
+    """Return the beginning of the default file name."""
+    return f"{file.stem}_{done.verification}".replace(" ", "-")
+
+
+def _badges(done: StoredVerification) -> tuple[str, ...]:
+    badges = []
+    if done.origin not in (None, Origin.LIVE):
+        badges.append(origin_text(done.origin))
+    if done.verdict is not None and done.verdict.grade != Grade.PASS:
+        badges.append(grade_text(Grade(done.verdict.grade)))
+    return tuple(badges)
+
+
+def _items(done: StoredVerification) -> Iterator[Block]:
+    yield heading(translate("paper", "Item under verification"))
+    yield from facts(
+        [
+            (translate("paper", "Task"), done.verification),
+            (translate("paper", "Verified"), zoned_moment_text(done.created)),
+            (translate("paper", "Pen serial number"), stated(done.pen)),
+            (translate("paper", "Station"), stated(done.station)),
+            (translate("paper", "Probe tip"), stated(done.tip)),
+            (translate("paper", "Operator"), stated(done.operator)),
+            (translate("paper", "Image source"), origin_text(done.origin)),
+            (translate("paper", "Program"), str(done.program)),
+        ]
+    )
+
+
+def _verdict(done: StoredVerification, verdict: Any) -> Iterator[Block]:
+    yield heading(translate("paper", "Verdict"))
+    if done.verdict is None or not isinstance(verdict, Mapping):
+        yield paragraph(translate("paper", "Measured, not judged."))
+        return
+    grade = grade_text(Grade(done.verdict.grade))
+    yield paragraph(f"{grade}: {worded(done.why)}", bold=True)
+    limits = [
+        (name.replace("_", " "), f"{limit:.{N_DECIMALS}f}")
+        for name, limit in done.verdict.limits_mm.items()
+    ]
+    yield paragraph(str(verdict.get("decision_rule") or ""))
+    if limits:
+        yield subheading(translate("paper", "Limits / mm"))
+        yield from facts(limits)
+    if done.reason:
+        told = translate("paper", "The tip was accepted. Reason: {0}")
+        yield paragraph(told.format(done.reason))
+
+
+def _figures(record: Mapping[str, Any]) -> Iterator[Block]:
+    yield heading(translate("paper", "Figures, as the JSON file names them"))
+    yield from _values(record)
+    for name, value in record.items():
+        if name in ELSEWHERE:
+            continue
+        if isinstance(value, Mapping):
+            yield subheading(_title(name))
+            yield from _values(value)
+            yield from _tables(value)
+        elif _is_list_of(value, Mapping):
+            for i, each in enumerate(value[:LONGEST_TABLE], 1):
+                yield subheading(f"{_title(name)} {i}")
+                yield from _values(each)
+    yield from _tables(record)
+
+
+def _values(of: Mapping[str, Any]) -> tuple[Block, ...]:
+    """Return numbers, words, and short lists of numbers."""
+    rows = [
+        (_title(name), _plain(name, value))
+        for name, value in of.items()
+        if name not in ELSEWHERE and _is_short(value)
+    ]
+    return facts(rows, n_columns=1) if rows else ()
+
+
+def _tables(of: Mapping[str, Any]) -> Iterator[Block]:
+    """Yield points, and longer lists of numbers."""
+    for name, value in of.items():
+        if name in ELSEWHERE or _is_short(value):
+            continue
+        if _is_list_of(value, (int, float)):
+            value = [[each] for each in value]
+        if not (_is_list_of(value, list) and all(map(_is_short, value))):
+            continue
+        yield subheading(_title(name))
+        n_columns = max(map(len, value), default=0)
+        columns = [Column("", 0.5), *(Column("", 1.0, RIGHT),) * n_columns]
+        rows = [
+            [str(i), *(_number(name, x) for x in each), *[""] * (n_columns - len(each))]
+            for i, each in enumerate(value[:LONGEST_TABLE], 1)
+        ]
+        yield from table(columns, rows)
+
+
+def _inputs(inputs: Any) -> Iterable[Block]:
+    """Yield the files with their hashes; of the images how many there are."""
+    files = {k: v for k, v in inputs.items() if isinstance(v, Mapping) and "file" in v}
+    others = inputs.get("files", ())
+    rows = [(name, each["file"], each["sha256"]) for name, each in files.items()]
+    rows += [("", each["file"], each["sha256"]) for each in others]
+    yield heading(translate("paper", "Input files"))
+    yield from table(
+        [
+            Column("", 0.7),
+            Column(translate("paper", "File"), 1.6),
+            Column("SHA-256", 3.6),
+        ],
+        rows,
+        size=PrintSize.SMALL,
+    )
+    text = translate(
+        "paper",
+        "Images or files of LED centres: {0}. The JSON file lists each with its "
+        "SHA-256.",
+    )
+    yield paragraph(text.format(len(inputs.get("images", ()))))
+
+
+def _title(name: str) -> str:
+    words, unit = name, ""
+    for end in ("_mm", "_px", "_deg"):
+        if name.endswith(end):
+            words, unit = name.removesuffix(end), f" / {end[1:]}"
+    return words.replace("_", " ") + unit
+
+
+def _is_short(value: Any) -> bool:
+    if isinstance(value, list):
+        return 0 < len(value) <= 3 and _is_list_of(value, (int, float))
+    return isinstance(value, (str, int, float)) or value is None
+
+
+def _is_list_of(value: Any, kind: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(each, kind) for each in value)
+
+
+def _plain(name: str, value: Any) -> str:
+    if isinstance(value, list):
+        return "  ".join(_number(name, each) for each in value)
+    if isinstance(value, bool):
+        return translate("paper", "yes") if value else translate("paper", "no")
+    if isinstance(value, (int, float)):
+        return _number(name, value)
+    return stated(str(value or ""))
+
+
+def _number(name: str, value: float) -> str:
+    """Return a length with decimals, and any other number with significant digits."""
+    is_length = isinstance(value, float) and name.endswith("_mm")
+    return f"{value:.{N_DECIMALS}f}" if is_length else f"{value:.{N_DIGITS}g}"
