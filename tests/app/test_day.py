@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 KNOWN = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
-    limits=SwingLimits(max_uncertainty=0.01, min_images=20, max_images=150),
+    limits=SwingLimits(max_uncertainty=0.02, min_images=20, max_images=150),
 )
 
 

@@ -20,7 +20,7 @@ import pytest
 import lightpen_app
 
 USUAL = "C"  # in which the demo is played by tests/app/test_demo.py
-LOCALES = ("tr_TR", "de_DE", "fa_IR", USUAL)
+LETTERS, NUMBERS, DATES = "tr_TR", "fa_IR", "de_DE"  # each unusual in its own way
 
 DEMO = """
 import sys
@@ -54,7 +54,8 @@ selection = wizard.workbench.selection
 selection.set_preparation(replace(selection.preparation, limits=limits))
 QTimer.singleShot(0, demo.start)
 application.exec()
-print(QLocale.system().name(), demo.is_accepted, wizard.workbench.shut_down(60.0))
+here = QLocale.system()
+print(here.name(), here.toString(1.5), demo.is_accepted, wizard.workbench.shut_down(60.0))
 """
 
 TIMER_BY_KEYWORD = """
@@ -63,21 +64,31 @@ application = QCoreApplication([])
 QTimer(application, interval=0)
 """
 
+EnvironmentOf = Callable[..., dict[str, str]]
+
 
 @pytest.fixture(scope="session")
-def environment_of(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Callable[[str], dict[str, str]]:
-    """Return a function that makes a locale, where the system can, and chooses it."""
+def environment_of(tmp_path_factory: pytest.TempPathFactory) -> EnvironmentOf:
+    """Return a function that makes locales, where the system can, and chooses them.
+
+    It takes the locale of letters and messages, of numbers and of dates.
+    """
     folder = tmp_path_factory.mktemp("locales")
 
     @cache
-    def environment(name: str) -> dict[str, str]:
-        code = name if name == USUAL else f"{name}.UTF-8"
-        if name != USUAL and shutil.which("localedef"):
-            words = ["localedef", "-i", name, "-f", "UTF-8", str(folder / code)]
-            subprocess.run(words, check=False, capture_output=True)
-        here = {"LC_ALL": code, "LANG": code, "LOCPATH": str(folder)}
+    def environment(name: str, numbers: str = "", dates: str = "") -> dict[str, str]:
+        codes = [f"{each}.UTF-8" for each in (name, numbers or name, dates or name)]
+        for code in set(codes):
+            if name != USUAL and shutil.which("localedef"):
+                locale = code.partition(".")[0]
+                words = ["localedef", "-i", locale, "-f", "UTF-8", str(folder / code)]
+                subprocess.run(words, check=False, capture_output=True)
+        names = ("LANG", "LC_NUMERIC", "LC_TIME")
+        here = {"LC_ALL": "", "LOCPATH": str(folder)} | dict(
+            zip(names, codes, strict=True)
+        )
+        if name == USUAL:
+            here = {"LC_ALL": USUAL, "LANG": USUAL}
         return here | {"LANGUAGE": "", "QT_QPA_PLATFORM": "offscreen"}
 
     return environment
@@ -107,35 +118,40 @@ def properties_by_keyword(source: str) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("name", [name for name in LOCALES if name != USUAL])
-def test_the_demo_opens_the_window_and_plays_in_any_locale(
-    environment_of: Callable[[str], dict[str, str]], tmp_path: Path, name: str
+def test_the_demo_opens_the_window_and_plays_in_unusual_locales(
+    environment_of: EnvironmentOf, tmp_path: Path
 ) -> None:
-    outcome = run(DEMO, environment_of(name), str(tmp_path))
+    unusual = environment_of(LETTERS, NUMBERS, DATES)
+    outcome = run(DEMO, unusual, str(tmp_path))
 
     assert outcome.returncode == 0, outcome.stderr
-    assert outcome.stdout.split() == [name, "True", "True"]
+    assert outcome.stdout.split() == [LETTERS, "\u06f1\u066b\u06f5", "True", "True"]
 
 
-def test_a_calibration_gives_the_same_tip_in_any_locale(
-    environment_of: Callable[[str], dict[str, str]],
+def test_a_calibration_gives_the_same_tip_in_unusual_locales(
+    environment_of: EnvironmentOf,
     scene: Callable[..., Path],
     script: Callable[..., CompletedProcess[str]],
     tmp_path: Path,
 ) -> None:
     folder = scene("--images", "8", "--seed", "3")
     words = ("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv")
+    environments = {
+        "usual": environment_of(USUAL),
+        "letters and numbers": environment_of(LETTERS, NUMBERS),
+        "dates": environment_of(DATES),
+    }
     tips = {}
-    for name in LOCALES:
+    for name, environment in environments.items():
         file = tmp_path / f"{name}.json"
         outcome = script(
             *("calibrate", folder / "images", *words, "--json", file),
-            environment=environment_of(name),
+            environment=environment,
         )
         assert outcome.returncode == 0, outcome.stderr
         tips[name] = json.loads(file.read_bytes())["tip_pen_mm"]
 
-    assert all(tip == tips[USUAL] for tip in tips.values())
+    assert all(tip == tips["usual"] for tip in tips.values())
 
 
 def test_no_property_of_qt_is_set_by_keyword() -> None:
@@ -160,8 +176,8 @@ def test_a_property_that_is_set_by_keyword_is_noticed() -> None:
 
 @pytest.mark.skipif(not shutil.which("localedef"), reason="needs a Turkish locale")
 def test_the_turkish_locale_of_these_tests_has_what_made_the_window_fail(
-    environment_of: Callable[[str], dict[str, str]],
+    environment_of: EnvironmentOf,
 ) -> None:
-    outcome = run(TIMER_BY_KEYWORD, environment_of("tr_TR"))
+    outcome = run(TIMER_BY_KEYWORD, environment_of(LETTERS))
 
     assert "'interval' is not a Qt property" in outcome.stderr
