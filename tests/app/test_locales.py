@@ -55,7 +55,8 @@ selection.set_preparation(replace(selection.preparation, limits=limits))
 QTimer.singleShot(0, demo.start)
 application.exec()
 here = QLocale.system()
-print(here.name(), here.toString(1.5), demo.is_accepted, wizard.workbench.shut_down(60.0))
+accepted, ended = demo.is_accepted, wizard.workbench.shut_down(60.0)
+print(here.name(), here.toString(1.5), accepted, ended)
 """
 
 TIMER_BY_KEYWORD = """

@@ -9,12 +9,11 @@ from PySide6.QtWidgets import QApplication, QWidget
 from typing_extensions import override
 
 from lightpen.estimation.reports.verdict import Grade, NextStep
-from lightpen.record.library.supervision import Signature
-from lightpen.record.results.acceptance import takes_supervisor
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.review.acceptance_control import AcceptanceControl
 from lightpen_app.steps.review.next_tips import NextTipsControl
 from lightpen_app.steps.review.result_export import ResultExport
 from lightpen_app.steps.review.result_panel import ReviewedResult
@@ -24,12 +23,10 @@ from lightpen_app.steps.review.view_state import (
     differs,
     next_step,
     next_step_text,
-    repeat_question,
     returns_to_swing,
     review_action,
     review_page_state,
     step_of_file,
-    take_back_question,
     unsaved_text,
     why_not_now,
 )
@@ -55,13 +52,14 @@ class ReviewPage(Page):
         # Widgets
         place = workbench.save_place
         self._view = view = ReviewView(self._run, place)
-        self._acceptance, self._reading = QTimer(self), QTimer(self)
-        for timer in (self._acceptance, self._reading):
+        self._accepted, self._reading = QTimer(self), QTimer(self)
+        for timer in (self._accepted, self._reading):
             timer.setSingleShot(True)
         self._painted: SwingAssessment | None = None  # since it is shown
         self._next = NextTipsControl(
             self._selection, self._run, workbench.library, view.next_tips
         )
+        self._acceptance = AcceptanceControl(self._selection, self._run, view)
         self._along = ResultExport(self._run, place, view.tabs.pictures, self)
 
         # Layout
@@ -70,18 +68,12 @@ class ReviewPage(Page):
         # Connections
         notices = workbench.notifications
         self._run.changed.connect(self._on_run_changed)
-        self._run.refused.connect(self._on_run_troubled)
         self._run.progressed.connect(view.set_progress)
-        self._acceptance.timeout.connect(self.changed)
+        self._accepted.timeout.connect(self.changed)
         self._reading.timeout.connect(self.changed)
         view.cancel.clicked.connect(self._runner.cancel)
         view.capture_more.clicked.connect(self._runner.capture_more)
-        view.repeat.clicked.connect(self._ask_to_repeat)
         view.verify.clicked.connect(self._on_verify_clicked)
-        view.take_back.clicked.connect(self._ask_to_take_back)
-        view.accept.clicked.connect(self._ask_reason)
-        view.reason.given.connect(self._runner.accept)
-        view.withdrawal.given.connect(self._withdraw)
         view.tabs.images_made.connect(self._on_images_made)
         view.tabs.saved.connect(notices.show_status)
         view.tabs.failed.connect(partial(notices.tell, self.key))
@@ -119,7 +111,7 @@ class ReviewPage(Page):
         # The second click of a double one must not go on at once.
         status, painted = self._run.status, self._painted
         is_read = painted is status.assessment and not self._reading.isActive()
-        is_new = self._acceptance.isActive()
+        is_new = self._accepted.isActive()
         tip = self._next_tip()
         return review_action(status, is_new=is_new, is_read=is_read, next_tip=tip)
 
@@ -146,7 +138,7 @@ class ReviewPage(Page):
                     "leds" if verdict is None else step_of_file(verdict.reason)
                 )
             case _:
-                self._ask_to_repeat()
+                self._acceptance.ask_to_repeat()
 
     @override
     def first_control(self) -> QWidget:
@@ -191,7 +183,7 @@ class ReviewPage(Page):
         self._shown = now
         if now.result is not before.result:
             self._next.follow(now.result)
-            self._acceptance.start(2 * QApplication.doubleClickInterval())
+            self._accepted.start(2 * QApplication.doubleClickInterval())
         if (now.result, now.assessment) != (before.result, before.assessment):
             self._view.end_questions()
         self._view.set_solving(now.is_solving)
@@ -230,35 +222,5 @@ class ReviewPage(Page):
         now = self._selection.preparation
         return "" if now.missing_inputs() else now.names.tip
 
-    def _ask_to_repeat(self) -> None:
-        self._view.question.ask_about(repeat_question, self._runner.set_aside)
-
     def _on_verify_clicked(self) -> None:
         self.step_requested.emit("verify")
-
-    def _ask_reason(self) -> None:
-        assessment = self._run.status.assessment
-        supervision = self._selection.supervision
-        if assessment is not None:
-            station = self._run.status.names.station
-            of_supervisor = takes_supervisor(supervision, assessment, station)
-            self._view.reason.ask(of_supervisor=of_supervisor)
-
-    def _ask_to_take_back(self) -> None:
-        if self._selection.supervision.is_guarded:
-            self._view.withdrawal.ask(of_supervisor=True)
-        else:
-            self._view.question.ask_about(take_back_question, self._withdraw)
-
-    def _withdraw(self, reason: str = "", signature: Signature | None = None) -> None:
-        result = self._run.status.result
-        if result is not None:
-            operator = self._selection.preparation.names.operator
-            self._runner.revoke(result, operator, reason, signature)
-
-    def _on_run_troubled(self) -> None:
-        if self._run.status.result is None:
-            self._view.reason.refuse()
-        images = self._view.tabs.images()
-        if images is not None:
-            images.forget_refused()

@@ -36,10 +36,8 @@ class StartPage(ResponsiveLayout, Page):
     large_from = QSize(150 * GRID, 96 * GRID)  # px; then its figures are larger
     vast_from = QSize(240 * GRID, 150 * GRID)  # px; then there is more below
 
-    def __init__(
-        self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, workbench: Workbench, sounds: Sounds) -> None:
+        super().__init__()
         self._selection, self._run = workbench.selection, workbench.run
         self._tips = workbench.library
         self._camera, self._chosen_files = workbench.camera, workbench.files

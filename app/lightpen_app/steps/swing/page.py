@@ -39,10 +39,8 @@ class SwingPage(Page):
     key = "swing"
     shows_images = True
 
-    def __init__(
-        self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, workbench: Workbench, sounds: Sounds) -> None:
+        super().__init__()
         self._sounds, self._notices = sounds, workbench.notifications
         self._selection, self._run = workbench.selection, workbench.run
         self._live, self._camera = workbench.live, workbench.camera
