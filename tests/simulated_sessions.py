@@ -61,8 +61,16 @@ from lightpen.verification.tasks.probed_point import (
     StillFrames,
     measure_touches,
 )
-from lightpen.verification.tasks.task import Conditions, Found
+from lightpen.verification.tasks.sphere import SIMULATED_AXES as SPHERE_AXES
+from lightpen.verification.tasks.sphere import SIMULATED_RADIUS as SPHERE_RADIUS
+from lightpen.verification.tasks.sphere import (
+    SphereOptions,
+    measure_sphere,
+    sphere_directions,
+)
+from lightpen.verification.tasks.task import Conditions, Found, Surface
 
+BALL = 10.0  # mm
 LED_SIGMA = SEAT_SIGMA = 0.002  # mm
 SIGMA = 0.03  # px
 N_IMAGES, N_FRAMES = 60, 5
@@ -230,6 +238,18 @@ def plane_session(
     return measure_plane([("", points)], Conditions(station.instrument), PlaneOptions())
 
 
+def sphere_session(station: SimulatedStation, rng: np.random.Generator) -> Found:
+    """Verify by the 25 points of a sphere, the pen upright."""
+    ways = sphere_directions() @ SPHERE_AXES
+    n = len(ways)
+    places = PAPER_CONE + SIMULATED_CENTER + (SPHERE_RADIUS + BALL / 2) * ways
+    postures = held(np.zeros(n), np.zeros(n), rng)
+    conditions = Conditions(station.instrument, ball_diameter=BALL)
+    options = SphereOptions(2 * SPHERE_RADIUS, surface=Surface.BOSS)
+    points = station.probe(places, postures, rng)
+    return measure_sphere([("", points)], conditions, options)
+
+
 def articulation_session(station: SimulatedStation, rng: np.random.Generator) -> Found:
     """Verify by five postures of five points."""
     runs = []
@@ -272,5 +292,6 @@ SESSIONS: dict[str, Session] = {
     ),
     "length": length_session,
     "plane": plane_session,
+    "sphere, upright": sphere_session,
     "drift": drift_session,
 }

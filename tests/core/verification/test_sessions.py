@@ -26,7 +26,7 @@ WRONG = 0.02  # mm
 # Sessions at each station; the larger tasks take a fifth of a second.
 N_EACH = {"fixed point": 5, "drift": 5}
 SHOWING_TIP = ["fixed point", "articulation"]
-SHOWING_NO_TIP = ["ring, upright", "length", "plane"]
+SHOWING_NO_TIP = ["ring, upright", "length", "plane", "sphere, upright"]
 
 Stations: TypeAlias = tuple[SimulatedStation, ...]
 

@@ -6,6 +6,7 @@ from typing_extensions import override
 from lightpen.simulator.hand import Operator
 from lightpen.verification.tasks.circle import SIMULATED_RADIUS
 from lightpen.verification.tasks.length import SIMULATED_LENGTH
+from lightpen.verification.tasks.sphere import SIMULATED_RADIUS as SPHERE_RADIUS
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
@@ -53,10 +54,12 @@ class ProbingSimulatorControls(SimulatorControls):
         set_words(
             self._lift, self.tr("Lift"), self.tr("Take the tip away for a moment.")
         )
-        sizes = self.tr("Its ring has a radius of {0} mm, its bar a length of {1} mm.")
-        self._sizes.setText(
-            sizes.format(f"{SIMULATED_RADIUS:g}", f"{SIMULATED_LENGTH:g}")
+        sizes = self.tr(
+            "Its ring has a radius of {0} mm, its bar a length of {1} mm, its sphere a "
+            "diameter of {2} mm by the ball centres."
         )
+        found = SIMULATED_RADIUS, SIMULATED_LENGTH, 2 * SPHERE_RADIUS
+        self._sizes.setText(sizes.format(*(f"{each:g}" for each in found)))
 
     @override
     def _follow_connection(self) -> None:

@@ -10,11 +10,14 @@ from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.fixed_point import FIXED_POINT
 from lightpen.verification.tasks.length import LENGTH
 from lightpen.verification.tasks.plane import PLANE
+from lightpen.verification.tasks.sphere import SPHERE
 from lightpen.verification.tasks.task import TaskOptions, VerificationTask
 
 AnyTask: TypeAlias = VerificationTask[Any, Any]
 
-TASKS: tuple[AnyTask, ...] = (FIXED_POINT, CIRCLE, LENGTH, PLANE, ARTICULATION, DRIFT)
+TASKS: tuple[AnyTask, ...] = (
+    *(FIXED_POINT, CIRCLE, LENGTH, PLANE, SPHERE, ARTICULATION, DRIFT),
+)
 PAPER = (FIXED_POINT, CIRCLE, LENGTH)  # the paper's three
 
 _BY_KIND = {task.kind: task for task in TASKS}

@@ -1,0 +1,472 @@
+"""A reference sphere of certified diameter: probing size and form, as ISO 10360-12.
+
+25 points on a hemisphere, as that standard spreads them, give the Gaussian sphere of
+least squares. Size is its diameter, the ball compensated, less the certified one; form
+is the range of the distances from it. The covariance of the points, with what they
+share, gives U of the size, and what form noise alone makes of an ideal sphere.
+
+References
+----------
+.. [1] ISO 10360-12:2016, probing size and form error P_Size.Sph.1x25 and
+   P_Form.Sph.1x25 of articulated arm CMMs.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from msgspec import Meta
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.messages import Message, message
+from lightpen.model.limits import VerificationLimits
+from lightpen.verification.tasks.assessment import (
+    CALIBRATE_AGAIN,
+    CHECK_FILES,
+    VERIFY_AGAIN,
+    VerificationAssessment,
+    check,
+    graded,
+    refused,
+)
+from lightpen.verification.tasks.circle import away_from_cones
+from lightpen.verification.tasks.probed_point import (
+    ProbedPoint,
+    joint_covariance,
+    point_entries,
+)
+from lightpen.verification.tasks.task import (
+    ANY,
+    Conditions,
+    Found,
+    HandGoal,
+    NumberOption,
+    ResultRow,
+    ResultTable,
+    Runs,
+    Screening,
+    Surface,
+    SurfaceOption,
+    TaskOptions,
+    TaskProgress,
+    VerificationTask,
+    ball_offset,
+    certificate_option,
+    count_option,
+)
+from lightpen.verification.tasks.tip_evidence import (
+    TipEvidence,
+    block_diagonal,
+    judged_tip,
+    tip_entries,
+    tip_evidence,
+    with_power,
+)
+
+MIN_POINTS, USUAL_POINTS, MAX_POINTS = 9, 25, 50
+LEAST_POINTS = 5  # that can lie off a sphere at all
+SPREAD = 0.15  # smallest extent of the points over their radius, or none is determined
+ASTRAY, LIFTED = 8.0, 0.1  # times the median distance; mm, as of a ring
+MAX_LEFT_OUT = 0.25  # of the points
+MAX_FORM = 0.05  # of the radius: what is further off is no sphere
+ANOTHER = 0.1  # of the certified radius: then it is another sphere
+NEW_PLACE = 3.0  # mm
+UNUSUAL = 0.001  # chance that an ideal sphere shows more form
+N_TRIALS = 4000
+N_STEPS = 20  # of Gauss and Newton, which converge in five
+LATEST = 6  # points whose residuals are shown
+
+# The points of the standard: so many at so many degrees from the pole.
+RINGS = (1, 0.0), (4, 22.5), (8, 45.0), (4, 67.5), (8, 90.0)
+# The sphere of the simulated operator, from the bottom of its cone, mm
+SIMULATED_RADIUS = 15.0
+SIMULATED_CENTER = np.array([0.0, -40.0, 0.0])
+SIMULATED_AXES = np.array(
+    [[1.0, 0.0, 0.0], [0.0, 0.9, -(0.19**0.5)], [0.0, -(0.19**0.5), -0.9]]
+)  # right, towards the camera, up
+
+
+class SphereFit(NamedTuple):
+    """A sphere of least squares.
+
+    Attributes
+    ----------
+    center_cam : (3,) array
+    radius : float
+    residuals : (N,) array
+        Distances of the points from it, outwards, mm.
+    spokes : (N, 3) array
+        Unit vectors from the centre to the points.
+    """
+
+    center_cam: FloatArray
+    radius: float
+    residuals: FloatArray
+    spokes: FloatArray
+
+    @property
+    def form(self) -> float:
+        """Range of the residuals, mm."""
+        return float(np.ptp(self.residuals))
+
+    @property
+    def by_sphere(self) -> FloatArray:
+        """Derivative of the residuals by centre and radius, (N, 4)."""
+        return np.column_stack([-self.spokes, -np.ones(len(self.spokes))])
+
+
+class Size(NamedTuple):
+    """A diameter, the ball compensated, mm.
+
+    Attributes
+    ----------
+    uncertainty : float
+        U (k = 2) of measured and certified diameter together, mm.
+    """
+
+    measured: float
+    certified: float
+    uncertainty: float
+
+    @property
+    def error(self) -> float:
+        """Measured less certified diameter, mm."""
+        return self.measured - self.certified
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere(Found):
+    """A sphere.
+
+    Attributes
+    ----------
+    left_out : tuple of ProbedPoint
+        Off the sphere: the pen was lifted.
+    form_by_noise : float
+        Largest form, mm, that an ideal sphere shows by what is known of the points.
+    tip : TipEvidence
+        What the points tell of the tip.
+    """
+
+    points: tuple[ProbedPoint, ...]
+    left_out: tuple[ProbedPoint, ...]
+    fit: SphereFit
+    size: Size
+    form_by_noise: float
+    tip: TipEvidence
+
+
+class SphereOptions(TaskOptions, frozen=True, tag="sphere"):
+    """A sphere; a diameter of 0 is not known."""
+
+    diameter: Annotated[float, Meta(ge=0)] = 0.0
+    diameter_uncertainty: Annotated[float, Meta(ge=0)] = 0.0
+    surface: Surface = Surface.GROOVE
+    n_points: Annotated[int, Meta(ge=MIN_POINTS, le=MAX_POINTS)] = USUAL_POINTS
+
+
+def measure_sphere(
+    runs: Runs, conditions: Conditions, options: SphereOptions
+) -> Sphere:
+    """Measure size and form of a sphere by the points of all runs.
+
+    Raises
+    ------
+    CalibrationError
+        The points are too few, cover too little, or lie on no sphere.
+    """
+    points = [point for _, own in runs for point in own]
+    places = np.array([point.point_cam for point in points]).reshape(-1, 3)
+    if len(points) < MIN_POINTS:
+        raise CalibrationError("sphere.too-few", n=len(points), needed=MIN_POINTS)
+    fit = fit_sphere(places)
+    off = np.abs(fit.residuals)
+    near = off <= max(ASTRAY * float(np.median(off)), LIFTED)
+    fit = fit_sphere(places[near])
+    if np.mean(~near) > MAX_LEFT_OUT or fit.form > MAX_FORM * fit.radius:
+        n_off = int(np.sum(~near))
+        raise CalibrationError("sphere.none", n_off=n_off, n=len(points), off=fit.form)
+    kept = tuple(p for p, is_near in zip(points, near, strict=True) if is_near)
+    left_out = tuple(p for p, is_near in zip(points, near, strict=True) if not is_near)
+    diameter = 2 * (fit.radius + ball_offset(options.surface, conditions.ball_diameter))
+    known = options.diameter_uncertainty
+    if options.surface is not Surface.GROOVE:
+        known = float(np.hypot(known, conditions.ball_uncertainty))
+    n = len(kept)
+    covariance = joint_covariance(kept, conditions.instrument)
+    covariance += np.diag(np.tile(conditions.drift**2, n))
+    by_points = block_diagonal(list(fit.spokes[:, None]))
+    spread = by_points @ covariance @ by_points.T
+    row = np.linalg.pinv(-fit.by_sphere)[3]
+    own = 2 * COVERAGE_FACTOR * float(np.sqrt(row @ spread @ row))
+    tip = tip_evidence(
+        kept,
+        conditions.instrument,
+        fit.residuals + (diameter - options.diameter) / 2,
+        by_points,
+        fit.by_sphere[:, :3],
+        _certified_covariance(n, known)
+        + by_points @ np.diag(np.tile(conditions.drift**2, n)) @ by_points.T,
+    )
+    size = Size(diameter, options.diameter, float(np.hypot(own, known)))
+    form_by_noise = _form_by_noise(fit, spread)
+    return Sphere(
+        points=kept,
+        left_out=left_out,
+        fit=fit,
+        size=size,
+        form_by_noise=form_by_noise,
+        tip=tip,
+        assessment=_assessment(
+            size, (fit.form, form_by_noise), left_out, tip, conditions.limits
+        ),
+    )
+
+
+def fit_sphere(points_cam: FloatArray) -> SphereFit:
+    """Fit a sphere to points (N, 3), mm.
+
+    Raises
+    ------
+    CalibrationError
+        They determine none.
+    """
+    A = np.column_stack([2 * points_cam, np.ones(len(points_cam))])
+    middle = points_cam.mean(axis=0)
+    extents = np.linalg.svd(points_cam - middle, compute_uv=False)
+    *center, rest = np.linalg.lstsq(A, np.sum(points_cam**2, axis=1))[0].tolist()
+    squared = rest + float(np.dot(center, center))
+    if squared <= 0 or extents[2] < SPREAD * np.sqrt(squared):
+        raise CalibrationError("sphere.flat")
+    unknowns = np.array([*center, np.sqrt(squared)])
+    fit = _fit_at(points_cam, unknowns)
+    for _ in range(N_STEPS):
+        step = np.linalg.lstsq(fit.by_sphere, fit.residuals)[0]
+        unknowns = unknowns - step
+        fit = _fit_at(points_cam, unknowns)
+        if np.abs(step).max() < np.finfo(float).eps * np.abs(unknowns).max():
+            break
+    return fit
+
+
+def _fit_at(points_cam: FloatArray, unknowns: FloatArray) -> SphereFit:
+    ways = points_cam - unknowns[:3]
+    distances = np.linalg.norm(ways, axis=1)
+    return SphereFit(
+        unknowns[:3],
+        float(unknowns[3]),
+        distances - unknowns[3],
+        ways / distances[:, None],
+    )
+
+
+def _certified_covariance(n: int, uncertainty: float) -> FloatArray:
+    """Return the covariance of n distances by U of the diameter, mm^2."""
+    return np.full((n, n), (uncertainty / 2 / COVERAGE_FACTOR) ** 2)
+
+
+def _form_by_noise(fit: SphereFit, spread: FloatArray) -> float:
+    """Return the quantile of the form that errors of the points make, mm."""
+    rng = np.random.default_rng(0)  # the same points give the same form
+    unknowns, _ = np.linalg.qr(fit.by_sphere)
+    keeps = np.eye(len(spread)) - unknowns @ unknowns.T
+    values, vectors = np.linalg.eigh(keeps @ spread @ keeps)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    off = rng.standard_normal((N_TRIALS, len(spread))) @ root.T
+    return float(np.quantile(np.ptp(off, axis=1), 1 - UNUSUAL))
+
+
+def _assessment(
+    size: Size,
+    form: tuple[float, float],
+    left_out: Sequence[ProbedPoint],
+    tip: TipEvidence,
+    limits: VerificationLimits,
+) -> VerificationAssessment:
+    """Judge size, tip and form; the limit of the diameter is twice that of a radius."""
+    error, uncertainty, limit = size.error, size.uncertainty, 2 * limits.radius
+    if abs(error) > ANOTHER * size.certified:
+        another = message(
+            "sphere.another", measured=size.measured, certified=size.certified
+        )
+        return refused(another, VERIFY_AGAIN)
+    grade = graded(error, uncertainty, limit, limits)
+    against = judged_tip(tip, limits)
+    if against is not None and against.grade is Grade.REPEAT:
+        return against
+    if grade is not Grade.PASS:
+        off = message(
+            "sphere.size-off", error=error, uncertainty=uncertainty, limit=limit
+        )
+        return VerificationAssessment(grade, off, CALIBRATE_AGAIN)
+    if against is not None:
+        return against
+    found, by_noise = form
+    allowed = max(limits.form, by_noise)
+    if found > allowed:
+        return refused(message("sphere.form", form=found, limit=allowed), VERIFY_AGAIN)
+    if left_out:
+        first = left_out[0].label
+        lifted = message("sphere.lifted", n_left_out=len(left_out), first=first)
+        return check(lifted, VERIFY_AGAIN)
+    if uncertainty > limit:
+        uncertain = message("sphere.uncertain", uncertainty=uncertainty, limit=limit)
+        return check(uncertain, CHECK_FILES)
+    good = message(
+        "sphere.good", error=error, uncertainty=uncertainty, limit=limit, form=found
+    )
+    return with_power(good, tip, limits)
+
+
+def _screen(
+    options: SphereOptions, conditions: Conditions, progress: TaskProgress
+) -> Screening:
+    return away_from_cones(progress)
+
+
+def _missing(options: SphereOptions, ball_diameter: float | None) -> Message | None:
+    if not options.diameter:
+        return message("sphere.no-diameter")
+    if not options.diameter_uncertainty:
+        return message("verification.no-certificate-u")
+    if options.surface is not Surface.GROOVE and not ball_diameter:
+        return message("verification.no-ball")
+    return None
+
+
+def _entries(found: Sphere, instrument: Instrument) -> dict[str, Any]:
+    return {
+        "certified_diameter_mm": found.size.certified,
+        "diameter_mm": found.size.measured,
+        "size_error_mm": found.size.error,
+        "expanded_uncertainty_mm": found.size.uncertainty,
+        "form_error_mm": found.fit.form,
+        **tip_entries(found.tip),
+        "center_cam_mm": found.fit.center_cam,
+        "residuals_mm": found.fit.residuals,
+        "touches": point_entries(found.points, instrument),
+        "left_out": point_entries(found.left_out, instrument),
+    }
+
+
+def _tables(found: Sphere, conditions: Conditions) -> tuple[ResultTable, ...]:
+    columns = (
+        message("sphere.diameter"),
+        message("table.error"),
+        message("table.uncertainty"),
+        message("sphere.form-error"),
+        message("option.points"),
+    )
+    size = found.size
+    values = [size.measured, size.error, size.uncertainty, found.fit.form]
+    row = ResultRow(message("sphere.title"), [*values, float(len(found.points))])
+    title = message("sphere.table", certified=size.certified)
+    return ResultTable(title, columns, (row,)), _residuals(found.points, found.fit)
+
+
+def _figures_so_far(
+    progress: TaskProgress, conditions: Conditions
+) -> tuple[ResultTable, ...]:
+    points = progress.points
+    if len(points) < LEAST_POINTS:
+        return (_residuals((), None),)
+    try:
+        fit = fit_sphere(np.array([point.point_cam for point in points]))
+    except CalibrationError:
+        return (_residuals((), None),)
+    return (_residuals(points, fit, LATEST),)
+
+
+def _residuals(
+    points: Sequence[ProbedPoint], fit: SphereFit | None, latest: int = MAX_POINTS
+) -> ResultTable:
+    title = message("sphere.residuals")
+    if fit is None:
+        return ResultTable(title)
+    rows = tuple(
+        ResultRow(str(i), [*point.point_cam.tolist(), residual])
+        for i, (point, residual) in enumerate(
+            zip(points, fit.residuals.tolist(), strict=True), start=1
+        )
+    )
+    return ResultTable(title, (*"uvw", message("circle.radial")), rows[-latest:])
+
+
+def _instruction(options: SphereOptions, progress: TaskProgress) -> Message:
+    return message(
+        "sphere.instruction", n_points=len(progress.points), needed=options.n_points
+    )
+
+
+def sphere_directions(n_points: int = USUAL_POINTS) -> FloatArray:
+    """Return unit vectors of the points of the standard, pole first, repeated, (N, 3).
+
+    Each ring is turned against the one before.
+    """
+    directions = []
+    for k, (n, degrees) in enumerate(RINGS):
+        tilt = np.radians(degrees)
+        for i in range(n):
+            turn = 2 * pi * (i + 0.5 * (k % 2)) / n
+            flat = np.sin(tilt) * np.array([np.cos(turn), np.sin(turn)])
+            directions.append([*flat, np.cos(tilt)])
+    return np.array([directions[i % len(directions)] for i in range(n_points)])
+
+
+def _hand(options: SphereOptions, run: int, step: int) -> HandGoal:
+    spoke = sphere_directions(step + 1)[-1] @ SIMULATED_AXES
+    return HandGoal(SIMULATED_CENTER + SIMULATED_RADIUS * spoke)
+
+
+SPHERE = VerificationTask(
+    kind="sphere",
+    summary="a reference sphere: size and form by 25 points (ISO 10360-12)",
+    run_help="points all over a hemisphere; several runs count as one",
+    title=message("sphere.title"),
+    purpose=message("sphere.purpose"),
+    first=message("sphere.first"),
+    another=message("task.next-point"),
+    known=message("sphere.known"),
+    limits=("radius", "form", "tip"),
+    options=SphereOptions,
+    fields=(
+        NumberOption(
+            "diameter",
+            message("sphere.certified"),
+            unknown=message("option.unknown"),
+            argument="--diameter",
+            help="certified diameter",
+        ),
+        certificate_option("diameter_uncertainty"),
+        SurfaceOption(
+            "surface",
+            message("option.surface"),
+            (
+                message("sphere.centre"),
+                message("sphere.inside"),
+                message("circle.boss"),
+            ),
+            argument="--surface",
+            words={"outside": Surface.BOSS, "inside": Surface.BORE},
+            ball_help="of the probe; unless given, the diameter is that of the sphere "
+            "of its centres",
+        ),
+        count_option("n_points", message("option.points"), MIN_POINTS, MAX_POINTS),
+    ),
+    measure=measure_sphere,
+    entries=_entries,
+    tables=_tables,
+    figures_so_far=_figures_so_far,
+    hand=_hand,
+    n_points=lambda options: options.n_points,
+    instruction=_instruction,
+    screen=_screen,
+    newness=lambda options: (ANY, NEW_PLACE),
+    missing=_missing,
+)
