@@ -2,91 +2,39 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from lightpen.commands.arguments import (
     above_zero,
     add_json,
     add_limits,
-    add_pen_options,
     add_verdict,
     chosen_limits,
     finite,
-    limits_by,
     not_negative,
 )
-from lightpen.commands.console import (
-    lacking,
-    printing,
-    progress,
-    require_other_file,
-    shown,
-    verdict_status,
-    write_record,
-)
+from lightpen.commands.console import printing, shown, verdict_status, write_record
 from lightpen.commands.entering import add_entering, keep_record
 from lightpen.commands.pen_health import add_verify_pen
-from lightpen.detection.observations import Observations, observe_centers
-from lightpen.errors import CalibrationError, UsageError
-from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.formats.hashes import all_hashed, hashed
-from lightpen.formats.json_records import file_entry
-from lightpen.formats.observation_files import read_centers
-from lightpen.formats.pen_files import read_pen
+from lightpen.commands.touched import MeasuredRuns, add_touch_inputs, measure_runs
+from lightpen.errors import UsageError
 from lightpen.model.limits import rule_in_words
-from lightpen.model.origin import Origin
-from lightpen.model.pen import Pen
-from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.verification.history.recorded_tasks import read_drift
-from lightpen.verification.probing.current_tip import cone_before
 from lightpen.verification.probing.drift_reference import (
-    LampDrift,
     judged_with,
     lamp_drift_entries,
 )
-from lightpen.verification.probing.image_locations import (
-    ImageLocation,
-    PenCameras,
-    read_viewers,
-    touch_place,
-)
-from lightpen.verification.probing.probing import (
-    FAST,
-    ONE_IMAGE,
-    PRECISE,
-    SETTLING,
-    ProbingRules,
-)
-from lightpen.verification.probing.sources import (
-    ProbingRun,
-    instrument_of,
-    lamp_drift_of,
-    observe_place,
-    touches_of,
-)
 from lightpen.verification.reports.records import verification_record
 from lightpen.verification.reports.summaries import found_text, touches_text
-from lightpen.verification.storage.verification_files import viewer_entries
 from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.probed_point import (
-    NO_DRIFT,
-    ProbedPoint,
-    RejectedFrame,
     on_surface,
     point_entries,
     rejected_entries,
 )
 from lightpen.verification.tasks.registry import TASKS, AnyTask
-from lightpen.verification.tasks.task import (
-    Conditions,
-    NumberOption,
-    SurfaceOption,
-    TaskOptions,
-)
+from lightpen.verification.tasks.task import NumberOption, SurfaceOption, TaskOptions
 
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
@@ -188,71 +136,9 @@ def _add_runs(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def _add_common(parser: argparse.ArgumentParser, *limits: str) -> None:
-    parser.add_argument("--camera", type=Path, metavar="FILE")
-    parser.add_argument(
-        "--rig",
-        type=Path,
-        metavar="FILE",
-        help=(
-            "rig file with the extrinsics of several cameras, instead of --camera; "
-            "give a folder that contains one folder per camera, named as in this "
-            "file"
-        ),
-    )
-    parser.add_argument("--pen", type=Path, metavar="FILE")
-    add_pen_options(parser)
-    parser.add_argument(
-        "--tip",
-        type=Path,
-        required=True,
-        metavar="RESULT.json",
-        help="calibration to verify",
-    )
-    parser.add_argument(
-        "--frames",
-        type=int,
-        choices=range(1, 101),
-        metavar="N",
-        help="images of a touch, through which the pen is held still, such as "
-        f"{FAST} or for a precise one {PRECISE}; 1 takes each image for a touch. "
-        f"Unless said {FAST}, or 1 where the pen was held still for none",
-    )
+    add_touch_inputs(parser, "calibration to verify")
     add_limits(parser, *limits)
     add_json(parser)
-
-
-@dataclass(frozen=True, eq=False)
-class _Measured:
-    """The points of all runs, and what they were measured with.
-
-    Attributes
-    ----------
-    origin : Origin
-        Of the images or centres; simulated if some of them are.
-    lamp_drift : LampDrift or None
-        The drift of fixed lamps in view.
-    """
-
-    calibration: CalibrationFile
-    origin: Origin
-    conditions: Conditions
-    runs: tuple[ProbingRun, ...]
-    files: tuple[Path, ...]
-    viewers: PenCameras
-    pen_file: Path
-    lamp_drift: LampDrift | None
-
-    @property
-    def instrument(self) -> Instrument:
-        return self.conditions.instrument
-
-    @property
-    def touches(self) -> list[tuple[str, Sequence[ProbedPoint]]]:
-        return [(run.name, run.touches) for run in self.runs]
-
-    @property
-    def rejected(self) -> list[RejectedFrame]:
-        return [each for run in self.runs for each in run.rejected]
 
 
 @printing
@@ -304,123 +190,14 @@ def _touches(options: argparse.Namespace) -> None:
 
 def _measure(
     options: argparse.Namespace, places: Sequence[tuple[str, ...]]
-) -> _Measured:
-    drift: Path | None = getattr(options, "drift", None)
-    inputs = options.camera, options.rig, options.pen, options.tip, drift
-    require_other_file(options.json, *inputs)
-    calibration = read_calibration(options.tip)
-    given = read_viewers(options.camera, options.rig)
-    rig = None if given is None else given.rig
+) -> MeasuredRuns:
     if bool(options.centers) == any(places):
         raise UsageError("cli.runs-or-centers")
-    found = [touch_place(each, rig) for each in places if each]
-    viewers = given or (found[0].viewers if found else None)
-    if viewers is None:
-        raise lacking("--camera or --rig")
-    pen, pen_file = _pen(options, found)
-    files = tuple(file for place in found for file in place.files)
-    files += tuple(options.centers)
-    require_other_file(options.json, *files)
-    instrument = instrument_of(calibration, viewers, pen, pen_file)
-    seen = _seen(options, found, instrument)
-    runs = _runs_of(seen, instrument, options.frames)
-    nominal = getattr(options, "nominal_tip", None)
-    for known in (pen.nominal_tip, calibration.nominal_tip):
-        nominal = known if nominal is None else nominal
-    limits = limits_by(options)
-    lamp_drift = lamp_drift_of(runs, instrument, limits)
-    moved = NO_DRIFT if drift is None else read_drift(drift)
-    return _Measured(
-        calibration=calibration,
-        origin=_origin(found),
-        conditions=Conditions(
-            instrument=instrument,
-            limits=limits,
-            ball_diameter=options.ball_diameter,
-            ball_uncertainty=getattr(options, "ball_uncertainty", 0.0),
-            nominal_tip=None if nominal is None else np.array(nominal, dtype=float),
-            cone_cam=cone_before(calibration, viewers),
-            drift=moved if lamp_drift is None else np.maximum(moved, lamp_drift.share),
-        ),
-        runs=tuple(runs),
-        files=files,
-        viewers=viewers,
-        pen_file=pen_file,
-        lamp_drift=lamp_drift,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _SeenRun:
-    """What the images of a run, or its centres, show in each camera."""
-
-    name: str
-    views: tuple[Observations, ...]
-    touches: tuple[int, ...] | None = None
-
-
-def _seen(
-    options: argparse.Namespace, places: Sequence[ImageLocation], instrument: Instrument
-) -> list[_SeenRun]:
-    if options.centers and instrument.rig.n_cameras > 1:
-        raise UsageError("cli.centers-of-rig")
-    seen = []
-    for path in options.centers:
-        centers = read_centers(path, instrument.pen.n_leds)
-        view = observe_centers(centers, instrument.camera, instrument.pen)
-        seen.append(_SeenRun(path.name, (view,)))
-    with progress("Finding LEDs") as report:
-        for i, place in enumerate(places, start=1):
-            views = observe_place(place, instrument)
-            seen.append(_SeenRun(place.name, views, place.touches))
-            report(i / len(places))
-    return seen
-
-
-def _runs_of(
-    seen: Sequence[_SeenRun], instrument: Instrument, n_frames: int | None
-) -> list[ProbingRun]:
-    """Return the touches of all runs.
-
-    Unless a number of images is given, the pen was held still for the usual one; where
-    it was not, each image is a touch.
-    """
-
-    def by(rules: ProbingRules) -> list[ProbingRun]:
-        return [
-            touches_of(run.name, run.views, instrument, rules, run.touches)
-            for run in seen
-        ]
-
-    if n_frames is not None:
-        return by(ProbingRules(n_frames, SETTLING) if n_frames > 1 else ONE_IMAGE)
-    try:
-        return by(ProbingRules())
-    except CalibrationError as error:
-        if error.message.code != "verification.never-still":
-            raise
-    return by(ONE_IMAGE)
-
-
-def _pen(
-    options: argparse.Namespace, places: Sequence[ImageLocation]
-) -> tuple[Pen, Path]:
-    if options.pen is not None:
-        pen = read_pen(options.pen, options.units, options.led_diameter, None)
-        return pen, options.pen
-    place = places[0] if places else None
-    if place is None or place.pen is None or place.pen_file is None:
-        raise lacking("--pen")
-    return place.pen, place.pen_file
-
-
-def _origin(places: Sequence[ImageLocation]) -> Origin:
-    origins = {place.origin for place in places}
-    return Origin.SIMULATED if Origin.SIMULATED in origins else Origin.RECORDED
+    return measure_runs(options, places, options.centers)
 
 
 def _print_lamp_drift(
-    measured: _Measured, judged: VerificationAssessment | None = None
+    measured: MeasuredRuns, judged: VerificationAssessment | None = None
 ) -> None:
     """Print the drift of fixed lamps, unless it is the verdict."""
     told = None if measured.lamp_drift is None else measured.lamp_drift.assessment
@@ -430,12 +207,11 @@ def _print_lamp_drift(
 
 def _record(
     options: argparse.Namespace,
-    measured: _Measured,
+    measured: MeasuredRuns,
     kind: str,
     entries: Mapping[str, Any],
     assessment: VerificationAssessment | None,
 ) -> dict[str, Any]:
-    drift: Path | None = getattr(options, "drift", None)
     return verification_record(
         kind,
         {
@@ -445,12 +221,6 @@ def _record(
         },
         assessment,
         chosen_limits(options),
-        {
-            "tip": file_entry(hashed(options.tip)),
-            **viewer_entries(measured.viewers),
-            "pen": file_entry(hashed(measured.pen_file)),
-            "images": [file_entry(file) for file in all_hashed(measured.files)],
-            **({} if drift is None else {"drift": file_entry(hashed(drift))}),
-        },
+        measured.input_entries(options),
         rule_in_words(measured.conditions.limits),
     )

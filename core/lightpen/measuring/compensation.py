@@ -25,7 +25,7 @@ from lightpen.measuring.quantities import Quantity, derive, quantity_of
 from lightpen.measuring.surfaces import SURFACES, FeatureKind
 from lightpen.measuring.touches import PartTouches
 
-CLEAR = 0.2  # mean cosine from which a direction decides the side
+CLEAR = 0.2  # cosine from which a direction decides the side
 MIXED = 0.25  # share of touches on the other side from which they contradict
 ROUND = {
     FeatureKind.CIRCLE,
@@ -76,6 +76,7 @@ def surface_of(
         The side is unknown, or touches are on both sides.
     """
     at = touches.of(planned.name)
+    assert planned.kind is not None
     quantity = quantity_of(feature, 3 * at, touches.n_inputs)
     if planned.kind in {FeatureKind.LINE, FeatureKind.CYLINDER}:
         quantity = _along_touches(quantity, touches.points_cam[at])
@@ -135,6 +136,7 @@ def _side(
         return planned.side, Evidence.PLAN
     if planned.kind is FeatureKind.SLOT:
         return Side.INSIDE, Evidence.PLAN
+    assert planned.kind is not None
     surface = SURFACES[planned.kind]
     if planned.air is not None:
         q = (np.array(planned.air) - feature.origin) @ feature.axes
@@ -144,6 +146,7 @@ def _side(
     q = (touches.points_cam[at] - feature.origin) @ feature.axes
     outwards = surface.distances(q, feature.sizes).by_point[:, 0] @ feature.axes.T
     approach = np.einsum("ni,ni->n", touches.approaches_cam[at], outwards)
+    approach[~(np.abs(approach) > CLEAR)] = np.nan  # along the surface
     if np.isfinite(approach).any():
         return _by_cosines(planned, approach, Side.INSIDE), Evidence.APPROACH
     stylus = np.einsum("ni,ni->n", touches.styli_cam[at], outwards)

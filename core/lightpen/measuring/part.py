@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec import structs
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
@@ -22,6 +23,7 @@ from lightpen.measuring.plan import (
     Side,
 )
 from lightpen.measuring.quantities import derive
+from lightpen.measuring.recognition import recognise, recognised
 from lightpen.measuring.surfaces import FeatureKind
 from lightpen.measuring.touches import PartTouches
 from lightpen.measuring.zones import Criterion, fit_zone
@@ -88,10 +90,11 @@ def measure_part(plan: Plan, touches: PartTouches) -> MeasuredPart:
         A feature has too few touches or none, its side is unknown, or a characteristic
         is not defined for its features.
     """
-    fits = {each.name: _fitted(each, touches) for each in plan.features}
-    surfaces = {
-        each.name: surface_of(each, fits[each.name], touches) for each in plan.features
-    }
+    plan = _with_kinds(plan, touches)
+    fits, surfaces = {}, {}
+    for each in plan.features:
+        fits[each.name] = _fitted(each, touches)
+        surfaces[each.name] = surface_of(each, fits[each.name], touches)
     for construction in plan.constructions:
         surfaces[construction.name] = _constructed(construction, surfaces)
     alignment = _aligned(plan, surfaces)
@@ -105,6 +108,31 @@ def measure_part(plan: Plan, touches: PartTouches) -> MeasuredPart:
     return MeasuredPart(plan, touches, features, alignment, results)
 
 
+def _with_kinds(plan: Plan, touches: PartTouches) -> Plan:
+    """Return a plan with the kinds that its touches show where it states none."""
+    return structs.replace(
+        plan,
+        features=tuple(
+            each
+            if each.kind is not None
+            else structs.replace(
+                each, kind=recognised(each.name, kind_of(each.name, touches))
+            )
+            for each in plan.features
+        ),
+    )
+
+
+def kind_of(name: str, touches: PartTouches) -> FeatureKind | None:
+    """Return the kind that the touches of a feature show, if they do."""
+    at = touches.of(name)
+    if not len(at):
+        return None
+    return recognise(
+        touches.points_cam[at], touches.noise(at), touches.approaches_cam[at]
+    )
+
+
 def _fitted(planned: PlannedFeature, touches: PartTouches) -> Feature:
     at = touches.of(planned.name)
     if not len(at) or len(at) < (planned.touches or 0):
@@ -115,6 +143,7 @@ def _fitted(planned: PlannedFeature, touches: PartTouches) -> Feature:
             needed=planned.touches or 1,
         )
     points = touches.points_cam[at]
+    assert planned.kind is not None
     feature = fit_feature(planned.kind, points)
     if planned.criterion == NEVER:
         return feature

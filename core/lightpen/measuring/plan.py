@@ -9,14 +9,14 @@ characteristics:
   - {quantity: diameter, of: [hole], nominal: 16, tolerance: 0.05}
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from enum import StrEnum
 from math import inf
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
 import msgspec
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, structs
 
 from lightpen.errors import FileError
 from lightpen.formats.documents import parse_document
@@ -29,10 +29,15 @@ from lightpen.model.decision_rules import DecisionRule
 PLAN = message("measuring.plan")
 MAX_SIZE = 1_000_000  # bytes
 MAX_FEATURES = 1000
+MAX_FREE = 50  # features of a part without a plan
 NEVER = "least squares"
+REDUNDANT = 2  # times as many points as determine a feature
+UNKNOWN_TOUCHES = 8  # of a feature to be recognised
+NEEDS_FRAME = ("x", "y", "z", "position")
 
 Vector: TypeAlias = tuple[float, float, float]
 Name: TypeAlias = Annotated[str, Meta(min_length=1, max_length=80)]
+Positive: TypeAlias = Annotated[float, Meta(gt=0)]
 
 
 class Side(StrEnum):
@@ -87,10 +92,20 @@ class Nominal(_Entry, frozen=True):
     ----------
     axis : triple of float or None
         Axis or normal; its length does not matter.
+    diameter : float or None
+        Of circle, sphere, cylinder and cone (at its origin); of a slot its width.
+    length, width : float or None
+        Extent of a line, plane, cylinder or cone; overall length of a slot.
+    angle : float or None
+        Of a cone, from side to side, degrees.
     """
 
     origin: Vector | None = None
     axis: Vector | None = None
+    diameter: Positive | None = None
+    length: Positive | None = None
+    width: Positive | None = None
+    angle: Annotated[float, Meta(gt=0, lt=180)] | None = None
 
 
 class PlannedFeature(_Entry, frozen=True):
@@ -98,19 +113,31 @@ class PlannedFeature(_Entry, frozen=True):
 
     Attributes
     ----------
+    kind : FeatureKind or None
+        None to recognise it from the touches.
     touches : int or None
-        Number of points; None for as many as there are.
+        Number of points; None for the usual one.
     air : triple of float or None
         Ball centre in air beside the surface, camera frame, mm: decides the side.
     """
 
     name: Name
-    kind: FeatureKind
+    kind: FeatureKind | None = None
     touches: Annotated[int, Meta(ge=1, le=10_000)] | None = None
     side: Side = Side.AUTO
     criterion: str = NEVER
     nominal: Nominal | None = None
     air: Vector | None = None
+
+    @property
+    def n_touches(self) -> int:
+        """Number of points to probe."""
+        if self.touches is not None:
+            return self.touches
+        if self.kind is None:
+            return UNKNOWN_TOUCHES
+        needed = SURFACES[self.kind].min_points
+        return needed if needed == 1 else REDUNDANT * needed
 
 
 class PlannedConstruction(_Entry, frozen=True):
@@ -128,6 +155,11 @@ class PlannedAlignment(_Entry, frozen=True):
     line: str = ""
     point: str = ""
     points: tuple[Name, ...] = ()
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """Features that it needs."""
+        return self.points or (self.plane, self.line, self.point)
 
 
 class PlannedCharacteristic(_Entry, frozen=True):
@@ -155,6 +187,11 @@ class PlannedCharacteristic(_Entry, frozen=True):
     def label(self) -> str:
         """Its name, or quantity and features."""
         return self.name or f"{self.quantity} {' - '.join(self.of)}"
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """Features that it needs."""
+        return (*self.of, *filter(None, [self.datum]))
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -192,6 +229,40 @@ class Plan(_Entry, frozen=True):
     def feature(self, name: str) -> PlannedFeature:
         """Return a feature to probe by its name."""
         return next(each for each in self.features if each.name == name)
+
+    def limited_to(self, names: Collection[str]) -> "Plan":
+        """Return what can be measured of it by some of its features."""
+        features = tuple(each for each in self.features if each.name in names)
+        known = {each.name for each in features}
+        constructions = []
+        for each in self.constructions:
+            if known.issuperset(each.of):
+                constructions.append(each)
+                known.add(each.name)
+        frame = self.alignment
+        if frame is not None and not known.issuperset(frame.features):
+            frame = None
+        characteristics = tuple(
+            each
+            for each in self.characteristics
+            if known.issuperset(each.features)
+            and (frame is self.alignment or each.quantity not in NEEDS_FRAME)
+        )
+        return structs.replace(
+            self,
+            features=features,
+            constructions=tuple(constructions),
+            alignment=frame,
+            characteristics=characteristics,
+        )
+
+
+def free_plan(
+    name: str, touches: int = UNKNOWN_TOUCHES, n_features: int = MAX_FREE
+) -> Plan:
+    """Return a plan of features that are recognised from their touches."""
+    names = (f"F{i}" for i in range(1, n_features + 1))
+    return Plan(name, tuple(PlannedFeature(each, touches=touches) for each in names))
 
 
 def read_plan(path: Path) -> Plan:
@@ -242,8 +313,8 @@ def _problems(plan: Plan) -> Iterator[str]:
     if len(names) > MAX_FEATURES:
         yield f"more than {MAX_FEATURES} features"
     for each in plan.features:
-        needed = SURFACES[each.kind].min_points
-        if each.touches is not None and each.touches < needed:
+        needed = 1 if each.kind is None else SURFACES[each.kind].min_points
+        if each.kind is not None and (each.touches or needed) < needed:
             yield f"a {each.kind.value} needs {needed} touches - at {each.name!r}"
         if each.criterion not in {NEVER, *(known.value for known in Criterion)}:
             yield f"unknown criterion {each.criterion!r} - at {each.name!r}"
@@ -254,8 +325,7 @@ def _problems(plan: Plan) -> Iterator[str]:
     if plan.alignment is not None:
         yield from _alignment_problems(plan, plan.alignment, known)
     for characteristic in plan.characteristics:
-        used = (*characteristic.of, *filter(None, [characteristic.datum]))
-        yield from _unknown(characteristic.label, used, known)
+        yield from _unknown(characteristic.label, characteristic.features, known)
 
 
 def _alignment_problems(

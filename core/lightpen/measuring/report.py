@@ -1,80 +1,71 @@
-"""A measured part as text and as JSON."""
+"""A measured part as rows of tables and as JSON."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
 import numpy as np
 
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
-from lightpen.measuring.characteristics import IS_ANGLE, Measured
+from lightpen.measuring.characteristics import IS_ANGLE
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
 from lightpen.measuring.plan import Nominal
-from lightpen.measuring.surfaces import SURFACES
+from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind
+from lightpen.messages import Message, message
 from lightpen.model.decision_rules import Decision
 
-WORDS = {
-    Decision.ACCEPTED: "OK",
-    Decision.OPEN: "NOT PROVEN",
-    Decision.REJECTED: "OUT OF TOLERANCE",
+DECISIONS: dict[Decision | None, Message | str] = {
+    Decision.ACCEPTED: message("part.ok"),
+    Decision.OPEN: message("part.open"),
+    Decision.REJECTED: message("part.rejected"),
     None: "",
 }
 
 
-def part_text(part: MeasuredPart) -> str:
-    """Return the results as text for the command line."""
-    lines = [f"{part.plan.name}: {len(part.touches.points_cam)} touches"]
-    frame = "part" if part.alignment is not None else "camera"
-    lines.append(f"features, frame of the {frame}; mm, degrees, U (k = 2)")
+@dataclass(frozen=True)
+class PartRow:
+    """A row of a table: numbers, None for a blank, and a word behind them."""
+
+    name: str
+    values: tuple[float | None, ...]
+    remark: Message | str
+
+
+def feature_rows(part: MeasuredPart) -> Iterator[PartRow]:
+    """Yield x, y, z with the largest U, size with U, form error, and kind.
+
+    A size is a diameter, the width of a slot, or the angle of a cone in degrees.
+    """
     for name, one in part.features.items():
-        lines += _feature_lines(name, one, part)
-    if part.results:
-        lines.append(
-            f"{'characteristic':32} {'nominal':>10} {'actual':>10} {'deviation':>10} "
-            f"{'U':>8} {'U alone':>8} {'P':>7}  decision ({part.plan.rule})"
+        values, spread = one.in_part.values, part.uncertainty(name)
+        size: tuple[float | None, float | None] = (None, None)
+        if one.kind is FeatureKind.CONE:
+            size = 2 * float(np.rad2deg(values[7])), 2 * float(np.rad2deg(spread[7]))
+        elif SURFACES[one.kind].sizes:
+            size = 2 * float(values[6]), 2 * float(spread[6])
+        has_form = one.feature is not None and one.kind is not FeatureKind.POINT
+        form = one.feature.form_error if has_form and one.feature is not None else None
+        place = (float(x) for x in values[:3])
+        yield PartRow(
+            name, (*place, float(spread[:3].max()), *size, form), NAMES[one.kind]
         )
-        lines += [_result_line(result) for result in part.results]
-        if any(each.independent_uncertainty is not None for each in part.results):
-            lines.append("U alone: U (k = 2) if the touches shared no error.")
-    return "\n".join(lines)
 
 
-def _feature_lines(name: str, one: Measured, part: MeasuredPart) -> list[str]:
-    values, uncertainty = one.in_part.values, part.uncertainty(name)
-    side = f", {one.surface.side} by {one.surface.evidence}" if one.feature else ""
-    lines = [f"  {name}: {one.kind.value}{side}"]
-    lines.append(_line("origin", values[:3], uncertainty[:3]))
-    if one.kind.value not in {"point", "sphere"}:
-        lines.append(_line("axis", values[3:6], uncertainty[3:6], digits=6))
-    for size, value, u in zip(
-        SURFACES[one.kind].sizes, values[6:], uncertainty[6:], strict=True
-    ):
-        if size == "half_angle":
-            value, u = np.rad2deg(value), np.rad2deg(u)
-        lines.append(_line(size.replace("_", " "), [value], [u]))
-    if one.feature is not None and one.kind.value != "point":
-        lines.append(f"    {'form error':12} {one.feature.form_error:10.4f}")
-    return lines
-
-
-def _line(name: str, values: Any, uncertainty: Any, digits: int = 4) -> str:
-    numbers = " ".join(f"{value:{digits + 8}.{digits}f}" for value in values)
-    spread = " ".join(f"{value:.{digits}f}" for value in uncertainty)
-    return f"    {name:12} {numbers}   U {spread}"
-
-
-def _result_line(result: CharacteristicResult) -> str:
-    planned, value = result.planned, result.value
-
-    def number(given: float | None, width: int) -> str:
-        return f"{given:{width}.4f}" if given is not None else width * " "
-
-    chance = "" if result.probability is None else f"{result.probability:.3f}"
-    return (
-        f"{planned.label:32} {number(planned.nominal, 10)} {value.value:10.4f} "
-        f"{number(result.deviation, 10)} {value.uncertainty:8.4f} "
-        f"{number(result.independent_uncertainty, 8)} {chance:>7}  "
-        f"{WORDS[result.decision]}"
-    ).rstrip()
+def characteristic_rows(part: MeasuredPart) -> Iterator[PartRow]:
+    """Yield nominal, actual, deviation, U, U of independent points, P, decision."""
+    for result in part.results:
+        yield PartRow(
+            result.planned.label,
+            (
+                result.planned.nominal,
+                result.value.value,
+                result.deviation,
+                result.value.uncertainty,
+                result.independent_uncertainty,
+                result.probability,
+            ),
+            DECISIONS[result.decision],
+        )
 
 
 def part_entries(part: MeasuredPart) -> dict[str, Any]:
@@ -82,7 +73,6 @@ def part_entries(part: MeasuredPart) -> dict[str, Any]:
     inputs = part.touches.inputs
     alignment = part.alignment
     return {
-        "coverage_factor": COVERAGE_FACTOR,
         "plan": msgspec.to_builtins(part.plan),
         "ball_diameter_mm": 2 * part.touches.ball_radius,
         "alignment": None
@@ -93,8 +83,9 @@ def part_entries(part: MeasuredPart) -> dict[str, Any]:
             "covariance": alignment.motion.covariance(inputs),
             "residuals_mm": alignment.residuals,
         },
-        "features": {
-            name: {
+        "features": [
+            {
+                "name": name,
                 "kind": one.kind.value,
                 "side": one.surface.side.value,
                 "side_by": one.surface.evidence.value,
@@ -112,10 +103,11 @@ def part_entries(part: MeasuredPart) -> dict[str, Any]:
                 "form_error_mm": None
                 if one.feature is None
                 else one.feature.form_error,
+                "n_touches": 0 if one.feature is None else len(one.feature.distances),
                 "nominal": _nominal(one.nominal),
             }
             for name, one in part.features.items()
-        },
+        ],
         "characteristics": [_result_entries(result) for result in part.results],
     }
 

@@ -69,6 +69,17 @@ class PartTouches:
         """Return the indices of the touches of a feature."""
         return np.flatnonzero([owner == name for owner in self.owners])
 
+    def noise(self, touches: IntArray) -> float:
+        """Return the standard deviation of a coordinate about the mean of touches, mm.
+
+        What moves all of them alike does not count.
+        """
+        n = len(touches)
+        columns = self.columns(touches)
+        own = self.covariance[np.ix_(columns, columns)].reshape(n, 3, n, 3)
+        spread = np.einsum("iaia", own) - np.einsum("iaja", own) / n
+        return float(np.sqrt(max(spread, 0.0) / (3 * max(n - 1, 1))))
+
     def columns(self, touches: IntArray) -> IntArray:
         """Return the indices of their coordinates among the inputs, (3 n,)."""
         return np.asarray((3 * touches[:, None] + np.arange(3)).ravel())

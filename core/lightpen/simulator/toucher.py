@@ -2,10 +2,14 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from lightpen.arrays import FloatArray
 from lightpen.simulator.hand import HandActivity, Operator
 from lightpen.verification.probing.probing import ProbingPhase
 from lightpen.verification.session.session_state import SessionSetup, SessionState
 from lightpen.verification.tasks.registry import AnyTask
+from lightpen.verification.tasks.task import HandGoal
 
 
 @dataclass(frozen=True)
@@ -46,9 +50,16 @@ class ProbingOperator:
         if must_move_on:
             operator.lift()
         elif goal.point is not None:
-            operator.touch(goal.point)
+            operator.touch(_ball_on(goal, goal.point, setup.ball_diameter or 0.0))
         else:
             is_other = before is None or before.task is not task
             if is_lifted or is_same_again or is_other:
                 operator.seat()
             operator.lean_towards(goal.tilt, goal.direction, 0.0)
+
+
+def _ball_on(goal: HandGoal, point: FloatArray, ball_diameter: float) -> FloatArray:
+    """Return where the centre of the ball goes."""
+    if goal.outwards is None:
+        return point
+    return np.asarray(point + ball_diameter / 2 * goal.outwards)

@@ -191,7 +191,7 @@ def step_of(
     return step | {
         "said": [{"code": each.code} for each in said],
         "kept": list(screened.kept),
-        "figures": shown(task.figures_so_far(progress, conditions)),
+        "figures": shown(task.figures_so_far(options, progress, conditions)),
     }
 
 

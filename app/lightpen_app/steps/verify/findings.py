@@ -173,7 +173,10 @@ class TaskFinding(ResponsiveLayout, QWidget):
         task, found = self._task, state.found.get(self._task.kind)
         if found is not None:
             return task.tables(found, setup.conditions)
-        return task.figures_so_far(state.progress(setup, task), setup.conditions)
+        options = setup.choices.options_of(task)
+        return task.figures_so_far(
+            options, state.progress(setup, task), setup.conditions
+        )
 
     @override
     def _use_room(self) -> None:
@@ -199,7 +202,10 @@ def figures_of(table: ResultTable) -> Figures:
         tuple(map(_words, table.columns)) if table.rows else (),
         tuple(_words(row.name) for row in table.rows),
         tuple(
-            tuple("" if x is None else number_text(x, row.decimals) for x in row.values)
+            (
+                *("" if x is None else number_text(x, row.decimals) for x in row.values),
+                *([_words(row.remark)] if len(row.values) < len(table.columns) else ()),
+            )
             for row in table.rows
         ),
     )

@@ -69,7 +69,8 @@ def _table(table: ResultTable) -> list[str]:
                 " " * width if x is None else f"{x:{width}.{row.decimals}f}"
                 for x in row.values[own]
             )
-            lines.append(f"{str(row.name)[:NAME]:<{NAME}}" + "".join(cells))
+            words = f"{str(row.name)[:NAME]:<{NAME}}" + "".join(cells)
+            lines.append(f"{words}  {row.remark}" if row.remark else words)
     return [line.rstrip() for line in (*lines, *map(str, table.notes))]
 
 

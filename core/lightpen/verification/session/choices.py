@@ -6,7 +6,12 @@ from lightpen.messages import Message, message
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.probing.probing import FAST
 from lightpen.verification.tasks.fixed_point import FIXED_POINT
-from lightpen.verification.tasks.registry import TASKS, AnyOptions, AnyTask, TaskKind
+from lightpen.verification.tasks.registry import (
+    ALL_TASKS,
+    AnyOptions,
+    AnyTask,
+    TaskKind,
+)
 from lightpen.verification.tasks.task import FoundT, OptionsT, VerificationTask
 
 
@@ -32,7 +37,7 @@ class VerificationChoices:
     @property
     def tasks(self) -> tuple[AnyTask, ...]:
         """The tasks that are chosen."""
-        return tuple(task for task in TASKS if task.kind in self.kinds)
+        return tuple(task for task in ALL_TASKS if task.kind in self.kinds)
 
     def options_of(self, task: VerificationTask[OptionsT, FoundT]) -> OptionsT:
         """Return the options of a task."""
@@ -42,14 +47,14 @@ class VerificationChoices:
     def with_options(self, options: AnyOptions) -> "VerificationChoices":
         """Return them with other options of a task."""
         chosen = {type(each): each for each in (*self.options, options)}
-        ordered = (chosen.get(task.options) for task in TASKS)
+        ordered = (chosen.get(task.options) for task in ALL_TASKS)
         unusual = (each for each in ordered if each and each != type(each)())
         return replace(self, options=tuple(unusual))
 
     def with_task(self, task: AnyTask, *, is_chosen: bool) -> "VerificationChoices":
         """Return them with a task chosen or not."""
         kinds = {*self.kinds, task.kind} if is_chosen else {*self.kinds} - {task.kind}
-        return replace(self, kinds=tuple(t.kind for t in TASKS if t.kind in kinds))
+        return replace(self, kinds=tuple(t.kind for t in ALL_TASKS if t.kind in kinds))
 
     def missing(self, ball_diameter: float | None) -> Message | None:
         """Return what has to be entered before, with a ball of this diameter, mm."""

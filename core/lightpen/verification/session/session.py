@@ -33,7 +33,7 @@ from lightpen.verification.session.session_state import (
 )
 from lightpen.verification.tasks.drift import DRIFT, MIN_VISITS, Drift, measure_drift
 from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
-from lightpen.verification.tasks.registry import TASKS, AnyTask
+from lightpen.verification.tasks.registry import ALL_TASKS, AnyTask
 from lightpen.verification.tasks.task import (
     Found,
     Points,
@@ -233,7 +233,7 @@ def with_other_choices(
     state has another `touching`.
     """
     at_hand = state.task(setup)
-    for task in TASKS:
+    for task in ALL_TASKS:
         one, other = setup.choices.options_of(task), choices.options_of(task)
         if task.kind in state.found and not task.is_same_artefact(one, other):
             state = touched_anew(state, task)

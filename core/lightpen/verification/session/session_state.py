@@ -15,7 +15,7 @@ from lightpen.verification.tasks.assessment import VerificationAssessment, worst
 from lightpen.verification.tasks.drift import DRIFT, MIN_VISITS, Drift
 from lightpen.verification.tasks.fixed_point import FIXED_POINT
 from lightpen.verification.tasks.probed_point import NO_DRIFT
-from lightpen.verification.tasks.registry import TASKS, AnyTask
+from lightpen.verification.tasks.registry import ALL_TASKS, AnyTask
 from lightpen.verification.tasks.task import (
     Conditions,
     Found,
@@ -167,7 +167,7 @@ class SessionState:
     def assessment(self) -> VerificationAssessment | None:
         """The worst that was found so far; a drift first, as it explains the rest."""
         drift = self.found_by(DRIFT)
-        found = [self.found[task.kind] for task in TASKS if task.kind in self.found]
+        found = [self.found[task.kind] for task in ALL_TASKS if task.kind in self.found]
         if drift is not None and not drift.assessment.is_accepted:
             found.insert(0, drift)
         return worst([each.assessment for each in found]) if found else None

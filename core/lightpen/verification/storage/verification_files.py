@@ -13,7 +13,6 @@ from typing import Any
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import file_entry, json_bytes, record_bytes
 from lightpen.formats.own_json import with_checksum
-from lightpen.model.limits import rule_in_words
 from lightpen.model.origin import Origin
 from lightpen.record.folder.verifications import VERIFICATIONS
 from lightpen.record.library.numbered_files import add_numbered
@@ -137,7 +136,7 @@ def task_record(
                 for each in images.records
             ],
         },
-        rule_in_words(choices.limits),
+        task.rule_of(choices.options_of(task), choices.limits),
     )
 
 

@@ -323,7 +323,7 @@ def _tables(found: Articulation, conditions: Conditions) -> tuple[ResultTable, .
 
 
 def _figures_so_far(
-    progress: TaskProgress, conditions: Conditions
+    options: ArticulationOptions, progress: TaskProgress, conditions: Conditions
 ) -> tuple[ResultTable, ...]:
     rows = []
     for i, run in enumerate(progress.runs, start=1):

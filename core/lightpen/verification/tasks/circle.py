@@ -479,7 +479,7 @@ def _tables(found: Circle, conditions: Conditions) -> tuple[ResultTable, ...]:
 
 
 def _figures_so_far(
-    progress: TaskProgress, conditions: Conditions
+    options: CircleOptions, progress: TaskProgress, conditions: Conditions
 ) -> tuple[ResultTable, ...]:
     """Return the residuals of the last points from the ring so far."""
     points, fit = progress.points, ring_fit(progress.points)

@@ -198,7 +198,7 @@ def _tables(found: Drift, conditions: Conditions) -> tuple[ResultTable, ...]:
 
 
 def _figures_so_far(
-    progress: TaskProgress, conditions: Conditions
+    options: DriftOptions, progress: TaskProgress, conditions: Conditions
 ) -> tuple[ResultTable, ...]:
     if len(progress.runs) < MIN_VISITS:
         return (ResultTable(message("drift.table"), notes=(message("drift.note"),)),)

@@ -341,7 +341,7 @@ def _tables(found: FixedPoint, conditions: Conditions) -> tuple[ResultTable, ...
 
 
 def _figures_so_far(
-    progress: TaskProgress, conditions: Conditions
+    options: FixedPointOptions, progress: TaskProgress, conditions: Conditions
 ) -> tuple[ResultTable, ...]:
     points = progress.points
     own = scatter_of(points)

@@ -370,7 +370,7 @@ def _tables(found: Flatness, conditions: Conditions) -> tuple[ResultTable, ...]:
 
 
 def _figures_so_far(
-    progress: TaskProgress, conditions: Conditions
+    options: PlaneOptions, progress: TaskProgress, conditions: Conditions
 ) -> tuple[ResultTable, ...]:
     points = progress.points
     if len(points) < LEAST_POINTS:

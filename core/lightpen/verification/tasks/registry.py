@@ -1,4 +1,4 @@
-"""The verification tasks, in the order in which they are done."""
+"""The verification tasks, in the order in which they are done, and that of a part."""
 
 from functools import reduce
 from operator import or_
@@ -9,6 +9,7 @@ from lightpen.verification.tasks.circle import CIRCLE
 from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.fixed_point import FIXED_POINT
 from lightpen.verification.tasks.length import LENGTH
+from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.plane import PLANE
 from lightpen.verification.tasks.sphere import SPHERE
 from lightpen.verification.tasks.task import TaskOptions, VerificationTask
@@ -18,16 +19,17 @@ AnyTask: TypeAlias = VerificationTask[Any, Any]
 TASKS: tuple[AnyTask, ...] = (
     *(FIXED_POINT, CIRCLE, LENGTH, PLANE, SPHERE, ARTICULATION, DRIFT),
 )
+ALL_TASKS: tuple[AnyTask, ...] = (*TASKS, PART)  # with that of the step Measure
 PAPER = (FIXED_POINT, CIRCLE, LENGTH)  # the paper's three
 
-_BY_KIND = {task.kind: task for task in TASKS}
+_BY_KIND = {task.kind: task for task in ALL_TASKS}
 
 if TYPE_CHECKING:
     TaskKind: TypeAlias = str
     AnyOptions: TypeAlias = TaskOptions
 else:  # by which msgspec takes the registered ones and no others
     TaskKind = Literal[tuple(_BY_KIND)]
-    AnyOptions = reduce(or_, (task.options for task in TASKS))
+    AnyOptions = reduce(or_, (task.options for task in ALL_TASKS))
 
 
 def task_of(kind: TaskKind) -> AnyTask:

@@ -14,7 +14,7 @@ from msgspec import Struct
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
-from lightpen.model.limits import VerificationLimits
+from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.probed_point import NO_DRIFT, ProbedPoint
 
@@ -167,11 +167,18 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class ResultRow:
-    """A row of a table: its name, and a number for each column or None for a blank."""
+    """A row of a table: its name, and a number for each column or None for a blank.
+
+    Attributes
+    ----------
+    remark : Message or str
+        In the last column, which has a head of its own.
+    """
 
     name: Message | str
     values: Sequence[float | None]
     decimals: int = 4
+    remark: Message | str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,6 +249,8 @@ class HandGoal:
     point : (3,) array or None
         Where the tip goes, from the bottom of the cone, camera frame, mm; None into
         the cone.
+    outwards : (3,) array or None
+        Unit normal of the surface there, on which the ball then rests.
     tilt, direction : float
         How the pen is held in the cone, rad.
     """
@@ -249,6 +258,7 @@ class HandGoal:
     point: FloatArray | None = None
     tilt: float = 0.0
     direction: float = 0.0
+    outwards: FloatArray | None = None
 
 
 OptionsT = TypeVar("OptionsT", bound=TaskOptions)
@@ -300,6 +310,8 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     newness : callable
         Returns the turn, rad, and the distance, mm, one of which makes a point a new
         one; both 0 where it is the same again after the tip was lifted.
+    rule_of : callable
+        Returns the decision rule in words, by options and limits.
     missing : callable
         Returns what has to be entered before, by options and ball diameter.
     is_each_run_measured : bool
@@ -334,15 +346,18 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     fields: tuple[Option, ...] = ()
     other_run: Message | None = None
     n_runs: Callable[[OptionsT], int] = lambda _: 1
-    figures_so_far: Callable[[TaskProgress, Conditions], tuple[ResultTable, ...]] = (
-        lambda progress, _: (points_table(progress.points),)
-    )
+    figures_so_far: Callable[
+        [OptionsT, TaskProgress, Conditions], tuple[ResultTable, ...]
+    ] = lambda options, progress, conditions: (points_table(progress.points),)
     fraction: Callable[[OptionsT, TaskProgress], float] | None = None
     count: Callable[[OptionsT, TaskProgress], Message] | None = None
     screen: Callable[[OptionsT, Conditions, TaskProgress], Screening] = (
         lambda options, conditions, progress: keep_all(len(progress.points))
     )
     missing: Callable[[OptionsT, float | None], Message | None] = lambda *_: None
+    rule_of: Callable[[OptionsT, VerificationLimits], Message] = (
+        lambda options, limits: rule_in_words(limits)
+    )
     is_each_run_measured: bool = True
     is_pooled: bool = False
     counts_drift: bool = True

@@ -1,0 +1,253 @@
+"""Probed points for a command: camera, pen and tip by files, then images or centres."""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightpen.commands.arguments import add_pen_options, limits_by
+from lightpen.commands.console import lacking, progress, require_other_file
+from lightpen.detection.observations import Observations, observe_centers
+from lightpen.errors import CalibrationError, UsageError
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.formats.hashes import all_hashed, hashed
+from lightpen.formats.json_records import file_entry
+from lightpen.formats.observation_files import read_centers
+from lightpen.formats.pen_files import read_pen
+from lightpen.model.origin import Origin
+from lightpen.model.pen import Pen
+from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.verification.history.recorded_tasks import read_drift
+from lightpen.verification.probing.current_tip import cone_before
+from lightpen.verification.probing.drift_reference import LampDrift
+from lightpen.verification.probing.image_locations import (
+    ImageLocation,
+    PenCameras,
+    read_viewers,
+    touch_place,
+)
+from lightpen.verification.probing.probing import (
+    FAST,
+    ONE_IMAGE,
+    PRECISE,
+    SETTLING,
+    ProbingRules,
+)
+from lightpen.verification.probing.sources import (
+    ProbingRun,
+    instrument_of,
+    lamp_drift_of,
+    observe_place,
+    touches_of,
+)
+from lightpen.verification.storage.verification_files import viewer_entries
+from lightpen.verification.tasks.probed_point import (
+    NO_DRIFT,
+    ProbedPoint,
+    RejectedFrame,
+)
+from lightpen.verification.tasks.task import Conditions
+
+
+def add_touch_inputs(parser: argparse.ArgumentParser, tip_help: str) -> None:
+    """Add the options for camera, pen, tip and images of a touch."""
+    parser.add_argument("--camera", type=Path, metavar="FILE")
+    parser.add_argument(
+        "--rig",
+        type=Path,
+        metavar="FILE",
+        help=(
+            "rig file with the extrinsics of several cameras, instead of --camera; "
+            "give a folder that contains one folder per camera, named as in this "
+            "file"
+        ),
+    )
+    parser.add_argument("--pen", type=Path, metavar="FILE")
+    add_pen_options(parser)
+    parser.add_argument(
+        "--tip", type=Path, required=True, metavar="RESULT.json", help=tip_help
+    )
+    parser.add_argument(
+        "--frames",
+        type=int,
+        choices=range(1, 101),
+        metavar="N",
+        help="images of a touch, through which the pen is held still, such as "
+        f"{FAST} or for a precise one {PRECISE}; 1 takes each image for a touch. "
+        f"Unless said {FAST}, or 1 where the pen was held still for none",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRuns:
+    """The points of all runs, and what they were measured with.
+
+    Attributes
+    ----------
+    origin : Origin
+        Of the images or centres; simulated if some of them are.
+    lamp_drift : LampDrift or None
+        The drift of fixed lamps in view.
+    """
+
+    calibration: CalibrationFile
+    origin: Origin
+    conditions: Conditions
+    runs: tuple[ProbingRun, ...]
+    files: tuple[Path, ...]
+    viewers: PenCameras
+    pen_file: Path
+    lamp_drift: LampDrift | None
+
+    @property
+    def instrument(self) -> Instrument:
+        """What they were measured with."""
+        return self.conditions.instrument
+
+    @property
+    def touches(self) -> list[tuple[str, Sequence[ProbedPoint]]]:
+        """Touches of each run with its name."""
+        return [(run.name, run.touches) for run in self.runs]
+
+    @property
+    def rejected(self) -> list[RejectedFrame]:
+        """Images that belong to no touch."""
+        return [each for run in self.runs for each in run.rejected]
+
+    def input_entries(self, options: argparse.Namespace) -> dict[str, Any]:
+        """Return the files that were read, for a record."""
+        drift: Path | None = getattr(options, "drift", None)
+        return {
+            "tip": file_entry(hashed(options.tip)),
+            **viewer_entries(self.viewers),
+            "pen": file_entry(hashed(self.pen_file)),
+            "images": [file_entry(file) for file in all_hashed(self.files)],
+            **({} if drift is None else {"drift": file_entry(hashed(drift))}),
+        }
+
+
+def measure_runs(
+    options: argparse.Namespace,
+    places: Sequence[tuple[str, ...]],
+    centers: Sequence[Path] = (),
+) -> MeasuredRuns:
+    """Measure the touches at places, and those of files of LED centres before them.
+
+    Parameters
+    ----------
+    options : Namespace
+        With what `add_touch_inputs` adds, and `json`.
+    """
+    drift: Path | None = getattr(options, "drift", None)
+    inputs = options.camera, options.rig, options.pen, options.tip, drift
+    require_other_file(options.json, *inputs)
+    calibration = read_calibration(options.tip)
+    given = read_viewers(options.camera, options.rig)
+    rig = None if given is None else given.rig
+    found = [touch_place(each, rig) for each in places if each]
+    viewers = given or (found[0].viewers if found else None)
+    if viewers is None:
+        raise lacking("--camera or --rig")
+    pen, pen_file = _pen(options, found)
+    files = tuple(file for place in found for file in place.files)
+    files += tuple(centers)
+    require_other_file(options.json, *files)
+    instrument = instrument_of(calibration, viewers, pen, pen_file)
+    seen = _seen(centers, found, instrument)
+    runs = _runs_of(seen, instrument, options.frames)
+    nominal = getattr(options, "nominal_tip", None)
+    for known in (pen.nominal_tip, calibration.nominal_tip):
+        nominal = known if nominal is None else nominal
+    limits = limits_by(options)
+    lamp_drift = lamp_drift_of(runs, instrument, limits)
+    moved = NO_DRIFT if drift is None else read_drift(drift)
+    return MeasuredRuns(
+        calibration=calibration,
+        origin=_origin(found),
+        conditions=Conditions(
+            instrument=instrument,
+            limits=limits,
+            ball_diameter=options.ball_diameter,
+            ball_uncertainty=getattr(options, "ball_uncertainty", 0.0),
+            nominal_tip=None if nominal is None else np.array(nominal, dtype=float),
+            cone_cam=cone_before(calibration, viewers),
+            drift=moved if lamp_drift is None else np.maximum(moved, lamp_drift.share),
+        ),
+        runs=tuple(runs),
+        files=files,
+        viewers=viewers,
+        pen_file=pen_file,
+        lamp_drift=lamp_drift,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _SeenRun:
+    """What the images of a run, or its centres, show in each camera."""
+
+    name: str
+    views: tuple[Observations, ...]
+    touches: tuple[int, ...] | None = None
+
+
+def _seen(
+    centers: Sequence[Path], places: Sequence[ImageLocation], instrument: Instrument
+) -> list[_SeenRun]:
+    if centers and instrument.rig.n_cameras > 1:
+        raise UsageError("cli.centers-of-rig")
+    seen = []
+    for path in centers:
+        own = read_centers(path, instrument.pen.n_leds)
+        view = observe_centers(own, instrument.camera, instrument.pen)
+        seen.append(_SeenRun(path.name, (view,)))
+    with progress("Finding LEDs") as report:
+        for i, place in enumerate(places, start=1):
+            views = observe_place(place, instrument)
+            seen.append(_SeenRun(place.name, views, place.touches))
+            report(i / len(places))
+    return seen
+
+
+def _runs_of(
+    seen: Sequence[_SeenRun], instrument: Instrument, n_frames: int | None
+) -> list[ProbingRun]:
+    """Return the touches of all runs.
+
+    Unless a number of images is given, the pen was held still for the usual one; where
+    it was not, each image is a touch.
+    """
+
+    def by(rules: ProbingRules) -> list[ProbingRun]:
+        return [
+            touches_of(run.name, run.views, instrument, rules, run.touches)
+            for run in seen
+        ]
+
+    if n_frames is not None:
+        return by(ProbingRules(n_frames, SETTLING) if n_frames > 1 else ONE_IMAGE)
+    try:
+        return by(ProbingRules())
+    except CalibrationError as error:
+        if error.message.code != "verification.never-still":
+            raise
+    return by(ONE_IMAGE)
+
+
+def _pen(
+    options: argparse.Namespace, places: Sequence[ImageLocation]
+) -> tuple[Pen, Path]:
+    if options.pen is not None:
+        pen = read_pen(options.pen, options.units, options.led_diameter, None)
+        return pen, options.pen
+    place = places[0] if places else None
+    if place is None or place.pen is None or place.pen_file is None:
+        raise lacking("--pen")
+    return place.pen, place.pen_file
+
+
+def _origin(places: Sequence[ImageLocation]) -> Origin:
+    origins = {place.origin for place in places}
+    return Origin.SIMULATED if Origin.SIMULATED in origins else Origin.RECORDED
