@@ -8,6 +8,7 @@ from lightpen_app.steps.page import Page
 from lightpen_app.steps.review.page import ReviewPage
 from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.swing.page import SwingPage
+from lightpen_app.steps.verify.measure_page import MeasurePage
 from lightpen_app.steps.verify.page import VerifyPage
 from lightpen_app.work.workbench import Workbench
 
@@ -21,5 +22,6 @@ def make_pages(workbench: Workbench, sounds: Sounds) -> tuple[Page, ...]:
         SwingPage(workbench, sounds),
         ReviewPage(workbench),
         VerifyPage(workbench, sounds),
+        MeasurePage(workbench, sounds),
         HistoryPage(workbench),
     )

@@ -107,8 +107,8 @@ class LiveView(QObject):
     ----------
     run : SwingRun
         Takes every image, but for those of a verification.
-    verification : VerificationRun
-        Takes every image while somebody is at it.
+    verifications : sequence of VerificationRun
+        The one that somebody is at takes every image.
     stream : PoseStream
         Tells other programs what the first camera shows.
     notifications : Notifications
@@ -140,14 +140,14 @@ class LiveView(QObject):
     def __init__(
         self,
         run: SwingRun,
-        verification: VerificationRun,
+        verifications: Sequence[VerificationRun],
         stream: PoseStream,
         notifications: Notifications,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
         self._run = run
-        self._verification = verification
+        self._verifications = tuple(verifications)
         self._stream = stream
         self._live: Live | None = None
         self._chosen = 0
@@ -185,7 +185,7 @@ class LiveView(QObject):
         listener.told.connect(self._on_told)
         self._live = live = Live(
             *(cameras, settings, listener, self._run.runner, clock, known),
-            verifier=self._verification.runner,
+            verifiers=[each.runner for each in self._verifications],
             stream=self._stream,
         )
         live.set_region(self._region)
@@ -364,11 +364,13 @@ class LiveView(QObject):
         self._run.follower = GuidedOperator(operator) if follows and operator else None
 
     def set_touching(self, touches: bool) -> None:
-        """Set whether the simulated operator follows the verification."""
+        """Set whether the simulated operator probes, where somebody is present."""
         operator = self._operator
-        self._verification.probing_operator = (
-            ProbingOperator(operator) if touches and operator else None
-        )
+        for run in self._verifications:
+            is_led = touches and run.runner.status.is_here
+            run.probing_operator = (
+                ProbingOperator(operator) if is_led and operator else None
+            )
 
     def _stop(self, live: Live, listener: "_QueuedListener") -> None:
         try:

@@ -13,6 +13,7 @@ from lightpen.messages import Message, message
 from lightpen.record.folder.data_folder import sweep_leftovers
 from lightpen.record.library.supervision import Supervision, read_supervision
 from lightpen.record.results.result_folder import SIMULATED
+from lightpen.verification.tasks.part import PART
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import Tone
 from lightpen_app.work.archive_writer import ArchiveWriter
@@ -50,8 +51,10 @@ class Workbench(QObject):
     ----------
     selection : Selection
         Selection at the station.
-    run, verification : SwingRun and VerificationRun
-        Running swing and verification.
+    run : SwingRun
+        Running swing.
+    verification, measuring : VerificationRun
+        Of the tip by reference artefacts, and of parts by the tip.
     live : LiveView
         The images of the cameras.
     camera : CameraSetup
@@ -91,10 +94,12 @@ class Workbench(QObject):
         self.verification = VerificationRun(
             self.run.archive, folder, around.now, notices, self
         )
-        self.streaming = Streaming(self.run.archive, around.clock, self)
-        self.live = LiveView(
-            self.run, self.verification, self.streaming.stream, notices, self
+        self.measuring = VerificationRun(
+            self.run.archive, folder, around.now, notices, self
         )
+        self.streaming = Streaming(self.run.archive, around.clock, self)
+        probing = (self.verification, self.measuring)
+        self.live = LiveView(self.run, probing, self.streaming.stream, notices, self)
         rule = settings.due_rule()
         self.library = LibraryWatch(
             folder, self.run.logbook, rule, around.now, notices, self
@@ -117,7 +122,8 @@ class Workbench(QObject):
         self.run.changed.connect(self._keep_heading)
         self.run.result_changed.connect(self.library.refresh)
         self.run.result_changed.connect(self.streaming.read_tip)
-        self.verification.files_changed.connect(self.archive_writer.enter_owed)
+        for each in probing:
+            each.files_changed.connect(self.archive_writer.enter_owed)
         settings.troubled.connect(self._on_settings_troubled)
         settings.relieved.connect(self._on_settings_relieved)
 
@@ -146,7 +152,7 @@ class Workbench(QObject):
             behind: all that was acknowledged is on the disk.
         """
         deadline = monotonic() + timeout_s
-        for told in (self.run, self.verification):
+        for told in (self.run, self.verification, self.measuring):
             told.blockSignals(True)  # nothing more is begun because of what they tell
         self.folder_watch.stop()
         self.pens.shut_down()
@@ -154,6 +160,7 @@ class Workbench(QObject):
         self.library.shut_down()
         self.run.runner.shut_down()
         self.verification.runner.shut_down()
+        self.measuring.runner.shut_down()
         self.live.close()
         pool = QThreadPool.globalInstance()
         jobs_ended = pool.waitForDone(round(1000 * timeout_s))
@@ -162,7 +169,11 @@ class Workbench(QObject):
         has_closed = self.live.await_closed(of_camera)
         has_ended = all(
             runner.await_end(max(0.0, deadline - monotonic()))
-            for runner in (self.run.runner, self.verification.runner)
+            for runner in (
+                self.run.runner,
+                self.verification.runner,
+                self.measuring.runner,
+            )
         )
         self.streaming.shut_down()
         self.folder_watch.leave()
@@ -182,7 +193,9 @@ class Workbench(QObject):
     def _tell_runners(self) -> None:
         chosen, choices = self.selection.preparation, self.selection.choices
         self.run.runner.choose(chosen)
+        part = replace(choices, kinds=(PART.kind,))
         self.verification.runner.ask(lambda workflow: workflow.choose(chosen, choices))
+        self.measuring.runner.ask(lambda workflow: workflow.choose(chosen, part))
         self.streaming.choose(chosen)
         self.library.set_rule(self.selection.limits.due)
 

@@ -106,8 +106,8 @@ class Live:
         Takes every image, except during a verification.
     known : mapping of str to CameraSettings
         Settings by serial number, in place of ``settings``.
-    verifier : VerificationRunner, optional
-        Takes every image during a verification.
+    verifiers : sequence of VerificationRunner
+        Of these the one where an operator is present takes every image.
     stream : PoseStream, optional
         Sends detections of the first camera; while it has clients, every image is
         processed.
@@ -121,7 +121,7 @@ class Live:
         runner: SwingRunner,
         clock: Clock | None = None,
         known: Mapping[str, CameraSettings] | None = None,
-        verifier: VerificationRunner | None = None,
+        verifiers: Sequence[VerificationRunner] = (),
         stream: PoseStream | None = None,
     ) -> None:
         self._workers = tuple(
@@ -134,7 +134,7 @@ class Live:
         self._has_refused = False
         self._listener = listener
         self._runner = runner
-        self._verifier = verifier
+        self._verifiers = tuple(verifiers)
         self._stream = stream
         self._region = RegionOfInterest()
         self._wanted: RegionOfInterest | SwingSetup = self._region
@@ -238,9 +238,15 @@ class Live:
             self._pairs.forget()
         return captured
 
+    @property
+    def _verifier(self) -> VerificationRunner | None:
+        """The one where an operator is present."""
+        return next((each for each in self._verifiers if each.status.is_here), None)
+
     def _verified(self) -> RegionOfInterest | None:
         """Return what a verification detects; None without one."""
-        status = None if self._verifier is None else self._verifier.status
+        verifier = self._verifier
+        status = None if verifier is None else verifier.status
         return status.region if status is not None and status.is_touching else None
 
     def _rest(self) -> float | None:
@@ -268,7 +274,8 @@ class Live:
     def _notice_stage(self) -> None:
         """Treat a new phase or task as a motion."""
         status = self._runner.status
-        verified = None if self._verifier is None else self._verifier.status
+        verifier = self._verifier
+        verified = None if verifier is None else verifier.status
         stage = (
             None if status.state is None else status.state.phase,
             verified is not None and verified.is_touching and verified.task,
@@ -342,8 +349,9 @@ class Live:
         detection = None
         if len(detections) == len(images):
             detection = replace(detections[0], others=tuple(detections[1:]))
-        if self._verifier is not None and captured.verification is not None:
-            self._verifier.take(frame, detection, captured.verification)
+        verifier = self._verifier
+        if verifier is not None and captured.verification is not None:
+            verifier.take(frame, detection, captured.verification)
         else:
             self._hand_over(frame, detection, captured.swing)
         for image in images:

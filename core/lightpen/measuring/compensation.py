@@ -174,6 +174,8 @@ def _outwards(
     at = touches.of(planned.name)
     approaches = touches.approaches_cam[at]
     known = np.isfinite(approaches).all(axis=1)
+    if planned.kind is FeatureKind.PLANE:  # not along the surface
+        known &= np.abs(np.nan_to_num(approaches) @ feature.axis) > CLEAR
     found, evidence = touches.styli_cam[at], Evidence.STYLUS
     if known.any():
         found, evidence = -approaches[known], Evidence.APPROACH

@@ -57,6 +57,8 @@ class Feature:
         Derivative of origin, axis and sizes by the points.
     distances_by_points : (N K, 3 N) array
         Derivative of the distances by the points, the feature following.
+    offsets : (N, 3) array
+        From the feature to the points, mm.
     """
 
     kind: FeatureKind
@@ -66,6 +68,7 @@ class Feature:
     distances: FloatArray
     by_points: FloatArray
     distances_by_points: FloatArray
+    offsets: FloatArray
 
     @property
     def axis(self) -> FloatArray:
@@ -194,7 +197,10 @@ def _feature(kind: FeatureKind, points: FloatArray, at: Start) -> Feature:
     )
     distances = values.reshape(n, k)
     by_distances = direct + J @ unknowns
-    return Feature(kind, origin, axes, sizes, distances, by_points, by_distances)
+    offsets = np.einsum("nk,nkd->nd", distances, by_point)
+    return Feature(
+        *(kind, origin, axes, sizes, distances, by_points, by_distances, offsets)
+    )
 
 
 def _condition(J: FloatArray) -> float:

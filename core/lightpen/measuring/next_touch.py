@@ -25,6 +25,7 @@ N_ROUND, N_ALONG = 24, 5  # places round an axis and along it
 N_GRID = 7  # places along the sides of a plane
 INSIDE = 0.8  # of the extent: edges are not probed
 HALF_ANGLE = np.radians(70.0)  # of a sphere, about its accessible pole
+APART = 1.0  # mm, of two touches
 USUAL_LENGTH = 20.0  # mm, of a feature whose nominal has none
 
 
@@ -133,11 +134,18 @@ def best_places(
     if touched is not None and len(touched):
         own = (_rows(area, area.local(touched)) / scale).reshape(-1, surface.n_unknowns)
         known = known + own.T @ own
+    is_free = np.ones(len(places), dtype=bool)
+    if touched is not None and len(touched):
+        away = np.linalg.norm(places[:, None] - area.local(touched), axis=2)
+        is_free = away.min(axis=1) > APART
     found = []
     for _ in range(n):
+        if not is_free.any():
+            is_free[:] = True
         inner = J @ np.linalg.inv(known) @ np.swapaxes(J, 1, 2)
         gains = np.linalg.slogdet(np.eye(inner.shape[1]) + inner)[1]
-        best = int(np.argmax(gains))
+        best = int(np.argmax(np.where(is_free, gains, -np.inf)))
+        is_free &= np.linalg.norm(places - places[best], axis=1) > APART
         known = known + J[best].T @ J[best]
         found.append(_place(area, places[best]))
     return found
@@ -174,7 +182,7 @@ def _places(area: ProbedArea) -> FloatArray:
             x, y = np.meshgrid(side * area.half[0], side * area.half[1])
             return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
         case FeatureKind.CIRCLE:
-            return area.sizes[0] * round_
+            return np.asarray(area.sizes[0] * round_)
         case FeatureKind.SLOT:
             radius, length = area.sizes
             ends = radius * round_ + np.sign(round_[:, :1]) * [length / 2, 0.0, 0.0]
@@ -189,7 +197,9 @@ def _places(area: ProbedArea) -> FloatArray:
             caps = [
                 np.sin(t) * round_ + np.cos(t) * np.array([0.0, 0.0, 1.0]) for t in tilt
             ]
-            return area.sizes[0] * np.concatenate(caps) @ frame_about(area.pole).T
+            return np.asarray(
+                area.sizes[0] * np.concatenate(caps) @ frame_about(area.pole).T
+            )
         case FeatureKind.CYLINDER | FeatureKind.CONE:
             slope = 0.0 if area.kind is FeatureKind.CYLINDER else np.tan(area.sizes[1])
             return np.concatenate(

@@ -6,16 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec import structs
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.measuring import constructions
 from lightpen.measuring.alignment import Alignment, align_321, align_points
 from lightpen.measuring.characteristics import AXIAL, FLAT, Measured, Value, evaluate
 from lightpen.measuring.compensation import Evidence, TouchedSurface, surface_of
-from lightpen.measuring.features import Feature, fit_feature
+from lightpen.measuring.features import AXIS, Feature, fit_feature
 from lightpen.measuring.plan import (
     NEVER,
     Construction,
+    Nominal,
     Plan,
     PlannedCharacteristic,
     PlannedConstruction,
@@ -24,10 +25,12 @@ from lightpen.measuring.plan import (
 )
 from lightpen.measuring.quantities import derive
 from lightpen.measuring.recognition import recognise, recognised
-from lightpen.measuring.surfaces import FeatureKind
+from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind
 from lightpen.measuring.touches import PartTouches
 from lightpen.measuring.zones import Criterion, fit_zone
 from lightpen.model.decision_rules import Decision, conformity_probability, decide
+
+MAX_SPREAD = 0.1  # rad of an axis, or of a size: more is not determined
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +119,42 @@ def _with_kinds(plan: Plan, touches: PartTouches) -> Plan:
             each
             if each.kind is not None
             else structs.replace(
-                each, kind=recognised(each.name, kind_of(each.name, touches))
+                each,
+                kind=recognised(each.name, kind_of(each.name, touches)),
+                touches=None,
             )
             for each in plan.features
+        ),
+    )
+
+
+def taught_plan(part: MeasuredPart) -> Plan:
+    """Return the plan of a part with its features, as measured, for nominals."""
+
+    def nominal_of(name: str, before: Nominal | None) -> Nominal:
+        values, kind = part.features[name].in_part.values, part.features[name].kind
+        sizes = dict(zip(SURFACES[kind].sizes, values[6:].tolist(), strict=True))
+        radius = sizes.get("radius")
+        found = Nominal(
+            origin=tuple(values[:3].tolist()),
+            axis=tuple(values[3:6].tolist()),
+            diameter=None if radius is None else 2 * radius,
+            length=sizes["length"] + 2 * sizes["radius"] if "length" in sizes else None,
+            angle=float(np.rad2deg(2 * sizes["half_angle"]))
+            if "half_angle" in sizes
+            else None,
+        )
+        return before or found
+
+    return structs.replace(
+        part.plan,
+        features=tuple(
+            structs.replace(
+                each,
+                nominal=nominal_of(each.name, each.nominal),
+                touches=int((np.array(part.touches.owners) == each.name).sum()),
+            )
+            for each in part.plan.features
         ),
     )
 
@@ -145,6 +181,7 @@ def _fitted(planned: PlannedFeature, touches: PartTouches) -> Feature:
     points = touches.points_cam[at]
     assert planned.kind is not None
     feature = fit_feature(planned.kind, points)
+    _require_determined(feature, touches, at)
     if planned.criterion == NEVER:
         return feature
     # The points that touch the zone carry it; its U is that of least squares.
@@ -158,7 +195,19 @@ def _fitted(planned: PlannedFeature, touches: PartTouches) -> Feature:
         feature.distances,
         feature.by_points,
         feature.distances_by_points,
+        feature.offsets,
     )
+
+
+def _require_determined(feature: Feature, touches: PartTouches, at: IntArray) -> None:
+    """Refuse touches that determine a feature by their noise alone."""
+    columns = touches.columns(at)
+    spread = feature.by_points @ touches.covariance[np.ix_(columns, columns)]
+    variances = np.einsum("ij,ij->i", spread, feature.by_points)
+    tilt = float(np.sqrt(variances[AXIS].sum()))
+    sizes = np.sqrt(variances[6:]) > MAX_SPREAD * np.abs(feature.sizes)
+    if tilt > MAX_SPREAD or sizes.any():
+        raise CalibrationError("measuring.undetermined", kind=NAMES[feature.kind])
 
 
 def _measured(

@@ -77,7 +77,7 @@ class PartTouches:
         n = len(touches)
         columns = self.columns(touches)
         own = self.covariance[np.ix_(columns, columns)].reshape(n, 3, n, 3)
-        spread = np.einsum("iaia", own) - np.einsum("iaja", own) / n
+        spread = np.einsum("iaia->", own) - np.einsum("iaja->", own) / n
         return float(np.sqrt(max(spread, 0.0) / (3 * max(n - 1, 1))))
 
     def columns(self, touches: IntArray) -> IntArray:

@@ -37,6 +37,7 @@ from lightpen.verification.session.session import (
     touched_anew,
     with_other_choices,
     with_read,
+    without_last_touch,
 )
 from lightpen.verification.session.session_state import SessionState, with_drift
 from lightpen.verification.session.status import (
@@ -160,6 +161,19 @@ class VerificationWorkflow:
         if state is not None:
             self._publish(replace(status, accepted_by=""))
             self._touch_again(touched_anew(state, task))
+
+    def undo(self) -> None:
+        """Take back the last point of the current run; its images do not count."""
+        before = self._status.state
+        if before is None or not before.touches:
+            return
+        after = without_last_touch(before)
+        try:
+            self._keeping.images.follow(before, SessionTransition(after))
+        except FileError as error:
+            self._faults.tell(error.message)
+            return
+        self._publish(replace(self._status, state=after))
 
     def accept(self, reason: str, signature: Signature | None = None) -> None:
         """Accept the tip despite findings, or report why not."""

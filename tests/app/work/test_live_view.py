@@ -52,7 +52,7 @@ class Diary:
 def view(
     run: SwingRun, verification: VerificationRun, notifications: Notifications
 ) -> Iterator[LiveView]:
-    view = LiveView(run, verification, PoseStream(), notifications)
+    view = LiveView(run, (verification,), PoseStream(), notifications)
     yield view
     view.close()
     view.await_closed()

@@ -25,6 +25,7 @@ from lightpen.verification.storage.checkpoint import (
     find_interrupted,
 )
 from lightpen.verification.storage.resuming import abandon_interrupted
+from lightpen.verification.tasks.part import PART
 from lightpen_app.look.phrases import missing_input_text, origin_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.words import listed
@@ -64,6 +65,7 @@ class InterruptedControl(QObject):
         super().__init__(parent)
         self._selection, self._camera = workbench.selection, workbench.camera
         self._run, self._verification = workbench.run, workbench.verification
+        self._measuring = workbench.measuring
         self._notices = workbench.notifications
         self._live, self._archive_writer = workbench.live, workbench.archive_writer
         self._data_folder, self._clock = workbench.folder, workbench.around.now
@@ -87,8 +89,9 @@ class InterruptedControl(QObject):
         workbench.run.open_requested.connect(self._on_swing_wanted)
         workbench.run.changed.connect(self._on_run_changed)
         workbench.run.refused.connect(self._on_run_troubled)
-        workbench.verification.changed.connect(self._on_verification_changed)
-        workbench.verification.refused.connect(self._on_verification_troubled)
+        for probing in (workbench.verification, workbench.measuring):
+            probing.changed.connect(self._on_verification_changed)
+            probing.refused.connect(self._on_verification_troubled)
 
     def search(self) -> None:
         """Look for what has no end, once the window is on the screen."""
@@ -282,23 +285,27 @@ class InterruptedControl(QObject):
         self._settle()
         self._go_to_station(under_way.names.station)
         selection.set_preparation(replace(selection.preparation, names=under_way.names))
-        limits = selection.choices.limits
-        selection.set_choices(replace(under_way.choices, limits=limits))
+        chosen, is_part = selection.choices, PART.kind in under_way.choices.kinds
+        kinds = chosen.kinds if is_part else under_way.choices.kinds
+        selection.set_choices(
+            replace(under_way.choices, kinds=kinds, limits=chosen.limits)
+        )
         missing_inputs = selection.preparation.missing_inputs()
         if missing_inputs:
             self._notices.tell(NOTICE, missing_input_text(missing_inputs[0]))
             return
         self._continued = under_way
         self._panel.set_waiting(self.tr("Reading the verification"))
-        self._verification.runner.ask(lambda workflow: workflow.go_on(found))
+        run = self._measuring if is_part else self._verification
+        run.runner.ask(lambda workflow: workflow.go_on(found))
 
     def _on_verification_changed(self) -> None:
         continued = self._continued
-        status = self._verification.status
-        if continued is not None and status.began == continued.began:
-            self._continued = None
-            self._panel.set_waiting("")
-            self.step_requested.emit("verify")
+        for run, key in ((self._verification, "verify"), (self._measuring, "measure")):
+            if continued is not None and run.status.began == continued.began:
+                self._continued = None
+                self._panel.set_waiting("")
+                self.step_requested.emit(key)
 
     def _on_verification_troubled(self) -> None:
         if self._continued is not None:

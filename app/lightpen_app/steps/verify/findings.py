@@ -14,12 +14,14 @@ from lightpen.messages import Message
 from lightpen.model.posture import Posture, posture_of
 from lightpen.verification.session.session_state import SessionSetup, SessionState
 from lightpen.verification.tasks.circle import CIRCLE, MIN_ANGLE, ring_fit
+from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.registry import AnyTask
 from lightpen.verification.tasks.task import ResultTable
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.verify.part_view import PartView, part_value
 from lightpen_app.steps.verify.ring_view import RingValue, RingView
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial, field_of
@@ -81,7 +83,10 @@ def _dial() -> PostureDial:
     return dial
 
 
-PICTURES = {CIRCLE.kind: TaskPicture(RingView, ring_value)}
+PICTURES = {
+    CIRCLE.kind: TaskPicture(RingView, ring_value),
+    PART.kind: TaskPicture(PartView, part_value),
+}
 POSTURES = TaskPicture(_dial, posture_value)
 
 
@@ -203,7 +208,10 @@ def figures_of(table: ResultTable) -> Figures:
         tuple(_words(row.name) for row in table.rows),
         tuple(
             (
-                *("" if x is None else number_text(x, row.decimals) for x in row.values),
+                *(
+                    "" if x is None else number_text(x, row.decimals)
+                    for x in row.values
+                ),
                 *([_words(row.remark)] if len(row.values) < len(table.columns) else ()),
             )
             for row in table.rows

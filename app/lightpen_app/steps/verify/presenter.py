@@ -4,7 +4,6 @@ from PySide6.QtCore import QObject
 
 from lightpen.cameras.worker_events import Connection
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.model.limits import rule_in_words
 from lightpen.model.origin import Origin
 from lightpen.record.library.calibration_status import TipStatus
 from lightpen.verification.probing.probing import ProbingPhase
@@ -16,7 +15,7 @@ from lightpen.verification.session.session_state import (
     instruction,
 )
 from lightpen.verification.session.status import ReadingState, VerificationStatus
-from lightpen.verification.tasks.assessment import USE_TIP
+from lightpen.verification.tasks.assessment import USE_TIP, VerificationAssessment
 from lightpen.verification.tasks.registry import TASKS, AnyTask
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import Instruction, grade_text
@@ -35,16 +34,21 @@ from lightpen_app.steps.verify.view_state import (
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.state_banner import State
 from lightpen_app.widgets.status_mark import status_text
+from lightpen_app.work.verification_run import VerificationRun
 from lightpen_app.work.workbench import Workbench
 
 
 class VerifyPresenter(QObject):
     """Computes the view from the status of runner, camera and station."""
 
-    def __init__(self, workbench: Workbench, parent: QObject | None = None) -> None:
+    tasks: tuple[AnyTask, ...] = TASKS
+
+    def __init__(
+        self, workbench: Workbench, run: VerificationRun, parent: QObject | None = None
+    ) -> None:
         super().__init__(parent)
         self._selection, self._tips = workbench.selection, workbench.library
-        self._verification, self._live = workbench.verification, workbench.live
+        self._verification, self._live = run, workbench.live
 
     def view(self) -> VerifyView:
         """Return the view."""
@@ -55,7 +59,7 @@ class VerifyPresenter(QObject):
             headline=headline,
             operator=self.operator_value(),
             lamps=lamps_message(status),
-            titles=tuple(self._title(task) for task in TASKS),
+            titles=tuple(self._title(task) for task in self.tasks),
             task=status.task,
             reading=self._verification.progress if is_reading else None,
             pause=(
@@ -66,6 +70,7 @@ class VerifyPresenter(QObject):
             can_be_accepted=headline.is_doubtful
             and status.is_done
             and not status.accepted_by,
+            can_undo=status.state is not None and bool(status.state.touches),
         )
 
     def headline(self) -> Headline:
@@ -111,7 +116,7 @@ class VerifyPresenter(QObject):
     def _lead(self) -> str:
         status = self._status
         if status.tip is None:
-            return self.tr("Verify the current tip on reference artefacts.")
+            return self._purpose()
         tip = status.tip
         when = moment_text(tip.calibration.when, self.tr("d MMMM yyyy, hh:mm"))
         words = self.tr("Tip {0} of pen {1}, in use since {2}").format(
@@ -124,6 +129,10 @@ class VerifyPresenter(QObject):
         accepted = self.tr("accepted by {0}").format(by) if by else ""
         parts = words, doubt, self._tip_status(), kept, accepted
         return PARTED.join(filter(None, parts))
+
+    def _purpose(self) -> str:
+        """Return what the step is for."""
+        return self.tr("Verify the current tip on reference artefacts.")
 
     def _tip_is_doubted(self) -> bool:
         """Return whether the tip was accepted though its grade is CHECK."""
@@ -173,30 +182,34 @@ class VerifyPresenter(QObject):
             hint = self.tr("The points in recorded images are measured.")
             return Instruction(self.tr("Reading images"), hint)
         if status.refusal is not None:
-            return Instruction(self.tr("Nothing to verify"), worded(status.refusal))
+            return Instruction(self._refused(), worded(status.refusal))
         if setup is None or state is None:
             return Instruction(
                 self.tr("Wait"), self.tr("The current tip is being read.")
             )
         if status.assessment is not None and status.is_done:
-            verifies_tip = status.assessment.next_step == USE_TIP
-            verdicts = {
-                Grade.PASS: self.tr("Tip verified")
-                if verifies_tip
-                else self.tr("Scale and form verified"),
-                Grade.CHECK: self.tr("Check needed"),
-                Grade.REPEAT: self.tr("Not verified"),
-            }
-            short = verdicts[status.assessment.grade]
+            short = self._verdict(status.assessment)
             return Instruction(short, worded(status.assessment.next_step))
         if self._live.connection is not Connection.STREAMING:
-            hint = self.tr(
-                "The camera sends none. The verification continues when they arrive."
-            )
+            hint = self.tr("The camera sends none. Probing continues when they arrive.")
             return Instruction(self.tr("No images"), hint)
         if status.is_paused:
             return Instruction(self.tr("Paused"), self.tr("Press Space to continue."))
         return Instruction(self._short(setup, state), worded(instruction(setup, state)))
+
+    def _refused(self) -> str:
+        """Return in a few words that nothing can be probed."""
+        return self.tr("Nothing to verify")
+
+    def _verdict(self, found: VerificationAssessment) -> str:
+        """Return the verdict in a few words."""
+        if found.grade is Grade.REPEAT:
+            return self.tr("Not verified")
+        if found.grade is Grade.CHECK:
+            return self.tr("Check needed")
+        if found.next_step == USE_TIP:
+            return self.tr("Tip verified")
+        return self.tr("Scale and form verified")
 
     def _short(self, setup: SessionSetup, state: SessionState) -> str:
         """Return in a few words what to do."""
@@ -226,7 +239,10 @@ class VerifyPresenter(QObject):
             return State(self.tr("READING"), "", Sign.WAIT, Tone.ACTIVE)
         if task is None and status.assessment is not None:
             grade = status.assessment.grade
-            rule = worded(rule_in_words(setup.choices.limits))
+            last = self.tasks[-1]
+            rule = worded(
+                last.rule_of(setup.choices.options_of(last), setup.choices.limits)
+            )
             why = f"{worded(status.assessment.reason)} {rule}"
             return State(self._grade_text(grade), why, *GRADE_MARKS[grade])
         if self._live.connection is not Connection.STREAMING:

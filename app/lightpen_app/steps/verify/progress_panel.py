@@ -1,5 +1,6 @@
 """Instruction, progress and buttons of a verification."""
 
+from PySide6.QtGui import QKeySequence
 from PySide6.QtWidgets import QProgressBar, QWidget
 from typing_extensions import override
 
@@ -15,6 +16,7 @@ from lightpen_app.widgets.reason_bar import ReasonBar, usual_reasons
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.verification_run import VerificationRun
 from lightpen_app.work.workbench import Workbench
 
 PROGRESS_STEPS = 1000
@@ -24,9 +26,11 @@ STATE_HEIGHT, VERDICT_HEIGHT = 9 * GRID, 13 * GRID  # px; a verdict has its reas
 class ProgressPanel(Translated, QWidget):
     """Shows the instruction, the state and the verdict of a verification."""
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, workbench: Workbench, run: VerificationRun, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
-        self._workbench, self._run = workbench, workbench.verification
+        self._workbench, self._run = workbench, run
         self._runner = self._run.runner
 
         # Widgets
@@ -36,6 +40,8 @@ class ProgressPanel(Translated, QWidget):
         self._instruction = FittedText(TextSize.HUGE)
         self._instruction.setMinimumHeight(6 * GRID)
         self._act, self._start_over, self._accept = (PushButton() for _ in range(3))
+        self._undo = PushButton()
+        self._undo.setShortcut(QKeySequence.StandardKey.Undo)
         self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
         self._banner = StateBanner(TextSize.TITLE)
         self._lamps = SignLabel()
@@ -48,7 +54,7 @@ class ProgressPanel(Translated, QWidget):
         # Layout
         layout = vertical_layout(self, self._question, self._reason)
         head = horizontal_layout(layout, (self._instruction, 1))
-        fill(head, self._accept, self._act, self._start_over)
+        fill(head, self._accept, self._act, self._undo, self._start_over)
         fill(layout, self._hint)
         state = horizontal_layout(layout, (self._banner, 3), spacing=2 * GRID)
         fill(state, (self._numbers, 2))
@@ -58,6 +64,7 @@ class ProgressPanel(Translated, QWidget):
         # Connections
         self._run.refused.connect(self._on_refused)
         self._act.clicked.connect(self.toggle_pause)
+        self._undo.clicked.connect(self._on_undo_clicked)
         self._start_over.clicked.connect(self._on_start_over_clicked)
         self._question.agreed.connect(self._begin_anew)
         self._accept.clicked.connect(self._ask_reason)
@@ -79,6 +86,7 @@ class ProgressPanel(Translated, QWidget):
         self._progress.setValue(round(PROGRESS_STEPS * (operator.fraction or 0.0)))
         self._act.setText(view.pause)
         self._act.setEnabled(view.task is not None)
+        self._undo.setEnabled(view.can_undo)
         self._accept.setVisible(view.can_be_accepted)
         if not view.can_be_accepted:
             self._reason.hide()
@@ -105,21 +113,26 @@ class ProgressPanel(Translated, QWidget):
         )
         self._accept.setText(self.tr("Accept..."))
         self._accept.setToolTip(self.tr("Use the tip with a reason"))
+        self._undo.setText(self.tr("Undo point"))
+        self._undo.setToolTip(self.tr("Discard the last point of the current task."))
         self._start_over.setText(self.tr("Start over"))
         self._start_over.setToolTip(
-            self.tr("Discard all points and verify the current tip from the start.")
+            self.tr("Discard all points, and start with the current tip.")
         )
         self._progress.setAccessibleName(self.tr("Progress"))
 
     def _starting_over(self) -> Question:
         return Question(
-            self.tr("Start the verification over? Results are kept."),
+            self.tr("Start over? Results are kept."),
             self.tr("Start over"),
             self.tr("Continue"),
         )
 
     def _begin_anew(self) -> None:
         self._runner.ask(lambda workflow: workflow.start_over())
+
+    def _on_undo_clicked(self) -> None:
+        self._runner.ask(lambda workflow: workflow.undo())
 
     def _ask_reason(self) -> None:
         found = self._run.status.assessment

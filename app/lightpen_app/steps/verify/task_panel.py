@@ -7,7 +7,7 @@ from typing_extensions import override
 from lightpen.verification.runner import VerificationRunner
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.status import VerificationStatus
-from lightpen.verification.tasks.registry import AnyTask
+from lightpen.verification.tasks.registry import TASKS, AnyTask
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
@@ -72,6 +72,7 @@ class TaskPanel(Translated, QWidget):
         self._images.cancel_requested.connect(self._on_cancel_requested)
 
         self._images.hide()
+        self._form.setVisible(task in TASKS)  # that of a part is not chosen
         self._retranslate()
 
     @property

@@ -57,6 +57,7 @@ class VerifyView:
     reading: float | None = None
     pause: str = ""
     can_be_accepted: bool = False
+    can_undo: bool = False
 
 
 def is_held(state: SessionState) -> bool:

@@ -223,6 +223,16 @@ def touched_anew(state: SessionState, task: AnyTask) -> SessionState:
     )
 
 
+def without_last_touch(state: SessionState) -> SessionState:
+    """Return the session without the last point of the current run."""
+    touching = replace(
+        state.touching,
+        taken=state.touching.taken[:-1],
+        places=state.touching.places[:-1],
+    )
+    return replace(state, touching=touching, touches=state.touches[:-1], trouble=None)
+
+
 def with_other_choices(
     setup: SessionSetup, state: SessionState, choices: VerificationChoices
 ) -> tuple[SessionSetup, SessionState]:
@@ -304,7 +314,8 @@ def _with_run(setup: SessionSetup, state: SessionState, task: AnyTask) -> Sessio
     if len(runs) >= task.n_runs(setup.choices.options_of(task)):
         return _done(setup, state, task, _numbered(runs))
     if task.is_each_run_measured:
-        measure(setup, task, _numbered(runs))
+        options = setup.choices.options_of(task)
+        (task.check or task.measure)(_numbered(runs), setup.conditions, options)
     return replace(without_touches(state), runs=runs)
 
 

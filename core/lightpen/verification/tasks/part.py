@@ -10,7 +10,7 @@ from functools import cache
 from typing import Annotated, Any
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, structs
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
@@ -44,11 +44,9 @@ from lightpen.verification.tasks.probed_point import (
 )
 from lightpen.verification.tasks.task import (
     ANY,
-    LARGEST_U,
     Conditions,
     Found,
     HandGoal,
-    NumberOption,
     ResultRow,
     ResultTable,
     Runs,
@@ -91,7 +89,7 @@ class PartOptions(TaskOptions, frozen=True, tag="part"):
     ball_uncertainty: Annotated[float, Meta(ge=0)] = BALL_UNCERTAINTY
 
 
-def measure(runs: Runs, conditions: Conditions, options: PartOptions) -> Part:
+def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) -> Part:
     """Measure a part by its plan, as far as it was probed.
 
     Parameters
@@ -116,6 +114,27 @@ def measure(runs: Runs, conditions: Conditions, options: PartOptions) -> Part:
         each.name for each in options.plan.features if each.name not in names
     )
     return Part(_assessment(part, missing), part, tuple(found), missing)
+
+
+def check_feature(runs: Runs, conditions: Conditions, options: PartOptions) -> None:
+    """Refuse the last of some runs if it does not determine its feature.
+
+    Raises
+    ------
+    CalibrationError
+        As of `measure_by_plan`.
+    """
+    if options.plan is None:
+        return
+    found = _owned(runs, options.plan)
+    last = found[-1][0]
+    own = [each for each in found if each[0] == last]
+    plan = structs.replace(
+        options.plan.limited_to({last}), constructions=(), characteristics=()
+    )
+    measure_part(
+        structs.replace(plan, alignment=None), touches_of_part(own, conditions, options)
+    )
 
 
 def touches_of_part(
@@ -164,7 +183,7 @@ def _assessment(part: MeasuredPart, missing: tuple[str, ...]) -> VerificationAss
 
     out, unclear = named(Decision.REJECTED), named(Decision.OPEN)
     n_judged = len(out) + len(unclear) + len(named(Decision.ACCEPTED))
-    counts = {"part": part.plan.name, "n_judged": n_judged}
+    counts: dict[str, str | int] = {"part": part.plan.name, "n_judged": n_judged}
     if out:
         said = message("part.out", n_out=len(out), names=_listed(out), **counts)
         return refused(said, message("part.rework"))
@@ -385,19 +404,15 @@ PART = VerificationTask(
     summary="a part by a plan",
     run_help="touches of a feature",
     title=message("part.title"),
-    purpose=message("part.purpose"),
+    purpose=message("part.title"),
     first=message("part.first"),
     another=message("task.next-point"),
     other_run=message("part.other-feature"),
     known=message("session.same-place"),
     limits=(),
     options=PartOptions,
-    fields=(
-        NumberOption(
-            "ball_uncertainty", message("part.ball-uncertainty"), most=LARGEST_U
-        ),
-    ),
-    measure=measure,
+    measure=measure_by_plan,
+    check=check_feature,
     entries=_entries,
     tables=_tables,
     figures_so_far=_figures_so_far,

@@ -371,7 +371,7 @@ def _tables(found: Sphere, conditions: Conditions) -> tuple[ResultTable, ...]:
 
 
 def _figures_so_far(
-    progress: TaskProgress, conditions: Conditions
+    options: SphereOptions, progress: TaskProgress, conditions: Conditions
 ) -> tuple[ResultTable, ...]:
     points = progress.points
     if len(points) < LEAST_POINTS:

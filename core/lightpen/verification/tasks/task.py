@@ -316,6 +316,9 @@ class VerificationTask(Generic[OptionsT, FoundT]):
         Returns what has to be entered before, by options and ball diameter.
     is_each_run_measured : bool
         Whether a single run gives a result.
+    check : callable
+        Raises `CalibrationError` where the last of some runs does not suffice, if that
+        takes less than `measure`.
     is_pooled : bool
         Whether all images that are given to the command are one run.
     counts_drift : bool
@@ -359,6 +362,7 @@ class VerificationTask(Generic[OptionsT, FoundT]):
         lambda options, limits: rule_in_words(limits)
     )
     is_each_run_measured: bool = True
+    check: Callable[[Runs, Conditions, OptionsT], object] | None = None
     is_pooled: bool = False
     counts_drift: bool = True
     compares_nominal_tip: bool = False

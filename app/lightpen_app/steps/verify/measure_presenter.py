@@ -1,0 +1,68 @@
+"""What the step Measure shows, computed from the status of the measurement."""
+
+from dataclasses import replace
+
+from typing_extensions import override
+
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.verification.session.session_state import SessionSetup, SessionState
+from lightpen.verification.tasks.assessment import VerificationAssessment
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
+from lightpen_app.look.quantities import number_text
+from lightpen_app.steps.verify.presenter import VerifyPresenter
+from lightpen_app.steps.verify.view_state import VerifyView
+from lightpen_app.widgets.operator_view import OperatorValue
+
+
+class MeasurePresenter(VerifyPresenter):
+    """Computes the view from the status of runner, camera and station."""
+
+    tasks = (PART,)
+
+    @override
+    def view(self) -> VerifyView:
+        return replace(super().view(), can_be_accepted=False)
+
+    @override
+    def operator_value(self) -> OperatorValue:
+        value, status = super().operator_value(), self._status
+        if status.setup is None or status.state is None or value.fraction is None:
+            return value
+        place = self._live_tip(status.setup, status.state)
+        return replace(value, count=place) if place else value
+
+    def _live_tip(self, setup: SessionSetup, state: SessionState) -> str:
+        """Return the tip with its U at the present pose; empty if it is not seen."""
+        touching = state.touching
+        if not touching.held or touching.n_lost:
+            return ""
+        still = StillFrames((touching.held[-1].frame,))
+        (point,) = measure_touches(setup.instrument, (still,))
+        spread = COVERAGE_FACTOR * point.covariance(setup.instrument).diagonal() ** 0.5
+        numbers = (number_text(x, 2) for x in point.point_cam.tolist())
+        u = number_text(float(spread.max()), 3)
+        return self.tr("{0}  {1}  {2}  \u00b1 {3} mm").format(*numbers, u)
+
+    @override
+    def _purpose(self) -> str:
+        return self.tr("Measure features of a part with the current tip.")
+
+    @override
+    def _refused(self) -> str:
+        return self.tr("Nothing to measure")
+
+    @override
+    def _verdict(self, found: VerificationAssessment) -> str:
+        if found.grade is Grade.PASS:
+            return self.tr("Part measured")
+        if found.grade is Grade.CHECK:
+            return self.tr("Not proven")
+        return self.tr("Out of tolerance")
+
+    @override
+    def _grade_text(self, grade: Grade) -> str:
+        if grade is Grade.REPEAT:
+            return self.tr("NOT OK")
+        return super()._grade_text(grade)

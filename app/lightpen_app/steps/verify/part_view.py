@@ -1,0 +1,181 @@
+"""A part as it is probed, in space: points, features, deviations and the next point."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from PySide6.QtCore import QPointF, QSize
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QSizePolicy, QWidget
+from typing_extensions import override
+
+from lightpen.arrays import FloatArray
+from lightpen.measuring.drawing import outline_of
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.verification.session.session_state import SessionSetup, SessionState
+from lightpen.verification.tasks.part import PART, feature_so_far
+from lightpen.verification.tasks.registry import AnyTask
+from lightpen_app.look.theme import GRID, colors_of
+from lightpen_app.widgets.translated import Translated
+
+MARGIN = 0.1  # of the sides
+DOT, TIP, GOAL = 3.0, 6.0, 9.0  # px, radii
+MAGNIFIED = 200.0  # times a deviation is drawn
+TURN = 0.01  # rad a pixel of the mouse
+FROM_ABOVE = np.array([0.6, 0.0, 0.0])  # rotation vector of the first view
+
+
+@dataclass(frozen=True, eq=False)
+class PartValue:
+    """What of a part is drawn, frame of the camera, mm.
+
+    Attributes
+    ----------
+    points : (N, 3) array
+        Ball centres.
+    deviations : (N, 3) array
+        From the feature to each point.
+    outlines : tuple of (M, 3) array
+        Lines of the features.
+    tip, goal : (3,) array or None
+        Tip at present; most informative next point.
+    """
+
+    points: FloatArray
+    deviations: FloatArray
+    outlines: tuple[FloatArray, ...] = ()
+    tip: FloatArray | None = None
+    goal: FloatArray | None = None
+
+
+NOTHING = PartValue(np.zeros((0, 3)), np.zeros((0, 3)))
+
+
+def part_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> PartValue:
+    """Return what is probed of a part, and what is measured once it is done."""
+    progress, found = state.progress(setup, task), state.found_by(PART)
+    touching = state.touching
+    is_seen = bool(touching.held) and not touching.n_lost
+    tip = touching.held[-1].tip_cam if is_seen else None
+    if found is not None:
+        part = found.part
+        off = np.zeros_like(part.touches.points_cam)
+        for name, one in part.features.items():
+            if one.feature is not None:
+                off[part.touches.of(name)] = one.feature.offsets
+        outlines = [line for one in part.features.values() for line in outline_of(one)]
+        return PartValue(part.touches.points_cam, off, tuple(outlines), tip)
+    earlier = [point.point_cam for run in progress.runs for point in run]
+    now = [point.point_cam for point in progress.points]
+    points = np.array([*earlier, *now]).reshape(-1, 3)
+    feature = feature_so_far(setup.choices.options_of(PART), progress, setup.conditions)
+    next_touch = None if feature is None else feature.next_touch
+    return PartValue(
+        points,
+        np.zeros_like(points),
+        (),
+        tip,
+        None if next_touch is None else next_touch.point,
+    )
+
+
+class PartView(Translated, QWidget):
+    """Draws a part in space; the mouse turns it."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = NOTHING
+        self._turn = rotation_from_vector(FROM_ABOVE)
+        self._pressed: QPointF | None = None
+        policy = QSizePolicy.Policy.Expanding
+        self.setSizePolicy(policy, policy)
+        self._retranslate()
+
+    def value(self) -> PartValue:
+        """Return the value."""
+        return self._value
+
+    def set_value(self, value: PartValue) -> None:
+        """Draw another state."""
+        self._value = value
+        self._retranslate()
+        self.update()
+
+    @override
+    def sizeHint(self) -> QSize:
+        return QSize(48 * GRID, 40 * GRID)
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        return QSize(24 * GRID, 24 * GRID)
+
+    @override
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self._pressed = event.position()
+
+    @override
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self._pressed is None:
+            return
+        way, self._pressed = event.position() - self._pressed, event.position()
+        turn = rotation_from_vector(np.array([-way.y(), way.x(), 0.0]) * TURN)
+        self._turn = turn @ self._turn
+        self.update()
+
+    @override
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        self._pressed = None
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        value, colors = self._value, colors_of(self.palette())
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.fillRect(self.rect(), QColor(colors.panel))
+        marks = [each for each in (value.tip, value.goal) if each is not None]
+        all_ = np.concatenate(
+            [value.points, *value.outlines, *(m[None] for m in marks)]
+        )
+        if not len(all_):
+            return
+        flat = all_ @ self._turn.T
+        low, high = flat[:, :2].min(axis=0), flat[:, :2].max(axis=0)
+        room = np.array([self.width(), self.height()]) * (1 - 2 * MARGIN)
+        scale = float((room / np.maximum(high - low, 1.0)).min())
+        middle, center = (low + high) / 2, np.array([self.width(), self.height()]) / 2
+
+        def seen(points: FloatArray) -> list[QPointF]:
+            places = ((points @ self._turn.T)[:, :2] - middle) * scale + center
+            return [QPointF(*place) for place in places.tolist()]
+
+        painter.setPen(QPen(QColor(colors.accent), 1.5))
+        for line in value.outlines:
+            painter.drawPolyline(QPolygonF(seen(line)))
+        ends = seen(value.points + MAGNIFIED * value.deviations)
+        painter.setPen(QPen(QColor(colors.warn), 2))
+        dots = seen(value.points)
+        for dot, end in zip(dots, ends, strict=True):
+            painter.drawLine(dot, end)
+        painter.setPen(QPen(QColor(colors.window), 1))
+        painter.setBrush(QColor(colors.text))
+        for dot in dots:
+            painter.drawEllipse(dot, DOT, DOT)
+        painter.setBrush(QColor(0, 0, 0, 0))
+        for mark, color, radius in (
+            (value.tip, colors.good, TIP),
+            (value.goal, colors.pointer, GOAL),
+        ):
+            if mark is not None:
+                painter.setPen(QPen(QColor(color), 3))
+                painter.drawEllipse(seen(mark[None])[0], radius, radius)
+
+    @override
+    def _retranslate(self) -> None:
+        words = self.tr("The part in space: {0} points, {1} lines of features")
+        self.setAccessibleName(
+            words.format(len(self._value.points), len(self._value.outlines))
+        )
+        self.setToolTip(
+            self.tr(
+                "Deviations are drawn {0} times as large. Drag to turn the part."
+            ).format(round(MAGNIFIED))
+        )

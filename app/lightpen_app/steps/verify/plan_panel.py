@@ -1,0 +1,210 @@
+"""The measuring plan: opened or taught; the kind of the feature at hand; exports."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from msgspec import structs
+from PySide6.QtWidgets import QFileDialog, QWidget
+from typing_extensions import override
+
+from lightpen.measuring.exports import EXPORTS, PartExport
+from lightpen.measuring.part import MeasuredPart, taught_plan
+from lightpen.measuring.plan import (
+    Plan,
+    PlannedFeature,
+    free_plan,
+    read_plan,
+    write_plan,
+)
+from lightpen.measuring.surfaces import NAMES, FeatureKind
+from lightpen.record.exports.exports import save_new
+from lightpen.simulator.plate import plate_plan
+from lightpen.verification.session.status import VerificationStatus
+from lightpen.verification.tasks.part import PART, planned_at
+from lightpen_app.look.layouts import horizontal_layout
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.choice_field import ChoiceField
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.job import Job, Report
+from lightpen_app.work.workbench import Workbench
+
+SUFFIXES = "*.yaml *.yml"
+
+
+class PlanPanel(Translated, QWidget):
+    """Chooses a plan, changes the kind of the feature at hand, and saves results."""
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._workbench, self._run = workbench, workbench.measuring
+        self._selection, self._live = workbench.selection, workbench.live
+        self._notices = workbench.notifications
+        self._status = VerificationStatus()
+
+        # Widgets
+        self._name = text_label(TextSize.BODY, Tone.QUIET)
+        self._open, self._free, self._plate = (PushButton() for _ in range(3))
+        self._kind_label = text_label(TextSize.SMALL, Tone.QUIET)
+        self._kind = ChoiceField()
+        self._kind_label.setBuddy(self._kind)
+        for kind in (None, *FeatureKind):
+            self._kind.addItem("", None if kind is None else kind.value)
+        self._save_plan, self._export = PushButton(), PushButton()
+
+        # Layout
+        cells = (self._open, self._free, self._plate, (self._name, 1))
+        of_feature = (self._kind_label, self._kind, self._save_plan, self._export)
+        horizontal_layout(self, *cells, *of_feature, spacing=GRID)
+
+        # Connections
+        self._open.clicked.connect(self._on_open_clicked)
+        self._free.clicked.connect(self._on_free_clicked)
+        self._plate.clicked.connect(self._on_plate_clicked)
+        self._kind.activated.connect(self._on_kind_chosen)
+        self._save_plan.clicked.connect(self._on_save_plan_clicked)
+        self._export.clicked.connect(self._on_export_clicked)
+
+        self._retranslate()
+
+    def set_status(self, status: VerificationStatus) -> None:
+        """Show a measurement."""
+        self._status = status
+        plan = self._plan()
+        self._name.setText("" if plan is None else plan.name)
+        planned = self._planned()
+        self._kind.setEnabled(planned is not None)
+        kind = None if planned is None else planned.kind
+        self._kind.setCurrentIndex(self._kind.findData(kind and kind.value))
+        self._plate.setVisible(self._live.operator is not None)
+        for button in (self._save_plan, self._export):
+            button.setEnabled(self._part() is not None)
+
+    def choose(self, plan: Plan) -> None:
+        """Measure by a plan, from its first feature."""
+        choices = self._selection.choices
+        options = structs.replace(choices.options_of(PART), plan=plan)
+        state = self._status.state
+        if state is not None and state.is_begun:
+            self._run.runner.ask(lambda workflow: workflow.start_over())
+        self._selection.set_choices(choices.with_options(options))
+
+    def _plan(self) -> Plan | None:
+        return self._selection.choices.options_of(PART).plan
+
+    def _planned(self) -> PlannedFeature | None:
+        state = self._status.state
+        if state is None or PART.kind in state.found:
+            return None
+        return planned_at(self._selection.choices.options_of(PART), len(state.runs))
+
+    def _part(self) -> MeasuredPart | None:
+        state = self._status.state
+        found = None if state is None else state.found_by(PART)
+        return None if found is None else found.part
+
+    @override
+    def _retranslate(self) -> None:
+        self._open.setText(self.tr("Open plan..."))
+        self._open.setToolTip(self.tr("Measure by a plan in a YAML file."))
+        self._free.setText(self.tr("Without a plan"))
+        self._free.setToolTip(
+            self.tr(
+                "Features are recognised while they are probed; end with the main "
+                "button."
+            )
+        )
+        self._plate.setText(self.tr("Use simulated plate"))
+        self._kind_label.setText(self.tr("Feature"))
+        self._kind.setAccessibleName(self.tr("Kind of the feature that is probed"))
+        self._kind.setItemText(0, self.tr("Recognise"))
+        for index, kind in enumerate(FeatureKind, start=1):
+            self._kind.setItemText(index, worded(NAMES[kind]))
+        self._save_plan.setText(self.tr("Save plan..."))
+        self._save_plan.setToolTip(
+            self.tr("Save a plan with the measured features as nominals.")
+        )
+        self._export.setText(self.tr("Export..."))
+
+    def _on_open_clicked(self) -> None:
+        name, _ = QFileDialog.getOpenFileName(
+            self,
+            self.tr("Open a measuring plan"),
+            "",
+            self.tr("Measuring plans ({0})").format(SUFFIXES),
+        )
+        if name:
+            self.open_plan(Path(name))
+
+    def open_plan(self, path: Path) -> None:
+        """Read a plan and measure by it, or tell why that is impossible."""
+        job = Job(lambda _: read_plan(path), self)
+
+        # Connections
+        job.succeeded.connect(self.choose)
+        job.succeeded.connect(lambda _: self._notices.withdraw(self))
+        job.failed.connect(partial(self._notices.tell, self))
+        job.start()
+
+    def _on_free_clicked(self) -> None:
+        self.choose(free_plan(self.tr("Part")))
+
+    def _on_plate_clicked(self) -> None:
+        self.choose(plate_plan())
+
+    def _on_kind_chosen(self) -> None:
+        plan, planned = self._plan(), self._planned()
+        if plan is None or planned is None:
+            return
+        word = self._kind.currentData()
+        kind = None if word is None else FeatureKind(word)
+        features = tuple(
+            structs.replace(each, kind=kind) if each is planned else each
+            for each in plan.features
+        )
+        choices = self._selection.choices
+        options = structs.replace(
+            choices.options_of(PART), plan=structs.replace(plan, features=features)
+        )
+        self._selection.set_choices(choices.with_options(options))
+
+    def _on_save_plan_clicked(self) -> None:
+        part = self._part()
+        name, _ = QFileDialog.getSaveFileName(
+            self,
+            self.tr("Save the measuring plan"),
+            "plan.yaml",
+            self.tr("Measuring plans ({0})").format(SUFFIXES),
+        )
+        if part is None or not name:
+            return
+        path, plan = Path(name), taught_plan(part)
+        self._save(lambda _: write_plan(plan, path), path)
+
+    def _on_export_clicked(self) -> None:
+        part = self._part()
+        filters = {f"{worded(each.label)} (*{each.suffix})": each for each in EXPORTS}
+        name, chosen = QFileDialog.getSaveFileName(
+            self, self.tr("Export the measured part"), "", ";;".join(filters)
+        )
+        if part is not None and name:
+            self.export(part, filters[chosen], Path(name))
+
+    def export(self, part: MeasuredPart, export: PartExport, path: Path) -> None:
+        """Write a measured part in a format for other programs."""
+        named = path if path.suffix else path.with_suffix(export.suffix)
+        self._save(
+            lambda _: save_new(named.parent, named.name, export.content(part)), named
+        )
+
+    def _save(self, work: Callable[[Report], object], path: Path) -> None:
+        job = Job(work, self)
+
+        # Connections
+        job.failed.connect(partial(self._notices.tell, self))
+        job.succeeded.connect(
+            lambda _: self._notices.show_status(self.tr("Saved: {0}").format(path))
+        )
+        job.start()

@@ -1,0 +1,67 @@
+"""Measured features as lines in space, for the window, the report and DXF."""
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.measuring.characteristics import Measured
+from lightpen.measuring.features import AXIS, PLACE
+from lightpen.measuring.starts import frame_about
+from lightpen.measuring.surfaces import FeatureKind
+
+N_ROUND = 73  # points of a closed circle
+MARK = 1.0  # mm, half of the cross of a point, and of what was not touched
+CORNERS = ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))
+
+
+def outline_of(one: Measured, *, in_part: bool = False) -> list[FloatArray]:
+    """Return the lines (M, 3) of a feature, mm.
+
+    Parameters
+    ----------
+    in_part : bool
+        Whether in the frame of the part; else in that of the camera.
+    """
+    values = (one.in_part if in_part else one.surface.quantity).values
+    origin, axis, sizes = values[PLACE], values[AXIS], values[6:]
+    frame = frame_about(axis)
+    reach = _reach(one)
+    along = [-reach * axis, reach * axis]
+    match one.kind:
+        case FeatureKind.POINT:
+            return [origin + np.outer([-MARK, MARK], each) for each in np.eye(3)]
+        case FeatureKind.LINE:
+            return [origin + np.array(along)]
+        case FeatureKind.PLANE:
+            return [origin + reach * np.array(CORNERS) @ frame[:, :2].T]
+        case FeatureKind.CIRCLE:
+            return [_ring(origin, frame, sizes[0])]
+        case FeatureKind.SLOT:
+            return [_ring(origin, frame, sizes[0] + sizes[1] / 2)]
+        case FeatureKind.SPHERE:
+            turned = (np.roll(np.eye(3), k, axis=0) for k in range(3))
+            return [_ring(origin, each, sizes[0]) for each in turned]
+        case FeatureKind.CYLINDER:
+            return [_ring(origin + each, frame, sizes[0]) for each in along]
+        case FeatureKind.CONE:
+            slope = np.tan(sizes[1])
+            radii = (max(sizes[0] + sign * reach * slope, 0.0) for sign in (-1, 1))
+            pairs = zip(along, radii, strict=True)
+            return [_ring(origin + each, frame, radius) for each, radius in pairs]
+
+
+def _ring(center: FloatArray, frame: FloatArray, radius: float) -> FloatArray:
+    turn = np.linspace(0, 2 * np.pi, N_ROUND)
+    return np.asarray(
+        center + radius * np.column_stack([np.cos(turn), np.sin(turn)]) @ frame[:, :2].T
+    )
+
+
+def _reach(one: Measured) -> float:
+    """Return how far the touches reach from the middle, along an axis or all over."""
+    if one.points is None:
+        return MARK
+    points = one.points.values.reshape(-1, 3)
+    away = points - points.mean(axis=0)
+    if one.kind is not FeatureKind.PLANE:
+        away = away @ one.surface.quantity.values[AXIS, None]
+    return float(np.linalg.norm(away, axis=1).max())

@@ -1,0 +1,126 @@
+"""Measured parts for other programs, in one table of formats.
+
+CSV has a row for each characteristic, Q-DAS (AQDEF) a value for each, QIF 3.0 [1]_ the
+results with their tolerances, and DXF (R12) the geometry in the frame of the part.
+
+References
+----------
+.. [1] ISO 23952:2020, "Automation systems and integration. Quality information
+   framework (QIF)".
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.formats.csv_cells import csv_table
+from lightpen.formats.files import printable
+from lightpen.local_time import local_now
+from lightpen.measuring.characteristics import IS_ANGLE, Measured
+from lightpen.measuring.drawing import outline_of
+from lightpen.measuring.part import CharacteristicResult, MeasuredPart
+from lightpen.measuring.qif import qif_text
+from lightpen.messages import Message, message
+
+N_DECIMALS = 6
+ENDS = ("10", "20", "30", "11", "21", "31")  # codes of x, y, z of a line in DXF
+DEGREE, MILLIMETRE = "degree", "mm"
+
+
+@dataclass(frozen=True)
+class PartExport:
+    """A format of measured parts.
+
+    Attributes
+    ----------
+    name : str
+        Name on the command line.
+    suffix : str
+        End of the names of its files.
+    text : callable
+        Returns the content of a file.
+    """
+
+    name: str
+    label: Message
+    suffix: str
+    text: Callable[[MeasuredPart], str]
+
+    def content(self, part: MeasuredPart) -> bytes:
+        """Return the content of a file, in UTF-8."""
+        return self.text(part).encode("utf-8", "backslashreplace")
+
+
+def unit_of(result: CharacteristicResult) -> str:
+    """Return the unit of a characteristic."""
+    return DEGREE if result.planned.quantity in IS_ANGLE else MILLIMETRE
+
+
+def _csv(part: MeasuredPart) -> str:
+    head = ["characteristic", "quantity", "features", "unit", "nominal", "lower_limit"]
+    head += ["upper_limit", "actual", "deviation", "expanded_uncertainty"]
+    head += ["decision", "probability_of_conformity"]
+    rows: list[list[object]] = [list(head)]
+    for result in part.results:
+        planned = result.planned
+        limits = ["" if np.isinf(x) else x for x in planned.limits]
+        rows.append(
+            [
+                *(planned.label, planned.quantity.value, " ".join(planned.of)),
+                *(unit_of(result), planned.nominal, *limits),
+                *(result.value.value, result.deviation, result.value.uncertainty),
+                "" if result.decision is None else result.decision.value,
+                result.probability,
+            ]
+        )
+    return csv_table([["" if x is None else x for x in row] for row in rows])
+
+
+def _qdas(part: MeasuredPart) -> str:
+    """Return a characteristic and its value for each of those of the plan."""
+    name, when = printable(part.plan.name), f"{local_now():%d.%m.%Y/%H:%M:%S}"
+    lines = [f"K0100 {len(part.results)}", f"K1001 {name}", f"K1002 {name}"]
+    for i, result in enumerate(part.results, start=1):
+        planned = result.planned
+        lines += [f"K2001/{i} {i}", f"K2002/{i} {printable(planned.label)}"]
+        lines += [f"K2022/{i} {N_DECIMALS}", f"K2142/{i} {unit_of(result)}"]
+        if planned.nominal is not None:
+            lines.append(f"K2101/{i} {planned.nominal:.{N_DECIMALS}f}")
+        for key, limit in zip(("K2110", "K2111"), planned.limits, strict=True):
+            if np.isfinite(limit):
+                lines.append(f"{key}/{i} {limit:.{N_DECIMALS}f}")
+        lines.append(f"K2900/{i} U (k=2) {result.value.uncertainty:.{N_DECIMALS}f}")
+    for i, result in enumerate(part.results, start=1):
+        lines += [f"K0001/{i} {result.value.value:.{N_DECIMALS}f}", f"K0002/{i} 0"]
+        lines.append(f"K0004/{i} {when}")
+    return "\n".join(lines) + "\n"
+
+
+def _dxf(part: MeasuredPart) -> str:
+    """Return the lines of the features, each on a layer of its name."""
+    entities = [
+        line for name, one in part.features.items() for line in _drawn(name, one)
+    ]
+    pairs = ["0", "SECTION", "2", "HEADER", "9", "$ACADVER", "1", "AC1009"]
+    pairs += ["0", "ENDSEC", "0", "SECTION", "2", "ENTITIES", *entities]
+    return "\n".join([*pairs, "0", "ENDSEC", "0", "EOF"]) + "\n"
+
+
+def _drawn(name: str, one: Measured) -> list[str]:
+    layer = "".join(c if c.isalnum() and c.isascii() else "_" for c in name).upper()
+    cells: list[str] = []
+    for line in outline_of(one, in_part=True):
+        for ends in np.hstack([line[:-1], line[1:]]).tolist():
+            cells += ["0", "LINE", "8", layer]
+            for code, value in zip(ENDS, ends, strict=True):
+                cells += [code, f"{value:.{N_DECIMALS}f}"]
+    return cells
+
+
+EXPORTS = (
+    PartExport("csv", message("part.csv"), ".csv", _csv),
+    PartExport("qdas", message("part.qdas"), ".dfq", _qdas),
+    PartExport("qif", message("part.qif"), ".qif", qif_text),
+    PartExport("dxf", message("part.dxf"), ".dxf", _dxf),
+)

@@ -1,0 +1,83 @@
+"""A part measured through the wizard, as an operator walks it."""
+
+import json
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pytest
+from msgspec import structs
+from tests.accepted_tip import accept_tip
+
+from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
+from lightpen.record.results.result_folder import SIMULATED
+from lightpen.record.swings.names import Names
+from lightpen.simulator.plate import plate_plan
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.tasks.part import PART, PartOptions
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.stations import Station
+
+if TYPE_CHECKING:
+    from tests.app.conftest import OpenWizard, Walker
+
+STATION = "Hall 2"
+DOME = structs.replace(plate_plan().features[7], touches=5)
+SMALL = structs.replace(
+    plate_plan().limited_to({DOME.name}),
+    features=(DOME,),
+    characteristics=tuple(
+        each for each in plate_plan().characteristics if each.of == (DOME.name,)
+    ),
+)
+PROBING = Station(
+    Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
+    verification=VerificationChoices(options=(PartOptions(SMALL),), n_frames=2),
+)
+
+
+@pytest.fixture
+def known(settings: Settings, open_wizard: "OpenWizard") -> "Walker":
+    """The program at a station with a tip in force and the plan of a dome."""
+    settings.set_station(STATION, PROBING)
+    settings.set_last_station(STATION)
+    walker = open_wizard()
+    walker.until(lambda: not walker.workbench.selection.preparation.missing_inputs())
+    accept_tip(walker.workbench.folder, walker.workbench.selection.preparation)
+    return walker
+
+
+def test_a_part_is_measured_without_a_key_between_first_and_last_point(
+    known: "Walker",
+) -> None:
+    walker = known
+    walker.click_step("Measure")
+    walker.until_tells("Probe the sphere dome: 0 of 5 points.")
+    assert walker.tells(SMALL.name)
+    walker.click("Let the simulated operator probe")
+    n_inputs = walker.n_inputs
+    walker.until_says("Part measured")
+
+    assert walker.n_inputs == n_inputs
+    folder = walker.workbench.folder / SIMULATED / VERIFICATIONS
+    records = [json.loads(each.read_bytes()) for each in sorted(folder.glob("*.json"))]
+    assert [each["verification"] for each in records] == [PART.kind, CONCLUSION]
+    (diameter,) = records[0]["characteristics"]
+    assert diameter["actual"] == pytest.approx(20, abs=0.1)
+    assert diameter["decision"] == "accepted"
+    assert len(records[0]["inputs"]["touches"]) == 1
+
+
+def test_without_a_plan_the_step_says_what_to_do(
+    settings: Settings, open_wizard: "OpenWizard"
+) -> None:
+    settings.set_station(STATION, replace(PROBING, verification=VerificationChoices()))
+    settings.set_last_station(STATION)
+    walker = open_wizard()
+    walker.until(lambda: not walker.workbench.selection.preparation.missing_inputs())
+    accept_tip(walker.workbench.folder, walker.workbench.selection.preparation)
+
+    walker.click_step("Measure")
+
+    walker.until_tells("No measuring plan is chosen.")
+    walker.click("Without a plan")
+    walker.until_tells("Probe the feature F1: 0 of 8 points.")

@@ -1,0 +1,249 @@
+"""A part as a task of a session: the simulated plate, undone points, what is kept."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from msgspec import structs
+from tests.accepted_tip import Hold, Holder
+
+from lightpen.errors import CalibrationError
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.measuring.exports import EXPORTS
+from lightpen.measuring.part import taught_plan
+from lightpen.measuring.plan import Plan, free_plan
+from lightpen.measuring.surfaces import FeatureKind
+from lightpen.model.posture import FACING
+from lightpen.simulator.plate import plate_plan
+from lightpen.simulator.swings import PAPER_CONE
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.session.session import (
+    advance_session,
+    end_task,
+    without_last_touch,
+)
+from lightpen.verification.session.session_state import SessionSetup, SessionState
+from lightpen.verification.tasks.part import PART, Part, PartOptions, feature_so_far
+from lightpen.verification.tasks.probed_point import ProbedPoint
+
+BALL = 10.0  # mm
+NOISE = 0.002  # mm
+RAISED = FACING
+
+
+@dataclass
+class Station:
+    """A session with a part, and a pen that a simulated hand holds."""
+
+    setup: SessionSetup
+    holder: Holder
+    state: SessionState = field(default_factory=SessionState)
+
+    def probe(self, n: int, plan: Plan | None = None) -> None:
+        """Probe the next points, of a plan with nominals or of the one in use."""
+        by = self.options if plan is None else PartOptions(plan)
+        for _ in range(n):
+            goal = PART.hand(by, len(self.state.runs), len(self.state.touches))
+            assert goal.point is not None
+            assert goal.outwards is not None
+            place = goal.point + BALL / 2 * goal.outwards
+            seen = [*self.holder.still(Hold(tuple(place.tolist()), 0.1), 5)]
+            for detection in [*seen, *self.holder.away(6)]:
+                transition = advance_session(self.setup, self.state, "image", detection)
+                self.state = transition.state
+
+    @property
+    def options(self) -> PartOptions:
+        return self.setup.choices.options_of(PART)
+
+    @property
+    def found(self) -> Part:
+        found = self.state.found_by(PART)
+        assert found is not None
+        return found
+
+
+def station(instrument: Instrument, plan: Plan) -> Station:
+    choices = VerificationChoices((PART.kind,), (PartOptions(plan),), n_frames=2)
+    setup = SessionSetup(instrument, choices, BALL)
+    return Station(setup, Holder(instrument.rig, instrument.pen))
+
+
+def n_points(plan: Plan) -> int:
+    return sum(each.n_touches for each in plan.features)
+
+
+def probed_plate(
+    instrument: Instrument, plan: Plan
+) -> list[tuple[str, list[ProbedPoint]]]:
+    """Return points of all features, which share the error of the tip."""
+    rng = np.random.default_rng(5)
+    options, n_parameters = PartOptions(plan), len(instrument.covariance)
+    sensitivity = np.zeros((3, n_parameters))
+    sensitivity[:, instrument.parameters.tip] = np.eye(3)
+    runs = []
+    for run, planned in enumerate(plan.features):
+        points = []
+        for step in range(planned.n_touches):
+            goal = PART.hand(options, run, step)
+            assert goal.point is not None
+            assert goal.outwards is not None
+            center = PAPER_CONE + goal.point + BALL / 2 * goal.outwards
+            points.append(
+                ProbedPoint(
+                    center + NOISE * rng.standard_normal(3),
+                    NOISE**2 * np.eye(3),
+                    sensitivity,
+                    RAISED,
+                    (f"{planned.name} {step}",),
+                    rms=0.01,
+                )
+            )
+        runs.append((planned.name, points))
+    return runs
+
+
+@pytest.fixture(scope="module")
+def measured(instrument: Instrument) -> Station:
+    """The plate of the simulated station, probed in one go."""
+    at_it = station(instrument, plate_plan())
+    runs = probed_plate(instrument, plate_plan())
+    found = PART.measure(runs, at_it.setup.conditions, at_it.options)
+    at_it.state = replace(at_it.state, found={PART.kind: found})
+    return at_it
+
+
+def test_ten_features_of_the_plate_are_measured_without_a_key(
+    measured: Station,
+) -> None:
+    part = measured.found.part
+
+    assert len(part.plan.features) == 10
+    for result in part.results:
+        error = result.value.value - (result.planned.nominal or 0.0)
+        assert abs(error) < max(2 * result.value.uncertainty, 0.02), result.planned
+    assert measured.found.missing == ()
+    assert measured.state.assessment is not None
+    assert measured.state.assessment.grade is not Grade.REPEAT
+
+
+def test_a_distance_is_known_better_than_by_independent_points(
+    measured: Station,
+) -> None:
+    apart = measured.found.part.results[6]
+
+    assert apart.planned.quantity == "distance"
+    assert apart.independent_uncertainty is not None
+    assert apart.value.uncertainty < apart.independent_uncertainty
+
+
+def test_tables_have_a_decision_for_each_characteristic(measured: Station) -> None:
+    characteristics, features = PART.tables(measured.found, measured.setup.conditions)
+
+    assert len(features.rows) == 10
+    assert {str(row.remark) for row in characteristics.rows} <= {"OK", "NOT PROVEN"}
+    entries = PART.entries(measured.found, measured.setup.instrument)
+    assert len(entries["touches"]) == n_points(plate_plan())
+
+
+@pytest.mark.parametrize("export", EXPORTS, ids=lambda each: each.name)
+def test_every_export_names_the_characteristics(
+    measured: Station, export: object
+) -> None:
+    part = measured.found.part
+    text = export.content(part).decode()  # type: ignore[attr-defined]
+
+    if export.name == "dxf":  # type: ignore[attr-defined]
+        assert text.count("\nBORE\n") > 2 * 70
+    else:
+        assert all(each.planned.label in text for each in part.results)
+
+
+def test_a_taught_plan_measures_the_same_part_again(measured: Station) -> None:
+    taught = taught_plan(measured.found.part)
+
+    again = station(measured.setup.instrument, taught)
+    again.probe(taught.features[0].n_touches)
+    assert len(again.state.runs) == 1
+
+
+def test_features_are_recognised_while_they_are_probed(instrument: Instrument) -> None:
+    plate = plate_plan()
+    at_it = station(instrument, free_plan("Part", touches=6))
+    wanted = [plate.features[i] for i in (0, 7)]
+    plate = structs.replace(
+        plate, features=tuple(structs.replace(each, touches=6) for each in wanted)
+    )
+    at_it.probe(12, plate)
+    at_it.state = end_task(at_it.setup, at_it.state).state
+
+    kinds = [each.kind for each in at_it.found.part.features.values()]
+    assert kinds == [FeatureKind.PLANE, FeatureKind.SPHERE]
+
+
+def test_the_next_point_lies_where_none_was_probed(instrument: Instrument) -> None:
+    at_it = station(instrument, plate_plan())
+    at_it.probe(5)  # one short of the plane
+    progress = at_it.state.progress(at_it.setup, PART)
+
+    now = feature_so_far(at_it.options, progress, at_it.setup.conditions)
+
+    assert now is not None
+    assert now.kind is FeatureKind.PLANE
+    assert now.next_touch is not None
+    away = [
+        np.linalg.norm(point.point_cam - now.next_touch.point)
+        for point in progress.points
+    ]
+    assert min(away) > 10
+
+
+def test_an_undone_point_can_be_probed_again(instrument: Instrument) -> None:
+    at_it = station(instrument, plate_plan())
+    at_it.probe(3)
+    at_it.state = without_last_touch(at_it.state)
+    assert len(at_it.state.touches) == 2
+    at_it.probe(4)
+
+    assert len(at_it.state.runs) == 1
+
+
+def test_a_plan_that_is_ended_early_gives_what_was_probed(
+    instrument: Instrument,
+) -> None:
+    at_it = station(instrument, plate_plan())
+    at_it.probe(6)
+    at_it.state = end_task(at_it.setup, at_it.state).state
+
+    assert [*at_it.found.part.features] == ["top"]
+    assert len(at_it.found.missing) == 9
+    assert at_it.found.assessment.grade is Grade.CHECK
+
+
+def test_points_that_do_not_determine_their_feature_are_told_at_once(
+    instrument: Instrument,
+) -> None:
+    line = plate_plan().features[1]
+    flat = structs.replace(line, touches=4)
+    plan = structs.replace(
+        plate_plan(),
+        features=(structs.replace(flat, kind=FeatureKind.PLANE),),
+        alignment=None,
+        characteristics=(),
+    )
+    at_it = station(instrument, plan)
+    at_it.probe(4, structs.replace(plan, features=(flat,)))
+
+    assert not at_it.state.runs
+    assert at_it.state.trouble is not None
+    assert at_it.state.trouble.code == "measuring.undetermined"
+    assert len(at_it.state.touches) == 4  # nothing is lost
+
+
+def test_nothing_is_measured_without_a_plan(instrument: Instrument) -> None:
+    setup = replace(SessionSetup(instrument), ball_diameter=BALL)
+
+    with pytest.raises(CalibrationError, match="No measuring plan"):
+        PART.measure([], setup.conditions, PartOptions())
+    assert PART.missing(PartOptions(), BALL) is not None
