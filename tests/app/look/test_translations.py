@@ -25,7 +25,9 @@ APPLICATION = ROOT / "app" / "lightpen_app"
 CORE = ROOT / "core" / "lightpen"
 TRANSLATIONS = RESOURCES / "translations"
 CHINESE = TRANSLATIONS / "lightpen_zh_CN.ts"
-HELP_TOPICS = (*("start", "camera", "leds", "swing", "review", "verify", "history"),)
+HELP_TOPICS = (
+    *("start", "camera", "leds", "swing", "review", "verify", "measure", "history"),
+)
 # Two words, one by itself that begins with a capital, or one beside a value.
 WORDS = re.compile(
     r"[A-Za-z]{2}[,.:]? [A-Za-z]{2}|^[A-Z][a-z]{2,}:? ?$|^ [a-z]{3}|[a-z]{3} $"
