@@ -9,6 +9,7 @@ at random; dialogs are closed after 2 s, as are menus. Where another source was 
 the two cameras are chosen again after 5 s.
 """
 
+import gc
 import json
 import os
 import random
@@ -42,7 +43,8 @@ from PySide6.QtWidgets import (
 
 from lightpen.formats.decoding import keep_freed_memory
 from lightpen.swing.preparation import N_CAMERAS, SourceChoice
-from lightpen_app.application import Wizard, make_application
+from lightpen_app.application import SETTLED_MS, Wizard, make_application
+from lightpen_app.plain_import import use_plain_import
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Preferences, Settings
 
@@ -50,7 +52,8 @@ SEED = 24
 TICK_MS, EVENT_MS, SAMPLE_MS = 10, 50, 1000
 LONGEST_DIALOG_S = 2.0
 LONGEST_WITHOUT = 5  # samples without an image, until the cameras are chosen again
-LATE_MS, SAMPLE_S = 80.0, 0.02  # how late the window is when its stack is noted
+# How long the window's thread has computed when its stack is noted; how often to look.
+LONG_MS, SAMPLE_S = 40.0, 0.01
 N_CALLERS, N_CAUSES = 9, 12
 N_POINTS = 50
 KEYS = (
@@ -85,6 +88,7 @@ class RandomUser(QObject):
         self._busy = array("f")
         self._last_busy = time.thread_time()
         self._causes = Counter[str]()
+        self._load = Load()
         self._n_delivered = self._n_images = self._n_without = 0
         self._n_events = 0
         self.errors: list[str] = []
@@ -105,18 +109,16 @@ class RandomUser(QObject):
 
     def figures(self) -> dict[str, object]:
         """Return what was measured."""
-        late = self._lateness
         return {
             "seconds": time.perf_counter() - self._start,
             "events": self._n_events,
             "errors": len(self.errors),
             "images": self._n_images,  # of one camera
-            "lateness_ms": [float(np.percentile(late, s)) for s in (50, 99, 100)],
+            "lateness_ms": _percentiles(self._lateness),
             # Without what other threads and programs kept from a processor core.
-            "lateness_on_core_ms": [
-                float(np.percentile(self._unqueued, s)) for s in (50, 99, 100)
-            ],
-            "busy_ms": [float(np.percentile(self._busy, s)) for s in (50, 99, 100)],
+            "lateness_on_core_ms": _percentiles(self._unqueued),
+            "thread_ms": _percentiles(self._busy),
+            "cores_of_others": self._load.of_others(),
             "causes": dict(self._causes.most_common(N_CAUSES)),
             "memory_minutes_mb": _by_minute(self._memory),
         }
@@ -208,12 +210,13 @@ class RandomUser(QObject):
         return root
 
     def _watch(self) -> None:
-        """Note what the thread of the window does while it is late."""
+        """Note what the thread of the window computes for long without an event."""
         window = threading.main_thread().ident
         assert window is not None
+        clock = time.pthread_getcpuclockid(window)
         while True:
             time.sleep(SAMPLE_S)
-            if 1000 * (time.perf_counter() - self._last_tick) < TICK_MS + LATE_MS:
+            if 1000 * (time.clock_gettime(clock) - self._last_busy) < LONG_MS:
                 continue
             frame = sys._current_frames().get(window)
             names: list[str] = []
@@ -222,6 +225,23 @@ class RandomUser(QObject):
                 names.append(f"{Path(code.co_filename).stem}.{code.co_name}")
                 frame = frame.f_back
             self._causes[" < ".join(names)] += 1
+
+
+class Load:
+    """What the machine does beside this process, from now on."""
+
+    def __init__(self) -> None:
+        self._start = time.perf_counter()
+        self._before = self._spent_s()
+
+    def of_others(self) -> float:
+        """Return how many processor cores other programs have taken on average."""
+        return (self._spent_s() - self._before) / (time.perf_counter() - self._start)
+
+    def _spent_s(self) -> float:
+        fields = Path("/proc/stat").read_text(encoding="ascii").split("\n", 1)[0]
+        user, nice, system = map(int, fields.split()[1:4])
+        return (user + nice + system) / os.sysconf("SC_CLK_TCK") - time.process_time()
 
 
 def choose_cameras(wizard: Wizard) -> None:
@@ -253,6 +273,11 @@ def _queued_ms() -> float:
     return int(Path("/proc/thread-self/schedstat").read_text().split()[1]) / 1e6
 
 
+def _percentiles(values: "array[float]") -> list[float]:
+    """Return the median, the 99th of a hundred, and the most."""
+    return [float(np.percentile(values, share)) for share in (50, 99, 100)]
+
+
 def _by_minute(memory: list[tuple[float, float]]) -> list[float]:
     """Return the median of each begun minute, MB."""
     minutes = range(int(memory[-1][0] // 60) + 1)
@@ -266,6 +291,7 @@ def main() -> int:
     seconds = float(sys.argv[1])
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else SEED
     qInstallMessageHandler(lambda kind, context, text: None)  # hints of the platform
+    use_plain_import()
     application = make_application(sys.argv[:1])
     with tempfile.TemporaryDirectory(prefix="lightpen-events-") as folder:
         os.environ["LIGHTPEN_KEYS"] = str(Path(folder) / "keys")
@@ -277,6 +303,7 @@ def main() -> int:
         wizard.window.show()
         wizard.workbench.start()
         choose_cameras(wizard)
+        QTimer.singleShot(SETTLED_MS, gc.freeze)
         user = RandomUser(wizard, seconds, seed)
         wizard.crash_hook.reported.connect(user.errors.append)
         application.exec()

@@ -1,5 +1,6 @@
 """The application around the window: fonts, colours, language, sounds, crash hook."""
 
+import gc
 import logging
 import os
 import sys
@@ -23,7 +24,6 @@ from PySide6.QtWidgets import QApplication
 from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import UsageError
-from lightpen.estimation.reports.summary import calibration_text
 from lightpen.formats.files import printable
 from lightpen.live.sources import SourceEnvironment
 from lightpen.logs import end_log, write_log_to
@@ -41,6 +41,7 @@ from lightpen_app.shell.sidebar import subject_of
 from lightpen_app.shell.stream_dialog import StreamState
 from lightpen_app.steps.page import Page
 from lightpen_app.work.garbage import GarbageCollector
+from lightpen_app.work.job import Job
 from lightpen_app.work.settings import Preferences, Settings, data_folder, settings_file
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
@@ -48,6 +49,8 @@ from lightpen_app.work.workbench import Workbench
 # s after which a thread that computes lets the window go on. A change of theme calls
 # thousands of methods, and by Python's 5 ms each would wait for the live images.
 SWITCH_INTERVAL = 0.0005
+
+SETTLED_MS = 5000  # from the start until all is made and loaded
 
 UNSEEN_FRAME_RATE = 8.0  # 1/s; of a demo that nobody watches, enough to swing by
 
@@ -204,8 +207,10 @@ def run(make_pages: MakePages, swing: Path | None = None) -> int:
         settings = Settings(settings_file())
         folder = data_folder(settings.preferences())
         write_log_to(folder)
-        _logger.info("window with the data folder %s; %s", folder, versions())
+        _logger.info("window with the data folder %s", folder)
         wizard = Wizard(application, make_pages, settings, folder)
+        log_versions = Job(lambda _: _logger.info("versions: %s", versions()), wizard)
+        QTimer.singleShot(SETTLED_MS, log_versions.start)
         if swing is not None:
             open_swing = partial(wizard.workbench.run.open_requested.emit, swing)
             QTimer.singleShot(0, open_swing)
@@ -264,6 +269,7 @@ def _shown(application: QApplication, wizard: Wizard, signals: EndSignals) -> in
     wizard.crash_hook.install()
     wizard.window.show()
     wizard.workbench.start()
+    QTimer.singleShot(SETTLED_MS, gc.freeze)  # no search goes through the window again
     try:
         return application.exec()
     finally:
@@ -302,6 +308,8 @@ def _tell_but_hints(kind: QtMsgType, context: QMessageLogContext, text: str) -> 
 def _print_tip(run: SwingRun) -> None:
     status = run.status
     if status.solution is not None and status.verdict is not None:
+        from lightpen.estimation.reports.summary import calibration_text
+
         nominal = status.solution.source.pen.nominal_tip
         calibration = status.solution.calibration
         print("\n" + calibration_text(calibration, "joint", nominal, status.verdict))

@@ -12,7 +12,6 @@ import sys
 import threading
 import traceback
 from datetime import datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
 
@@ -132,6 +131,9 @@ def _without_home(text: str) -> str:
 
 def versions() -> dict[str, str]:
     """Return the versions of the program and its libraries."""
+    # With a library for e-mail, which the start of the window need not wait for.
+    from importlib.metadata import PackageNotFoundError, version
+
     found = {"Python": platform.python_version(), "Qt": qVersion()}
     for package in PACKAGES:
         try:

@@ -7,7 +7,6 @@ there is nothing, `SilentSounds` takes its place and says why.
 import io
 import shutil
 import sys
-import wave
 from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -144,6 +143,8 @@ def find_sounds(folder: Path) -> Sounds:
 
 def sound_wav(sound: Sound, step: int = 0) -> bytes:
     """Return a sound as a WAV file; KEPT is raised by twelfths of an octave."""
+    import wave  # of no use at most starts, as the files are there
+
     tones = [_tone(pitch * 2 ** (step / 12), time) for pitch, time in TONES[sound]]
     samples = np.concatenate(tones)
     buffer = io.BytesIO()
