@@ -1,11 +1,5 @@
 """The pages of the wizard, in the order of the steps."""
 
-from collections.abc import Sequence
-from functools import partial
-from importlib import import_module
-
-from PySide6.QtCore import QTimer
-
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.steps.camera.page import CameraPage
 from lightpen_app.steps.history.page import HistoryPage
@@ -16,11 +10,10 @@ from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.swing.page import SwingPage
 from lightpen_app.steps.verify.measure_page import MeasurePage
 from lightpen_app.steps.verify.page import VerifyPage
-from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
 
-# What the pages show only later, with plots and archive, and how long after the start
-# it is loaded, so that neither the start nor the one who opens it waits.
+# What the pages show only later, with plots and archive: neither the start nor the one
+# who opens it waits for these.
 LATER = (
     "lightpen_app.steps.swing.plots_panel",
     "lightpen_app.steps.review.plots_panel",
@@ -29,14 +22,11 @@ LATER = (
     "lightpen_app.steps.history.content",
     "lightpen_app.steps.camera.board_window",
 )
-LATER_MS = 1000
 
 
 def make_pages(workbench: Workbench, sounds: Sounds) -> tuple[Page, ...]:
     """Return all pages."""
-    loading = Job(partial(_load, LATER), workbench)
-    # Counted from when the window handles its first events.
-    QTimer.singleShot(0, partial(QTimer.singleShot, LATER_MS, loading.start))
+    workbench.load_later(LATER)
     return (
         StartPage(workbench, sounds),
         CameraPage(workbench, sounds),
@@ -47,9 +37,3 @@ def make_pages(workbench: Workbench, sounds: Sounds) -> tuple[Page, ...]:
         MeasurePage(workbench, sounds),
         HistoryPage(workbench),
     )
-
-
-def _load(modules: Sequence[str], report: Report) -> None:
-    for n_loaded, module in enumerate(modules):
-        report(n_loaded / len(modules))
-        import_module(module)
