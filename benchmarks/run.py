@@ -34,6 +34,7 @@ from benchmarks.published import with_section
 from benchmarks.rows import NEEDS_DATA, Row, table
 from benchmarks.small_leds import small_led_rows
 from benchmarks.speed import speed_rows
+from benchmarks.station import station_rows
 from benchmarks.tips import repeat_rows, tip_rows
 from benchmarks.tracker import tracker_rows
 from benchmarks.verification import verification_rows
@@ -52,6 +53,7 @@ SECTIONS: dict[str, Section] = {
     "repeat": repeat_rows,
     "bound": lambda workers, data: cramer_rao_rows(workers),
     "files": lambda workers, data: wrong_file_rows(workers),
+    "station": lambda workers, data: station_rows(workers),
     "cameras": camera_calibration_rows,
     "discover": lambda workers, data: discovery_rows(workers),
     "hard": lambda workers, data: hard_scene_rows(workers),

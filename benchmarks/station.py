@@ -9,13 +9,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from benchmarks.rows import Row, numbers
+from benchmarks.workers import Workers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
+from lightpen.estimation.reports.report_warnings import warnings_of
+from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
+from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, from_first, rig_of
 from lightpen.model.rigid import rotation_from_vector
@@ -89,6 +94,112 @@ USUAL_SIZES = Effects(
     uneven=0.3,
     copies=0.0,
 )
+
+
+# One effect each, all together, and none.
+CASES: dict[str, Effects] = {
+    "no effect": GOOD,
+    "lens field of up to 0.03 px": replace(GOOD, lens=USUAL_SIZES.lens),
+    "compliance of 4 µm": replace(GOOD, compliance=USUAL_SIZES.compliance),
+    "loose stylus, up to 4 µm": replace(GOOD, loose=USUAL_SIZES.loose),
+    "sag of up to 20 µm": replace(GOOD, sag=USUAL_SIZES.sag),
+    "camera that tilts, 0.01 px": replace(GOOD, tilt=USUAL_SIZES.tilt),
+    "seat jitter of up to 4 µm": replace(GOOD, seat=USUAL_SIZES.seat),
+    "pen 2 K warmer or colder": replace(GOOD, warmth=USUAL_SIZES.warmth),
+    "LEDs unlike in noise": replace(GOOD, uneven=USUAL_SIZES.uneven),
+    "a third of the images copied": replace(GOOD, copies=1 / 3),
+    "all together": USUAL_SIZES,
+}
+TOGETHER = "all together"
+COVERED = 93.0, 97.0  # per cent, of all together; of 95 % chance alone makes +- 3 SE
+MOST_PASSED_BEYOND = 5.0  # per cent of PASS
+NORMAL_95 = 1.959964
+MORE_TRIALS = 100
+FEWER_TRIALS = 40
+
+
+class StationCase(NamedTuple):
+    """One row: effects by name, images and cameras."""
+
+    name: str
+    n_images: int
+    n_cameras: int
+
+    @property
+    def n_trials(self) -> int:
+        """Number of stations drawn."""
+        if self.name == TOGETHER and self.n_cameras == 1:
+            return MORE_TRIALS
+        return FEWER_TRIALS
+
+    @property
+    def drawn(self) -> list[tuple["StationCase", int]]:
+        """The case with the seed of each station."""
+        return [(self, seed) for seed in range(self.n_trials)]
+
+
+ROWS = [
+    *(StationCase(name, n, 1) for name in CASES for n in (60, 300)),
+    *(StationCase(TOGETHER, n, 2) for n in (60, 300)),
+]
+
+
+class Outcome(NamedTuple):
+    """What a calibration says of itself, and what is true."""
+
+    error: float  # mm, of the tip
+    covered: tuple[bool, bool, bool]  # by 95 % intervals
+    is_beyond: bool  # U along any axis
+    is_told: bool  # by a warning, or by CHECK
+    is_passed: bool
+
+
+def station_rows(workers: Workers) -> list[Row]:
+    """Return how far off tips are at stations with effects, and whether U holds."""
+    return [_row(case, workers.map(_outcome, case.drawn)) for case in ROWS]
+
+
+def _outcome(drawn: tuple[StationCase, int]) -> Outcome:
+    case, seed = drawn
+    effects = CASES[case.name]
+    trial = calibrated(effects, case.n_images, case.n_cameras, seed, "operator")
+    off, U = np.abs(trial.error), trial.uncertainty
+    verdict = judge(trial.calibration, SwingLimits())
+    x, y, z = (off < 0.5 * NORMAL_95 * U).tolist()
+    return Outcome(
+        float(np.linalg.norm(off)),
+        (x, y, z),
+        bool(np.any(off > U)),
+        verdict.grade is Grade.CHECK or bool(warnings_of(trial.calibration)),
+        verdict.grade is Grade.PASS,
+    )
+
+
+def _row(case: StationCase, outcomes: list[Outcome]) -> Row:
+    n = len(outcomes)
+    errors, covered, beyond, told, passed = map(np.array, zip(*outcomes, strict=True))
+    shares = 100 * covered.mean(axis=0)
+    silent = 100 * float(np.mean(beyond & ~told))
+    n_passed, n_beyond = int(passed.sum()), int(np.sum(passed & beyond))
+    chance = 300 * np.sqrt(0.95 * 0.05 / n)  # three standard errors
+    is_limited = case.name == TOGETHER
+    low, high = COVERED[0] - chance, COVERED[1] + chance
+    cameras = "one camera" if case.n_cameras == 1 else f"{case.n_cameras} cameras"
+    return Row(
+        f"{case.name}, {case.n_images} images, {cameras}: median error; in 95 % "
+        f"intervals x y z; beyond U untold; PASS, of these beyond U; {n} stations",
+        f"{1000 * np.median(errors):.1f} µm; {numbers(shares, 0)} %; {silent:.0f} %; "
+        f"{n_passed}, {n_beyond}",
+        f"{COVERED[0]:.0f} to {COVERED[1]:.0f} % but for chance, "
+        f"<= {MOST_PASSED_BEYOND:.0f} % of PASS"
+        if is_limited
+        else "-",
+        met=not is_limited
+        or bool(
+            np.all((shares >= low) & (shares <= high))
+            and 100 * n_beyond <= MOST_PASSED_BEYOND * n_passed
+        ),
+    )
 
 
 class Trial(NamedTuple):

@@ -107,6 +107,7 @@ _SHARES: dict[ContributionName, str] = {
     ContributionName.LOOSE: QT_TRANSLATE_NOOP("phrases", "loose stylus"),
     ContributionName.SAG: QT_TRANSLATE_NOOP("phrases", "sag"),
     ContributionName.TILT: QT_TRANSLATE_NOOP("phrases", "camera tilt"),
+    ContributionName.TIMING: QT_TRANSLATE_NOOP("phrases", "timing"),
     ContributionName.SHRINKAGE: QT_TRANSLATE_NOOP("phrases", "unmodelled effects"),
 }
 _LACKS: dict[MissingInput, str] = {

@@ -257,6 +257,7 @@ def _share_name(name: ContributionName) -> str:
         ContributionName.LOOSE: translate("paper", "Loose stylus"),
         ContributionName.SAG: translate("paper", "Sag of the pen"),
         ContributionName.TILT: translate("paper", "Tilt of the camera with the pen"),
+        ContributionName.TIMING: translate("paper", "Images not of the same moment"),
         ContributionName.SHRINKAGE: translate(
             "paper", "Effects too uncertain to be fitted"
         ),

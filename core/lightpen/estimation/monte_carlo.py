@@ -51,6 +51,7 @@ OF_OTHERS = {
     ContributionName.LOOSE,
     ContributionName.SAG,
     ContributionName.TILT,
+    ContributionName.TIMING,
 }  # cones, or cameras; not drawn
 
 

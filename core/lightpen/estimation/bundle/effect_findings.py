@@ -17,7 +17,15 @@ _MESSAGES: Mapping[EffectName, Callable[[float], Message]] = {
     EffectName.LOOSE: lambda size: message("warning.effect-loose-stylus", size=size),
     EffectName.SAG: lambda size: message("warning.effect-sag", size=size),
     EffectName.TILT: lambda size: message("warning.effect-camera-tilt", size=size),
+    EffectName.DELAY: lambda size: message("warning.effect-late-camera", size=size),
+    EffectName.SHUTTER: lambda size: message("warning.effect-shutter", size=size),
+    EffectName.STROBE: lambda size: message("warning.effect-strobe", size=size),
 }
+
+OF_ONE_CAMERA = (
+    *(EffectName.LENS, EffectName.TILT),
+    *(EffectName.DELAY, EffectName.SHUTTER),
+)
 
 
 @dataclass(frozen=True)
@@ -30,7 +38,7 @@ class FoundEffect:
         Of a rig, whose images it shifts; empty of a single camera, and of the pen.
     size : float
         Its value where it has one unknown, else the root mean square of its values:
-        mm, of lens and camera px.
+        mm, of lens and camera tilt px, of time image intervals.
     sigma : float or None
         Standard uncertainty of the one value.
     gain : float
@@ -79,7 +87,7 @@ def found_effects(bundle: Bundle) -> tuple[FoundEffect, ...]:
             sigma = float(np.sqrt(bundle.covariance[place, place][0, 0]))
         else:
             size = float(np.linalg.norm(values))
-        of_camera = effect.name in (EffectName.LENS, EffectName.TILT) and names
+        of_camera = effect.name in OF_ONE_CAMERA and names
         found.append(
             FoundEffect(
                 effect.name,

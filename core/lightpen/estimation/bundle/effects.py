@@ -15,6 +15,10 @@ loose stylus   jump of the tip with the side of the lean: along h, or along one 
                axes of the pen, with the sign of the lean to that side
 sag            the pen bends under its weight, as the square of the height of the LED
 camera tilt    the image of one camera shifts with h, px
+late camera    a further camera takes its images later, in image intervals
+rolling        the rows of an image are read one after the other; interval from the
+shutter        first row to the last
+LEDs in turn   the LEDs light one after the other; interval from one to the next
 ============== =========================================================================
 """
 
@@ -39,6 +43,8 @@ LEAST_LEAN = 0.02  # sine; below it the side of the lean is not known
 # How often chance alone supports an effect, at most. Four kinds are tried at every
 # station: of 24 without effects, one in six (Akaike) made the tip twice as far off.
 CHANCE = 0.01
+UNEVEN = 0.5  # of a step from image to image, by which the next differs: no motion
+MOVING = 1.0  # px, least median step: pens at rest tell no time
 N_SCALES = 60  # standard deviations tried
 SMALLEST = 1e-3  # of the largest one
 ROUNDING = 1e-9  # of the largest eigenvalue
@@ -52,15 +58,21 @@ class EffectName(StrEnum):
     LOOSE = "loose stylus"
     SAG = "sag"
     TILT = "camera tilt"
+    DELAY = "late camera"
+    SHUTTER = "rolling shutter"
+    STROBE = "leds in turn"
 
 
-# Largest standard deviations, mm or px: what is larger is another fault.
+# Largest standard deviations, mm, px or image intervals; a larger one is another fault.
 LARGEST = {
     EffectName.LENS: 0.08,
     EffectName.COMPLIANCE: 0.03,
     EffectName.LOOSE: 0.01,
     EffectName.SAG: 0.03,
     EffectName.TILT: 0.1,
+    EffectName.DELAY: 0.5,  # image intervals
+    EffectName.SHUTTER: 1.0,
+    EffectName.STROBE: 0.1,
 }
 
 
@@ -107,7 +119,7 @@ class EffectComponent(NamedTuple):
     covariance : (k, k) array
         Of the unknowns with that.
     expected : (k, k) array
-        Of the unknowns, averaged over what their size may be.
+        Their mean square given the images, averaged over what their size may be.
     """
 
     sigma: float
@@ -144,34 +156,60 @@ def size_of(effect: Effect, S: FloatArray, right: FloatArray) -> EffectComponent
         return held(effect)
     largest = LARGEST[effect.name]
     sigmas = np.geomspace(SMALLEST * largest, largest, N_SCALES)
-    all_costs = np.array([_costs(S, right, shape, sigmas) for shape in effect.shapes])
+    spectra = [_Spectrum.of(S, right, shape) for shape in effect.shapes]
+    all_costs = np.array([each.costs(sigmas) for each in spectra])
     s, i = np.unravel_index(int(np.argmin(all_costs)), all_costs.shape)
     gain = -float(all_costs[s, i])
     if effect.stated > 0:
-        own = np.linalg.inv(np.linalg.inv(effect.shapes[0] * effect.stated**2) + S)
-        mean = own @ right
-        expected = own + np.outer(mean, mean)
+        expected = spectra[0].second_moment(np.array([effect.stated]), np.ones(1))
     else:
         weights = np.exp(-0.5 * (all_costs + gain)) * (1 - P_NONE) / all_costs.size
-        total = weights.sum() + P_NONE * np.exp(-0.5 * gain)
-        variances = (weights / total) @ sigmas**2
-        expected = np.einsum("s,sij->ij", variances, np.array(effect.shapes))
+        weights /= weights.sum() + P_NONE * np.exp(-0.5 * gain)
+        expected = np.sum(
+            [x.second_moment(sigmas, w) for x, w in zip(spectra, weights, strict=True)],
+            axis=0,
+        )
     sigma = float(sigmas[i])
     return EffectComponent(sigma, gain, sigma**2 * effect.shapes[s], expected)
 
 
-def _costs(
-    S: FloatArray, right: FloatArray, shape: FloatArray, sigmas: FloatArray
-) -> FloatArray:
-    """Return twice the negative log likelihood ratio to no effect, of each size."""
-    values, vectors = np.linalg.eigh(shape)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    seen, turned = np.linalg.eigh(root.T @ S @ root)
-    seen = np.maximum(seen, 0.0)
-    projected = turned.T @ (root.T @ right)
-    excess = 1 + seen * sigmas[:, None] ** 2
-    gains = sigmas[:, None] ** 2 * projected**2 / excess
-    return np.asarray(np.log(excess).sum(axis=1) - gains.sum(axis=1))
+class _Spectrum(NamedTuple):
+    """Unknowns ``root x`` as independent ones x of equal variance s^2 and information.
+
+    Attributes
+    ----------
+    root : (k, k) array
+    seen, right : (k,) array
+        Information about each, and the right side that belongs to it.
+    """
+
+    root: FloatArray
+    seen: FloatArray
+    right: FloatArray
+
+    @classmethod
+    def of(cls, S: FloatArray, right: FloatArray, shape: FloatArray) -> "_Spectrum":
+        """Return the spectrum of unknowns of which the shape is the covariance."""
+        values, vectors = np.linalg.eigh(shape)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        seen, turned = np.linalg.eigh(root.T @ S @ root)
+        root = root @ turned
+        return cls(root, np.maximum(seen, 0.0), root.T @ right)
+
+    def costs(self, sigmas: FloatArray) -> FloatArray:
+        """Return twice the negative log likelihood ratio to no effect, of each size."""
+        variances = sigmas[:, None] ** 2
+        excess = 1 + self.seen * variances
+        gains = variances * self.right**2 / excess
+        return np.asarray(np.log(excess).sum(axis=1) - gains.sum(axis=1))
+
+    def second_moment(self, sigmas: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the mean square of the unknowns, averaged over sizes, (k, k)."""
+        variances = sigmas[:, None] ** 2
+        left = variances / (1 + self.seen * variances)
+        means = left * self.right
+        moment = np.diag(weights @ left) + (weights[:, None] * means).T @ means
+        return np.asarray(self.root @ moment @ self.root.T)
 
 
 class ConeMoves(NamedTuple):
@@ -269,7 +307,61 @@ def effects_of(
         tilt[:, c, :, 0, :2] = tilt[:, c, :, 1, 2:] = lean[:, None]
         found.append(Effect(EffectName.TILT, c, tilt, (np.eye(4),)))
         found.append(_lens(camera, c, pixels, used))
-    return tuple(found)
+    return (*found, *_timing(pixels, used, cameras))
+
+
+def _timing(
+    pixels: FloatArray, used: BoolArray, cameras: tuple[Camera, ...]
+) -> list[Effect]:
+    """Return what happens later than the image of the first camera, if the pen moves.
+
+    Images between which the pen does not move evenly on the whole tell nothing of it.
+    """
+    speed = _speeds(np.where(used[..., None], pixels, np.nan))
+    if speed is None:
+        return []
+    found = []
+
+    def consider(name: EffectName, camera: int, delays: FloatArray) -> None:
+        columns = np.asarray(delays[..., None, None] * speed[..., None])
+        found.append(Effect(name, camera, columns, (np.eye(1),)))
+
+    order = np.arange(pixels.shape[2]) - 0.5 * (pixels.shape[2] - 1)
+    consider(EffectName.STROBE, 0, np.broadcast_to(order, pixels.shape[:-1]))
+    for c, camera in enumerate(cameras):
+        only = np.zeros(pixels.shape[:-1])
+        if c > 0:
+            only[:, c] = 1.0
+            consider(EffectName.DELAY, c, only)
+        rows = np.zeros_like(only)
+        rows[:, c] = np.nan_to_num(pixels[:, c, :, 1] / camera.height - 0.5)
+        consider(EffectName.SHUTTER, c, rows)
+    return found
+
+
+def _speeds(pixels: FloatArray) -> FloatArray | None:
+    """Return the motion of each LED's image, (N, C, L, 2), px an image interval.
+
+    None if it seldom is even from image to image, or the pen rests. An LED that the
+    images before or after do not show moves as the others do on average.
+    """
+    steps = np.diff(pixels, axis=0)
+    lengths = np.linalg.norm(steps, axis=-1)
+    bends = np.linalg.norm(np.diff(steps, axis=0), axis=-1)
+    seen = np.isfinite(bends)
+    if not seen.any() or np.nanmedian(lengths) < MOVING:
+        return None
+    is_even = bends[seen] < UNEVEN * np.minimum(lengths[1:], lengths[:-1])[seen]
+    if is_even.mean() < 0.5:
+        return None
+    both = np.stack(
+        [np.concatenate([steps[:1], steps]), np.concatenate([steps, steps[-1:]])]
+    )
+    counts = np.isfinite(both).sum(axis=0)
+    speed = np.nansum(both, axis=0) / np.maximum(counts, 1)
+    known = counts > 0
+    means = np.sum(speed * known, axis=2) / np.maximum(known.sum(axis=2), 1)
+    return np.asarray(np.where(known, speed, means[:, :, None]))
 
 
 def _lens(camera: Camera, c: int, pixels: FloatArray, used: BoolArray) -> Effect:

@@ -130,6 +130,7 @@ class UncertaintyRecord(Struct, frozen=True):
     loose_stylus_mm: Triple | None
     sag_mm: Triple | None
     camera_tilt_mm: Triple | None
+    timing_mm: Triple | None
     not_followed_mm: Triple | None
     independent_noise_mm: Triple | None
     blocks_mm: Triple | None
@@ -175,7 +176,8 @@ class EffectRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     Attributes
     ----------
     size
-        Standard deviation, of one unknown its value: mm, of lens and tilt px.
+        Standard deviation, of one unknown its value: mm, of lens and tilt px, of time
+        image intervals.
     standard_uncertainty
         Of one unknown.
     gain

@@ -5,6 +5,7 @@ from collections import Counter
 import numpy as np
 
 from lightpen.detection.reasons import Reason
+from lightpen.estimation.bundle.effects import EffectName
 from lightpen.estimation.bundle.linearised import N_CONE
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS
 from lightpen.estimation.calibrate import Calibration
@@ -122,12 +123,15 @@ def _seat_warnings(calibration: Calibration) -> list[Message]:
 
 
 def late_cameras(calibration: Calibration) -> list[Message]:
-    """Return warnings on cameras with a time lag."""
+    """Return warnings on cameras with a time lag that is not corrected."""
     names = calibration.bundle.state.rig.names[1:]
+    corrected = [
+        each.camera for each in calibration.effects if each.name is EffectName.DELAY
+    ]
     return [
         not_simultaneous(name, lag.value)
         for name, lag in zip(names, calibration.lags, strict=True)
-        if lag is not None and lag.is_noticeable
+        if lag is not None and lag.is_noticeable and name not in corrected
     ]
 
 

@@ -61,6 +61,7 @@ _ADVICE = {
     ContributionName.EXTRINSICS: message("share.rig"),
     ContributionName.LENS: message("share.lens"),
     ContributionName.COMPLIANCE: message("share.compliance"),
+    ContributionName.TIMING: message("share.timing"),
 }
 
 

@@ -17,7 +17,7 @@ drift              (17)      of cone against camera
 led geometry       (17)      errors of the LED file
 pen scale, temperature, cone distance, disc diameter, camera, rig
                    (16)      prior or measurement of each
-lens, compliance, loose stylus, sag, camera tilt
+lens, compliance, loose stylus, sag, camera tilt, timing
                    (17)      effects of the station (`effects`)
 not followed       (19)      shift of the estimate by shrinkage of assumed priors
 =================  ========  =========================================================
@@ -89,6 +89,7 @@ class ContributionName(StrEnum):
     LOOSE = "loose stylus"
     SAG = "sag"
     TILT = "camera tilt"
+    TIMING = "timing"
     SHRINKAGE = "not followed"  # by the estimate: what assumed priors allow beyond it
 
 
@@ -98,6 +99,9 @@ SHARES_OF_EFFECTS = {
     EffectName.LOOSE: ContributionName.LOOSE,
     EffectName.SAG: ContributionName.SAG,
     EffectName.TILT: ContributionName.TILT,
+    EffectName.DELAY: ContributionName.TIMING,
+    EffectName.SHUTTER: ContributionName.TIMING,
+    EffectName.STROBE: ContributionName.TIMING,
 }
 IMAGES_SHRINK = (
     ContributionName.NOISE,
@@ -108,6 +112,7 @@ IMAGES_SHRINK = (
     ContributionName.LOOSE,
     ContributionName.SAG,
     ContributionName.TILT,
+    ContributionName.TIMING,
 )
 
 
@@ -337,8 +342,9 @@ def _of_effects(
         gain = bundle.covariance[:6, place] @ bundle.prior_information[place, place]
         parts.append((effect.name, gain @ budgeted @ gain.T))
     shares = []
-    for name, share in SHARES_OF_EFFECTS.items():
-        covariance = sum((part for of, part in parts if of is name), np.zeros((6, 6)))
+    for share in dict.fromkeys(SHARES_OF_EFFECTS.values()):
+        own = (part for name, part in parts if SHARES_OF_EFFECTS[name] is share)
+        covariance = sum(own, np.zeros((6, 6)))
         assumed = share is ContributionName.COMPLIANCE
         shares.append(UncertaintyContribution(share, covariance, assumed))
     return shares

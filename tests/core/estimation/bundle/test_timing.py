@@ -1,0 +1,117 @@
+"""What is not simultaneous is found, corrected and named, and else costs nothing."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated_centers import simulate_rig_centers
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.bundle.effects import EffectName
+from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
+from lightpen.estimation.reports.report_warnings import warnings_of
+from lightpen.estimation.uncertainty.budget import ContributionName
+from lightpen.formats.observation_files import Centers
+from lightpen.model.rig import from_first
+from lightpen.simulator.postures import Postures
+from lightpen.simulator.samples import row_of_cameras
+from lightpen.simulator.swings import (
+    Swing,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_from_postures,
+)
+
+CAMERA, PEN = paper_camera(), paper_pen()
+N_IMAGES, NOISE = 120, 0.03
+TIMES = np.arange(N_IMAGES, dtype=float)  # image intervals
+
+
+def swing_at(times: FloatArray) -> Swing:
+    """Return the same smooth swing of the pen at any times."""
+    phase = 2 * np.pi * times / 60
+    tilts = np.radians(22 + 7 * np.sin(0.37 * phase))
+    return swing_from_postures(Postures(tilts, phase, 0.4 * np.sin(0.71 * phase)))
+
+
+def seen(delays: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Return centres (N, L, 2) of LEDs that are seen later by delays of centres."""
+    exact = _centers(np.zeros((N_IMAGES, PEN.n_leds)))
+    moved = _centers(delays(_centers(delays(exact))))
+    rng = np.random.default_rng(265)
+    return moved + rng.normal(0, NOISE, moved.shape)
+
+
+def _centers(delays: FloatArray) -> FloatArray:
+    pixels = []
+    for j in range(PEN.n_leds):
+        swing = swing_at(TIMES + delays[:, j])
+        poses = swing.rotations, swing.translations
+        drawn = simulate_centers(CAMERA, PEN, *poses, 0.0, np.random.default_rng(0))
+        pixels.append(drawn[:, j])
+    return np.stack(pixels, axis=1)
+
+
+def calibrated(pixels: FloatArray) -> tuple[Calibration, FloatArray]:
+    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
+    found = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    return found, found.joint.tip_pen - swing_at(TIMES).tip_pen
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "code"),
+    [
+        (EffectName.SHUTTER, 0.2, "warning.effect-shutter"),
+        (EffectName.STROBE, 0.004, "warning.effect-strobe"),
+    ],
+)
+def test_what_is_not_simultaneous_is_corrected_and_named(
+    name: EffectName, size: float, code: str
+) -> None:
+    def delays(pixels: FloatArray) -> FloatArray:
+        if name is EffectName.SHUTTER:
+            return np.asarray(size * (pixels[..., 1] / CAMERA.height - 0.5))
+        return np.tile(size * (np.arange(PEN.n_leds) - 4.5), (N_IMAGES, 1))
+
+    found, error = calibrated(seen(delays))
+    effect = next(each for each in found.effects if each.name is name)
+    assert effect.sigma is not None
+    assert effect.size == pytest.approx(size, rel=0.05)
+    assert (np.abs(error) < found.budget.expanded_uncertainty[:3]).all()
+    assert np.linalg.norm(error) < 0.01
+    assert code in [each.code for each in warnings_of(found)]
+
+
+def test_a_simultaneous_swing_loses_nothing_by_timing() -> None:
+    found, _ = calibrated(seen(lambda pixels: np.zeros(pixels.shape[:-1])))
+    names = {EffectName.SHUTTER, EffectName.STROBE, EffectName.DELAY}
+    assert not names & {each.name for each in found.effects}
+    shares = {each.name: each.standard_uncertainty for each in found.budget.shares}
+    by_timing = shares.get(ContributionName.TIMING, np.zeros(3))
+    assert (by_timing < 0.3 * shares[ContributionName.NOISE]).all()
+
+
+def test_a_late_camera_is_corrected_and_named() -> None:
+    rig = from_first(row_of_cameras(2, 1000.0))
+    rng, late = np.random.default_rng(266), 0.06
+    now, later = (
+        simulate_rig_centers(rig, PEN, swing_at(TIMES + delay), NOISE, rng)
+        for delay in (0.0, late)
+    )
+    pixels = np.stack([now[:, 0], later[:, 1]], axis=1)
+    observed = [
+        observe_centers(
+            Centers(np.arange(N_IMAGES), pixels[:, c], Path("simulated")), camera, PEN
+        )
+        for c, camera in enumerate(rig.cameras)
+    ]
+    found = calibrate_rig(rig, PEN, observed)
+    effect = next(each for each in found.effects if each.name is EffectName.DELAY)
+    assert effect.camera == rig.names[1]
+    assert effect.size == pytest.approx(late, rel=0.05)
+    error = found.joint.tip_pen - swing_at(TIMES).tip_pen
+    assert (np.abs(error) < found.budget.expanded_uncertainty[:3]).all()
+    assert "verdict.not-simultaneous" not in [m.code for m in warnings_of(found)]
