@@ -16,6 +16,7 @@ PACKAGES = {
     "lightpen_app": ROOT / "app" / "lightpen_app",
 }
 
+LONGEST_PAGE = 250  # lines; more belongs into presenters and controls
 GIVEN = {"main", "upgrade"}  # where a program starts; what Alembic looks for
 
 
@@ -70,6 +71,17 @@ def test_a_name_given_twice_is_noticed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
+def test_no_page_is_long() -> None:
+    pages = (PACKAGES["lightpen_app"] / "steps").glob("*/page.py")
+    lengths = {
+        page.parent.name: len(page.read_text(encoding="utf-8").splitlines())
+        for page in pages
+    }
+
+    assert lengths
+    assert max(lengths.values()) <= LONGEST_PAGE, lengths
+
+
 def test_every_package_has_its_place_in_the_order_of_imports(
     contracts: list[dict[str, Any]], package: str
 ) -> None:
