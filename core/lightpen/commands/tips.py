@@ -27,13 +27,18 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
         "retire", help="retire an item; it stays in the archive"
     )
     returned = actions.add_parser("return", help="reactivate a retired item")
+    shared = actions.add_parser(
+        "share",
+        help="take over the newest changes of other stations, from the server set by "
+        "LIGHTPEN_ARCHIVE and from imported archives",
+    )
     spun = actions.add_parser(
         "spin",
         help=(
             "determine the axis of a stylus from images of its pen rotated in the cone"
         ),
     )
-    for action in (listed, added, changed, retired, returned, spun):
+    for action in (listed, added, changed, retired, returned, shared, spun):
         action.add_argument(
             "--data",
             type=Path,
@@ -61,6 +66,11 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
     add_pen_options(spun)
     for action in (added, changed, retired, returned, spun):
         _add_author(action)
+    shared.add_argument(
+        "--supervisor",
+        metavar="NAME",
+        help="supervisor who signs, if the data folder has a supervisor password",
+    )
 
 
 def _add_entries(action: argparse.ArgumentParser) -> None:

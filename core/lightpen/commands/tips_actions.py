@@ -3,7 +3,7 @@
 import argparse
 import json
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,11 @@ from msgspec import structs, to_builtins
 
 from lightpen.archive.chains import chain_at_home
 from lightpen.archive.database import look_into
+from lightpen.archive.exchange import deliver
+from lightpen.archive.lazy_logbook import server_address
 from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.archive.server import open_server
+from lightpen.archive.shared_library import TakenOver, take_over
 from lightpen.archive.tip_status import statuses
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
@@ -23,7 +27,7 @@ from lightpen.estimation.spin import SpinFit, fit_spin
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.pen_files import read_pen
-from lightpen.local_time import local_now
+from lightpen.local_time import local_now, local_time
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import StationStatus
 from lightpen.record.library.library_changes import (
@@ -39,6 +43,7 @@ from lightpen.record.library.tip_library import (
     AxisOrigin,
     ItemKind,
     Library,
+    LibraryChange,
     ListedCone,
     ListedPen,
     ListedTip,
@@ -108,6 +113,40 @@ def _return(options: argparse.Namespace) -> None:
 
 
 @printing
+def _share(options: argparse.Namespace) -> None:
+    data, address = _data(options), server_address()
+    signature = supervisor_signature(options.supervisor)
+    with closing(Logbook(data)) as logbook, ExitStack() as stack:
+        logbook.enter_owed()
+        server = None
+        if address:
+            server = stack.enter_context(closing(open_server(address)))
+            deliver(logbook.database, logbook.chain, server)
+        taken = take_over(data, logbook.database, local_now(), server, signature)
+        faults = logbook.enter_owed()
+        if server is not None:
+            deliver(logbook.database, logbook.chain, server)
+    for each in taken:
+        print(shown(_taken_line(each)))
+    for trouble in faults:
+        print(shown(f"It is not in the archive yet: {trouble}"))
+    print(f"{len(taken)} changes of other stations were taken over.")
+
+
+def _taken_line(taken: TakenOver) -> str:
+    """Return whose change counts now, and whose it replaces."""
+
+    def told(change: LibraryChange) -> str:
+        who = " ".join(filter(None, (change.station, change.operator))) or "-"
+        return f"{who}, {local_time(change.at):%Y-%m-%d %H:%M}"
+
+    change, before = taken.change, taken.replaced
+    retired = ", retired" if change.item.is_retired else ""
+    line = f"{change.item.kind} {change.item.id}{retired}: {told(change)}"
+    return line if before is None else f"{line}; replaces {told(before)}"
+
+
+@printing
 def _spin(options: argparse.Namespace) -> None:
     data = _data(options)
     tip = known_item(read_library(data), ItemKind.TIP, options.id)
@@ -131,6 +170,7 @@ ACTIONS: dict[str, Command] = {
     "change": _change,
     "retire": _retire,
     "return": _return,
+    "share": _share,
     "spin": _spin,
 }
 

@@ -157,6 +157,33 @@ def retire_item(
     return change_item(data, retired, by, now, before=item)
 
 
+def adopt_change(
+    data: Path, change: LibraryChange, signature: Signature | None
+) -> Library:
+    """Keep the change of another station as one of this library; return the library.
+
+    Parameters
+    ----------
+    change : LibraryChange
+        With the time, station and operator of the original.
+    signature : Signature or None
+        Of a supervisor of this station, where there is a password.
+
+    Raises
+    ------
+    UsageError
+        An entry makes no sense.
+    AcceptanceError, FileError
+        As of `add_item`.
+    """
+    item = _sensible(change.item)
+    by = Author(change.station, change.operator, change.reason, signature)
+    while True:
+        number = newest_number(data / LIBRARY) + 1
+        with suppress(NameTakenError):  # another program changed the library meanwhile
+            return _keep(data, number, item, by, change.at)
+
+
 def known_item(library: Library, kind: ItemKind, name: str) -> AnyItem:
     """Return an item of a library.
 

@@ -331,13 +331,24 @@ def read_change(file: Path, supervision: Supervision | None = None) -> LibraryCh
     if supervision is None:
         supervision = read_supervision(data)
     try:
-        change = parse_upgraded(text, LibraryChange, upgrades.LIBRARY)
+        change = parse_change(text)
     except LaterFormatError as error:
         raise FileError("library.later-version", file=printable(str(file))) from error
     except DamagedError as error:
         raise FileError("library.damaged", file=printable(str(file))) from error
     supervision.require_signed(data, file, text, has_supervisor=True)
     return change
+
+
+def parse_change(content: bytes) -> LibraryChange:
+    """Return the change that a file of the library of any station holds.
+
+    Raises
+    ------
+    DamagedError, LaterFormatError
+        It was changed, or is of a later version of the program.
+    """
+    return parse_upgraded(content, LibraryChange, upgrades.LIBRARY)
 
 
 def _of(
