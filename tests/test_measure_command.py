@@ -44,12 +44,16 @@ def test_recorded_touches_are_measured_by_a_plan(
     tmp_path: Path,
 ) -> None:
     json_file = tmp_path / "part.json"
+    csv, qif = tmp_path / "part.csv", tmp_path / "part.qif"
+    exports = "--export", csv, "--export", qif
     words = "measure", plan, shared_data / "circle", *files, "--json", json_file
 
-    outcome = lightpen(*words)
+    outcome = lightpen(*words, *exports)
 
     assert outcome.returncode == 0, outcome.stderr
     assert "radius run_01" in outcome.stdout
+    assert "radius run_01" in csv.read_text(encoding="utf-8")
+    assert qif.read_text(encoding="utf-8").count("CharacteristicMeasurement id") == 3
     radius, distance, roundness = json.loads(json_file.read_bytes())["characteristics"]
     assert radius["deviation"] == pytest.approx(0, abs=0.02)
     assert radius["decision"] == roundness["decision"] == "accepted"

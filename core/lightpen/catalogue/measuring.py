@@ -70,4 +70,6 @@ MESSAGES = {
     "part.qdas": "Q-DAS (AQDEF), for statistics",
     "part.qif": "QIF 3.0 results",
     "part.dxf": "DXF, the measured geometry",
+    "measuring.not-tied": "Position {position} shares {n_shared} features with the first one; at least {needed} datum points have to be probed in both. Probe more of them again.",
+    "measuring.no-format": "{file} has an end of no known format. End its name with one of {suffixes}.",
 }

@@ -15,8 +15,10 @@ from lightpen.commands.console import (
 from lightpen.commands.entering import add_entering, keep_record
 from lightpen.commands.touched import add_touch_inputs, measure_runs
 from lightpen.errors import FileError, UsageError
+from lightpen.formats.files import write_whole
 from lightpen.formats.hashes import hashed
 from lightpen.formats.json_records import file_entry
+from lightpen.measuring.exports import EXPORTS, PartExport
 from lightpen.measuring.plan import Plan, read_plan
 from lightpen.verification.probing.drift_reference import (
     judged_with,
@@ -61,6 +63,14 @@ def add_measure(parser: argparse.ArgumentParser) -> None:
         metavar="DRIFT.json",
         help="record of verify drift of the same session, included in U",
     )
+    parser.add_argument(
+        "--export",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="; ".join(f"{each.suffix}: {each.label}" for each in EXPORTS),
+    )
     add_json(parser)
     add_entering(parser)
     add_verdict(parser)
@@ -69,6 +79,7 @@ def add_measure(parser: argparse.ArgumentParser) -> None:
 @printing
 def _measure(given: argparse.Namespace) -> int:
     require_other_file(given.json, given.plan)
+    exports = {path: _export_of(path) for path in given.export}
     plan = read_plan(given.plan)
     places = _places(plan, given.touches)
     centers = {name: Path(at) for name, at in places.items() if _is_csv(at)}
@@ -100,8 +111,19 @@ def _measure(given: argparse.Namespace) -> int:
         {"plan": file_entry(hashed(given.plan)), **measured.input_entries(given)},
         rule,
     )
+    for path, export in exports.items():
+        write_whole(path, export.content(found.part))
     keep_record(given, record, measured.calibration, measured.origin)
     return verdict_status(given, judged.grade)
+
+
+def _export_of(path: Path) -> PartExport:
+    """Return the format that the end of a file name states."""
+    for export in EXPORTS:
+        if path.suffix.lower() == export.suffix:
+            return export
+    suffixes = ", ".join(each.suffix for each in EXPORTS)
+    raise UsageError("measuring.no-format", file=str(path), suffixes=suffixes)
 
 
 def _is_csv(place: str) -> bool:

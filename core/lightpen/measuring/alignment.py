@@ -53,6 +53,15 @@ class Alignment:
         """Return the values of a feature in the frame of the part."""
         return derive(_in_part, self.motion, feature)
 
+    def moved(self, points: Quantity) -> Quantity:
+        """Return the coordinates (3 n,) of points in the frame of the part."""
+        return derive(_moved_points, self.motion, points)
+
+
+def _moved_points(motion: FloatArray, points: FloatArray) -> FloatArray:
+    moved = points.reshape(-1, 3) @ rotation_from_vector(motion[:3]).T + motion[3:]
+    return np.asarray(moved.ravel())
+
 
 def _in_part(motion: FloatArray, feature: FloatArray) -> FloatArray:
     R, t = rotation_from_vector(motion[:3]), motion[3:]

@@ -1,7 +1,7 @@
 """Measurement of a part: features, alignment and characteristics of a plan."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from msgspec import structs
@@ -9,7 +9,13 @@ from msgspec import structs
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.measuring import constructions
-from lightpen.measuring.alignment import Alignment, align_321, align_points
+from lightpen.measuring.alignment import (
+    MIN_POINTS,
+    Alignment,
+    align_321,
+    align_points,
+    tie,
+)
 from lightpen.measuring.characteristics import AXIAL, FLAT, Measured, Value, evaluate
 from lightpen.measuring.compensation import Evidence, TouchedSurface, surface_of
 from lightpen.measuring.features import AXIS, Feature, fit_feature
@@ -23,10 +29,10 @@ from lightpen.measuring.plan import (
     PlannedFeature,
     Side,
 )
-from lightpen.measuring.quantities import derive
+from lightpen.measuring.quantities import Quantity, derive
 from lightpen.measuring.recognition import recognise, recognised
 from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind
-from lightpen.measuring.touches import PartTouches
+from lightpen.measuring.touches import PartTouches, at_position
 from lightpen.measuring.zones import Criterion, fit_zone
 from lightpen.model.decision_rules import Decision, conformity_probability, decide
 
@@ -94,21 +100,70 @@ def measure_part(plan: Plan, touches: PartTouches) -> MeasuredPart:
         is not defined for its features.
     """
     plan = _with_kinds(plan, touches)
-    fits, surfaces = {}, {}
-    for each in plan.features:
-        fits[each.name] = _fitted(each, touches)
-        surfaces[each.name] = surface_of(each, fits[each.name], touches)
+    fits, surfaces, points = _probed(plan, touches)
     for construction in plan.constructions:
         surfaces[construction.name] = _constructed(construction, surfaces)
     alignment = _aligned(plan, surfaces)
     features = {
-        name: _measured(plan, name, surface, fits.get(name), touches, alignment)
+        name: _measured(
+            plan, name, surface, fits.get(name), points.get(name), alignment
+        )
         for name, surface in surfaces.items()
     }
     results = tuple(
         _result(plan, planned, features, touches) for planned in plan.characteristics
     )
     return MeasuredPart(plan, touches, features, alignment, results)
+
+
+def _probed(
+    plan: Plan, touches: PartTouches
+) -> tuple[dict[str, Feature], dict[str, TouchedSurface], dict[str, Quantity]]:
+    """Return fits, surfaces and points of the features, all in the first position.
+
+    Features that were probed in the first position and in a later one are the datum
+    points that tie the two together.
+    """
+    fits, surfaces, points = {}, {}, {}
+    for position in touches.positions:
+        own, places = {}, {}
+        for each in plan.features:
+            name = at_position(each.name, position)
+            at = touches.of(name)
+            if not len(at) and (position > 1 or _is_later(each.name, touches)):
+                continue
+            planned = structs.replace(each, name=name)
+            fit = _fitted(planned, touches)
+            own[each.name] = surface_of(planned, fit, touches)
+            places[each.name] = touches.points(at)
+            fits.setdefault(each.name, fit)
+        if position > 1:
+            shared = [name for name in own if name in surfaces]
+            if len(shared) < MIN_POINTS:
+                raise CalibrationError(
+                    "measuring.not-tied",
+                    position=position,
+                    n_shared=len(shared),
+                    needed=MIN_POINTS,
+                )
+            motion = tie(
+                [surfaces[name].quantity for name in shared],
+                [own[name].quantity for name in shared],
+            )
+            own = {
+                name: replace(each, quantity=motion.in_part(each.quantity))
+                for name, each in own.items()
+            }
+            places = {name: motion.moved(each) for name, each in places.items()}
+        for name, surface in own.items():
+            surfaces.setdefault(name, surface)
+            points.setdefault(name, places[name])
+    return fits, {each.name: surfaces[each.name] for each in plan.features}, points
+
+
+def _is_later(name: str, touches: PartTouches) -> bool:
+    """Return whether a feature was probed in a later position."""
+    return any(len(touches.of(at_position(name, p))) for p in touches.positions[1:])
 
 
 def _with_kinds(plan: Plan, touches: PartTouches) -> Plan:
@@ -161,7 +216,8 @@ def taught_plan(part: MeasuredPart) -> Plan:
 
 def kind_of(name: str, touches: PartTouches) -> FeatureKind | None:
     """Return the kind that the touches of a feature show, if they do."""
-    at = touches.of(name)
+    positions = (touches.of(at_position(name, p)) for p in touches.positions)
+    at = next((each for each in positions if len(each)), touches.of(name))
     if not len(at):
         return None
     return recognise(
@@ -215,7 +271,7 @@ def _measured(
     name: str,
     surface: TouchedSurface,
     fit: Feature | None,
-    touches: PartTouches,
+    points: Quantity | None,
     alignment: Alignment | None,
 ) -> Measured:
     in_part = (
@@ -223,7 +279,6 @@ def _measured(
     )
     if fit is None:
         return Measured(surface, in_part)
-    points = touches.points(touches.of(name))
     return Measured(surface, in_part, fit, points, plan.feature(name).nominal)
 
 

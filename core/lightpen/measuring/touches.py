@@ -9,6 +9,11 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.measuring.quantities import Quantity
 
 
+def at_position(name: str, position: int) -> str:
+    """Return the owner of touches after part or camera were moved to a position."""
+    return name if position == 1 else f"{name}@{position}"
+
+
 @dataclass(frozen=True, eq=False)
 class PartTouches:
     """All touches of a part in their order.
@@ -24,7 +29,7 @@ class PartTouches:
     styli_cam : (N, 3) array
         Unit vectors from the ball along its stylus into the pen.
     owners : tuple of str
-        Feature of each touch.
+        Feature of each touch, see `at_position`.
     ball_radius, ball_uncertainty : float
         Radius of the ball and its U (k = 2), mm; 0 to measure at the centre of the tip.
     """
@@ -36,6 +41,13 @@ class PartTouches:
     owners: tuple[str, ...]
     ball_radius: float = 0.0
     ball_uncertainty: float = 0.0
+
+    @property
+    def positions(self) -> tuple[int, ...]:
+        """Positions of part and camera, the first one first."""
+        tails = {owner.rpartition("@")[2] for owner in self.owners if "@" in owner}
+        later = sorted(int(tail) for tail in tails if tail.isdigit())
+        return (1, *(each for each in later if each > 1))
 
     @property
     def n_inputs(self) -> int:

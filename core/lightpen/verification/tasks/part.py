@@ -105,7 +105,7 @@ def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) ->
     if options.plan is None:
         raise CalibrationError("part.no-plan")
     found = _owned(runs, options.plan)
-    names = {name for name, _ in found}
+    names = {name.partition("@")[0] for name, _ in found}
     plan = options.plan.limited_to(names)
     if not plan.features:
         raise CalibrationError("part.nothing-probed")
@@ -127,7 +127,7 @@ def check_feature(runs: Runs, conditions: Conditions, options: PartOptions) -> N
     if options.plan is None:
         return
     found = _owned(runs, options.plan)
-    last = found[-1][0]
+    last = found[-1][0]  # of a session, which has one position
     own = [each for each in found if each[0] == last]
     plan = structs.replace(
         options.plan.limited_to({last}), constructions=(), characteristics=()

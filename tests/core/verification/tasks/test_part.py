@@ -15,6 +15,7 @@ from lightpen.measuring.part import taught_plan
 from lightpen.measuring.plan import Plan, free_plan
 from lightpen.measuring.surfaces import FeatureKind
 from lightpen.model.posture import FACING
+from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.swings import PAPER_CONE
 from lightpen.verification.session.choices import VerificationChoices
@@ -247,3 +248,37 @@ def test_nothing_is_measured_without_a_plan(instrument: Instrument) -> None:
     with pytest.raises(CalibrationError, match="No measuring plan"):
         PART.measure([], setup.conditions, PartOptions())
     assert PART.missing(PartOptions(), BALL) is not None
+
+
+def test_a_moved_part_is_tied_by_datum_points_probed_again(
+    instrument: Instrument,
+) -> None:
+    plan = plate_plan()
+    at_it = station(instrument, plan)
+    turn = rotation_from_vector(np.array([0.1, -0.2, 0.3]))
+    runs = []
+    for name, points in probed_plate(instrument, plan):
+        away = [
+            replace(
+                each,
+                point_cam=turn @ each.point_cam + np.array([20.0, -10.0, 30.0]),
+                rotation=turn @ each.rotation,
+            )
+            for each in points
+        ]
+        if name != "slot":
+            runs.append((name, points))
+        if name in {"slot", "dome", "hole 1", "hole 2", "hole 3"}:
+            runs.append((f"{name}@2", away))
+
+    found = PART.measure(runs, at_it.setup.conditions, at_it.options)
+
+    slot = found.part.features["slot"].in_part
+    assert slot.values[:3] == pytest.approx([0, 22, -4], abs=0.02)
+    once = PART.measure(
+        probed_plate(instrument, plan), at_it.setup.conditions, at_it.options
+    )
+    assert found.part.uncertainty("slot")[1] > once.part.uncertainty("slot")[1]
+    few = [each for each in runs if not each[0].startswith("hole")]
+    with pytest.raises(CalibrationError, match="Position 2 shares 1 features"):
+        PART.measure(few, at_it.setup.conditions, at_it.options)
