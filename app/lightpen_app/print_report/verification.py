@@ -16,6 +16,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.hashes import InputFile
 from lightpen.model.origin import Origin
 from lightpen.record.folder.verifications import StoredVerification
+from lightpen.verification.tasks.part import PART
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.print_report.blocks import (
@@ -30,6 +31,7 @@ from lightpen_app.print_report.blocks import (
     table,
 )
 from lightpen_app.print_report.pages import Margins, PrintReport, lay_out
+from lightpen_app.print_report.part import part_blocks
 from lightpen_app.print_report.sections import (
     proof_blocks,
     record_number,
@@ -62,15 +64,20 @@ def verification_paper(
         Its file with the content.
     """
     record: dict[str, Any] = json.loads(file.content or b"{}")
+    is_part = done.verification == PART.kind
     title = translate("paper", "Verification report")
+    by = translate("paper", "Verified by")
+    if is_part:
+        title = translate("paper", "Measurement report")
+        by = translate("paper", "Measured by")
     blocks = (
         paragraph(title, PrintSize.TITLE, bold=True),
         *_items(done),
         *_verdict(done, record.get("verdict")),
-        *_figures(record),
+        *(part_blocks(record) if is_part else _figures(record)),
         *_inputs(record.get("inputs", {})),
         *proof_blocks(file.path.name, file.sha256, entered),
-        *signature_blocks(translate("paper", "Verified by")),
+        *signature_blocks(by),
     )
     items = (each or "\u2013" for each in (done.pen, done.tip, done.verification))
     foot = translate("paper", "SHA-256 of the JSON file: {0}")
@@ -99,7 +106,9 @@ def _badges(done: StoredVerification) -> tuple[str, ...]:
 
 
 def _items(done: StoredVerification) -> Iterator[Block]:
-    yield heading(translate("paper", "Item under verification"))
+    is_part = done.verification == PART.kind
+    under_verification = translate("paper", "Item under verification")
+    yield heading(translate("paper", "Station") if is_part else under_verification)
     yield from facts(
         [
             (translate("paper", "Task"), done.verification),

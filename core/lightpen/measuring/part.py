@@ -52,6 +52,8 @@ class CharacteristicResult:
         None without a tolerance.
     probability : float or None
         Probability of conformity (JCGM 106).
+    quantity : Quantity or None
+        The value with its derivative; None for geometrical deviations.
     """
 
     planned: PlannedCharacteristic
@@ -59,6 +61,7 @@ class CharacteristicResult:
     independent_uncertainty: float | None
     decision: Decision | None
     probability: float | None
+    quantity: Quantity | None = None
 
     @property
     def deviation(self) -> float | None:
@@ -124,7 +127,9 @@ def _probed(
     Features that were probed in the first position and in a later one are the datum
     points that tie the two together.
     """
-    fits, surfaces, points = {}, {}, {}
+    fits: dict[str, Feature] = {}
+    surfaces: dict[str, TouchedSurface] = {}
+    points: dict[str, Quantity] = {}
     for position in touches.positions:
         own, places = {}, {}
         for each in plan.features:
@@ -343,7 +348,7 @@ def _result(
         alone = quantity.uncertainty(touches.independent_inputs)
         independent = float(alone[0])
     if planned.tolerance is None:
-        return CharacteristicResult(planned, value, independent, None, None)
+        return CharacteristicResult(planned, value, independent, None, None, quantity)
     lower, upper = planned.limits
     return CharacteristicResult(
         planned,
@@ -353,4 +358,5 @@ def _result(
         conformity_probability(
             value.value, value.uncertainty, lower=lower, upper=upper
         ),
+        quantity,
     )

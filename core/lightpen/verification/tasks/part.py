@@ -14,6 +14,7 @@ from msgspec import Meta, structs
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.measuring.features import fit_feature
 from lightpen.measuring.next_touch import Place, area_of, best_places, nominal_area
@@ -80,6 +81,50 @@ class Part(Found):
     part: MeasuredPart
     points: tuple[tuple[str, ProbedPoint], ...]
     missing: tuple[str, ...]
+
+    def deviations(self) -> list[FloatArray | None]:
+        """Return the way from its feature to each point, (3,), mm; None if unknown."""
+        found: list[FloatArray | None] = [None] * len(self.points)
+        for name, one in self.part.features.items():
+            at = self.part.touches.of(name)
+            if one.feature is not None and len(at) == len(one.feature.offsets):
+                for i, offset in zip(at.tolist(), one.feature.offsets, strict=True):
+                    found[i] = offset
+        return found
+
+    def budgets(self, instrument: Instrument) -> list[dict[str, float] | None]:
+        """Return U (k = 2) of each characteristic by its sources, mm or degrees.
+
+        The sources are taken one by one, without their correlations; None for
+        geometrical deviations.
+        """
+        points = [point for _, point in self.points]
+        by_parameters = np.concatenate([point.sensitivity for point in points])
+        own = np.zeros((len(by_parameters), len(by_parameters)))
+        for i, point in enumerate(points):
+            own[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = point.noise
+        at = instrument.parameters
+        leds = np.r_[at.leds, at.diameter]
+        known = {*np.r_[at.tip].tolist(), *leds.tolist()}
+        cameras = np.array([i for i in range(at.number) if i not in known])
+        covariances = {"points": own}
+        for name, of in (("tip", np.r_[at.tip]), ("LEDs", leds), ("cameras", cameras)):
+            rows = by_parameters[:, of]
+            covariances[name] = rows @ instrument.covariance[np.ix_(of, of)] @ rows.T
+        ball = self.part.touches.ball_uncertainty
+        budgets: list[dict[str, float] | None] = []
+        for result in self.part.results:
+            if result.quantity is None:
+                budgets.append(None)
+                continue
+            row = result.quantity.by_inputs[0]
+            budget = {
+                name: COVERAGE_FACTOR * float(np.sqrt(row[:-1] @ C @ row[:-1]))
+                for name, C in covariances.items()
+            }
+            budget["ball"] = abs(float(row[-1])) * ball
+            budgets.append(budget)
+        return budgets
 
 
 class PartOptions(TaskOptions, frozen=True, tag="part"):
@@ -209,13 +254,26 @@ def _listed(names: Sequence[str]) -> str:
 
 def _entries(found: Part, instrument: Instrument) -> dict[str, Any]:
     points = [point for _, point in found.points]
+    entries = part_entries(found.part)
+    for each, budget in zip(
+        entries["characteristics"], found.budgets(instrument), strict=True
+    ):
+        each["budget"] = budget
     return {
-        **part_entries(found.part),
+        **entries,
         "missing": list(found.missing),
         "touches": [
-            {"feature": name, "approach_cam": point.approach_cam, **entry}
-            for (name, point), entry in zip(
-                found.points, point_entries(points, instrument), strict=True
+            {
+                "feature": name,
+                "approach_cam": point.approach_cam,
+                "deviation_cam_mm": off,
+                **entry,
+            }
+            for (name, point), off, entry in zip(
+                found.points,
+                found.deviations(),
+                point_entries(points, instrument),
+                strict=True,
             )
         ],
     }

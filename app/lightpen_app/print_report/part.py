@@ -1,0 +1,207 @@
+"""Sections of the report of a measured part, from its record."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import QCoreApplication, QPointF, QRectF
+from PySide6.QtGui import QColor, QPainter
+
+from lightpen.arrays import FloatArray
+from lightpen_app.look.quantities import number_text
+from lightpen_app.look.theme import LIGHT
+from lightpen_app.print_report.blocks import (
+    MM,
+    RIGHT,
+    WIDTH,
+    Block,
+    Column,
+    PrintSize,
+    draw_text,
+    heading,
+    line_pen,
+    paragraph,
+    table,
+)
+
+translate = QCoreApplication.translate
+
+HEIGHT = 80 * MM  # of the plot
+DOT = 22.0  # dots, across
+WHISKER = 200.0  # times a deviation is drawn
+N_DECIMALS = 4
+
+
+def part_blocks(record: Mapping[str, Any]) -> Iterator[Block]:
+    """Yield characteristics, budget, features, alignment, points and plan."""
+    yield heading(translate("paper", "Characteristics / mm, degrees"))
+    yield from _characteristics(record["characteristics"])
+    yield from _budget(record["characteristics"])
+    yield heading(translate("paper", "Features / mm"))
+    yield from _features(record["features"])
+    yield from _alignment(record["alignment"])
+    yield heading(translate("paper", "Points"))
+    yield from _points(record["touches"])
+    yield heading(translate("paper", "Measuring plan"))
+    yield from _plan(record["plan"])
+
+
+def _numbers(*columns: str) -> list[Column]:
+    return [Column(each, 1.0, RIGHT) for each in columns]
+
+
+def _text(value: float | None) -> str:
+    return "" if value is None else number_text(value, N_DECIMALS)
+
+
+def _characteristics(entries: list[dict[str, Any]]) -> Iterator[Block]:
+    columns = [Column(translate("paper", "Characteristic"), 2.2)]
+    columns += _numbers(
+        translate("paper", "Nominal"),
+        translate("paper", "Actual"),
+        translate("paper", "Deviation"),
+        translate("paper", "U (k = 2)"),
+        translate("paper", "U alone"),
+        translate("paper", "P"),
+    )
+    columns.append(Column(translate("paper", "Decision"), 1.2))
+    yield from table(
+        columns,
+        [
+            [
+                each["name"],
+                *(
+                    _text(each[name])
+                    for name in (
+                        *("nominal", "actual", "deviation", "expanded_uncertainty"),
+                        *("independent_expanded_uncertainty",),
+                        *("probability_of_conformity",),
+                    )
+                ),
+                each["decision"] or "",
+            ]
+            for each in entries
+        ],
+        strong=[i for i, e in enumerate(entries) if e["decision"] == "rejected"],
+        size=PrintSize.SMALL,
+    )
+    yield paragraph(
+        translate(
+            "paper",
+            "U alone: U (k = 2) if the points shared no error. P: probability of "
+            "conformity (JCGM 106).",
+        ),
+        PrintSize.SMALL,
+    )
+
+
+def _budget(entries: list[dict[str, Any]]) -> Iterator[Block]:
+    budgets = {each["name"]: each["budget"] for each in entries if each["budget"]}
+    if not budgets:
+        return
+    names = list(next(iter(budgets.values())))
+    yield heading(translate("paper", "Uncertainty budget, U (k = 2) by source"))
+    columns = [Column(translate("paper", "Characteristic"), 2.2), *_numbers(*names)]
+    rows = [[name, *map(_text, own.values())] for name, own in budgets.items()]
+    yield from table(columns, rows, size=PrintSize.SMALL)
+
+
+def _features(entries: list[dict[str, Any]]) -> Iterator[Block]:
+    columns = [
+        Column(translate("paper", "Feature"), 1.6),
+        Column(translate("paper", "Kind"), 1.0),
+        *_numbers("x", "y", "z", translate("paper", "U (k = 2)")),
+        Column(translate("paper", "Sizes"), 2.2),
+        *_numbers(translate("paper", "Form error"), translate("paper", "Points")),
+    ]
+    rows = []
+    for each in entries:
+        sizes = ", ".join(f"{k} {_text(v)}" for k, v in each["sizes"].items())
+        rows.append(
+            [
+                *(each["name"], each["kind"]),
+                *map(_text, each["origin_mm"]),
+                _text(max(each["expanded_uncertainty"][:3])),
+                *(sizes, _text(each["form_error_mm"]), str(each["n_touches"])),
+            ]
+        )
+    yield from table(columns, rows, size=PrintSize.SMALL)
+
+
+def _alignment(alignment: dict[str, Any] | None) -> Iterator[Block]:
+    if alignment is None:
+        text = translate("paper", "Coordinates are in the frame of the camera.")
+        yield paragraph(text)
+        return
+    yield paragraph(
+        translate("paper", "Coordinates are in the frame of the part. Camera to part:")
+    )
+    turn = alignment["part_from_cam_rotation"]
+    shift = alignment["part_from_cam_translation_mm"]
+    rows = [
+        ["xyz"[i], *(f"{x:.8f}" for x in turn[i]), _text(shift[i])] for i in range(3)
+    ]
+    columns = [Column("", 0.3), *_numbers("u", "v", "w", translate("paper", "Shift"))]
+    yield from table(columns, rows, size=PrintSize.SMALL)
+
+
+def _points(touches: list[dict[str, Any]]) -> Iterator[Block]:
+    """Yield a plot of all points with their deviations, from the flattest side."""
+    points = np.array([each["point_cam_mm"] for each in touches])
+    off = np.array([each["deviation_cam_mm"] or [0, 0, 0] for each in touches])
+    middle = points.mean(axis=0)
+    axes = np.linalg.svd(points - middle, full_matrices=False)[2]
+    if len(axes) < 2:
+        return
+    flat = (points - middle) @ axes[:2].T
+    ends = flat + WHISKER * off @ axes[:2].T
+    yield Block(lambda painter: _draw(painter, flat, ends, touches), HEIGHT, space=60)
+    text = translate(
+        "paper", "{0} points; deviations are drawn {1} times as large, at most {2} mm."
+    )
+    largest = number_text(float(np.linalg.norm(off, axis=1).max()), N_DECIMALS)
+    yield paragraph(text.format(len(points), round(WHISKER), largest), PrintSize.SMALL)
+
+
+def _draw(
+    painter: QPainter, flat: FloatArray, ends: FloatArray, touches: list[dict[str, Any]]
+) -> None:
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    room = np.array([0.8 * WIDTH, 0.8 * HEIGHT])
+    scale = float((room / np.maximum(high - low, 1.0)).min())
+    center = np.array([WIDTH / 2, HEIGHT / 2])
+
+    def placed(points: FloatArray) -> list[QPointF]:
+        at = (points - (low + high) / 2) * scale + center
+        return [QPointF(*each) for each in at.tolist()]
+
+    painter.setPen(line_pen(LIGHT.pointer, 10.0))
+    dots = placed(flat)
+    for dot, end in zip(dots, placed(ends), strict=True):
+        painter.drawLine(dot, end)
+    painter.setPen(line_pen(LIGHT.text))
+    painter.setBrush(QColor(LIGHT.text))
+    for dot in dots:
+        painter.drawEllipse(dot, DOT, DOT)
+    names = [each["feature"] for each in touches]
+    for name in dict.fromkeys(names):
+        own = np.array([each == name for each in names])
+        (place,) = placed(flat[own].mean(axis=0, keepdims=True))
+        area = QRectF(place.x() + DOT, place.y() + DOT, WIDTH / 4, 2 * PrintSize.SMALL)
+        draw_text(painter, area, name, PrintSize.SMALL, LIGHT.muted)
+
+
+def _plan(plan: dict[str, Any]) -> Iterator[Block]:
+    columns = [
+        Column(translate("paper", "Feature"), 1.2),
+        Column(translate("paper", "Kind"), 0.8),
+        Column(translate("paper", "Nominals / mm, degrees"), 3.0),
+    ]
+    rows = [
+        [
+            *(each["name"], each["kind"]),
+            ", ".join(f"{k} {v}" for k, v in each.get("nominal", {}).items() if v),
+        ]
+        for each in plan["features"]
+    ]
+    yield from table(columns, rows, size=PrintSize.SMALL)
