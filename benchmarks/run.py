@@ -3,8 +3,9 @@
 Usage: python benchmarks/run.py [--update-docs] [SECTION ...]
 
 Figures on the image sets need LIGHTPEN_DATA. Nothing else should run meanwhile: the
-sections `files`, `hostile`, `archive`, `soak` and `events` take from ten minutes to an
-hour, all others together some thirty minutes. Exit status 1 if a limit is missed.
+sections `files`, `measure`, `hostile`, `archive`, `soak` and `events` take from ten
+minutes to an hour, all others together some thirty minutes. Exit status 1 if a limit is
+missed.
 """
 
 import argparse
@@ -37,7 +38,7 @@ from benchmarks.speed import speed_rows
 from benchmarks.station import station_rows
 from benchmarks.tips import repeat_rows, tip_rows
 from benchmarks.tracker import tracker_rows
-from benchmarks.verification import verification_rows
+from benchmarks.verification import part_rows, verification_rows
 from benchmarks.verification_sessions import session_rows
 from benchmarks.whole_program import program_rows
 from benchmarks.wizard import event_rows, idle_rows, link_rows, soak_rows, start_rows
@@ -61,6 +62,7 @@ SECTIONS: dict[str, Section] = {
     "leds": lambda workers, data: small_led_rows(workers),
     "tracker": tracker_rows,
     "verify": verification_rows,
+    "measure": lambda workers, data: part_rows(workers),
     "power": lambda workers, data: session_rows(workers),
     "speed": lambda workers, data: speed_rows(workers),
     "program": lambda workers, data: program_rows(data),
