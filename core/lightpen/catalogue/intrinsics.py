@@ -1,7 +1,7 @@
 """Messages of intrinsics: code, then template with named values."""
 
 MESSAGES = {
-    "intrinsics.not-settled": "The adjustment did not converge in {n_steps} iterations: the views are too similar, or show another board. Add views with the board tilted by 20° to 40° to each side and in each corner of the image; otherwise count and measure the squares again.",
+    "intrinsics.not-settled": "The adjustment did not converge in {n_steps} iterations: the views are too similar, or the board is another one, or far from flat. Add views with the board tilted by 20° to 40° to each side and in each corner of the image; otherwise count and measure the squares again.",
     "intrinsics.no-start": "The points do not match a flat board {board}: its squares differ from the description, or the images are from different cameras. Count and measure the squares again.",
     "intrinsics.open": "The views leave the camera open: they are too alike. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image.",
     "board.form": "{text} is not a board. Use a form such as {forms}; lengths are in mm.",

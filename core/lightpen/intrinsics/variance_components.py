@@ -196,18 +196,32 @@ def _solve(
 ) -> _Solution:
     normal = reduced.normal + design.prior(components)
     right = reduced.right - design.prior_pull
-    covariance: FloatArray = np.asarray(
-        np.linalg.inv(0.5 * (normal + normal.T)), dtype=np.float64
-    )
+    covariance, logarithm = _inverse(0.5 * (normal + normal.T))
     x = covariance @ right
     deviance = (
         reduced.logarithm
-        + np.linalg.slogdet(normal)[1]
+        + logarithm
         - design.prior_logarithm(components)
         + reduced.squares
         - right @ x
     )
     return _Solution(components, float(deviance), x, covariance)
+
+
+def _inverse(normal: FloatArray) -> tuple[FloatArray, float]:
+    """Return the inverse of normal equations, and the logarithm of the determinant.
+
+    By Cholesky's decomposition, in a third of the time of `numpy.linalg`.
+    """
+    from scipy.linalg.lapack import dpotrf, dpotri
+
+    factor, info = dpotrf(normal, lower=1)
+    if info != 0:
+        raise np.linalg.LinAlgError("The normal matrix is not positive definite.")
+    inverse = np.tril(dpotri(factor, lower=1)[0])
+    diagonal = np.diag(np.diag(inverse))
+    logarithm = 2 * float(np.log(np.diag(factor)).sum())
+    return np.asarray(inverse + inverse.T - diagonal, dtype=np.float64), logarithm
 
 
 def _own(design: Design, reduced: _Reduced, solution: _Solution) -> FloatArray:
