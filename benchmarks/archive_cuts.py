@@ -1,4 +1,4 @@
-"""The archive, cut off at random moments of whatever is written in it.
+"""The archive, interrupted at random moments of writing.
 
 Usage: python benchmarks/archive_cuts.py [KIND ...]
 

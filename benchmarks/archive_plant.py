@@ -1,4 +1,4 @@
-"""Two stations that enter at once for one PostgreSQL server, which goes away.
+"""Two stations that replicate to one PostgreSQL server, which fails at times.
 
 Usage: python benchmarks/archive_plant.py
 

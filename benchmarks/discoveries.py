@@ -1,4 +1,4 @@
-"""Tip, pen and camera from nothing: accuracy and coverage over random stations."""
+"""Discovery: accuracy and coverage over random stations."""
 
 import time
 from dataclasses import dataclass

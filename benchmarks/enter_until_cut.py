@@ -1,4 +1,4 @@
-"""Write all that the archive is made of, over and over, in a process to be cut off.
+"""Write all parts of the archive repeatedly, in a process to be killed.
 
 Usage: python benchmarks/enter_until_cut.py FOLDER
 

@@ -1,4 +1,4 @@
-"""What is fed to the program that no good program wrote, and what it makes of it."""
+"""Malformed input to the program, and its reaction."""
 
 from benchmarks.hostile_files import hostile_file_rows
 from benchmarks.hostile_guard import hostile_guard_rows

@@ -1,4 +1,4 @@
-"""Spoiled files through every reader: each is read, or refused in words, and soon.
+"""Damaged files through every reader: each is read or rejected in time.
 
 Usage: python benchmarks/hostile_files.py [N_FILES [FIRST_SEED]]
 

@@ -1,4 +1,4 @@
-"""Damaged limits, keys, verifications and imports: refused in words, never in force.
+"""Damaged limits, keys, verifications and imports: rejected, never valid.
 
 Usage: python benchmarks/hostile_guard.py [N_MUTATIONS [SEED]]
 

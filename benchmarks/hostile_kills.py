@@ -1,4 +1,4 @@
-"""What is left when the program is killed while it writes.
+"""Files after the program is killed while writing.
 
 Usage: python benchmarks/hostile_kills.py
 

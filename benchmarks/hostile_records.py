@@ -1,4 +1,4 @@
-"""Damage to results, records and settings: what is named, and what passes unseen.
+"""Damage to results, records and settings: detected and undetected.
 
 Usage: python benchmarks/hostile_records.py [N_MUTATIONS [SEED]]
 

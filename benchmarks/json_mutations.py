@@ -1,4 +1,4 @@
-"""Seeded damage to files: flipped bits, and what a spiteful hand would write."""
+"""Seeded damage to files: flipped bits and malicious values."""
 
 import json
 from copy import deepcopy

@@ -1,4 +1,4 @@
-"""Let the wizard capture a swing from a GigE Vision camera, and print what came of it.
+"""Let the wizard capture a swing from a GigE Vision camera; print the result.
 
 Usage: python benchmarks/linked_wizard.py SECONDS
 

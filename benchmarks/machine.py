@@ -1,4 +1,4 @@
-"""What the figures were measured on."""
+"""Description of the machine of the measurements."""
 
 import datetime
 import os

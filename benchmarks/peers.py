@@ -1,4 +1,4 @@
-"""What others do in place of Lightpen: OpenCV's blobs, grey centroids, plain pivots."""
+"""Reference methods: OpenCV's blobs, grey centroids, plain pivots."""
 
 import cv2
 import numpy as np

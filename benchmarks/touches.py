@@ -1,4 +1,4 @@
-"""How often U holds the truth: of points (``run bench verify``), parts (``measure``).
+"""Coverage of U: of points (``./run bench verify``) and of parts (``measure``).
 
 Camera and LEDs differ from their files as the files say they may, tip and LEDs are
 calibrated by a swing, then points are touched about the cone, or the features of the

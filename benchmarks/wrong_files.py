@@ -1,4 +1,4 @@
-"""Calibrations with files, seats and noise that are not as a textbook has them."""
+"""Calibrations with erroneous files, seats and noise."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What goes wrong on real computers, each tried on a machine."""
+"""Adverse conditions of real computers, each tried in the installation."""
 
 import os
 import shutil

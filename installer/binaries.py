@@ -1,4 +1,4 @@
-"""What Windows programs and libraries say of themselves, and need of each other."""
+"""Version resources and imports of Windows programs and libraries."""
 
 from collections import defaultdict
 from collections.abc import Iterator

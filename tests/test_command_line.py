@@ -957,7 +957,7 @@ def test_a_result_is_not_replaced_by_its_record_on_paper(
 
     assert main(["report", "tip.json", "--out", "./tip.json"], desktop) == 2
     assert desktop.papers == []
-    assert "would replace the result" in capsys.readouterr().err
+    assert "would replace its input" in capsys.readouterr().err
 
 
 def test_a_word_that_is_neither_command_nor_file_is_refused(
@@ -1018,6 +1018,6 @@ def test_what_is_no_level_of_the_log_is_refused(
     assert (refused.returncode, refused_too.returncode) == (2, 2)
     assert "argument --log-level: invalid choice: 'loud'" in refused.stderr
     assert refused_too.stderr == (
-        "lightpen: LIGHTPEN_LOG_LEVEL is loud, which is no level of the log. "
+        "lightpen: LIGHTPEN_LOG_LEVEL is loud, which is not a log level. "
         "Set it to one of: debug, info, warning, error.\n"
     )

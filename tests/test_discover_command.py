@@ -71,7 +71,7 @@ def test_a_swing_of_centres_and_a_length_give_pen_camera_and_record(
     ("more", "told"),
     [
         ([], "one known length"),
-        (["--length", "1", "180"], "is no length"),
+        (["--length", "1", "180"], "is not a length"),
         (["--length", "1", "99", "180"], "no LED 99"),
         (["--length", "2", "2", "180"], "to itself"),
     ],

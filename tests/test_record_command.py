@@ -215,7 +215,7 @@ def test_what_the_record_brings_is_not_to_be_given(
     outcome = lightpen("calibrate", folder, option, *values)
 
     assert outcome.returncode == 2
-    assert f"is the record of a swing, which brings its own. Leave out {option}." in (
+    assert f"is the record of a swing and contains these files. Omit {option}." in (
         outcome.stderr
     )
 
@@ -241,7 +241,8 @@ def test_an_empty_record_says_what_to_do(lightpen: Run, folder: Path) -> None:
     assert outcome.returncode == 1
     assert outcome.stderr == (
         f"lightpen: {N_IMAGES} images, the first images/000001.png, are in the folder "
-        "but not in the journal; they were not acknowledged and take no part.\n"
+        "but not in the journal; their recording was not confirmed, and they are "
+        "excluded.\n"
         "lightpen: The record swing 1 contains no images. Resume the swing, or start "
         "a new one.\n"
     )
@@ -324,7 +325,7 @@ def test_what_a_record_lacks_is_told(lightpen: Run, folder: Path, name: str) -> 
     outcome = lightpen("calibrate", folder)
 
     assert outcome.returncode == 2
-    assert f"swing 1 is not a whole one: it lacks {name}. Restore" in outcome.stderr
+    assert f"swing 1 is incomplete: {name} is missing. Restore" in outcome.stderr
 
 
 def test_a_record_of_a_later_version_is_refused(
@@ -346,7 +347,7 @@ def test_a_folder_that_is_no_record_still_needs_its_files(
     outcome = lightpen("calibrate", folder / "images")
 
     assert outcome.returncode == 2
-    assert "--camera FILE is missing. Only a record needs none." in outcome.stderr
+    assert "--camera FILE is missing. It may be omitted only for the record" in outcome.stderr
 
 
 @pytest.mark.parametrize(

@@ -206,7 +206,7 @@ def test_names_that_tell_nothing_are_paired_in_order_with_a_note(
     outcome = calibrate(lightpen, copied)
 
     assert outcome.returncode == 0
-    assert "do not tell which are of the same moment" in outcome.stderr
+    assert "do not show which images are simultaneous" in outcome.stderr
 
 
 @pytest.mark.parametrize(
@@ -214,8 +214,8 @@ def test_names_that_tell_nothing_are_paired_in_order_with_a_note(
     [
         (("left",), (), "files given: 1. The rig has 2 cameras"),
         (("left", "right", "left"), (), "files given: 3"),
-        (("left", "left"), (), "A place is given twice. The rig has 2 cameras"),
-        ((), ("--camera", "left.yaml"), "Leave out --camera"),
+        (("left", "left"), (), "A folder or file is given twice. The rig has 2 cameras"),
+        ((), ("--camera", "left.yaml"), "Omit --camera"),
     ],
 )
 def test_another_number_of_places_or_a_camera_beside_a_rig_is_refused(
@@ -232,7 +232,7 @@ def test_two_folders_without_a_rig_ask_for_it(station: Path, lightpen: Run) -> N
     files = "--camera", station / "left.yaml", "--pen", station / "leds.csv"
     outcome = lightpen("calibrate", station / "left", station / "right", *files)
 
-    assert_refused(outcome, "need --rig FILE in place of --camera", 2)
+    assert_refused(outcome, "need --rig FILE instead of --camera", 2)
 
 
 def test_a_rig_file_that_names_no_camera_file_is_refused(

@@ -72,4 +72,4 @@ def test_an_address_of_another_computer_is_refused(
     outcome = lightpen("stream", swung(), "--address", "192.0.2.1", "--port", "0")
 
     assert outcome.returncode == 2
-    assert "192.0.2.1 is no address of this computer" in outcome.stderr
+    assert "192.0.2.1 is not an address of this computer" in outcome.stderr

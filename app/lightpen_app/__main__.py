@@ -1,4 +1,4 @@
-"""Start of the program: its window, its demo, its test of itself, or a command."""
+"""Start of the program: window, demo, self-test or command."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Errors the user can put right; anything else is a bug and is left to crash."""
+"""Errors that the user can correct; any other exception is a bug and not caught."""
 
 from lightpen.messages import Message, Value
 

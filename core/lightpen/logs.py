@@ -1,4 +1,4 @@
-"""The log of the program: from which level on, and where its lines go.
+"""The log of the program: level and destinations.
 
 Every module logs by a logger of its own name. Whoever logs does not wait for a disk: a
 thread of its own writes the lines, to a file that several processes may share, and

@@ -1,4 +1,4 @@
-"""Messages to the user: a code with values, worded in any language from the catalogue.
+"""Messages to the user: a code with values; the catalogue has the text.
 
 The core raises a message by its code; `lightpen.catalogue` holds its English template.
 The command line prints English; the wizard looks the template up in its language. A

@@ -99,7 +99,7 @@ def test_the_window_is_refused_in_a_sentence_without_a_screen(newcomer: Run) -> 
 
     assert outcome.returncode == 2
     assert outcome.stdout == ""
-    assert "There is no display to open a window on." in outcome.stderr
+    assert "No display is available for the window." in outcome.stderr
     assert "Traceback" not in outcome.stderr
 
 

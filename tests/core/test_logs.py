@@ -261,6 +261,6 @@ def test_a_variable_that_names_no_level_is_told(
         log_level(None)
 
     assert str(refused.value) == (
-        "LIGHTPEN_LOG_LEVEL is loud, which is no level of the log. "
+        "LIGHTPEN_LOG_LEVEL is loud, which is not a log level. "
         "Set it to one of: debug, info, warning, error."
     )

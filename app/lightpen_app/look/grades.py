@@ -1,4 +1,4 @@
-"""How the grades of a calibration look, wherever they are shown."""
+"""Appearance of the grades of a calibration."""
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen_app.look.signs import Sign

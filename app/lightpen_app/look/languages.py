@@ -1,4 +1,4 @@
-"""The languages of the program, changed while it runs."""
+"""The languages of the program, changeable at run time."""
 
 from PySide6.QtCore import (
     QT_TRANSLATE_NOOP,

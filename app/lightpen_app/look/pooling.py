@@ -1,4 +1,4 @@
-"""Images made smaller to be shown."""
+"""Images reduced for display."""
 
 import numpy as np
 

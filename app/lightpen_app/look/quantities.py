@@ -1,4 +1,4 @@
-"""Numbers as they are shown: with as many decimals as their uncertainty warrants."""
+"""Displayed numbers, with the decimals that their uncertainty warrants."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Symbols for states, told apart by shape and drawn without a font."""
+"""Symbols for states, distinguished by shape and drawn without a font."""
 
 from enum import Enum, auto
 

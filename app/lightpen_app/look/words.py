@@ -1,4 +1,4 @@
-"""Names and moments as they are shown."""
+"""Displayed names and times."""
 
 import re
 from collections.abc import Iterable

@@ -1,1 +1,1 @@
-"""The record of a calibration on paper: its words, its pages, printed and as PDF."""
+"""The calibration report: text, pages, print and PDF."""

@@ -1,4 +1,4 @@
-"""What a page is put together of: headings, paragraphs, tables, and room for figures.
+"""Blocks of a page: headings, paragraphs, tables and figures.
 
 A piece stands whole on one page. Lengths are in dots, of which a point has ten, so that
 words are measured as they are printed.

@@ -1,4 +1,4 @@
-"""Plots as they are printed: axes with numbers, dots, lines, bars and arrows.
+"""Printed plots: axes with numbers, dots, lines, bars and arrows.
 
 What tells series apart is their form besides their colour, as paper is often grey.
 Nothing is see-through: PDF/A-1 has no transparency.

@@ -1,4 +1,4 @@
-"""What a calibration rests on, on paper: its images, LEDs and files."""
+"""Section of the report on the evidence: images, LEDs and files."""
 
 from collections.abc import Iterable
 

@@ -1,4 +1,4 @@
-"""The plots of a calibration, from what its file states."""
+"""The plots of a calibration from its file."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""What a calibration found, on paper: the tip, the rule of its verdict, its budget."""
+"""Section of the report on the results: tip, decision rule, budget."""
 
 from collections.abc import Iterable, Sequence
 

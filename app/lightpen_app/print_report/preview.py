@@ -1,4 +1,4 @@
-"""The record on paper as it will be printed, to be saved or printed."""
+"""Print preview of the calibration report, to be saved or printed."""
 
 from functools import partial
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The record of a calibration as pages, as PDF, and on a printer.
+"""The calibration report as pages, as PDF, and on a printer.
 
 All three are drawn by the same strokes. The PDF is PDF/A-1b: fonts are in it, colours
 are defined, and nothing outside of it is needed to show it in decades. Qt writes it, as

@@ -1,4 +1,4 @@
-"""What a self-test tries, in its order.
+"""The checks of a self-test, in order.
 
 Only modules of Python itself are imported before the files are found to be whole.
 """

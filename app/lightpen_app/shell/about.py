@@ -1,4 +1,4 @@
-"""What the program is, and which versions it is made of."""
+"""About box: program and versions."""
 
 from collections.abc import Mapping
 

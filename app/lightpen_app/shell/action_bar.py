@@ -1,4 +1,4 @@
-"""The foot of the window: the status line, Back, and the main button."""
+"""The action bar at the bottom: status line, Back and main button."""
 
 from collections.abc import Callable
 

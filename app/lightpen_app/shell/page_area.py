@@ -1,4 +1,4 @@
-"""The part of the window that the page has: its title and lead, over them a notice."""
+"""The page area: notice, title, lead and page."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""The steps of the wizard: done, now, to do, or closed with the reason."""
+"""The list of steps: done, current, to do, or unavailable with the reason."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What every page of the wizard has: a step's title, its rules and its main action."""
+"""Base of the wizard pages: title, rules and main action of a step."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What the buttons for the simulated operator have in common."""
+"""Base of the buttons for the simulated operator."""
 
 from collections.abc import Callable
 

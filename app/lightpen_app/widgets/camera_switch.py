@@ -1,4 +1,4 @@
-"""Which of two cameras is shown and set."""
+"""Selects which of two cameras is shown and adjusted."""
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QButtonGroup, QWidget

@@ -1,4 +1,4 @@
-"""A list of which one is chosen."""
+"""A drop-down list for one choice."""
 
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QComboBox

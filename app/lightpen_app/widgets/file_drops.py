@@ -1,4 +1,4 @@
-"""Files and folders that are dropped on a part of a page."""
+"""Drag and drop of files and folders."""
 
 from PySide6.QtCore import QEvent, QMimeData, QObject, Signal
 from PySide6.QtGui import QDropEvent

@@ -1,4 +1,4 @@
-"""Text as large as its place allows, up to the size that the distance asks for."""
+"""Text scaled to its place, up to the size for the viewing distance."""
 
 from functools import lru_cache
 from math import ceil

@@ -1,4 +1,4 @@
-"""Windows and dialogs that stay within their screen, their buttons with them."""
+"""Windows and dialogs that fit their screen."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Keys that several widgets answer to."""
+"""Keys that several widgets handle."""
 
 from PySide6.QtCore import Qt
 

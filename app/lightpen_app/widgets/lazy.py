@@ -1,4 +1,4 @@
-"""A widget that takes long to be made, and is made when it is first seen."""
+"""A widget that is created when it is first shown."""
 
 from collections.abc import Callable
 from typing import Generic, TypeVar

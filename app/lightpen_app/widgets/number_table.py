@@ -1,4 +1,4 @@
-"""Figures in rows and columns, to be read and copied."""
+"""A table of numbers that can be copied."""
 
 from dataclasses import dataclass
 

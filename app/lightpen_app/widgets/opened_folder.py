@@ -1,4 +1,4 @@
-"""Folders shown by the program that the system has for them."""
+"""Opens a folder in the file manager."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The pen as it leans, and as it should, seen from behind its operator."""
+"""Current and target posture of the pen, seen from behind the operator."""
 
 import math
 from dataclasses import dataclass

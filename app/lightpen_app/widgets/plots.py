@@ -1,4 +1,4 @@
-"""Plots that are made once and then given new data; each saves itself as PNG and CSV.
+"""Plots with replaceable data, which can be saved as PNG and CSV.
 
 Making a plot anew costs fifty times more than `setData` on one that is there.
 """

@@ -1,4 +1,4 @@
-"""The postures that a swing holds, seen from above, and the one to take next."""
+"""The postures of a swing, seen from above, and the next one."""
 
 import math
 from collections.abc import Iterator

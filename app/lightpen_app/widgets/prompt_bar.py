@@ -1,4 +1,4 @@
-"""What bars that ask something in the page have in common."""
+"""Base of the bars with a question in the page."""
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QWidget

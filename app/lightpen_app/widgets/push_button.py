@@ -1,4 +1,4 @@
-"""A button that is never narrower than its words."""
+"""A button that is never narrower than its text."""
 
 from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QPushButton, QWidget

@@ -1,4 +1,4 @@
-"""A question in the page that waits for an answer, and stops nothing else."""
+"""A non-modal question in the page."""
 
 from collections.abc import Callable
 from typing import NamedTuple

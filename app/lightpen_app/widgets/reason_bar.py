@@ -1,4 +1,4 @@
-"""A question in the page that takes a reason, and a signature, for an answer."""
+"""A question in the page that requires a reason, and possibly a signature."""
 
 from collections.abc import Sequence
 from functools import partial

@@ -1,4 +1,4 @@
-"""Widgets that are arranged otherwise where they have little room, or much."""
+"""Responsive layout of widgets by the available size."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""A table of which whole rows are chosen."""
+"""A table with selection of whole rows."""
 
 from PySide6.QtCore import QAbstractItemModel, Qt
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget

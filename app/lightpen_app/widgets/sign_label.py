@@ -1,4 +1,4 @@
-"""A sign and the words that go with it."""
+"""A symbol with its text."""
 
 from dataclasses import dataclass
 

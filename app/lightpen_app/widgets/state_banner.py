@@ -1,4 +1,4 @@
-"""One state, by a word, a sign and a colour, to be read from a distance."""
+"""A state as word, symbol and colour, legible from a distance."""
 
 from dataclasses import dataclass
 from math import ceil

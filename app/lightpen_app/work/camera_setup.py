@@ -1,4 +1,4 @@
-"""The cameras that are chosen: opened, looked for, and remembered as they are set."""
+"""The selected cameras: opening, search, and stored settings."""
 
 import logging
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Where results are saved for use elsewhere, and under which names."""
+"""Folders and file names of saved results."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

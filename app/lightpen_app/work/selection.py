@@ -1,4 +1,4 @@
-"""What is chosen for a station: remembered, and limited by its supervisors."""
+"""The selection of a station, stored, and limited by its supervisors."""
 
 from dataclasses import replace
 

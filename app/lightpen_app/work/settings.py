@@ -1,4 +1,4 @@
-"""What is remembered from one run to the next, in a JSON file.
+"""Settings, stored in a JSON file.
 
 What is chosen is in force at once, and written by a thread of its own: neither a disk
 that does not answer nor another program that keeps the settings to itself holds the

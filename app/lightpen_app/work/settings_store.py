@@ -1,4 +1,4 @@
-"""The file of the settings: read with care, written whole, shared by two windows.
+"""The settings file: checked reading, atomic writing, shared by windows.
 
 It is a JSON object of sections, each with its entries. Who writes puts only what was
 changed into what is there by then, so that each of two windows keeps its own.

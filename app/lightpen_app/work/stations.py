@@ -1,4 +1,4 @@
-"""What a station remembers from one run to the next."""
+"""Stored settings of a station."""
 
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias

@@ -1,4 +1,4 @@
-"""What the pages share: made, connected, started and ended together."""
+"""Shared objects of the pages, created, started and ended together."""
 
 from collections.abc import Sequence
 from dataclasses import replace

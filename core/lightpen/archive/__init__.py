@@ -1,1 +1,1 @@
-"""Every calibration that was ever accepted, refused or abandoned, entry by entry."""
+"""The archive: one entry for each calibration accepted, rejected or abandoned."""

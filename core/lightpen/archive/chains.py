@@ -1,4 +1,4 @@
-"""The chains in a database: appended to where they are at home, copied elsewhere."""
+"""The chains of a database: its own, which grows by events, and copies of others."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Whether all of an archive is as it was entered: its rows, chains and records."""
+"""Check of an archive for changes: its rows, chains and records."""
 
 from collections.abc import Callable, Iterator
 from contextlib import closing

@@ -1,4 +1,4 @@
-"""What a check of an archive notes besides changes: it may be honest.
+"""Notes of an archive check that are no evidence of a change.
 
 A power cut leaves files that are not entered yet, a clock may be set back, a data
 folder may move to another computer. None of it proves a change.

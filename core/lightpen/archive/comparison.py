@@ -1,4 +1,4 @@
-"""A chain here and its copy on a server: who is ahead, and where they differ.
+"""Comparison of a chain with its copy on a server.
 
 Long chains are compared by one hash for each block of entries, so that little travels;
 only of a block that differs the entries are compared, each by its hash.

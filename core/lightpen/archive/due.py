@@ -1,4 +1,4 @@
-"""When the tips in force are due to be calibrated again."""
+"""Due dates of the current tips."""
 
 from bisect import bisect_right
 from collections import defaultdict

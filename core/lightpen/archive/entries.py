@@ -1,4 +1,4 @@
-"""An entry of the archive, its one way of being written, and the chain of all.
+"""Entries of the archive: their canonical text, and their chain of hashes.
 
 An archive holds chains, one for each data folder that was ever entered in it. A chain
 grows only where its data folder is; everywhere else it is a copy of what was entered

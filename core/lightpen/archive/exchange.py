@@ -1,4 +1,4 @@
-"""Entries that travel: to a server, and by a file from one station to another.
+"""Exchange of entries: with a server, and by files between stations.
 
 Whichever way they go, they are copied chain by chain in their order, and what is there
 already is passed over: a copy that was cut off is simply made again.

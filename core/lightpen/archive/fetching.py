@@ -1,4 +1,4 @@
-"""A data folder restored from the server: the entries of its chain, and their files.
+"""Restores a data folder from the server: the entries of its chain, and their files.
 
 An entry of a result, a verification, a camera calibration or a change of the library
 has the file that tells of it, so that these are made again byte by byte. Swings and

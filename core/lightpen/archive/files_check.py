@@ -1,4 +1,4 @@
-"""Whether the results, swings and images that entries vouch for are as they were.
+"""Check of results, swings and images against the hashes in their entries.
 
 An entry has the hash of the journal of its swing as far as it went then, and each line
 of that the hashes of the images of all cameras: so the entry vouches for every image.

@@ -1,4 +1,4 @@
-"""A logbook that is opened when something is entered first."""
+"""A logbook that is opened at the first entry."""
 
 import os
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What is looked for in an archive: the entries of a pen, a station or a time."""
+"""Queries of an archive: the entries of a pen, a station or a period."""
 
 from dataclasses import dataclass
 from datetime import datetime

@@ -1,4 +1,4 @@
-"""Whether accepted tips follow from the LED centres in their records.
+"""Check of accepted tips by recomputation from the LED centres in their records.
 
 Hashes and signatures show that a result is as it was entered, not that it was right
 then: who has the key of the station may enter any tip. To be believed, a forged tip

@@ -1,4 +1,4 @@
-"""The archive on a server: its address, its password, and how it is called.
+"""The archive on a server: address, password and name.
 
 A line to a server is encrypted, and the server proves its name, unless the address
 says otherwise. A server that does not answer, or not any more, is given up.

@@ -1,4 +1,4 @@
-"""The tables of a server, and the rights of those who use it, as SQL.
+"""SQL of the tables on a server and of the rights of its roles.
 
 A station adds entries and reads its own, and the changes of the library of all; it can
 change nothing. A chain belongs to the

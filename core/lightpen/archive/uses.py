@@ -1,4 +1,4 @@
-"""Who uses something that is open to many threads, so that it closes after them."""
+"""Counts the users of a shared resource, which closes after the last one."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

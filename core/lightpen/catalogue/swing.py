@@ -5,7 +5,7 @@ MESSAGES = {
     "swing.seat-tip": "Press the tip into the cone and keep it there.",
     "swing.swing-to-seat": "Press the tip into the cone and swing the pen gently.",
     "swing.hold-still": "The tip rests in the cone. Keep it pressed in.",
-    "swing.hold-upright": "For a moment, the tip in the cone. Then the program learns where you stand.",
+    "swing.hold-upright": "Keep the tip in the cone for a moment. The program then learns your position.",
     "swing.lean-to-your-right": "To YOUR right, so that the program learns your position.",
     "swing.follow-arrow": "Keep the tip pressed into the cone.",
     "swing.too-fast": "Motion blur. Swing the pen more slowly.",

@@ -1,4 +1,4 @@
-"""What each ``lightpen archive ...`` does."""
+"""The actions of ``lightpen archive``."""
 
 import argparse
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Words of the command line as values, and options that several commands share."""
+"""Types of command-line arguments, and options that several commands share."""
 
 import argparse
 import math

@@ -1,4 +1,4 @@
-"""``lightpen calibrate``: find the tip from a swing."""
+"""``lightpen calibrate``: the tip from a swing."""
 
 import argparse
 import os

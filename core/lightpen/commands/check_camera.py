@@ -1,4 +1,4 @@
-"""``lightpen check-camera``: whether camera and file still agree, by one swing."""
+"""``lightpen check-camera``: test of a camera file with one swing."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What every command does with its console: print, show progress, fail to print."""
+"""Console output of commands: text, progress, and failures to print."""
 
 import argparse
 import os

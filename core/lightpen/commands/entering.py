@@ -1,4 +1,4 @@
-"""A verification by command, kept and entered where its tip was accepted."""
+"""Stores and enters a verification by command in the data folder of its tip."""
 
 import argparse
 from collections.abc import Mapping

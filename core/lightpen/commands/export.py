@@ -1,4 +1,4 @@
-"""``lightpen export``: a calibration as other programs read it."""
+"""``lightpen export``: a calibration in the formats of other programs."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""``lightpen pen``: put measured LEDs into the pen frame."""
+"""``lightpen pen``: transform measured LEDs into the pen frame."""
 
 import argparse
 from pathlib import Path

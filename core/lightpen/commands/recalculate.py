@@ -1,4 +1,4 @@
-"""``lightpen recalculate``: solve calibrations again, and check their uncertainty."""
+"""``lightpen recalculate``: recompute calibrations and check their uncertainty."""
 
 import argparse
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""``lightpen stream``: pose and tip for programs that listen by OpenIGTLink."""
+"""``lightpen stream``: pose and tip by OpenIGTLink."""
 
 import argparse
 import sys

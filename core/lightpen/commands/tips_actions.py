@@ -1,4 +1,4 @@
-"""What each ``lightpen tips ...`` does."""
+"""The actions of ``lightpen tips``."""
 
 import argparse
 import json

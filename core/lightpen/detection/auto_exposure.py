@@ -1,4 +1,4 @@
-"""The exposure at which the brightest LED is bright, and none is saturated.
+"""Auto exposure: the brightest LED is bright, and none is saturated.
 
 The light of an LED is proportional to exposure and gain, so one image tells the next
 setting; only of a saturated LED it is not known by how much it is too bright. Gain adds

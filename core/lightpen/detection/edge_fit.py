@@ -1,4 +1,4 @@
-"""The outline of a disc that is not evenly lit, from its rim alone.
+"""The outline of an unevenly lit disc, from its edge alone.
 
 Inside its rim a real LED has a hot spot, a dark middle, or a dome whose bright part
 moves with the view. Its outline is the disc's all the same. Along a ray across the rim,

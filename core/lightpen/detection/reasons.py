@@ -1,4 +1,4 @@
-"""Why an image does not take part in a calibration."""
+"""Reasons for excluding an image from a calibration."""
 
 from enum import StrEnum
 

@@ -1,4 +1,4 @@
-"""Centres of LEDs of a few pixels, of which blur leaves no even inside.
+"""Centres of LEDs of a few pixels, which have no plateau because of blur.
 
 A disc less than some 20 px wide with a blur of 1.5 px is a bell, not a plateau with a
 rim. Reflections on the board and bloom reach into its foot, so its outline near the

@@ -1,4 +1,4 @@
-"""Which mirror image, which focal length: all are tried on a part of the swing.
+"""Hypotheses of mirror image and focal length, tried on a part of the swing.
 
 Under weak perspective a shape and its mirror image along the line of sight have the
 same tracks. Perspective tells them apart: the wrong one fits hundreds of times worse.

@@ -1,4 +1,4 @@
-"""Which spot is which LED, by the shape of the pen found so far.
+"""Assignment of spots to LEDs by the shape of the pen found so far.
 
 Rotations are fitted outwards from the images that are solved, with the tip in the cone.
 A piece of a track that stays where an LED is predicted is that LED; one that does not,

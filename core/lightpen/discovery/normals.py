@@ -1,4 +1,4 @@
-"""The normal of the discs before it is known: it faces the camera, roughly."""
+"""Prior of the disc normal: it faces the camera approximately."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The pen's scale by known lengths, and priors that leave all else to the images."""
+"""Scale of the pen by known lengths, and wide priors for everything else."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

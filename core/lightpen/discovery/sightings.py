@@ -1,4 +1,4 @@
-"""What the images of a swing show, before anything is known of pen and camera."""
+"""Spots in the images of a swing, before pen and camera are known."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""From a weak-perspective shape to a start of the bundle adjustment.
+"""Initial values of the bundle adjustment from a weak-perspective shape.
 
 A start is adjusted here with a robust loss and damped steps, as the factorisation is
 off by several percent; the final adjustment is that of `lightpen.estimation`. Both use

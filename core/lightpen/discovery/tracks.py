@@ -1,4 +1,4 @@
-"""Unlabelled spots followed from image to image.
+"""Tracks of unlabelled spots from image to image.
 
 Spots are predicted to go on as they went, then as the affine map of the spots that are
 certain moves them, which leaves little of a hand's tremor, and assigned to the

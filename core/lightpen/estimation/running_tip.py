@@ -1,4 +1,4 @@
-"""How a tip settles as images are added, by the poses of the images alone.
+"""Convergence of a tip with the number of images, from single-image poses.
 
 Each image i says ``R_i tip_pen + t_i = cone_cam`` with the covariance of its pose. The
 normal equations of weighted least squares add up over images, so that the tip by the

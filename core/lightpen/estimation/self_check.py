@@ -1,4 +1,4 @@
-"""A check of the whole model without an artefact: some LEDs predict the others.
+"""Self-check of the model without an artefact: half of the LEDs predict the others.
 
 In each image the pose by one half of the LEDs, the tip not held in its cone, predicts
 the other half; the halves go round. Noise alone makes such errors differ from image to

@@ -1,4 +1,4 @@
-"""The axis of a stylus, by spinning the pen about it with the tip in the cone.
+"""Axis of a stylus from a rotation of the pen about it with the tip in the cone.
 
 While the pen turns about its stylus, the stylus points one way in the camera, whatever
 the pen does about it. So every pose i gives

@@ -1,4 +1,4 @@
-"""The frames of a pen of which LEDs sit elsewhere than in its file.
+"""The frames of a pen with displaced LEDs.
 
 Where an LED is displaced it is ambiguous what the frame of the file is: that in which
 the other LEDs fit the file best, or that of all LEDs as they are. The tip differs.

@@ -1,4 +1,4 @@
-"""CSV tables that a spreadsheet shows as they are, and never calculates [1]_.
+"""CSV tables without formulas for spreadsheets [1]_.
 
 References
 ----------

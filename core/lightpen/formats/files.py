@@ -1,4 +1,4 @@
-"""Files read whole within a limit, and written whole or not at all."""
+"""Files read within a size limit, and written atomically."""
 
 import contextlib
 import errno

@@ -1,4 +1,4 @@
-"""What an administrator has set for all users of a computer, in a read-only file.
+"""Settings of an administrator for all users of a computer, in a read-only file.
 
 What a user chooses goes before it, and so do the limits of a supervisor.
 """

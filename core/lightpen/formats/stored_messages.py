@@ -1,4 +1,4 @@
-"""Messages as files keep them: code and values, to be worded in any language later."""
+"""Messages in files: code and values, so that they can be shown in any language."""
 
 from collections.abc import Mapping
 from typing import Any, Self, TypeAlias, Union

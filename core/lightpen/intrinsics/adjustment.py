@@ -1,4 +1,4 @@
-"""Bundle adjustment of a board: cameras, their places, and how true the board is.
+"""Bundle adjustment of a board: cameras, their poses, and the shape of the board.
 
 Point n of the board in view v, seen by camera c, lies at
 

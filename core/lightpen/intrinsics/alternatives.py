@@ -1,4 +1,4 @@
-"""What else than the board may be wrong: the views are not of one camera.
+"""Alternatives to a wrong board: views that are not from one unchanged camera.
 
 Each alternative is fitted to the views: the camera changed at some image, some images
 are turned by 180 degrees, the images are of two cameras, the rows of pixels are not

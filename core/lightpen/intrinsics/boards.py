@@ -1,4 +1,4 @@
-"""Boards that cameras are calibrated by, and how they are named in one word.
+"""Calibration boards and their description in one word.
 
 A board is told as ``KIND:COLUMNSxROWS:...`` with lengths in mm:
 

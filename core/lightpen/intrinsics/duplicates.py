@@ -1,4 +1,4 @@
-"""Views in which the board is where it was in another: they count once.
+"""Detection of repeated board positions, which count once.
 
 What such views share (where the points lie on the pixels, how the board hangs, blur and
 shadows) is the same in all of them, so more of them tell nothing more of the camera.

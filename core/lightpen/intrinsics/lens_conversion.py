@@ -1,4 +1,4 @@
-"""A camera of one lens model that is near to a camera of another."""
+"""Conversion of a camera to the nearest camera of another lens model."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A board as a page to be printed: PDF of lines and areas alone, in millimetres.
+"""A board as a PDF page of vector graphics at true scale.
 
 References
 ----------

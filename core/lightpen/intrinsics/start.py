@@ -1,4 +1,4 @@
-"""Start of an adjustment: focal length and poses, from homographies.
+"""Initial values of an adjustment: focal length and poses, from homographies.
 
 A homography ``H = K [r1 r2 t]`` of a plane makes ``h1^T w h2 = 0`` and ``h1^T w h1 =
 h2^T w h2`` with ``w = diag(1, 1, f^2) / f^2`` about the middle of the image, which all

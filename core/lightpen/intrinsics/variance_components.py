@@ -1,4 +1,4 @@
-"""What a board and a lens do beside the model: a mixed model with variance components.
+"""Mixed model of board and lens errors with variance components.
 
 The residuals of a fitted board are linear in four kinds of random effects: each point
 of the board is off in its plane and out of it; each lens has a smooth residual field

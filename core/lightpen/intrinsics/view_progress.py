@@ -1,4 +1,4 @@
-"""How far views of a board vary: position, size and skew in the image.
+"""Variation of board views: position, size and skew in the image.
 
 The measures and the ranges that suffice are those of the calibrator of ROS [1]_.
 

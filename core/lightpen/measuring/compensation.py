@@ -1,4 +1,4 @@
-"""From the feature through the ball centres to the surface that the ball touched.
+"""Compensation of the ball: from the feature of ball centres to the surface.
 
 The surface is parallel to the feature of the centres, so that a least-squares feature
 moves by the ball radius along its normal: radii change by it, a plane is shifted, and a

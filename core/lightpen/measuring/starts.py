@@ -1,4 +1,4 @@
-"""Where the fits of features begin: algebraic solutions.
+"""Initial values of feature fits: algebraic solutions.
 
 Cylinder and cone are quadrics about an axis along z, ``x^2 + y^2 = 2 a x + 2 b y + c
 + d z + e z^2``, linear in the unknowns once the direction of the axis is given.

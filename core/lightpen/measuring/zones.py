@@ -1,4 +1,4 @@
-"""Features by other criteria than least squares: zones that just contain the points.
+"""Features by the minimum-zone, inscribed and circumscribed criteria.
 
 Each is the limit of linear programs: the distances are linearised at the present
 feature, and the best step within a trust region is taken while it improves the fit.

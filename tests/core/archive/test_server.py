@@ -86,7 +86,7 @@ def test_tables_of_another_program_on_a_server_are_left_alone(
 def test_an_empty_database_names_the_command_that_sets_it_up(
     postgres: Postgres,
 ) -> None:
-    with pytest.raises(ArchiveError, match="Its administrator sets it up"):
+    with pytest.raises(ArchiveError, match="Its administrator must set it up"):
         open_server(postgres.new_database(""))
 
 

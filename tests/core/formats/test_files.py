@@ -238,7 +238,7 @@ def test_a_full_disk_leaves_the_old_file_whole(tmp_path: Path) -> None:
         f"write_whole(Path({str(path)!r}), bytes(10_000))",
     )
     assert "the file would be larger than allowed" in result
-    assert "What was there before is unchanged" in result
+    assert "The previous content is unchanged" in result
     assert path.read_bytes() == b"old"
     assert names_in(tmp_path) == ["cam.yaml"]
 

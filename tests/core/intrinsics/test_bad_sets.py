@@ -54,7 +54,7 @@ def test_views_copied_six_times_count_once(
 
     np.testing.assert_allclose(expanded(found), expanded(ten))
     assert len(found.duplicates) == 50
-    assert "50 views show the board where" in str(found.remarks[0])
+    assert "50 views repeat the board position" in str(found.remarks[0])
 
 
 def test_images_of_a_board_at_rest_count_once(

@@ -56,7 +56,7 @@ def test_points_of_markers_and_of_charuco_are_those_of_opencv() -> None:
         ("charuco:9x6:20:15", "is not a board."),
         ("chessboard:9x1:20", "9 x 1"),
         ("chessboard:9x6:0", "are not valid"),
-        ("charuco:9x6:20:15:DICT_NONE", "not known"),
+        ("charuco:9x6:20:15:DICT_NONE", "unknown dictionary"),
         ("charuco:20x20:20:15:DICT_4X4_50", "needs 200 markers"),
     ],
 )

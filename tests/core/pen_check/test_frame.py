@@ -114,7 +114,7 @@ def test_a_pen_of_another_layout_keeps_its_frame() -> None:
     check = examine_frame(six_led_pen())
 
     assert check.error is None
-    assert "do not stand as the pen frame needs it" in str(check.remark)
+    assert "layout does not define the pen frame" in str(check.remark)
     assert outcomes(check)[Rule.LINE] is RuleStatus.OPEN
     assert check.is_a_pen
 

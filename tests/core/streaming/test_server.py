@@ -355,7 +355,7 @@ def test_a_taken_port_is_said(stream: PoseStream) -> None:
 
 def test_an_address_of_another_computer_is_said() -> None:
     for address in ("192.0.2.1", "no such place"):
-        with pytest.raises(StreamError, match="is no address of this computer"):
+        with pytest.raises(StreamError, match="is not an address of this computer"):
             PoseStream().open(StreamPlace(address, 0))
 
 

@@ -1,4 +1,4 @@
-"""What is drawn over the image of a board: outline, residuals, or uncertainty."""
+"""Overlay of a board image: outline, residuals or uncertainty."""
 
 import numpy as np
 

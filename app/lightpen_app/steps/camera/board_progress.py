@@ -1,4 +1,4 @@
-"""How far the views of a board vary, and what is still missing."""
+"""Progress of a board calibration: variation of the views, and missing views."""
 
 from PySide6.QtWidgets import QProgressBar, QWidget
 from typing_extensions import override

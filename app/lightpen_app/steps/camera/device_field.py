@@ -1,4 +1,4 @@
-"""A field for a camera: one that was found, or a serial number or address typed in."""
+"""A field for a camera: from the search, or a serial number or address."""
 
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QSizePolicy, QWidget

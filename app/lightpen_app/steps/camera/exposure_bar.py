@@ -1,4 +1,4 @@
-"""How brightly the LEDs are exposed: too dark, good, or saturated."""
+"""Exposure of the LEDs: too dark, good, or saturated."""
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen

@@ -1,4 +1,4 @@
-"""The exposure of the camera that is shown: by hand, or adjusted by the LEDs."""
+"""Exposure of the displayed camera: manual, or automatic by the LEDs."""
 
 from PySide6.QtCore import QObject
 

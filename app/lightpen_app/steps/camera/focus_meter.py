@@ -1,4 +1,4 @@
-"""How sharp the rims of the LEDs are, as a large number and its last seconds."""
+"""Edge width of the LEDs as a large number, with the last seconds."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""What the step Camera does with the intrinsics: a file is read, or one is made."""
+"""Intrinsics of the step Camera: read from a file, or calibrated."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The mask of the camera that is shown: drawn, searched for, marked in the image."""
+"""Stray light mask of the displayed camera: drawn or searched for."""
 
 import numpy as np
 from PySide6.QtCore import QObject

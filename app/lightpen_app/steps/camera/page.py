@@ -1,4 +1,4 @@
-"""The step Camera: images come, well exposed, sharp, and with their intrinsics."""
+"""The step Camera: source, exposure, focus and intrinsics."""
 
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override

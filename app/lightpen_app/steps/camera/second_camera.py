@@ -1,4 +1,4 @@
-"""The choice of a second camera: whether there is one, its source, and the rig file."""
+"""Selection of a second camera: its source and the rig file."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What else of a camera can be set: rate, region, pixel format, trigger, packets."""
+"""Further camera settings: rate, region, pixel format, trigger, packets."""
 
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QGroupBox, QLabel, QWidget

@@ -1,4 +1,4 @@
-"""Where the images come from."""
+"""Selection of the image source."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Stray light: what stays bright while the pen is covered is found and masked."""
+"""Stray light: search for bright spots with the pen covered, and masking."""
 
 import numpy as np
 from PySide6.QtCore import Signal

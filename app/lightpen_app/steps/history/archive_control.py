@@ -1,4 +1,4 @@
-"""What is done to the archive as a whole: checked, saved elsewhere, and imported."""
+"""Actions on the whole archive: check, save and import."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The archive as a whole: checked, saved for other programs, and taken up."""
+"""Panel of the whole archive: check, save and import."""
 
 from collections.abc import Sequence
 from enum import Enum, auto

@@ -1,4 +1,4 @@
-"""What the step History shows: the entries of the archive, and what they come to."""
+"""Content of the step History: the entries of the archive and their evaluation."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""When the tips in force are due to be calibrated again."""
+"""Due dates of the current tips."""
 
 from collections.abc import Callable, Sequence
 from datetime import datetime

@@ -1,4 +1,4 @@
-"""One entry of the archive in words, and what can be done about it."""
+"""One entry of the archive as text, with its actions."""
 
 from collections.abc import Sequence
 

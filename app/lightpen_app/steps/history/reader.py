@@ -1,4 +1,4 @@
-"""Reads the archive for the step History, off the thread of the window."""
+"""Reads the archive for the step History, off the GUI thread."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What the step LEDs does with files: one is opened, or the table is saved in one."""
+"""Files of the step LEDs: opening, and saving the table."""
 
 from collections.abc import Callable
 from functools import partial

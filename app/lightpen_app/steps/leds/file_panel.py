@@ -1,4 +1,4 @@
-"""The file of the LEDs: opened, saved under another name, or why it cannot be."""
+"""Panel of the LED file: open, save as, and the reason for failures."""
 
 from collections.abc import Callable
 from functools import partial

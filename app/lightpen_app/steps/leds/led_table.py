@@ -1,4 +1,4 @@
-"""The LEDs of a pen as a table to be typed in."""
+"""The LEDs of a pen as an editable table."""
 
 from collections.abc import Mapping
 from typing import TypeAlias

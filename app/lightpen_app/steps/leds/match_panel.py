@@ -1,4 +1,4 @@
-"""The live image, and how the LEDs seen in it fit the table."""
+"""The live image, and the match of its LEDs with the table."""
 
 import math
 from collections import deque

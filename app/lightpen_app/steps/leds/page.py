@@ -1,4 +1,4 @@
-"""The step LEDs: their places on the pen, checked against its frame and live images."""
+"""The step LEDs: coordinates, checked against pen frame and live images."""
 
 from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QWidget

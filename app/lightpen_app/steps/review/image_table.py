@@ -1,4 +1,4 @@
-"""The images of a solved swing as a table, the worst first."""
+"""The images of a solved swing as a table, worst first."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""The images of a solved swing: a list, the image itself, and its misfit among all."""
+"""The images of a solved swing: list, image and residuals."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Remarks one below the other, in as little room as they need."""
+"""A compact list of status messages."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""What comes after a tip was accepted: the other tips of its pen, one click each."""
+"""The next tip after acceptance: other tips of the pen, one click each."""
 
 from collections.abc import Sequence
 from dataclasses import replace

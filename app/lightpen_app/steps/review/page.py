@@ -1,4 +1,4 @@
-"""The step Review: is the tip good, how sure is it, and what next."""
+"""The step Review: the tip, its uncertainty, and the next step."""
 
 from functools import partial
 from typing import TYPE_CHECKING

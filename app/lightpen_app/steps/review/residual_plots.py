@@ -1,4 +1,4 @@
-"""Plots of residuals: image by image, over the image, and how they are distributed."""
+"""Plots of residuals: by image, over the image, and their distribution."""
 
 import numpy as np
 import pyqtgraph as pg

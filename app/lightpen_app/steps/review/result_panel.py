@@ -1,4 +1,4 @@
-"""The result of a swing in figures: the tip, how sure it is, and what has changed."""
+"""The result of a swing: the tip, its uncertainty, and the change."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""What the step Review shows: the verdict, the result, and its details."""
+"""View of the step Review: the verdict, the result and its details."""
 
 from PySide6.QtCore import QSize, QTimer
 from PySide6.QtWidgets import QBoxLayout, QProgressBar, QWidget

@@ -1,4 +1,4 @@
-"""Barcode scanner input, told from typing by its speed."""
+"""Barcode scanner input, distinguished from typing by its speed."""
 
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QWindow

@@ -1,4 +1,4 @@
-"""Fills the day page, and does what is asked for there."""
+"""Controller of the day page."""
 
 from collections import deque
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What the day page shows: the tips of a station, and whether a swing can start."""
+"""View state of the day page: tips of a station, and readiness for a swing."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""The day page: the tips of the station, and whether a swing can start."""
+"""The day page: tips of the station, and readiness for a swing."""
 
 from collections.abc import Sequence
 

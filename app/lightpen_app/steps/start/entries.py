@@ -1,4 +1,4 @@
-"""What is typed and chosen at the step Start, as fields and as the selection."""
+"""Entries of the step Start, as fields and as the selection."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What is typed at the step Start: names, the probe tip, and the limits of a swing."""
+"""Form of the step Start: names, probe tip and limits of a swing."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What the step Start does with swings and verifications that have no end."""
+"""Interrupted swings and verifications at the step Start: resume, discard."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What the step Start does with the tip library: lists, dialog and barcodes."""
+"""The tip library at the step Start: lists, dialog and barcodes."""
 
 from datetime import datetime
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The limits of a station, laid down by a supervisor."""
+"""Dialog for the limits of a station, set by a supervisor."""
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLineEdit, QWidget

@@ -1,4 +1,4 @@
-"""The step Start: the tips of a station each day, and how the station is set up."""
+"""The step Start: day page and set-up of the station."""
 
 from PySide6.QtCore import QEvent, QSize
 from PySide6.QtGui import QHideEvent, QShowEvent

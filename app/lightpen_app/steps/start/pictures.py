@@ -1,4 +1,4 @@
-"""What the program is for, in pictures: the pen, the cone, and the steps."""
+"""Introduction in pictures: pen, cone and steps."""
 
 import math
 

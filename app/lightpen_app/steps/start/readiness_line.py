@@ -1,4 +1,4 @@
-"""The line that says whether a swing can start, one button for each thing it needs."""
+"""Readiness for a swing: one button for each requirement."""
 
 from collections.abc import Sequence
 from functools import partial

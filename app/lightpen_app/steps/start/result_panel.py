@@ -1,4 +1,4 @@
-"""The tip in force for a pen and probe tip, and its age."""
+"""The current tip of a pen and probe tip, and its age."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

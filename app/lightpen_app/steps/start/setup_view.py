@@ -1,4 +1,4 @@
-"""Set up station: what is entered once, for all days."""
+"""Set up station: permanent entries."""
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QBoxLayout, QWidget

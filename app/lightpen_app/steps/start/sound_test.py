@@ -1,4 +1,4 @@
-"""A button that plays all sounds, each with its word."""
+"""A button that plays all sounds, each with its meaning."""
 
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QSizePolicy, QWidget

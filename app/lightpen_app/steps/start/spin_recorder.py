@@ -1,4 +1,4 @@
-"""Finding the axis of a stylus live: the pen is spun in the cone before the camera."""
+"""Live determination of a stylus axis: the pen is rotated in the cone."""
 
 import numpy as np
 from PySide6.QtCore import QObject, Signal

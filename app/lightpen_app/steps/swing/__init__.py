@@ -1,1 +1,1 @@
-"""The step Swing: the pen swung in the cone, guided."""
+"""The step Swing: a guided swing of the pen in the cone."""

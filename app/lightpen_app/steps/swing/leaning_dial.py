@@ -1,4 +1,4 @@
-"""The dial as a handle: the mouse and the keys lean a simulated pen."""
+"""A posture dial that tilts a simulated pen by mouse and keys."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What the live images show while a swing is on, in a few words."""
+"""Short description of the live detection during a swing."""
 
 from collections import deque
 

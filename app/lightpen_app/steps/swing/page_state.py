@@ -1,4 +1,4 @@
-"""What the step Swing shows and offers, computed from the status of the swing."""
+"""Page state of the step Swing, computed from the status of the swing."""
 
 from dataclasses import dataclass, replace
 from enum import Enum, auto

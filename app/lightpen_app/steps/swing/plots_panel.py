@@ -1,4 +1,4 @@
-"""The plots that grow while the pen is swung."""
+"""Live plots of a swing."""
 
 from collections import deque
 

@@ -1,4 +1,4 @@
-"""What is seen of a swing: instruction, dial, count, state, image and plots."""
+"""View of a swing: instruction, dial, count, state, image and plots."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING

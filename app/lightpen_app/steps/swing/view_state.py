@@ -1,4 +1,4 @@
-"""What the operator is shown at one moment of a swing, as a value for the widgets."""
+"""View state of the step Swing, as a value for the widgets."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""What a task finds, and its points while they are probed: figures and a picture."""
+"""Results of a task, and its points during probing: tables and a picture."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

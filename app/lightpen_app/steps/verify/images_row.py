@@ -1,4 +1,4 @@
-"""Touches from recorded images instead of live ones."""
+"""Probed points from recorded images instead of live ones."""
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QProgressBar, QWidget

@@ -1,4 +1,4 @@
-"""The step Verify: from the current tip to its verdict, without a key."""
+"""The step Verify: verification of the current tip without a key."""
 
 from typing import TYPE_CHECKING
 

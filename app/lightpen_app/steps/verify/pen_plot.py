@@ -1,4 +1,4 @@
-"""How far each LED of a pen moved, over its swings."""
+"""Plot of the displacement of each LED of a pen over its swings."""
 
 import numpy as np
 import pyqtgraph as pg

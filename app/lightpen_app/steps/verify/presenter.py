@@ -1,4 +1,4 @@
-"""What the step Verify shows, computed from the status of the verification."""
+"""View state of the step Verify, computed from the status of the verification."""
 
 from PySide6.QtCore import QObject
 

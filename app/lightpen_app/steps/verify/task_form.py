@@ -1,4 +1,4 @@
-"""Whether a task is done, and its options: a row of fields made from the task."""
+"""Form of a task: its selection and options, derived from the task."""
 
 from PySide6.QtCore import QSize, Signal
 from PySide6.QtWidgets import QCheckBox, QWidget

@@ -1,1 +1,1 @@
-"""Which spot of an image is which LED of the pen."""
+"""Assignment of the spots of an image to the LEDs of the pen."""

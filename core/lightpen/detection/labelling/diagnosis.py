@@ -1,4 +1,4 @@
-"""Why LEDs are not found where the pen file has them: the likely cause, in words."""
+"""Diagnosis of LEDs that are not where the pen file has them: the likely cause."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

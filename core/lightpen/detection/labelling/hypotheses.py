@@ -1,4 +1,4 @@
-"""Poses that a pen may have, guessed from a few of its spots.
+"""Hypotheses of the pose of a pen from a few of its spots.
 
 A triple of spots is supposed to be a triple of LEDs, which fixes up to four poses.
 There are hundreds of triples of LEDs; the size of a spot tells its distance, and with

@@ -1,4 +1,4 @@
-"""Which spot is which LED.
+"""Assignment of spots to LEDs.
 
 A triple of spots is supposed to be a triple of LEDs; the size of the spots tells their
 distance, which orders the suppositions by plausibility. Each fixes a pose (P3P), which

@@ -1,4 +1,4 @@
-"""Supposed poses of a pen laid over the spots of images: matched, refined, weighed.
+"""Matching of pose hypotheses with the spots of images, refined and scored.
 
 Everything is batched over candidates, each a pose supposed for one image, and done in
 the pinhole pixels of `lightpen.detection.labelling.spot_arrays`.

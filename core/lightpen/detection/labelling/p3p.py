@@ -1,4 +1,4 @@
-"""Pose from three points seen along three rays, in closed form.
+"""Pose from three points and their lines of sight, in closed form.
 
 The ranges ``r_i`` along the unit rays ``y_i`` obey three equations of the kind
 ``|r_1 y_1 - r_2 y_2|^2 = a_12``. Eliminating the scale leaves two cones in the ranges,

@@ -1,4 +1,4 @@
-"""The spots of many images as arrays, freed of distortion.
+"""The spots of many images as arrays, without distortion.
 
 Pinhole pixels are the undistorted normalised plane times the focal length.
 """

@@ -1,4 +1,4 @@
-"""The diameter of the LED discs by the areas of their images.
+"""Diameter of the LED discs from the areas of their images.
 
 Each whole LED of each image gives a diameter by equation (11) of method.md; focal
 length and distance cancel. Errors are common to all images: the edge is cut at a level,

@@ -1,4 +1,4 @@
-"""The effects of a station that the images support: size, message and remedy."""
+"""Significant effects of a station: size, message and remedy."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

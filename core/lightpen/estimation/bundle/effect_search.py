@@ -1,4 +1,4 @@
-"""Which effects of a station the images support, beside a fit without them.
+"""Search for effects of a station that improve a fit without them.
 
 The information about the unknowns of all effects takes one pass about the fit, with all
 other unknowns marginalised. An effect whose likelihood gains is a candidate: it

@@ -1,4 +1,4 @@
-"""Modes in which the tip's seat shifts as the pen leans, and the cone drifts.
+"""Modes of the seat offset as a function of the tilt, and of the drift of the cone.
 
 A tip that sits in a worn cone, or that is itself out of round, moves as the pen leans;
 camera and cone drift during a swing. Each mode is a weight for every image: w_m and v_n

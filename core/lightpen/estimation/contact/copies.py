@@ -1,4 +1,4 @@
-"""Images that are copies of others: they count once."""
+"""Detection of copied images, which count once."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The images of one camera by themselves: their poses, and which agree on a tip."""
+"""Single images of one camera: their poses, and which agree on a tip."""
 
 from dataclasses import dataclass
 

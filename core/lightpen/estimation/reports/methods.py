@@ -1,4 +1,4 @@
-"""Tip and cone by each of the methods that find them from the same images."""
+"""Tip and cone by each method from the same images."""
 
 from dataclasses import dataclass
 from typing import Literal, TypeAlias

@@ -1,4 +1,4 @@
-"""What the user should look into, whatever the tip of a calibration is worth."""
+"""Warnings of a calibration, independent of its verdict."""
 
 from collections import Counter
 

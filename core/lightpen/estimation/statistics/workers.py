@@ -1,4 +1,4 @@
-"""Long computations in other processes: of this machine, or of a Dask cluster."""
+"""Computations in worker processes of this machine or of a Dask cluster."""
 
 import os
 from collections.abc import Callable, Iterator, Sequence

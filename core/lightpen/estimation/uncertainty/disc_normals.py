@@ -1,4 +1,4 @@
-"""The normal common to the discs, where it is not known exactly.
+"""The common normal of the discs as an uncertain parameter.
 
 The centre of a disc's image lies off that of the disc by where it faces. The adjustment
 holds the normals. What a turn of all of them adds to the uncertainty is found with it

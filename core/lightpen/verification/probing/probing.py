@@ -1,4 +1,4 @@
-"""Taking touches by themselves: a point is taken when the pen is held still on it.
+"""Automatic probing: a point is recorded when the pen is held still on it.
 
 `advance_touch` takes the state and what the next image shows, and returns the new state
 and what happened. It has no clock and no threads: live images and recorded ones go

@@ -354,7 +354,7 @@ def test_wrong_units_are_told(
     choice.textActivated.emit(choice.currentText())
     seen.settle()
 
-    assert "Are the coordinates in metres?" in seen.words
+    assert "If the coordinates are in metres" in seen.words
     assert in_use(workbench) is before
 
 
@@ -452,7 +452,7 @@ def test_leds_that_cannot_be_a_pen_are_told_and_still_drawn(seen: "Seen") -> Non
 def test_a_number_that_no_pen_has_is_told(seen: "Seen") -> None:
     type_cell(seen, 7, Y, "1e300")
 
-    assert "LED 7 is 1e+297 m from the origin, which no pen is." in seen.words
+    assert "LED 7 is 1e+297 m from the origin, which is implausible" in seen.words
 
 
 def test_a_changed_cell_is_in_use_once_it_is_saved(
