@@ -46,7 +46,7 @@ from lightpen_app.work.settings import Preferences, Settings, data_folder, setti
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
 
-# s after which a thread that computes lets the window go on. A change of theme calls
+# s after which a thread that computes lets the window continue. A change of theme calls
 # thousands of methods, and by Python's 5 ms each would wait for the live images.
 SWITCH_INTERVAL = 0.0005
 
@@ -221,7 +221,7 @@ def run(make_pages: MakePages, swing: Path | None = None) -> int:
 def run_demo(make_pages: MakePages) -> int:
     """Play the demo, and return the exit status.
 
-    Without a display it is played unseen, in a time of its own that waits for a machine
+    Without a display it is played unseen, in its own time that waits for a machine
     too slow for it; what happens is printed, and at the end the tip. Settings and
     records of the user are left alone.
     """

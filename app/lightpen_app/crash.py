@@ -1,7 +1,7 @@
 """Handling of internal errors: a report is written and the program continues.
 
 An exception that nobody caught does not end the program: what was captured is on the
-disk, and the operator is told in one sentence. A crash inside a library, which ends
+disk, and the operator is informed in one sentence. A crash inside a library, which ends
 the program, leaves its trace in a file that the next report points to.
 """
 

@@ -134,7 +134,7 @@ def main(arguments: Sequence[str] | None = None, desktop: Desktop | None = None)
 
 def _write_log_to_existing(data: Path) -> None:
     """Log to a data folder; a command does not make one."""
-    with suppress(OSError):  # it cannot be looked at
+    with suppress(OSError):  # it is not accessible
         if data.is_dir():
             write_log_to(data)
 

@@ -36,7 +36,7 @@ class NoArchiveError(ArchiveError):
 
 
 class StreamError(LightpenError):
-    """Poses cannot be streamed as it was asked for."""
+    """Poses cannot be streamed as requested."""
 
 
 class UsageError(LightpenError):
@@ -48,7 +48,7 @@ class CalibrationError(LightpenError):
 
 
 class AcceptanceError(LightpenError):
-    """The tip must not be put in force, or not as it was asked for."""
+    """The tip must not be made current, or not as requested."""
 
 
 class Cancelled(Exception):  # noqa: N818 - not an error

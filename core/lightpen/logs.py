@@ -1,7 +1,7 @@
 """The log of the program: level and destinations.
 
-Every module logs by a logger of its own name. Whoever logs does not wait for a disk: a
-thread of its own writes the lines, to a file that several processes may share, and
+Every module logs by its own logger name. Whoever logs does not wait for a disk: its own
+thread writes the lines, to a file that several processes may share, and
 keeps the last ones in memory for reports.
 """
 

@@ -90,12 +90,12 @@ def starts_in(seconds: int) -> Message:
 
 
 def few_leds(seen: int, needed: int) -> Message:
-    """Tell that an image shows too few LEDs."""
+    """State that an image shows too few LEDs."""
     return message(Code.FEW_LEDS, seen=seen, needed=needed)
 
 
 def bad_fit(noise: float, usual: float) -> Message:
-    """Tell that the LEDs of an image do not fit: its noise and that of others, px."""
+    """State that the LEDs of an image do not fit: its noise and that of others, px."""
     return message(Code.BAD_FIT, noise=noise, usual=usual)
 
 
@@ -135,12 +135,12 @@ def not_upright(n_images: int) -> Message:
 
 
 def uncertain(uncertainty: float, limit: float) -> Message:
-    """Tell that U (k = 2) of the tip is above its limit, mm."""
+    """State that U (k = 2) of the tip is above its limit, mm."""
     return message(Code.UNCERTAIN, uncertainty=uncertainty, limit=limit)
 
 
 def cannot_get_below(floor: float, limit: float) -> Message:
-    """Tell that U (k = 2) stays above its limit whatever is captured, mm."""
+    """State that U (k = 2) stays above its limit whatever is captured, mm."""
     return message(Code.OUT_OF_REACH, floor=1000 * floor, limit=1000 * limit)
 
 
@@ -181,7 +181,7 @@ def file_contradicted(why: Message) -> Message:
 
 
 def not_simultaneous(camera: str, lag: float) -> Message:
-    """Tell by which part of the time between two images a camera is late."""
+    """State by which part of the time between two images a camera is late."""
     return message(Code.NOT_SIMULTANEOUS, camera=camera, lag=abs(lag))
 
 
@@ -232,7 +232,7 @@ def change_beyond_limit(distance: float, date: str, limit: float) -> Message:
 
 
 def last_unknown(why: Message) -> Message:
-    """Tell that a tip cannot be compared with the one in force."""
+    """State that a tip cannot be compared with the one in force."""
     return message(Code.LAST_UNKNOWN, why=why)
 
 
@@ -242,7 +242,7 @@ def halves_differ(difference: float, usual: float) -> Message:
 
 
 def many_excluded(n_excluded: int) -> Message:
-    """Tell how many images the user has excluded."""
+    """State how many images the user has excluded."""
     return message(Code.MANY_EXCLUDED, n_excluded=n_excluded)
 
 
@@ -252,7 +252,7 @@ def many_dropped(n_dropped: int, n_images: int) -> Message:
 
 
 def leds_off(sigma: float, uncertainty: float) -> Message:
-    """Tell the error of the LED file, and U (k = 2) of the tip by it alone, mm."""
+    """State the error of the LED file, and U (k = 2) of the tip by it alone, mm."""
     return message(Code.LEDS_OFF, sigma=sigma, uncertainty=uncertainty)
 
 
@@ -262,15 +262,15 @@ def led_displaced(led: int, distance: float) -> Message:
 
 
 def leds_misfit(sigma: float, usual: float) -> Message:
-    """Tell the residuals of a fit, and what they are at most as a rule, px."""
+    """State the residuals of a fit, and what they are at most as a rule, px."""
     return message(Code.LEDS_MISFIT, sigma=sigma, usual=usual)
 
 
 def no_tip(why: Message) -> Message:
-    """Tell why there is no tip."""
+    """State why there is no tip."""
     return message(Code.NO_TIP, why=why)
 
 
 def tip_is_good(uncertainty: float) -> Message:
-    """Tell U (k = 2) of a tip with which all is well, mm."""
+    """State U (k = 2) of a tip with which all is well, mm."""
     return message(Code.GOOD, uncertainty=uncertainty)

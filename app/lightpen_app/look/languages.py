@@ -34,7 +34,7 @@ def system_language() -> str:
 class LanguageSwitch(QObject):
     """Installs the translations of a language in the application.
 
-    Every widget then gets a LanguageChange event and sets its texts anew.
+    Every widget then gets a LanguageChange event and sets its texts again.
     """
 
     def __init__(self, application: QApplication) -> None:

@@ -223,8 +223,8 @@ def phrase(message: Message, heading: float | None = None) -> Instruction:
     message : Message
         One of `lightpen.swing_messages`.
     heading : float, optional
-        The operator's right as the camera sees it, rad; without it sides are told as
-        the camera sees them.
+        The operator's right as the camera sees it, rad; without it sides are reported
+        as the camera sees them.
     """
     code = Code(message.code)
     if code is Code.TOO_LITTLE_TILT and heading is not None:

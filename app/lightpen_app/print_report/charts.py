@@ -1,6 +1,6 @@
 """Printed plots: axes with numbers, dots, lines, bars and arrows.
 
-What tells series apart is their form besides their colour, as paper is often grey.
+What shows series apart is their form besides their colour, as paper is often grey.
 Nothing is see-through: PDF/A-1 has no transparency.
 """
 

@@ -64,7 +64,7 @@ class PrintReport:
     Attributes
     ----------
     author : str
-        Who is told by the file's properties; may be empty.
+        Author in the properties of the file; may be empty.
     """
 
     author: str

@@ -85,7 +85,7 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
     @override
     def closeEvent(self, event: QCloseEvent) -> None:
         super().closeEvent(event)
-        if self._saving is None:  # else it tells of it first
+        if self._saving is None:  # else it reports it first
             self.deleteLater()
 
     def n_pages(self) -> int:

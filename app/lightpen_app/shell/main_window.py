@@ -464,7 +464,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._tell_attention()
 
     def _tell_attention(self) -> None:
-        """Tell whether live images can be seen now."""
+        """Return whether live images can be seen now."""
         is_seen = self.is_seen()
         self.attention_changed.emit(self.page().shows_images and is_seen)
 

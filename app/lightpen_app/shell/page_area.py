@@ -16,8 +16,8 @@ from lightpen_app.widgets.translated import Translated
 class NoticeBar(Translated, QFrame):
     """Bar for a message, hidden without one; Close hides it.
 
-    While nothing can be kept in the data folder, whatever is told of it says where
-    another one is chosen, and is told once.
+    While nothing can be kept in the data folder, whatever is reported of it says where
+    another one is chosen, and is reported once.
 
     Signals
     -------

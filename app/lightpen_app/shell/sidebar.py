@@ -128,7 +128,7 @@ class Sidebar(Translated, QFrame):
         self._reveal_present()
 
     def subject(self) -> str:
-        """Return the item in words, one line for each name."""
+        """Return the item as text, one line for each name."""
         return self._subject.text()
 
     def standing(self) -> StatusMessage:
@@ -189,7 +189,7 @@ class Sidebar(Translated, QFrame):
         self._foot.setContentsMargins(side, 0, side, 0)
         top, bottom = (GRID, GRID) if room.is_low else (3 * GRID, 2 * GRID)
         self._layout.setContentsMargins(0, top, 0, bottom)
-        self._name.setVisible(not room.is_low)  # the title of the window tells it
+        self._name.setVisible(not room.is_low)  # the title of the window shows it
         self._steps.set_narrow(narrow)
         self._retranslate()
 

@@ -44,7 +44,7 @@ class Page(Translated, QWidget):
     key : str
         Names the step in the settings and its help file: "start", "camera" and so on.
     shows_images : bool
-        Whether live images are looked at on it.
+        Whether live images are shown on it.
 
     Signals
     -------
@@ -53,7 +53,7 @@ class Page(Translated, QWidget):
     advance_requested()
         The step is done; show the next.
     step_requested(str)
-        The step of this key must be shown, such as that of a swing to go on with.
+        The step of this key must be shown, such as that of a swing to continue with.
     operator_value_changed(OperatorValue)
         What the operator view shows.
     data_folder_requested()
@@ -136,4 +136,4 @@ class Page(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        """Set every text anew; by default there is none."""
+        """Translate every text; by default there is none."""

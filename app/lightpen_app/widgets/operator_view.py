@@ -23,7 +23,7 @@ NOTICE_SHARE, SMALL_SHARE, GAP_SHARE = 0.12, 0.03, 0.008
 BESIDE_NOTICE = 0.55  # of their share that instruction and hint have below a notice
 LEAST_SHARE = 1 / 18  # of the height; smaller letters would leave it empty
 USUAL_DPI = 92.0  # a 24 inch screen of 1920 x 1080
-CREDIBLE_DPI = (60.0, 250.0)  # outside, a screen does not tell its size
+CREDIBLE_DPI = (60.0, 250.0)  # outside, a screen does not show its size
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ class OperatorView(Translated, QWidget):
         self._progress = QProgressBar()
         self._progress.setRange(0, 1000)
         self._progress.setTextVisible(False)
-        self._banner = StateBanner(speaks=False)  # the page tells it
+        self._banner = StateBanner(speaks=False)  # the page shows it
         self._keys = FittedText(43, 1)
 
         # Layout

@@ -1,6 +1,6 @@
 """Plots with replaceable data, which can be saved as PNG and CSV.
 
-Making a plot anew costs fifty times more than `setData` on one that is there.
+Making a plot again costs fifty times more than `setData` on one that is there.
 """
 
 from collections.abc import Mapping, Sequence
@@ -231,7 +231,7 @@ class Plot(QWidget):
         return ()
 
     def _fitted_title_px(self) -> int:
-        """Return how large the title is, which has to be read whole, px."""
+        """Return how large the title is, which must be read whole, px."""
         largest = scaled(TextSize.SMALL)
         words = "   ".join((self._axes.title, *self._named_curves()))
         needed = QFontMetricsF(font(largest, bold=True)).horizontalAdvance(words)
@@ -261,7 +261,7 @@ class Plot(QWidget):
                 axis.showLabel(False)
 
     def _fit(self, x: FloatArray, y: FloatArray, *, y_zero: bool = False) -> None:
-        """Show all of the data, and the zero of y if it is asked for."""
+        """Show all of the data, and the zero of y if it is requested."""
         x, y = x[np.isfinite(x)], y[np.isfinite(y)]
         if not (len(x) and len(y)):
             return
@@ -393,7 +393,7 @@ class TracePlot(Plot):
         return self._n_covered(label.orthoPos, label.anchors[0])
 
     def _show_range(self) -> None:
-        """Show what has to be in sight, with room for the words of the limit."""
+        """Show what must be in sight, with room for the words of the limit."""
         x, *values = map(np.asarray, self._columns.values())
         if not len(x):
             self._show_nothing()

@@ -60,7 +60,7 @@ class QuestionBar(Translated, AskingBar):
         self.hide()
 
     def set_words(self, words: Callable[[], Question]) -> None:
-        """Change the question; its words are asked for in each language anew."""
+        """Change the question; its words are requested in each language again."""
         self._words = words
         self.refresh()
 

@@ -47,7 +47,7 @@ class State:
 class StateBanner(QWidget):
     """A filled area with a sign, a word and a sentence.
 
-    A screen reader is told each new word with its sentence, once all is shown that
+    A screen reader announces each new word with its sentence, once all is shown that
     belongs to it: what stands only in passing is not told.
 
     Parameters
@@ -56,7 +56,7 @@ class StateBanner(QWidget):
         Size of the word, px; the sentence is half of it, at least `TextSize.BODY`, and
         no smaller than `TextSize.SMALL` however long it is: the banner grows.
     speaks : bool
-        Whether a screen reader is told; not where another banner says the same.
+        Whether a screen reader announces it; not where another banner says the same.
 
     Signals
     -------

@@ -67,10 +67,10 @@ class UndoButtons(Translated, QWidget):
         self._why_locked = why
         self._refresh()
 
-    # A stack that is being deleted still tells these: it is not to be asked then.
+    # A stack that is being deleted still shows these: it is not to be asked then.
 
     def _on_can_undo_changed(self, can_undo: bool) -> None:
-        self._can_undo = can_undo  # a stack always tells the other next
+        self._can_undo = can_undo  # a stack always shows the other next
 
     def _on_can_redo_changed(self, can_redo: bool) -> None:
         self._can_redo = can_redo

@@ -36,7 +36,7 @@ class ArchiveWriter(QObject):
         Job(lambda _: logbook.enter_owed(), self).start()
 
     def keep_camera_trial(self, trial: CameraTrial, names: Names) -> None:
-        """Keep what came of the calibration of a camera, and enter it."""
+        """Keep the result of the calibration of a camera, and enter it."""
         logbook, folder, now = self._logbook, self._folder, self._now
 
         def keep(_: Report) -> None:

@@ -66,7 +66,7 @@ class CameraSetup(QObject):
     def open(self) -> None:
         """Open the source, or open it again after it failed; then follow its choice.
 
-        A swing that is captured goes on with it.
+        A swing that is captured continues with it.
         """
         self._is_started = True
         source, *others = self._selection.preparation.sources
@@ -82,7 +82,7 @@ class CameraSetup(QObject):
     def search(self, kind: str, producer: str) -> None:
         """Search for the cameras of a source, with a GenTL producer if needed.
 
-        Of a search before nothing is told any more.
+        Of a search before nothing is reported any more.
         """
         source = source_named(kind)
         if source is None:

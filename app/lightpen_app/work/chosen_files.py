@@ -20,7 +20,7 @@ from lightpen_app.work.stations import FilePaths
 class ChosenFiles(QObject):
     """Reads the files of a station, those beside images, and samples.
 
-    One reading at a time; of the one before nothing is told any more.
+    One reading at a time; of the one before nothing is reported any more.
 
     Parameters
     ----------

@@ -39,9 +39,9 @@ class LibraryWatch(QObject):
     changed()
         `statuses` are different.
     change_kept(object)
-        What was asked for.
+        What was requested.
     change_failed(object, str)
-        What was asked for, and the sentence why it was not kept.
+        What was requested, and the sentence why it was not kept.
     """
 
     changed = Signal()
@@ -108,7 +108,7 @@ class LibraryWatch(QObject):
             library = read_library(folder)
             if not FolderArchive(folder).all_files():  # nothing was ever in force
                 return StationStatus(library, now=now())
-            with suppress(ArchiveError):  # which the runner tells of
+            with suppress(ArchiveError):  # which the runner reports
                 opened = logbook.opened()
                 opened.enter_owed()
                 # A fifth of a second, which the start need not take.

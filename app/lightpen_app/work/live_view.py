@@ -126,7 +126,7 @@ class LiveView(QObject):
     configured(int, CameraSettings)
         A camera, by its number from 0, has these in force.
     failed()
-        No more images come until another `open`; `why_no_images` tells.
+        No more images come until another `open`; `why_no_images` shows.
     """
 
     image_shown = Signal(object)
@@ -224,7 +224,7 @@ class LiveView(QObject):
         Returns
         -------
         bool
-            Whether all have; the others go on closing.
+            Whether all have; the others continue closing.
         """
         deadline = monotonic() + timeout_s
         for thread in self._closing:

@@ -73,12 +73,12 @@ class Selection(QObject):
 
     @property
     def supervision(self) -> Supervision:
-        """What supervisors have laid down for the data folder."""
+        """What supervisors have set for the data folder."""
         return self._supervision
 
     @property
     def limits(self) -> StationLimits:
-        """The limits of the station: as laid down, or as chosen."""
+        """The limits of the station: as set, or as chosen."""
         return self._limits_for(self._preparation)
 
     def stations(self) -> tuple[str, ...]:
@@ -126,7 +126,7 @@ class Selection(QObject):
         self.changed.emit(self._preparation)
 
     def set_supervision(self, supervision: Supervision) -> None:
-        """Go by what supervisors have laid down, from now on."""
+        """Use what supervisors have set, from now on."""
         self._supervision = supervision
         before, limits = self._preparation, self.limits
         self._preparation = replace(before, limits=limits.swing)

@@ -1,6 +1,6 @@
 """Settings, stored in a JSON file.
 
-What is chosen is in force at once, and written by a thread of its own: neither a disk
+What is chosen is in force at once, and written by its own thread: neither a disk
 that does not answer nor another program that keeps the settings to itself holds the
 window.
 """
@@ -208,7 +208,7 @@ class Settings(QObject):
         return self._machine.update_file
 
     def machine_limits(self) -> StationLimits:
-        """Return the limits of this computer, which a station goes by at first."""
+        """Return the limits of this computer, which a station uses at first."""
         return self._machine.station_limits()
 
     def set_due_rule(self, rule: DueRule) -> None:

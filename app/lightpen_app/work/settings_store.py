@@ -106,7 +106,7 @@ def _read(file: Path) -> Content:
 
 def _set_aside(file: Path) -> Message:
     aside = file.with_name(f"{file.name}.damaged")
-    with suppress(OSError):  # it is told all the same
+    with suppress(OSError):  # it is reported all the same
         file.replace(aside)
     return message(
         "settings.damaged", file=printable(str(file)), aside=printable(aside.name)

@@ -22,7 +22,7 @@ class Streaming(QObject):
     Parameters
     ----------
     clock : Clock
-        The one that the cameras go by.
+        The one that the cameras use.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ def _what_counts(preparation: Preparation) -> tuple[object, ...]:
 
 
 def _tip(archive: FolderArchive, preparation: Preparation) -> StreamedTip | None:
-    """Return the tip in force; None where there is none to be measured with."""
+    """Return the current tip; None where there is none to be measured with."""
     if preparation.camera_file is None or preparation.pen_file is None:
         return None
     try:

@@ -22,7 +22,7 @@ from lightpen_app.work.run_view import RunView
 class SwingRun(RunView[SwingStatus, SwingEvent]):
     """Shows the GUI what its `runner` does with a swing.
 
-    `progressed` tells of solving; the verdict is an event, too.
+    `progressed` reports solving; the verdict is an event, too.
 
     Signals
     -------
@@ -41,7 +41,7 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
     Attributes
     ----------
     follower : GuidedOperator or None
-        Leads the hand of a simulated operator, if one is to do what is asked for.
+        Leads the hand of a simulated operator, if one is to do what is requested.
     logbook : LazyLogbook
         All that becomes of swings is entered in it; any thread may use it.
     """
@@ -59,7 +59,7 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
         super().__init__(SwingStatus(), notifications, parent)
         self._folder = folder
         address = ""
-        with suppress(FileError):  # which `Settings.trouble` tells
+        with suppress(FileError):  # which `Settings.trouble` reports
             address = server_address()
         self.logbook = LazyLogbook(folder, address)
         self._archive = FolderArchive(folder, self.logbook.confirm)

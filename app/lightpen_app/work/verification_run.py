@@ -18,7 +18,7 @@ from lightpen_app.work.run_view import RunView
 class VerificationRun(RunView[VerificationStatus, SessionEventKind]):
     """Shows the GUI what its `runner` does to verify a tip.
 
-    `progressed` tells of recorded images that are read.
+    `progressed` reports recorded images that are read.
 
     Signals
     -------
@@ -35,7 +35,7 @@ class VerificationRun(RunView[VerificationStatus, SessionEventKind]):
     Attributes
     ----------
     probing_operator : ProbingOperator or None
-        Leads the hand of a simulated operator, if one is to do what is asked for.
+        Leads the hand of a simulated operator, if one is to do what is requested.
     """
 
     files_changed = Signal()

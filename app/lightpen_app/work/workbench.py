@@ -158,7 +158,7 @@ class Workbench(QObject):
         Returns
         -------
         bool
-            Whether it has, the jobs of all pages included. What goes on may be left
+            Whether it has, the jobs of all pages included. What continues may be left
             behind: all that was acknowledged is on the disk.
         """
         deadline = monotonic() + timeout_s

@@ -66,7 +66,7 @@ class CopyResult:
 
 
 def own_chain(database: Database) -> str:
-    """Return the chain that is at home in a database; it begins with the first call.
+    """Return the own chain of a database; it begins with the first call.
 
     With it begins its station key.
 
@@ -87,7 +87,7 @@ def own_chain(database: Database) -> str:
 
 
 def chain_at_home(database: Database) -> str | None:
-    """Return the chain that is at home in a database, if it has begun."""
+    """Return the own chain of a database, if it has begun."""
     if database.file is None:
         return None
     with database.reading() as connection:
@@ -97,11 +97,11 @@ def chain_at_home(database: Database) -> str | None:
 def append(
     database: Database, chain: str, event: Event, record: str | None = None
 ) -> StoredEntry | None:
-    """Append an entry to a chain that is at home in a database.
+    """Append an entry to the own chain of a database.
 
     When this returns, the entry is kept whatever happens next; when it raises, or is
     killed, it is kept whole or not at all. Of two programs that enter the same result
-    file, or that the same swing was set aside, one does; the other gets None.
+    file, or that the same swing was abandoned, one does; the other gets None.
 
     Parameters
     ----------
@@ -134,13 +134,13 @@ def copy_entries(
 ) -> CopyResult:
     """Let the copy of a chain grow by entries, in their order; known ones are passed.
 
-    A chain that is at home in the database grows by `append` alone.
+    The own chain of the database grows by `append` alone.
 
     Raises
     ------
     ArchiveError
-        They do not go on where the copy ends, are not signed by the station of the
-        chain, are beyond the head of a chain at home, or the copy says otherwise.
+        They do not continue the copy, are not signed by the station of the
+        chain, are beyond the head of the own chain, or the copy says otherwise.
     """
     with database.writing() as connection:
         if _is_server(connection):
@@ -165,13 +165,13 @@ def adopt_entries(
     entries: Sequence[StoredEntry],
     records: Mapping[str, str],
 ) -> None:
-    """Let a chain that is at home here grow by entries that this folder lost.
+    """Let the own chain here grow by entries that this folder lost.
 
     Raises
     ------
     ArchiveError
-        They do not go on where the chain ends, are not signed by its station, or
-        another chain is at home here.
+        They do not continue the chain, are not signed by its station, or
+        the own chain is another one.
     """
     empty = delete(CHAINS).where(
         CHAINS.c.is_own, CHAINS.c.number == 0, CHAINS.c.chain != chain
@@ -264,7 +264,7 @@ def batch_of(database: Database, chain: str, after: int) -> tuple[StoredEntry, .
 
 
 def records_of(database: Database, entries: Sequence[StoredEntry]) -> dict[str, str]:
-    """Return the records that entries vouch for, by their hash."""
+    """Return the records that entries refer to, by their hash."""
     names = [each.entry.event.record_sha256 for each in entries]
     wanted = select(RECORDS).where(RECORDS.c.sha256.in_([n for n in names if n]))
     with database.reading() as connection:
@@ -335,7 +335,7 @@ class ArchivedFiles:
     def __contains__(self, place: str) -> bool:
         """Return whether a place was entered, as far as was read.
 
-        A swing whose result was taken back was not: it may still be set aside.
+        A swing whose result was revoked was not: it may still be abandoned.
         """
         revoked = Kind.TAKEN_BACK.value
         is_swing = self._kinds.get(searchable(place), revoked) != revoked
@@ -501,7 +501,7 @@ def _require_next(head: ChainHead, new: list[StoredEntry]) -> None:
 
 
 def _require_elsewhere(connection: Connection, new: StoredEntry) -> None:
-    """Refuse an entry of the chain at home that was not entered here."""
+    """Refuse an entry of the own chain that was not entered here."""
     if _is_server(connection):
         return
     if connection.execute(_AT_HOME).scalar_one_or_none() == new.entry.chain:

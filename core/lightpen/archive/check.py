@@ -57,12 +57,12 @@ class ArchiveCheckResult:
 def check_archive(
     database: Database, data: Path | None = None, report: Report = lambda fraction: None
 ) -> ArchiveCheckResult:
-    """Look at every entry, every record and every file that an archive vouches for.
+    """Look at every entry, every record and every file that an archive refers to.
 
     Parameters
     ----------
     data : Path, optional
-        Data folder, whose files are looked at, too.
+        Data folder, whose files are examined, too.
     report : callable
         Called with the fraction done, 0 to 1; what it raises ends the check.
 
@@ -92,10 +92,10 @@ def check_archive(
 
 
 def check_file(archive: Path, data: Path, report: Report) -> ArchiveCheckResult:
-    """Look at an archive in a file, and at the files that it vouches for.
+    """Look at an archive in a file, and at the files that it refers to.
 
     Of a file that a program began to write meanwhile nothing is known but what a check
-    beside that program tells, which is made then.
+    beside that program shows, which is made then.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ class ServerCheckResult:
     Attributes
     ----------
     n_entries : int
-        On the server, each of which was looked at.
+        On the server, each of which was examined.
     n_waiting : int
         Entries of this station that were not delivered yet.
     findings : tuple of Message
@@ -72,7 +72,7 @@ def check_server(database: Database, server: Database) -> ServerCheckResult:
 
 
 def require_continued(database: Database, chain: str, server: Database) -> None:
-    """Refuse a server whose last entry of a chain at home is not where it should be.
+    """Refuse a server whose last entry of the own chain is not where it should be.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def require_continued(database: Database, chain: str, server: Database) -> None:
 
 
 def require_same(database: Database, chain: str, server: Database) -> None:
-    """Refuse a server that is ahead of a chain at home, lost some of it or differs.
+    """Refuse a server that is ahead of the own chain, lost some of it or differs.
 
     Raises
     ------

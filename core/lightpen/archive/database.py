@@ -1,6 +1,6 @@
 """The database of an archive: a file of SQLite, or a server of PostgreSQL.
 
-It is looked at before anything is written: one of another program, or of a later
+It is examined before anything is written: one of another program, or of a later
 version of this one, stays as it is. A new file gets the tables as they are now; what is
 of an earlier version is brought up to date by the steps in the folder ``migrations``.
 """
@@ -181,7 +181,7 @@ def is_open(path: Path) -> bool:
     Raises
     ------
     ArchiveError
-        It may not be looked at.
+        It is not accessible.
     """
     with _looking_at(path):
         return Path(f"{path}-wal").exists()
@@ -206,7 +206,7 @@ def _connected(place: str) -> sqlite3.Connection:
         uri=place.startswith("file:"),
         timeout=LONGEST_WAIT_S,
         check_same_thread=False,
-        # Transactions begin where they are told to: by themselves, a writer's would
+        # Transactions begin explicitly: by default, a writer's would
         # begin as a reader's, and two of them refuse each other.
         isolation_level=None,
     )
@@ -218,7 +218,7 @@ def _connected(place: str) -> sqlite3.Connection:
 def _write_ahead(connection: sqlite3.Connection) -> None:
     """Let readers and a writer not hold up each other.
 
-    For one who does so just then, or who writes, SQLite does not wait by itself.
+    For one who does so just then, or who writes, SQLite does not wait automatically.
     """
     deadline = monotonic() + LONGEST_WAIT_S
     while True:

@@ -62,7 +62,7 @@ IN_FORCE_BY = (Kind.ACCEPTED, Kind.RESTORED)  # that put a tip in force
 
 
 class FileHash(Struct, frozen=True):
-    """A file that an entry vouches for.
+    """A file that an entry refers to.
 
     Attributes
     ----------
@@ -102,8 +102,8 @@ class Event(Struct, frozen=True):
         Settings and limits of a swing, task of a verification, new values of limits or
         of a library item.
     result : FileHash or None
-        The file that put a tip in force, or took it back; of what is no swing, the
-        file that tells of it.
+        The file that put a tip in force, or revoked it; of what is no swing, the file
+        that states it.
     files : tuple of FileHash
         The record of the swing, whose journal names the images with their hashes; of
         a verification the journals of its touches; of the library a picture.

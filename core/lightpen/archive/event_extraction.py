@@ -45,10 +45,10 @@ class ExtractedEvent:
     Attributes
     ----------
     record : str or None
-        The file that tells of it, from which the file can be made again; of a tip that
+        the file that states it, from which the file can be made again; of a tip that
         was not accepted its calibration record. The event has its hash.
     takes_back : str
-        File of the result that is taken back, as `FileHash.place`; else empty.
+        File of the result that is revoked, as `FileHash.place`; else empty.
     """
 
     event: Event

@@ -1,8 +1,9 @@
 """Restores a data folder from the server: the entries of its chain, and their files.
 
 An entry of a result, a verification, a camera calibration or a change of the library
-has the file that tells of it, so that these are made again byte by byte. Swings and
-their images are on no server; limits may have the hash of a password, and are set anew.
+has the file that states it, so that these are made again byte by byte. Swings and
+their images are on no server; limits may have the hash of a password, and are set
+again.
 """
 
 from dataclasses import dataclass
@@ -124,7 +125,7 @@ def _restore_files(
 
 
 def _missing_file(entry: StoredEntry, data: Path) -> Path | None:
-    """Return the file that tells of an entry, if it is of this folder and missing."""
+    """Return the file that states an entry, if it is of this folder and missing."""
     result = entry.entry.event.result
     if result is None:
         return None

@@ -1,7 +1,7 @@
 """Check of results, swings and images against the hashes in their entries.
 
 An entry has the hash of the journal of its swing as far as it went then, and each line
-of that the hashes of the images of all cameras: so the entry vouches for every image.
+of that the hashes of the images of all cameras: so the entry refers to every image.
 """
 
 from collections.abc import Iterable, Iterator
@@ -24,7 +24,7 @@ from lightpen.record.swings.reading import image_name, open_record
 
 
 class FilesCheck:
-    """Reads each file once, however many entries vouch for it.
+    """Reads each file once, however many entries refer to it.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def _images(data: Path, journal: FileHash) -> Iterator[FileHash]:
     try:
         content = journal_bytes(path.parent)[: journal.n_bytes]
         if sha256(content).hexdigest() != journal.sha256:
-            return  # which is a finding of its own
+            return  # which is a separate finding
         lines = parse_lines(content.splitlines(), path.parent)
     except FileError:
         return

@@ -110,7 +110,7 @@ def lines(
 
 
 def messages_on(database: Database, entry: StoredEntry) -> tuple[StoredEntry, ...]:
-    """Return what concerns an entry: notes, that it was taken back, or restored."""
+    """Return what concerns an entry: notes, that it was revoked, or restored."""
     found = select(*READ).where(ENTRIES.c.concerns == entry.sha256).order_by(*IN_ORDER)
     with database.reading() as connection:
         rows = connection.execute(found).all()

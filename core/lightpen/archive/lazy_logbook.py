@@ -60,7 +60,7 @@ class LazyLogbook:
         assessment: SwingAssessment | None,
         at: datetime,
     ) -> None:
-        """Enter that a swing was set aside, with the tip that was not accepted.
+        """Enter that a swing was abandoned, with the tip that was not accepted.
 
         Raises
         ------

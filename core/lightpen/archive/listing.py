@@ -49,7 +49,7 @@ def entries_csv(entries: Iterable[StoredEntry], home: str | None) -> str:
     Parameters
     ----------
     home : str or None
-        Chain at home in the archive; entries of all others are foreign.
+        Own chain of the archive; entries of all others are foreign.
     """
     return csv_table([COLUMNS, *(_row(each, home) for each in entries)])
 

@@ -1,13 +1,13 @@
 """The logbook of a station: enters the events of a data folder in its chain.
 
-One rule joins it to the files. A result file puts a tip in force, or takes it back, the
-journal of a swing says that it was set aside, and changes of the tip library, limits,
+One rule joins it to the files. A result file puts a tip in force, or revokes it, the
+journal of a swing says that it was abandoned, and changes of the tip library, limits,
 verifications and calibrated cameras have files of their own: these files are the truth,
 written whole before anything else, and each is owed one entry. What is owed is entered
 as soon
 as it is written; where that failed, or the program was killed, or had no archive yet,
 with whatever is entered next, and at every start. So nothing is in force or set aside
-that the archive does not tell of from the next start on, and no entry is of nothing.
+that the archive does not contain from the next start on, and no entry is of nothing.
 """
 
 import logging
@@ -170,12 +170,12 @@ class Logbook:
     def enter_refused(
         self, solution: Solution, assessment: SwingAssessment, at: datetime
     ) -> None:
-        """Enter that the tip of a swing that is set aside was not accepted.
+        """Enter that the tip of a swing that is abandoned was not accepted.
 
         Raises
         ------
         ArchiveError
-            It cannot be entered; its being set aside stays owed.
+            It cannot be entered; the entry remains pending.
         FileError
             A file of the swing cannot be read.
         """
@@ -228,7 +228,7 @@ class Logbook:
             The tip is retired, there is no reason, or there is a password and no
             supervisor signs.
         FileError
-            It cannot be put in force; what was in force stays so.
+            It cannot be made current; what was in force stays so.
         """
         require_in_use(self._results, entry.entry.event.names.tip)
         event, now = entry.entry.event, local_now()
@@ -302,7 +302,7 @@ class Logbook:
 
     def _renew_lost_key(self) -> None:
         """Go on with a new key in a folder that was moved here, without a password."""
-        with suppress(FileError):  # which every acceptance tells
+        with suppress(FileError):  # which every acceptance reports
             guard = read_supervision(self._data)
             name = (
                 chain_of(guard.station_keys[-1]) if guard.station_keys else self.chain
@@ -362,7 +362,7 @@ def _taking_back(event: Event, back: StoredEntry) -> Event:
 
 
 def _set_aside(records: Path) -> Iterator[Path]:
-    """Yield the folders of the swings that were set aside, the oldest first."""
+    """Yield the folders of the swings that were abandoned, the oldest first."""
     try:
         folders = sorted(records.iterdir()) if records.is_dir() else []
     except OSError as error:

@@ -84,7 +84,7 @@ def last_accepted(
     is_simulated: bool = False,
     chain: str | None = None,
 ) -> StoredEntry | None:
-    """Return the last acceptance of a pen and tip that was not taken back.
+    """Return the last acceptance of a pen and tip that was not revoked.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def of_chain(chain: str) -> ColumnElement[bool]:
 
 
 def revoked(entries: FromClause) -> Exists:
-    """Return the condition that an entry was taken back since."""
+    """Return the condition that an entry was revoked since."""
     back = ENTRIES.alias()
     return exists().where(
         back.c.concerns == entries.c.sha256, back.c.kind == Kind.TAKEN_BACK.value
@@ -139,7 +139,7 @@ def revoked(entries: FromClause) -> Exists:
 
 
 def is_at_home(entries: FromClause) -> Exists:
-    """Return the condition that an entry is of the chain at home in its database."""
+    """Return the condition that an entry is of the own chain of its database."""
     return exists().where(CHAINS.c.chain == entries.c.chain, CHAINS.c.is_own)
 
 

@@ -29,7 +29,7 @@ def require_restorable(
     Parameters
     ----------
     chain : str
-        That is at home in the data folder.
+        Own chain of the data folder.
     data : Path
         Data folder.
 
@@ -95,7 +95,7 @@ def restored_result(
     Raises
     ------
     ArchiveError
-        The entry put no tip in force, or the archive does not tell all of it.
+        The entry put no tip in force, or the archive does not show all of it.
     """
     event = entry.entry.event
     if not reason.strip():

@@ -3,7 +3,7 @@
 Chains and hashes tell of every entry and record that was changed, but a file of SQLite
 has bytes that belong to neither. As long as nothing was entered since, the file must be
 as it was sealed, bit by bit. Whatever was entered since, the archive must still hold
-the last entries of then: so one whose last entries were taken out, with all that tells
+the last entries of then: so one whose last entries were removed, with all that shows
 of them, is found, and one that was replaced by an older copy of itself.
 
 The first seals had one hash of all that. They are read as what they are, and the next
@@ -56,7 +56,7 @@ def seal_of(archive: Path) -> Path:
 def close_sealed(database: Database) -> None:
     """Close an archive, and seal its file unless another process has it open.
 
-    A seal that is damaged, or tells of entries which the archive does not hold, stays
+    A seal that is damaged, or names entries which the archive does not hold, stays
     as it is, to be found.
 
     Raises

@@ -15,7 +15,7 @@ from lightpen.archive.tables import CHAIN_WRITERS, ENTRIES, RECORDS
 _HEADING = """\
 -- The archive of Lightpen on PostgreSQL 13 or later. Run it once, in a database of its
 -- own, as its owner:   lightpen archive server-sql | psql -v ON_ERROR_STOP=1 DATABASE
--- Each station gets a role of its own, and so does who reads the whole archive:
+-- Each station gets its own role, and so does who reads the whole archive:
 --     CREATE ROLE hall_2 LOGIN PASSWORD '...' IN ROLE lightpen_station;
 --     CREATE ROLE quality LOGIN PASSWORD '...' IN ROLE lightpen_auditor;
 -- A station whose role is replaced keeps its chain:

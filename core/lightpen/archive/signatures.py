@@ -8,7 +8,7 @@ continue it, nor begin one of that name, see `lightpen.record.signing.keys`.
 A chain gets another key by an entry of limits whose settings have ``station_key``, with
 the signature of `key_change` by the key before, or by a supervisor whose key an earlier
 entry has as ``supervisor_key``. A station without a supervisor password that lost its
-key goes on with a new one that nothing approves; a check says so.
+key continues with a new one that nothing approves; a check says so.
 """
 
 from collections.abc import Iterable

@@ -43,7 +43,7 @@ class AravisFeatures:
     Parameters
     ----------
     told : callable
-        Returns what tells of errors in sentences.
+        Returns the context that raises errors as messages.
     """
 
     def __init__(
@@ -172,7 +172,7 @@ class AravisDevice:
         except AravisError as error:
             raise not_found(self._place, str(error)) from error
         self._require_control(aravis, camera)
-        with suppress(AravisError):  # not every camera tells its serial number
+        with suppress(AravisError):  # not every camera shows its serial number
             serial = aravis.camera_get_device_serial_number(camera)
             self._serial = serial.decode("utf-8", "replace") or self._serial
         self._features = AravisFeatures(aravis, camera, self._told)
@@ -203,7 +203,7 @@ class AravisDevice:
     def stop(self) -> None:
         """Stop streaming."""
         aravis, camera = self._open_ones()
-        if not self._is_gone:  # seconds would go by without an answer
+        if not self._is_gone:  # seconds would pass without an answer
             with suppress(AravisError):
                 aravis.camera_stop_acquisition(camera)
         self._drop_stream()

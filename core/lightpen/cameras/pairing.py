@@ -3,7 +3,7 @@
 Cameras with clocks are paired by these. Where the clocks do not agree, each is set by
 the frame that reached this machine fastest: all others were held up on the way. Nothing
 is paired before a few frames were no faster; what was paired wrongly all the same, as
-every frame so far was held up, is told as soon as one is not.
+every frame so far was held up, is reported as soon as one is not.
 Recordings are paired by the numbers of their images.
 """
 
@@ -17,7 +17,7 @@ from lightpen.messages import Message, message
 
 WAITING = 6  # frames of one camera that wait for the other
 LONGEST_WAITING = 16  # while the clocks are not known
-WINDOW = 64  # frames by which rates are told
+WINDOW = 64  # frames by which rates are estimated
 CLOCK_WINDOW = 256  # by which clocks are, that drift by less than 1 ms meanwhile
 SETTLED = 6  # frames after which a clock is known, if none was much faster
 CLOCK_SET_NS = 1_000_000_000  # by which a clock jumps that somebody set

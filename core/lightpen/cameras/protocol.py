@@ -258,7 +258,7 @@ class CameraCapabilities:
     waits : bool
         Whether no image is lost when nobody reads, as with a file.
     n_images : int or None
-        After so many images a recording begins anew.
+        After so many images a recording restarts.
     """
 
     width: int

@@ -255,7 +255,7 @@ class CameraWorker:
         if rest is not None:
             self._clock.wait(rest, self._wake)
         else:
-            if not self._camera.caps.waits:  # a recording would begin anew
+            if not self._camera.caps.waits:  # a recording would restart
                 self._camera.stop()
                 self._is_stopped = True
             self._wake.wait(PROBING)

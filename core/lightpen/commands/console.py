@@ -37,7 +37,7 @@ def printing(command: Callable[[argparse.Namespace], int | None]) -> Command:
     Raises
     ------
     FileError
-        A file or a folder is not to be looked at.
+        A file or a folder is not accessible.
     """
 
     @wraps(command)
@@ -65,7 +65,7 @@ def printing(command: Callable[[argparse.Namespace], int | None]) -> Command:
 
 
 def verdict_status(options: argparse.Namespace, grade: Grade | None) -> int:
-    """Return the exit status of a verdict, if it is asked for."""
+    """Return the exit status of a verdict, if it is requested."""
     if not options.exit_by_verdict:
         return DONE
     if grade is Grade.REPEAT:
@@ -94,7 +94,7 @@ def lacking(option: str) -> UsageError:
 
 def are_same(one: Path, other: Path) -> bool:
     """Return whether two paths lead to one file."""
-    with suppress(OSError):  # one of them is not there, or is not to be looked at
+    with suppress(OSError):  # one of them is not there, or is not accessible
         return one.samefile(other)
     return os.path.realpath(one) == os.path.realpath(other)
 

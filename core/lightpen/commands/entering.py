@@ -40,7 +40,7 @@ def keep_record(
     tip: CalibrationFile | None,
     origin: Origin | None = None,
 ) -> None:
-    """Write a verification as JSON where asked for, and enter it in the archive.
+    """Write a verification as JSON where requested, and enter it in the archive.
 
     Parameters
     ----------

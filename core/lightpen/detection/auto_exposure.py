@@ -1,6 +1,6 @@
 """Auto exposure: the brightest LED is bright, and none is saturated.
 
-The light of an LED is proportional to exposure and gain, so one image tells the next
+The light of an LED is proportional to exposure and gain, so one image shows the next
 setting; only of a saturated LED it is not known by how much it is too bright. Gain adds
 noise, so it is raised only where a longer exposure would smear the moving pen.
 """

@@ -4,7 +4,7 @@ Intensities are cut to ``f = clip((I - low) / (high - low), 0, 1)`` with `low` n
 the background and `high` near the plateau of the disc. The interior becomes constant,
 so its noise is gone, and the background zero; only the rim is grey. The centroid of f
 is then as precise as a fit of the rim, at the cost of one pass over a small window. The
-moments of f up to the third order also tell whether the region is a whole ellipse.
+moments of f up to the third order also show whether the region is a whole ellipse.
 """
 
 from collections.abc import Sequence
@@ -47,7 +47,7 @@ LEAST_SHADED = 4.0
 LEAST_INNER = 0.3  # of the area
 BESIDE = np.ones((3, 3), np.uint8)
 
-# Beyond these the light of a disc tells that it is not evenly lit.
+# Beyond these the light of a disc shows that it is not evenly lit.
 UNEVEN_AMOUNT = 0.1  # of the light that its area would have at the level of its plateau
 FLAT = 0.5  # width of the rim over the radius up to which a disc has a plateau
 UNEVEN_CENTER = 0.002  # of the radius: the outline is 0.01 px off at a sharp rim
@@ -102,14 +102,14 @@ class PixelBox(NamedTuple):
         )
 
     def holds_center_of(self, other: "PixelBox") -> bool:
-        """Tell whether the centre of the other box is inside."""
+        """Return whether the centre of the other box is inside."""
         return (
             2 * self.left <= other.left + other.right <= 2 * self.right
             and 2 * self.top <= other.top + other.bottom <= 2 * self.bottom
         )
 
     def is_close_to(self, other: "PixelBox") -> bool:
-        """Tell whether no side differs by more than 2 px and a tenth of the size."""
+        """Return whether no side differs by more than 2 px and a tenth of the size."""
         tolerance = 2 + other.size // 10
         return all(abs(a - b) <= tolerance for a, b in zip(self, other, strict=True))
 
@@ -174,10 +174,10 @@ class DiscMoments(NamedTuple):
 class Disc(NamedTuple):
     """A bright region measured as if it were a disc.
 
-    `cut_level` is the intensity at its outline. `is_whole` tells that sampling, blur
+    `cut_level` is the intensity at its outline. `is_whole` shows that sampling, blur
     and noise explain how it differs from an ellipse; a sliver of 1 px off a disc of
     42 px, which shifts the centre by 0.13 px, is beyond that. `others` are further
-    regions in the box that was asked for. `is_even` tells that its light is as even as
+    regions in the box that was requested. `is_even` shows that its light is as even as
     its outline supposes. `rim` is where the fit of its rim may begin,
     by which `with_rims` measures a disc that is not evenly lit; `filled`
     has the moments of a ring with its dark middle filled, if that makes it whole.
@@ -405,7 +405,7 @@ def _is_even(
 
 
 def _corrects_shading(moments: DiscMoments) -> bool:
-    """Tell whether the inside of a disc is large enough to measure its shading."""
+    """Return whether the inside of a disc is large enough to measure its shading."""
     return moments.radius >= LEAST_SHADED * moments.rim_width
 
 
@@ -508,7 +508,7 @@ def _unshaded(
     An LED is less bright seen from the side, so one side of a leaning disc is brighter
     than the other. If the brightness rises by the share g from the centre to the rim,
     the outline lies further out there by g / 2 times the width of the rim, the mean of
-    all levels; the centroid of the inner pixels tells g.
+    all levels; the centroid of the inner pixels shows g.
     """
     if not _corrects_shading(moments):
         return moments

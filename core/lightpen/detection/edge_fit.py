@@ -10,7 +10,7 @@ Gaussian of standard deviation sigma, gives the light
 with ``M0 = Phi``, ``M1 = s Phi - sigma^2 g`` and ``M2 = (s^2 + sigma^2) Phi - s sigma^2
 g``, where Phi is the share of the blur that lies inside. A rim that is d px further out
 adds ``p0 g d``, since the derivatives of M1 and M2 are among the functions already; a
-wider blur adds ``p0 s g / sigma`` per px. So each ray tells d by linear least squares
+wider blur adds ``p0 s g / sigma`` per px. So each ray shows d by linear least squares
 with its own b, p0, p1, p2, and all rays of a disc share one matrix. The ellipse follows
 the d of all rays; a few rounds lead to the rim [1]_.
 
@@ -50,7 +50,7 @@ CONVERGED = 0.05  # px
 INSIDE, OUTSIDE = 3.0, 3.0  # reach of a ray in standard deviations of the blur
 MORE_INSIDE, MORE_OUTSIDE = 2.5, 1.0  # px beyond that
 MAX_INSIDE = 0.5  # of the shorter semi-axis: deeper, brightness is no parabola
-MIN_INSIDE = 3.5  # standard deviations of the blur: less tells little from it
+MIN_INSIDE = 3.5  # standard deviations of the blur: less shows little from it
 DEEPEST = 0.8  # of the shorter semi-axis, whatever the blur
 MIN_SIGMA = 0.4  # px
 MAX_SIGMA = 0.3  # of the shorter semi-axis, beyond which blur hides the rim
@@ -58,9 +58,9 @@ MIN_SEMI_AXIS = 4.0  # px
 LARGEST_SHARPENING = 0.3  # of the blur in one round
 START_SIGMA = 0.7  # of the blur that all rays together seem to have
 HALF_WIDTH = sqrt(2 * log(2))  # of a Gaussian at half its height, standard deviations
-SMOOTHED = 7  # rays whose mean tells the brightness at one
+SMOOTHED = 7  # rays whose mean shows the brightness at one
 BRIGHTEST = 1.5  # times the usual brightness: brighter rays count no more
-DARK = 0.1  # of the usual brightness inside the rim, which tells no place of it
+DARK = 0.1  # of the usual brightness inside the rim, which shows no place of it
 
 # A sliver of 1 px off a disc of 42 px leaves 0.5 px.
 MAX_DENT = 0.15  # px, of three neighbouring rays off the ellipse
@@ -184,7 +184,7 @@ def fit_edges(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]
     list of EdgeFit or None
         None where no sharp enough rim is found. The area is that of the rim, not
         lessened by blur. A disc that is not found from the image before is looked for
-        anew.
+        again.
     """
     found: list[EdgeFit | None] = [None] * len(starts)
     known = [i for i, start in enumerate(starts) if start.sigma is not None]
@@ -377,7 +377,7 @@ def _functions(
 def _onto_steepest(image: Image, ellipses: _Ellipses) -> tuple[_Ellipses, FloatArray]:
     """Return the ellipses grown to where the light falls most, and the blur there.
 
-    The side of the fall that is outside tells the blur: nothing else shines there.
+    The side of the fall that is outside shows the blur: nothing else shines there.
     """
     shorter = ellipses.semi_axes[1]
     depths = MAX_INSIDE * shorter

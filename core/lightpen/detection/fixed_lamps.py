@@ -105,7 +105,7 @@ def lamps_among(masked: FloatArray, lights: Sequence[FloatArray]) -> FloatArray:
         looked_at = np.linspace(0, len(shown) - 1, N_LOOKED_AT).astype(int)
         places = np.concatenate([shown[index] for index in looked_at])
         paths += [_path(padded, place) for place in places]
-    # The same lamp, looked at in several images, has the same path.
+    # The same lamp, examined in several images, has the same path.
     distinct = {path.tobytes(): path for path in paths if _is_shown(path)}
     found: list[FloatArray] = []
     for path in _with_jumps(list(distinct.values())):
@@ -175,7 +175,7 @@ def _stay(path: FloatArray) -> _Stay:
 
 
 def _may_jump(one: _Stay, other: _Stay) -> bool:
-    """Tell whether a light may have jumped from one place to the other."""
+    """Return whether a light may have jumped from one place to the other."""
     between = other.first - one.last - 1
     if not 0 <= between <= BETWEEN * len(one.path):
         return False
@@ -185,7 +185,7 @@ def _may_jump(one: _Stay, other: _Stay) -> bool:
 
 
 def _is_shown(path: FloatArray) -> bool:
-    """Tell whether any image shows a light."""
+    """Return whether any image shows a light."""
     return bool(np.isfinite(path[:, 0]).any())
 
 

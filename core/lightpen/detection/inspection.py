@@ -27,9 +27,9 @@ class Exposure:
     peaks : tuple of float
         Peak of each LED as a fraction of full scale; 1 if saturated.
     are_leds : bool
-        False where no LED could be told, and these are of all that is bright.
+        False where no LED could be identified, and these are of all that is bright.
     leds : tuple of int
-        Numbers of the LEDs, counted from 1; empty where no LED could be told.
+        Numbers of the LEDs, counted from 1; empty where no LED could be identified.
     """
 
     peaks: tuple[float, ...] = ()

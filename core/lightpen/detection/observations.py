@@ -53,7 +53,7 @@ class Observations:
         blur, px^2; NaN elsewhere, or where only centres are given.
     sigmas : (N, L) array
         Standard deviation of one coordinate of each centre by its estimator, px, which
-        tells how LEDs of one image compare; NaN where an LED is not fit for use.
+        shows how LEDs of one image compare; NaN where an LED is not fit for use.
     rotations, translations : (N, 3, 3) and (N, 3) array
         Rough cam_from_pen, mm; NaN where there is none.
     edge_widths : (N,) array
@@ -196,7 +196,7 @@ def _with_copies(seen: Observations) -> Observations:
     """Return observations with images left out that are copies of earlier ones.
 
     Noise moves the centres of two images of a pen at rest; what it does not move is one
-    image given twice, perhaps packed anew, and tells nothing new.
+    image given twice, perhaps packed again, and shows nothing new.
     """
     used = [i for i, reason in enumerate(seen.reasons) if reason is Reason.NONE]
     pixels = seen.pixels[used]

@@ -169,7 +169,7 @@ def detect_pen(
     full_scale : int, optional
         Brightest value a pixel can have; see `lightpen.detection.spots.detect_spots`.
     is_followed : bool
-        Whether the pen is all that is asked for: where its LEDs are about where they
+        Whether the pen is all that is requested: where its LEDs are about where they
         were ``before``, the rest of the image is not read.
     """
     if not camera.fits(image):
@@ -211,7 +211,7 @@ def detections_of(
 
     * too small, where hardly any but tiny spots are seen;
     * blurred, where most spots are or where there is light but no spot, since stillness
-      comes first: it may part merged LEDs, and tell alike ones apart;
+      comes first: it may part merged LEDs, and distinguish alike ones;
     * empty, without any spot;
     * too few LEDs, where there are not spots enough, or not enough whole LEDs;
     * ambiguous, or not the pen.

@@ -2,8 +2,8 @@
 
 A disc less than some 20 px wide with a blur of 1.5 px is a bell, not a plateau with a
 rim. Reflections on the board and bloom reach into its foot, so its outline near the
-background tells neither its centre nor whether it is whole. Three estimators measure it
-in a window of its own:
+background shows neither its centre nor whether it is whole. Three estimators measure it
+in its own window:
 
 * the **grey centroid** in a Gaussian window 0.75 half-level radii wide, iterated until
   it stays in the middle of its window [1]_, for light with nothing beside it;
@@ -13,13 +13,13 @@ in a window of its own:
   higher the more foreign light there is; for saturated LEDs in the upper half, the only
   light that is steep.
 
-How far the first two differ tells the foreign light of an image. Size, saturation and
+How far the first two differ shows the foreign light of an image. Size, saturation and
 this difference decide which of them is taken: the one that errs least on rendered
 panels with and without foreign light (`benchmarks/small_leds.py`).
 
 The part of the window that is odd under a point reflection about the centre holds all
 noise and none of a symmetric LED: it gives the standard deviation of the centre, and
-tells LEDs that are partly hidden or merge with something.
+shows LEDs that are partly hidden or merge with something.
 
 References
 ----------
@@ -68,11 +68,11 @@ BRIGHTER = 1.05  # than the middle, of a place that is the LED's rather
 RING = (2.0, 2.5)  # half-level radii, round a spot
 LIT_SHARE = 0.2  # of a ring, and
 DARK = 0.08  # of the light, round a spot that is alone
-MIN_WIDTH = 4.0  # px, at half level; less tells no centre
+MIN_WIDTH = 4.0  # px, at half level; less shows no centre
 LEAST_TINY = 1.2  # px; what is smaller is a hot pixel
 LARGEST_TINY = 12  # px, of the box at the foot
 FEWEST_TINY = 4
-MAX_TINY = 4000  # contours looked at
+MAX_TINY = 4000  # contours examined
 LOPSIDED = 0.25  # odd part over the light, of an LED that is not whole
 
 
@@ -99,7 +99,7 @@ class SmallSpots:
     saturated : (N,) array
         Whether the light is clipped.
     alone : (N,) array
-        Whether it is dark all round, so that the outline tells a whole LED.
+        Whether it is dark all round, so that the outline shows a whole LED.
     """
 
     centers: FloatArray

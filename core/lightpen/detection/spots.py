@@ -1,7 +1,7 @@
 """Bright spots in an image: centres, shapes and flaws.
 
-Every fourth pixel of every fourth row tells where something is bright; only windows
-around that are read in full. A region that is no whole disc is looked at again at
+Every fourth pixel of every fourth row shows where something is bright; only windows
+around that are read in full. A region that is no whole disc is examined again at
 higher levels, which parts discs that touch and finds LEDs in front of something bright.
 What never becomes a disc is dropped, or kept and flagged if it resembles one.
 """
@@ -41,7 +41,7 @@ NumberArray = TypeVar("NumberArray", FloatArray, IntArray)
 
 MAX_SPOTS = 64
 MAX_BOXES = 128  # the smallest of more are clutter
-MAX_REGIONS = 256  # looked at in one image
+MAX_REGIONS = 256  # examined in one image
 MAX_CONTOURS = 4000
 
 MOVED = 0.5  # of a spot's size; a hand that holds still trembles by less
@@ -342,7 +342,7 @@ def _flattened(image: Image, full_scale: int) -> Image:
     """Return the image without its uneven background.
 
     That is the median of the neighbourhood in a coarse grid, in which a disc is a few
-    points at the most. What reads full scale stays, to be told as saturated.
+    points at the most. What reads full scale stays, to be reported as saturated.
     """
     step = max(min(image.shape) // NOISE_SAMPLES, 1)
     coarse = cv2.medianBlur(np.ascontiguousarray(image[::step, ::step]), 5)
@@ -524,7 +524,7 @@ def _as_spots(discs: list[Disc], full_scale: float, noise: float) -> Spots:
 def _with_small(
     spots: Spots, discs: list[Disc], image: Image, noise: float, full_scale: float
 ) -> Spots:
-    """Return spots with the small ones measured anew.
+    """Return spots with the small ones measured again.
 
     These are the ones that blur leaves without an even inside, or foreign light without
     a foot.
@@ -537,7 +537,7 @@ def _with_small(
     found = measure_small(image, spots.centers[small], radii[small], full_scale)
     unwhole = SpotFlaw.CUT | SpotFlaw.MERGED
     kept = spots.flaws[small] & (SpotFlaw.BLURRED | unwhole)
-    # What was parted at high levels and is whole in a window of its own is not cut.
+    # What was parted at high levels and is whole in its own window is not cut.
     reach = found.radii[:, None]
     height, width = image.shape
     inside = (found.centers > reach - 0.5) & (found.centers < [width, height] - reach)

@@ -292,7 +292,7 @@ def _scaled_start(
 def _with_discs(pen: Pen, request: Request) -> Pen:
     if request.lengths:
         return replace(pen, diameter=request.diameter)
-    usual = USUAL_DISC * RELATIVE  # nothing tells how large they are
+    usual = USUAL_DISC * RELATIVE  # nothing shows how large they are
     return replace(pen, diameter=usual, diameter_sigma=usual)
 
 

@@ -1,7 +1,7 @@
 """Hypotheses of mirror image and focal length, tried on a part of the swing.
 
 Under weak perspective a shape and its mirror image along the line of sight have the
-same tracks. Perspective tells them apart: the wrong one fits hundreds of times worse.
+same tracks. Perspective distinguishes them: the wrong one fits hundreds of times worse.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import fit_rigid
 
-USUAL_FOCAL = 1.7  # image widths, where the shape tells none
+USUAL_FOCAL = 1.7  # image widths, where the shape shows none
 # Parts of the images, and what is assumed of the depth of a shape; in turn, until one
 # fits.
 ATTEMPTS = (
@@ -199,7 +199,7 @@ def _attempted(
 
 
 def _are_alike(one: Start, other: Start) -> bool:
-    """Tell whether two starts have the same pen, not its mirror image."""
+    """Return whether two starts have the same pen, not its mirror image."""
     leds, others = one.state.pen.leds, other.state.pen.leds
     R, t = fit_rigid(leds, others)
     return bool(np.abs(leds @ R.T + t - others).max() < ALIKE * UNIT)
@@ -208,7 +208,7 @@ def _are_alike(one: Start, other: Start) -> bool:
 def _require_one_pen(
     pieces: Pieces, seed: Seed, size: tuple[int, int], known: Camera | None
 ) -> None:
-    """Refuse tracks of which a part fits by itself, as those of one of two pens.
+    """Refuse tracks of which a part fits alone, as those of one of two pens.
 
     The tracks of two bodies span subspaces of their own [1]_.
 
@@ -240,7 +240,7 @@ def _require_one_pen(
 def _require_one_camera(
     pieces: Pieces, seed: Seed, size: tuple[int, int], known: Camera | None
 ) -> None:
-    """Refuse a swing whose parts fit by themselves, with focal lengths of their own."""
+    """Refuse a swing whose parts fit alone, with focal lengths of their own."""
     n_images = seed.images[-1] + 1
     images = np.arange(seed.images[0], n_images)
     shown = (pieces.spots[np.ix_(images, seed.pieces)] >= 0).sum(axis=1)

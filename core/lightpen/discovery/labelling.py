@@ -218,7 +218,7 @@ class _Search:
         return named
 
     def _taken(self, p: int, j: int) -> bool:
-        """Tell whether another piece is that LED in an image of this one."""
+        """Return whether another piece is that LED in an image of this one."""
         others = self.pieces.spots[:, self.led == j] >= 0
         return bool((others.any(axis=1) & (self.pieces.spots[:, p] >= 0)).any())
 

@@ -93,7 +93,7 @@ def framed(
     Parameters
     ----------
     tip : (3,) array
-        In the frame of the pen, mm; told apart by nothing, and moved with it.
+        In the frame of the pen, mm; not estimated, and moved with it.
     sketch : (L, 3) array or None
         mm.
     """

@@ -68,7 +68,7 @@ def scale_by(lengths: Sequence[KnownLength], leds: FloatArray) -> float:
     Raises
     ------
     CalibrationError
-        The lengths contradict each other; the text tells which.
+        The lengths contradict each other; the text shows which.
     """
     found = np.array([_distance(leds, each) for each in lengths])
     stated = np.array([each.length for each in lengths])

@@ -131,7 +131,7 @@ def focal_length_of(shape: WeakShape) -> float:
 def _lever(shape: WeakShape) -> FloatArray:
     """Return the centroid from the tip, (3,), by its images: s R l + c, least squares.
 
-    The share of the lever along the line of sight is told by the turns alone.
+    The share of the lever along the line of sight follows from the turns alone.
     """
     n = len(shape.scales)
     rows = np.zeros((2 * n, 5))

@@ -1,7 +1,7 @@
 """Tracks of unlabelled spots from image to image.
 
-Spots are predicted to go on as they went, then as the affine map of the spots that are
-certain moves them, which leaves little of a hand's tremor, and assigned to the
+Spots are predicted to continue as they went, then as the affine map of the spots that
+are certain moves them, which leaves little of a hand's tremor, and assigned to the
 predictions [1]_. Where two spots could be taken for each other, or a spot is lost, its
 piece ends; pieces are joined by the shape of the pen once that is found, never by
 guessing.
@@ -23,11 +23,11 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 REACH = 0.06  # of the image width: farthest step beside the one before
 NEAR = 0.006  # of the image width: farthest from the prediction by the others
 COASTING = 8  # images in which a spot may be missing
-USUAL = 0.75  # of the spots, that are found where they go on as they went
+USUAL = 0.75  # of the spots, that are found where they continue as they went
 CONFUSED = 6.0  # times the usual error of a prediction, within which spots are alike
 FINEST = 0.7  # px, of that error
 STILL, MOVED = 3.0, 12.0  # px: a lamp, and what moves beside it
-LASTING = 15  # images, after which that is told
+LASTING = 15  # images, after which that is reported
 AFFINE = 4  # spots that fix an affine map, and check it
 
 

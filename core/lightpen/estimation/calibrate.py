@@ -286,7 +286,7 @@ class _Inputs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _SingleCameraFits:
-    """Step 1: the images of C cameras at N moments, each by itself.
+    """Step 1: the images of C cameras at N moments, each alone.
 
     Attributes
     ----------

@@ -3,7 +3,7 @@
 The estimate is taken for the truth. Each trial draws files of camera and pen about it,
 by what the files state of themselves or what is assumed in its place, a seat and a
 drift as U counts them, centres that are off in each posture, the areas of the discs,
-and noise in the images; then it calibrates anew, as a user would who has no more than
+and noise in the images; then it calibrates again, as a user would who has no more than
 these files. The scatter of the tips is their uncertainty, whatever is not linear in
 between.
 

@@ -103,7 +103,7 @@ def calibrate_pivot(
 
 
 def _names(chosen: BoolArray, max_runs: int) -> str:
-    """Return the chosen poses (N,) in words, by their place in the file from 1."""
+    """Return the chosen poses (N,) as text, by their place in the file from 1."""
     places = np.flatnonzero(chosen) + 1
     runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
     named = [

@@ -7,7 +7,7 @@ the pen does about it. So every pose i gives
 
 with two unknown directions. The sum of the squared differences is least for the pair of
 singular vectors of the mean rotation that belongs to its largest singular value [1]_.
-The hand tilts the pen as it turns it; by how much, the differences tell, and how that
+The hand tilts the pen as it turns it; by how much, the differences show, and how that
 carries over to the axis their derivatives by both directions.
 
 References
@@ -28,7 +28,7 @@ MIN_TURN = np.radians(40.0)  # less, and the tilt of the hand hides the axis
 TURN_NOISE = np.radians(1.0)  # by which a turn is measured too small
 MAX_UNCERTAINTY = np.radians(2.0)  # puts the surface of a 10 mm ball 0.003 mm off
 COVERAGE_FACTOR = 2.0
-MOST_ALIKE = 0.98  # lag-1 autocorrelation that can be told from a drift
+MOST_ALIKE = 0.98  # lag-1 autocorrelation that can be distinguished from a drift
 TINY = 1e-30
 
 

@@ -48,7 +48,7 @@ def keep_freed_memory() -> None:
     """Reuse the memory of freed images (Linux with glibc).
 
     Blocks as large as an image otherwise go back to the kernel when freed, and come
-    anew page by page, zeroed: two fifths of the time that decoding takes. Threads that
+    again page by page, zeroed: two fifths of the time that decoding takes. Threads that
     begin later share one arena; several would each keep the memory of an image or two.
     """
     if sys.platform != "linux":

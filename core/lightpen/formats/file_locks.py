@@ -30,7 +30,7 @@ def locked(descriptor: int, *, shared: bool = False, patience_s: float = 0.0) ->
     Raises
     ------
     OSError
-        The disk fails, or it knows no locks (`NO_LOCKS`).
+        The disk fails, or it supports no locks (`NO_LOCKS`).
     """
     deadline = time.monotonic() + patience_s
     while True:

@@ -3,7 +3,7 @@
 Records, results and settings all come in here. A text is turned into a declared type:
 what is missing, of another type or out of its range is refused, and so is what JSON as
 Python reads it lets pass, such as ``NaN``, a number too large for a float, or an entry
-given twice. A checksum as the last entry tells damage that leaves the text well-formed.
+given twice. A checksum as the last entry shows damage that leaves the text well-formed.
 """
 
 import json

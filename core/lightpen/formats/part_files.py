@@ -2,7 +2,7 @@
 
 A part is locked as long as it is written, so that one whose lock can be had was left
 behind by a program that was killed. Windows lets no open file be renamed, and some
-disks know no locks: there a part that was left is known by its age.
+disks support no locks: there a part that was left is known by its age.
 """
 
 import contextlib

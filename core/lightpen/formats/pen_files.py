@@ -6,7 +6,7 @@ optional. Units may be written as in ``x_mm``, ``x [mm]``, ``x (m)`` and ``x/inc
 Standard uncertainties (k = 1) are optional columns, the same number in each row:
 ``led_sigma_mm`` of one LED coordinate, ``scale_sigma`` of all coordinates together
 (relative: 1e-5 is 10 um a metre) and ``diameter_sigma_mm``. So are ``expansion``, that
-of the pen by warmth in 1/K, ``expansion_sigma`` and ``temperature_c``, at which the
+of the pen in 1/K, ``expansion_sigma`` and ``temperature_c``, at which the
 LEDs were measured.
 
 A JSON file has
@@ -20,7 +20,7 @@ A JSON file has
 ``scale_sigma`` of all coordinates together, relative, optional
 ``diameter_sigma`` of the diameter, optional
 ``normal_sigma`` of a turn common to all normals, rad, optional
-``expansion``   of the pen by warmth, 1/K, optional
+``expansion``   of the pen, 1/K, optional
 ``expansion_sigma`` standard uncertainty of that, 1/K, optional
 ``temperature_c`` at which the LEDs were measured, degrees C, optional
 ``nominal_tip`` list of three coordinates, optional

@@ -4,7 +4,7 @@ A rig file has ``cameras``, a list of which the first is the reference, and opti
 ``comment``, which is not read. Of each camera it has
 
 ============================ =========================================================
-``name``                     by which the program speaks of it
+``name``                     by which the program refers to it
 ``intrinsics``               its camera file, from the folder of the rig file
 ``cam_from_rig_rotation``    9 numbers, the rotation matrix row by row, or 4, a unit
                              quaternion w x y z

@@ -2,7 +2,7 @@
 
 What a frame of a video takes is known only to its decoder: a stream of H.264 in 3 kB
 may say anywhere that its frames are 16000 x 16000 px from here on, and a gigabyte is
-asked for before anyone can look. A decoder that crashes takes no other process with it.
+requested before anyone can look. A decoder that crashes takes no other process with it.
 """
 
 import ctypes
@@ -27,7 +27,7 @@ from lightpen.formats.files import printable
 def limit_memory(more: int) -> None:
     """Limit this process to its present memory plus ``more`` bytes.
 
-    It stays as it is where the system knows no such limit.
+    It stays as it is where the system has no such limit.
 
     Raises
     ------

@@ -53,7 +53,7 @@ def count_frames_in_process(path: Path) -> int:
         n_frames = 0
         while n_frames <= MAX_VIDEO_FRAMES and stream.grab():
             n_frames += 1
-            if codec == MOTION_JPEG and _has_ffmpeg():  # each has a size of its own
+            if codec == MOTION_JPEG and _has_ffmpeg():  # each has its own size
                 _check_jpeg(stream.retrieve()[1].tobytes(), _name(n_frames))
     finally:
         stream.release()

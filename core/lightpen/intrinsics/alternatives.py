@@ -47,7 +47,7 @@ class CameraChange:
     Attributes
     ----------
     name : str
-        Of the first view after it; empty if it went on gradually.
+        Of the first view after it; empty if it continued gradually.
     difference : (4 + n,) array
         Of the intrinsics, after less before, or last less first.
     in_image : float
@@ -109,7 +109,7 @@ def _fitted_change(
     known = way.T @ information @ way
     scale = 1 / np.sqrt(np.maximum(np.diag(known), 1e-300))
     values, vectors = np.linalg.eigh(known * np.outer(scale, scale))
-    if values[0] <= LEAST_KNOWN:  # one part alone does not tell
+    if values[0] <= LEAST_KNOWN:  # one part alone does not show
         return np.zeros(len(score)), 0.0
     vectors = scale[:, None] * vectors
     found = (vectors / values) @ (vectors.T @ (way.T @ score))
@@ -212,7 +212,7 @@ def explain(
 
 
 def _differ(cameras: tuple[Camera, Camera]) -> bool:
-    """Tell whether two cameras image a point at places that matter."""
+    """Return whether two cameras image a point at places that matter."""
     one, other = cameras
     try:
         moves = error_fields(one) @ (other.intrinsics - one.intrinsics)

@@ -17,7 +17,7 @@ USUAL_SIDES = 10.0, 3000.0  # mm, of a board
 
 
 def released_tolerances(stated: BoardTolerances) -> BoardTolerances:
-    """Return tolerances by which the views tell how the board is."""
+    """Return tolerances by which the views show how the board is."""
     return BoardTolerances(LET_GO_MM, LET_GO, stated.scale)
 
 

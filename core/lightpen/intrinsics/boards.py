@@ -1,6 +1,6 @@
 """Calibration boards and their description in one word.
 
-A board is told as ``KIND:COLUMNSxROWS:...`` with lengths in mm:
+A board is described as ``KIND:COLUMNSxROWS:...`` with lengths in mm:
 
 ================================================ =====================================
 ``chessboard:11x8:20``                           inner corners, side of a square
@@ -155,7 +155,7 @@ def parse_board(text: str) -> Board:
     Raises
     ------
     UsageError
-        The word tells none.
+        The text is not a board.
     """
     kind_word, *parts = text.strip().split(":")
     kinds = {kind.value: kind for kind in BoardKind}

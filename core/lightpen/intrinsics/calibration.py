@@ -242,7 +242,7 @@ def _calibrated(
     kept, left_out = _without_outliers(views, first)
     fitted = fit_camera(kept, tolerances, first.state.cameras[0])
     denied = board_contradictions(fitted, tolerances)
-    if denied.any():  # then the views tell how it is, and not what was said of it
+    if denied.any():  # then the views show how it is, and not what was said of it
         tolerances = released_tolerances(tolerances)
         fitted = fit_camera(kept, tolerances, fitted.state.cameras[0])
     report(0.2)

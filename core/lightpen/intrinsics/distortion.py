@@ -42,7 +42,7 @@ class Choice:
         5 or 8, or 4 of a fisheye.
     held_out : dict of int to float
         Distance of points in views that were not fitted to, px rms, with each number of
-        coefficients that the views tell.
+        coefficients that the views show.
     pull : float or None
         Standard deviation about 0 that was assumed of k3, or of k4 k5 k6, as they
         folded the image; None where they did not.
@@ -54,7 +54,7 @@ class Choice:
 
     @property
     def message(self) -> Message:
-        """It in words."""
+        """The reason as text."""
         own = self.held_out[self.n_coefficients]
         others = tuple(
             _other_model(n, rms)
@@ -129,7 +129,7 @@ def choose_distortion(
     held_out = {best.n_coefficients: rms_together(errors, views)}
     report(0.5)
     for other in others:
-        with suppress(CalibrationError):  # a part of the views does not tell so many
+        with suppress(CalibrationError):  # a part of the views does not show so many
             trial = other()
             if trial is None:
                 continue
@@ -149,7 +149,7 @@ def choose_distortion(
 
 
 def _is_wide(camera: Camera, views: Views) -> bool:
-    """Tell whether points were seen so far off the axis that a fisheye differs."""
+    """Return whether points were seen so far off the axis that a fisheye differs."""
     pixels = views.pixels[:, 0][views.seen[:, 0]]
     off = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
     return bool(np.linalg.norm(off, axis=-1).max() > WIDE)
@@ -201,7 +201,7 @@ def fit_camera(
 
 
 def folds(camera: Camera) -> bool:
-    """Tell whether the distortion folds the image before its corners."""
+    """Return whether the distortion folds the image before its corners."""
     try:
         error_fields(camera)
     except CalibrationError:

@@ -45,7 +45,7 @@ def message_on_duplicates(n_views: int, names: tuple[str, ...]) -> Message:
 
 
 def _is_same(one: FloatArray, other: FloatArray, scale: FloatArray) -> bool:
-    """Tell whether all cameras see the points (C, N, 2) at the same places."""
+    """Return whether all cameras see the points (C, N, 2) at the same places."""
     squares = np.square(one - other).sum(axis=-1)
     common = np.isfinite(squares)
     n_seen = np.isfinite(one[..., 0]).sum(axis=-1)

@@ -120,7 +120,7 @@ def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Message |
     Parameters
     ----------
     images : callable
-        Gives them anew, one at a time: they may be large.
+        Gives them again, one at a time: they may be large.
     """
     mirrored = (image[:, ::-1].copy() for image in images())
     if board.kind in TELLS_SIDES and _is_found(mirrored, board):

@@ -68,7 +68,7 @@ class PairLag:
         return None if self.interval_ms is None else self.views * self.interval_ms
 
     def told(self, name: str) -> Message:
-        """Return it in words, of a camera of that name."""
+        """Return it as text, of a camera of that name."""
         if self.lag_ms is None:
             return message(
                 "pair.late",

@@ -86,7 +86,7 @@ def find_points(
 
 
 def _is_spread(points: FloatArray, board: Board) -> bool:
-    """Tell whether the points seen fix a pose: enough, not all but one in one row."""
+    """Return whether the points seen fix a pose: enough, not all but one in one row."""
     seen = board.points[np.isfinite(points[:, 0]), :2]
     n_seen = len(seen)
     if n_seen < FEWEST:
@@ -199,7 +199,7 @@ def _is_board(
 
 
 def _is_even(grid: FloatArray) -> bool:
-    """Tell whether rows and columns are evenly spaced."""
+    """Return whether rows and columns are evenly spaced."""
     for along in (grid, np.swapaxes(grid, 0, 1)):
         steps = np.diff(along, axis=1)
         bends = np.linalg.norm(np.diff(steps, axis=1), axis=-1)

@@ -1,6 +1,6 @@
 """Extent of a chessboard beyond the corners that were found.
 
-A search finds as many corners as it is asked for, or stops where it loses its way; the
+A search finds as many corners as requested, or stops where it loses its way; the
 squares beyond tell whether that was the whole board. From the outermost corners on the
 next ones are where the rows lead. They are inner corners of the board if the squares
 beyond them are black and white in turn, too; where all of those are white, that is the
@@ -53,7 +53,7 @@ class CornerCount:
 
 
 def is_chequered(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
-    """Tell whether the squares between corners are black and white in turn.
+    """Return whether the squares between corners are black and white in turn.
 
     Where light blinds the camera, or none falls, squares tell nothing.
 
@@ -87,7 +87,7 @@ def is_chequered(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
 
 
 def goes_on(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
-    """Tell whether a chessboard extends beyond the corners found.
+    """Return whether a chessboard extends beyond the corners found.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.fisheye import N_COEFFICIENTS
 
-USUAL_FOCAL_LENGTH = 1.5  # of the longer side of the image, where the views tell none
+USUAL_FOCAL_LENGTH = 1.5  # of the longer side of the image, where the views show none
 FISHEYE_FOCALS = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)  # of the longer side
 STRAIGHTER = 0.5  # times the bend of rows by a pinhole
 FARTHEST = np.tan(np.radians(75.0))  # in the normalised plane, for a first pose

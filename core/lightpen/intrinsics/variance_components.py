@@ -6,9 +6,9 @@ over the image, the same in all views; each view has a smooth error of its own (
 shadows, a board that gives way), of second and third order over the board; the rest is
 independent noise. Their variances follow from restricted maximum likelihood [1]_, by
 the fixed point of [2]_. The cameras are estimated together with the effects, so what
-the views cannot tell from an effect is in their covariance. Amplitude and length of the
-fields are hardly known by one set of views: the estimate is the mean over a grid of
-both, weighed by the likelihood, all amplitudes being as likely before [3]_.
+the views cannot separate from an effect is in their covariance. One set of views hardly
+determines amplitude and length of the fields: the estimate is the mean over a grid of
+both, weighted by the likelihood, all amplitudes being as likely before [3]_.
 
 References
 ----------
@@ -55,7 +55,7 @@ class MixedFit:
         the fields.
     repeatability : (p, p) array
         Share of the covariance by noise and by errors of single views, which another
-        set of views draws anew.
+        set of views draws again.
     fields : tuple of LensField or None
         Of each camera; None where the likelihood does not support one.
     field_gain : float

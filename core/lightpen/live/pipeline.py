@@ -223,7 +223,7 @@ class Live:
         """Report an internal error and close the cameras; the swing is kept."""
         self._listener.on_camera(Failed(LightpenError("live.bug")), 0)
         for worker in self._workers:
-            with suppress(DeviceLost):  # `stop` tells it
+            with suppress(DeviceLost):  # `stop` shows it
                 worker.stop()
 
     def _captured(self) -> _Capture:
@@ -337,7 +337,7 @@ class Live:
         if rest is not None and frame.host_ts_ns - self._seen_ns < rest * 1e9:
             return
         frames = (frame, *frame.others)[: len(wanted.regions)]
-        # The whole image tells now and then what else has come into view.
+        # The whole image shows now and then what else has come into view.
         is_followed = captured.swing is not None and frame.seq % FULL_SCAN != 0
         images = [
             self._look(each, wanted, c, is_followed=is_followed)
@@ -389,7 +389,7 @@ class Live:
         wanted = self._pairs.wanted
         try:
             frame = self._workers[wanted].next_frame(LONGEST_WAIT)
-        except FrameTimeout:  # what the other has sent goes on, and finds no partner
+        except FrameTimeout:  # what the other has sent continues, and finds no partner
             wanted = 1 - wanted
             frame = self._workers[wanted].next_frame(0.0)
         self._pairs.add(wanted, frame)

@@ -216,7 +216,7 @@ def _unit_normals(normals: FloatArray) -> FloatArray:
     return np.asarray(normals / lengths[:, None])
 
 
-MEASURED_DECIMALS = 3  # mm; live images do not tell an LED's place any finer
+MEASURED_DECIMALS = 3  # mm; live images do not show an LED's place any finer
 
 
 def leds_to_exchange(frame: FrameCheck | None) -> tuple[int, int] | None:
@@ -283,7 +283,7 @@ class OpenedPen:
     draft : PenDraft or None
         Else its LEDs to be mended, if they can be shown.
     needs_units : bool
-        Whether the file has to be read again with the units that it does not say.
+        Whether the file must be read again with the units that it does not say.
     problem : Message or None
         Why it cannot be used.
     """

@@ -2,7 +2,7 @@
 
 LEDs are alike, so an image shows where they are, not which is which: two LEDs that are
 exchanged in the file as a whole fit the images, and only the definition of the pen
-frame tells them apart, see `lightpen.pen_check.frame`. An LED far off its place has
+frame distinguishes them, see `lightpen.pen_check.frame`. An LED far off its place has
 no spot where the file has it; the spots left over, seen from several sides, tell where
 it is instead.
 """
@@ -45,7 +45,7 @@ N_COMPARED = 20  # spots of each, at most, as every image is compared with all v
 BESIDE = 12.0  # px from its place, where an LED's spot is looked for
 ENOUGH_VIEWS = 5  # before a pen is said to fit
 SAME = 0.3  # mm, within which two coordinates are the same
-SURE = 0.05  # mm, standard deviation of a shift that is told with its direction
+SURE = 0.05  # mm, standard deviation of a shift that is reported with its direction
 SURE_SHARE = 0.1  # of its length, likewise
 
 
@@ -197,7 +197,7 @@ class _Seen:
         pixels = _centers(camera, spots, np.where(whole, taken, -1))
         beside = _beside(camera, pen, spots, taken, R, t)
         taken = np.where(beside >= 0, beside, taken)
-        # Poses do without LEDs beside their places, the shifts are told with them.
+        # Poses do without LEDs beside their places, the shifts are reported with them.
         poses = fit_poses(camera, pen, pixels, R, t)
         added = _centers(camera, spots, beside)
         pixels = np.where((beside >= 0)[..., None], added, pixels)

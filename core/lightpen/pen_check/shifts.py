@@ -30,7 +30,7 @@ MIN_SHIFT = 0.1  # mm; less is taken up when the tip is solved
 STANDS_OUT = 25.0  # times the misfit that the other LEDs explain: 5 standard deviations
 SIGNIFICANT = 40.0  # chi-square, 3 degrees of freedom: below 1e-8 by chance
 RIVAL = 25.0  # chi-square by which another LED must explain less to be ruled out
-LIKELY_SHIFT = 3.0  # mm, standard deviation; holds what the views cannot tell
+LIKELY_SHIFT = 3.0  # mm, standard deviation; holds what the views cannot show
 SMALLEST_SIGMA = 0.02  # px; the centres of an image are hardly better
 RIDGE = 1e-9
 

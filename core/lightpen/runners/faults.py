@@ -24,7 +24,7 @@ class FaultListener(Protocol):
 class FaultReporter:
     """Tells one trouble at a time, and when it is over.
 
-    A trouble that can end by itself has a cause, of whatever kinds its owner knows.
+    A trouble that can end automatically has a cause, of whatever kinds its owner knows.
     """
 
     def __init__(self, listener: FaultListener) -> None:
@@ -51,13 +51,13 @@ class FaultReporter:
         self._listener.on_fault(trouble)
 
     def end(self) -> None:
-        """Tell that the trouble is over, whatever it came of."""
+        """State that the trouble is over, whatever its cause."""
         told, self._told = self._told, None
         if told is not None:
             _logger.info("fault cleared: %s", told.code)
             self._listener.on_fault_cleared(told)
 
     def end_of(self, cause: Enum) -> None:
-        """Tell that the trouble is over, if it came of this."""
+        """State that the trouble is over, if this was its cause."""
         if self._cause is cause:
             self.end()

@@ -26,7 +26,7 @@ class SerialQueue:
     Parameters
     ----------
     on_bug : callable
-        Done next after an act that ended by a bug; not after a bug of its own.
+        Done next after an act that ended by a bug; not after a bug in itself.
     """
 
     def __init__(self, name: str, on_bug: Act) -> None:
@@ -223,7 +223,7 @@ class BackgroundTask:
     ) -> None:
         """Start a computation, see `SerialQueue.start`.
 
-        When the outcome is told, it is there no more.
+        When the outcome is reported, it is there no more.
         """
 
         def succeed(outcome: T) -> None:

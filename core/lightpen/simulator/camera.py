@@ -64,7 +64,7 @@ class SimulatedCamera:
         Pen, camera, tip, cone, optics and sensor; its swing and its disturbances are
         left out.
     operator : Operator, optional
-        Must go by the same clock.
+        Must use the same clock.
     rig : Rig, optional
         The camera is the second of it, and the scene before the first.
     lamps : tuple of Lamp

@@ -38,7 +38,7 @@ class GuidedOperator:
         elif self._wish in GENTLE_LEANS:  # so that the first lean is told from these
             self._lean_towards(UPRIGHT)
         elif self._wish != UPRIGHT:
-            self._wish = None  # a hand that was stopped must be led anew
+            self._wish = None  # a hand that was stopped must be led again
 
     def _wanted(self, state: SwingState) -> Posture | None:
         if state.heading is None and not state.was_upright:

@@ -1,6 +1,6 @@
 """The hand of a simulated operator: seats, tilts and lifts the pen.
 
-Time goes in equal small steps, so the movement does not depend on when it is looked at.
+Time goes in equal small steps, so the movement does not depend on when it is examined.
 """
 
 from collections import deque

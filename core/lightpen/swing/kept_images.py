@@ -46,7 +46,7 @@ class AcceptedImages:
     cofactors : (N, 6, 6) array
         Covariances of these poses for a noise of 1 px, rad and mm.
     sigmas : (N,) array
-        Noise of each image by itself, px.
+        Noise of each image alone, px.
     seat : Seat or None
         Tip and cone by the best fit there is.
     joint : JointFit or None

@@ -20,7 +20,7 @@ class OperatorPresence:
     is_away : bool
         Whether the operator has left: the capture is paused meanwhile.
     paused_by_leaving : bool
-        Whether it is paused for that reason alone, and resumes by itself.
+        Whether it is paused for that reason alone, and resumes automatically.
     choices : Preparation or None
         Present choices.
     begun_with : Preparation or None

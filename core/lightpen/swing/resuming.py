@@ -69,7 +69,7 @@ class Resumable:
 
 
 def read_resumable(folder: Path) -> Resumable:
-    """Read an interrupted swing and fit its images anew.
+    """Read an interrupted swing and fit its images again.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def read_resumable(folder: Path) -> Resumable:
 def read_for_more(folder: Path) -> Resumable:
     """Read a swing that has all it needs, to capture more images nevertheless.
 
-    The record notes it, so that the swing goes on likewise when it is interrupted.
+    The record notes it, so that the swing continues likewise when it is interrupted.
 
     Raises
     ------

@@ -64,7 +64,7 @@ RESEATED = 0.5  # s in the cone that end a pause
 LIFTED = 3.0  # mm from the cone; less is a slip
 LEAVING = 0.2  # s out of the cone until the pen counts as lifted
 ABOUT_TO_SLIP = 0.5  # s before a slip, in which the tip may be half out
-SLIP_TOLD = 4.0  # s for which a slip is told of, at least
+SLIP_TOLD = 4.0  # s for which a slip is reported, at least
 ASTRAY = 2.0  # s out of the cone until the capture pauses
 FEW = 12  # images; not worth more than a new start
 BAD_SIGMA = 3.0  # times the noise of the other images
@@ -144,7 +144,7 @@ def conclude(state: SwingState, verdict: Message, passed: bool) -> Transition:
 
 
 def forget_side(state: SwingState) -> SwingState:
-    """Return the swing that asks anew for the operator's right."""
+    """Return the swing that asks again for the operator's right."""
     return replace(state, heading=None, was_upright=False, target=None)
 
 

@@ -1,6 +1,6 @@
 """The owner of a swing, from its first image to the accepted tip.
 
-A thread of its own runs the workflow. Commands and images reach it through one queue:
+Its own thread runs the workflow. Commands and images reach it through one queue:
 an accepted image is on the disk before the next is taken. A listener is notified of
 every change and event. Solving and reading run in the background; all other work on
 the disk is done between two images.
@@ -101,7 +101,7 @@ class SwingRunner:
         self._queue.ask(self._workflow.resume)
 
     def forget_side(self) -> None:
-        """Learn the operator's left and right anew."""
+        """Learn the operator's left and right again."""
         self._queue.ask(self._workflow.forget_side)
 
     def finish(self) -> None:

@@ -31,10 +31,10 @@ from lightpen.swing_messages import (
 )
 
 UPRIGHT_HELD = 0.5  # s
-LEARNING_TILT = np.radians(12.0)  # tells to which side the operator leans
+LEARNING_TILT = np.radians(12.0)  # shows to which side the operator leans
 REACHED = np.radians(5.0)  # of a target
-N_MORE = 40  # images at least, where more are asked for than a swing needs
-PATIENCE = 4.0  # s until a target that is not reached is chosen anew
+N_MORE = 40  # images at least, where more are requested than a swing needs
+PATIENCE = 4.0  # s until a target that is not reached is chosen again
 DECAY = 2 / 3  # U^2 less its floor goes with n^-DECAY, measured with simulated stations
 ENOUGH_FILLED = 0.5  # of the fields, before it is said what no image can lower
 
@@ -46,7 +46,7 @@ class Shortfall:
     Attributes
     ----------
     wanted : (3, 8) array of int
-        Images asked for in each field of the dial.
+        Images requested in each field of the dial.
     fields : (3, 8) array of int
         Images missing in each of them.
     n_images : int
@@ -74,7 +74,7 @@ class Shortfall:
 def measure_shortfall(setup: SwingSetup, state: SwingState) -> Shortfall:
     """Measure what postures and uncertainty still need.
 
-    Fields of the dial in which the camera would not see enough LEDs are not asked for.
+    Fields of the dial in which the camera would not see enough LEDs are not requested.
     """
     limits = setup.limits
     wanted: IntArray = np.full((3, N_DIRECTIONS), limits.min_per_field, dtype=np.int64)

@@ -46,13 +46,13 @@ class SwingStatus:
     assessment : SwingAssessment or None
         Assessment of the solution, compared with the current result.
     failed : FailedSwing or None
-        What came of the images that gave no tip; None where they gave one.
+        The result of the images that gave no tip; None where they gave one.
     result : Result or None
         The result that was accepted.
     revoked : Result or None
-        The result that was taken back last, of this swing or another.
+        The result that was revoked last, of this swing or another.
     refusal : Message or None
-        Why no swing could begin by itself.
+        Why no swing could begin automatically.
     has_fault : bool
         Whether it is paused because an image could not be recorded.
     has_other_choices : bool

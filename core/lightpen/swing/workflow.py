@@ -208,7 +208,7 @@ class SwingWorkflow:
         """Enter a new swing, or resume an old one, as read from the disk."""
         status, record = self._status, swing.record
         if status.is_capturing and record.folder == status.record_folder:
-            return  # it goes on already
+            return  # it continues already
         names = recorded_names(record)
         recorder = SwingRecorder(record)
         self._task.drop()
@@ -504,7 +504,7 @@ class SwingWorkflow:
 
     def _keep_solution(self, solution: Solution, why: Message) -> None:
         """Keep the solution and its images, and report why."""
-        if self._wanted != self._tried:  # the user went on meanwhile
+        if self._wanted != self._tried:  # the user continued meanwhile
             self._solve_again(solution)
             return
         self._wanted = solution.taken_out
@@ -593,7 +593,7 @@ def _log_change(
 
 
 def _is_judged(status: SwingStatus) -> bool:
-    """Tell whether a swing has its verdict, but is not accepted."""
+    """Return whether a swing has its verdict, but is not accepted."""
     state = status.state
     is_accepted = status.result is not None
     return state is not None and state.phase is Phase.VERDICT and not is_accepted

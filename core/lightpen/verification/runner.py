@@ -1,6 +1,6 @@
-"""The one owner of a verification, from the tip in force to its verdict.
+"""The one owner of a verification, from the current tip to its verdict.
 
-A thread of its own has its workflow. Commands reach it through one queue, and so do
+Its own thread has its workflow. Commands reach it through one queue, and so do
 the images, one at a time; it publishes every change and every event. Reading
 results and recorded images takes long and runs beside it; results are written in
 its turn, between two images.
@@ -24,7 +24,7 @@ from lightpen.verification.workflow import VerificationWorkflow
 
 
 class VerificationRunner:
-    """Verifies the tip in force, by live images and by recorded ones.
+    """Verifies the current tip, by live images and by recorded ones.
 
     Every method returns at once, but for `take` and `await_end`. A command that cannot
     be carried out in the state that the verification is in by then does nothing.

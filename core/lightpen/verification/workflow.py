@@ -70,14 +70,14 @@ _logger = logging.getLogger(__name__)
 
 
 class Cause(Enum):
-    """What a trouble comes of that can end by itself."""
+    """The cause of a fault that can end automatically."""
 
     IMAGES = auto()  # of touches cannot be kept
     NOTE = auto()  # the checkpoint cannot be written
 
 
 class VerificationWorkflow:
-    """One verification after another, of the tip in force.
+    """One verification after another, of the current tip.
 
     Parameters
     ----------

@@ -74,11 +74,11 @@ class BoardCalibration(QObject):
         return None if self._computed is None else self._computed.found
 
     def remark(self) -> StatusMessage:
-        """Return what came of the last step, in the present language."""
+        """Return the result of the last step, in the present language."""
         return self._remark()
 
     def tell(self, remark: Callable[[], StatusMessage]) -> None:
-        """Say what came of something, in each language anew."""
+        """State a result, again in each language."""
         self._remark = remark
         self.told.emit()
 
@@ -227,7 +227,7 @@ def calibrate_by_folder(folder: str, board: Board, report: Report) -> ComputedCa
     Raises
     ------
     FileError, CalibrationError
-        There are no images, or they do not tell the camera.
+        There are no images, or they do not show the camera.
     """
     images = find_images(folder)
     observed = observe_board(images, board, lambda fraction: report(0.7 * fraction))

@@ -101,7 +101,7 @@ class BoardCapture(QObject):
         return self._searching is not None
 
     def start(self, board: Board | None) -> None:
-        """Begin anew, without views."""
+        """Restart, without views."""
         for job in (self._searching, self._leading):
             if job is not None:
                 job.cancel()

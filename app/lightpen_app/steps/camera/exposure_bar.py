@@ -16,7 +16,7 @@ MOST_NAMED = 6  # LEDs in one line
 
 
 class ExposureBar(Translated, QWidget):
-    """A scale with one tick per LED, and the verdict in words."""
+    """A scale with one tick per LED, and the verdict as text."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -64,7 +64,7 @@ class ExposureBar(Translated, QWidget):
         return f"{told}: {named}{more}"
 
     def levels(self) -> str:
-        """Return the level of each LED, in words."""
+        """Return the level of each LED, as text."""
         value = self._value
         return "\n".join(
             self.tr("LED {0}: {1} %").format(led, f"{100 * peak:.0f}")

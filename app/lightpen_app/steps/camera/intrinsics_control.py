@@ -35,7 +35,7 @@ class IntrinsicsControl(QObject):
         self._panel = panel
         self._page = page
         self._reading: Job | None = None
-        self._board: BoardWindow | None = None  # made when it is asked for
+        self._board: BoardWindow | None = None  # made when it is requested
 
         # Connections
         workbench.selection.station_changed.connect(self._forget_file)

@@ -55,12 +55,12 @@ class SecondCameraChoice(QWidget):
         return self._source
 
     def tell_step(self, seen: LiveImage) -> None:
-        """Tell whether two cameras take their images at the same moment.
+        """Return whether two cameras take their images at the same moment.
 
         Parameters
         ----------
         seen : LiveImage
-            The newest image, which tells how far away the pen is.
+            The newest image, which shows how far away the pen is.
         """
         live = self._live
         if live.n_cameras == 1:

@@ -31,7 +31,7 @@ class SettingsPanel(Translated, QGroupBox):
     Signals
     -------
     settings_changed(CameraSettings)
-        What is asked for; all else is None.
+        What is requested; all else is None.
     """
 
     settings_changed = Signal(object)
@@ -99,7 +99,7 @@ class SettingsPanel(Translated, QGroupBox):
         return self._hint.value()
 
     def counts(self) -> str:
-        """Return the frame counters in words."""
+        """Return the frame counters as text."""
         return self._counts.text()
 
     def set_stats(self, stats: Stats) -> None:

@@ -137,7 +137,7 @@ class SourcePanel(Translated, QGroupBox):
         self._refresh()
 
     def set_absent(self, absent: Mapping[str, Message]) -> None:
-        """Say what has to be installed for sources, by their keys."""
+        """Say what must be installed for sources, by their keys."""
         self._absent = absent
         self._retranslate()
 

@@ -20,7 +20,7 @@ FIELD_WIDTH = 20 * GRID
 
 
 class DuePanel(Translated, QWidget):
-    """Shows the tips in force with their due dates, by a rule that can be changed.
+    """Shows the current tips with their due dates, by a rule that can be changed.
 
     Where a password guards the limits, it is changed with them, at Start.
 

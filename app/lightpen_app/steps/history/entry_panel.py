@@ -104,7 +104,7 @@ class EntryPanel(Translated, QWidget):
         self._retranslate()
 
     def set_home(self, chain: str) -> None:
-        """Take over which chain is at home here: the files of its results are here."""
+        """Take over the own chain: the files of its results are here."""
         self._home = chain
 
     def set_guarded(self, is_guarded: bool) -> None:

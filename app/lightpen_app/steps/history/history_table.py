@@ -257,7 +257,7 @@ class HistoryTable(Translated, RowTable):
     def _share_width(self) -> None:
         """Give each column its minimum, and share the rest up to the maximum.
 
-        Where not even that fits, the letters are smaller, and no column tells the
+        Where not even that fits, the letters are smaller, and no column shows the
         station where there is only one.
         """
         room = self.viewport().width() - LEAST_WORDS

@@ -30,7 +30,7 @@ class FirstEntries:
     Attributes
     ----------
     home : str
-        Chain that is at home here.
+        Own chain.
     first : tuple of Line
         The newest.
     delivery : ReplicationState or None
@@ -59,7 +59,7 @@ class HistoryReader(QObject):
     remarks_read(object)
         Entries that concern the one asked about.
     due_read(object)
-        The tips in force, each a `DueTip`.
+        The current tips, each a `DueTip`.
     failed(str)
         A sentence to be read.
     """
@@ -130,7 +130,7 @@ class HistoryReader(QObject):
         )
 
     def read_due(self, rule: DueRule, library: Library) -> None:
-        """Read when the tips in force at this station are due."""
+        """Read when the current tips at this station are due."""
         logbook = self._logbook
 
         def read(_: Report) -> tuple[DueTip, ...]:

@@ -144,7 +144,7 @@ class LedFilePanel(Translated, QWidget):
             self._on_declined()
 
     def refresh_question(self) -> None:
-        """Word the question anew; it ends where its words are empty by now."""
+        """Word the question again; it ends where its words are empty by now."""
         self._question.refresh()
 
     def question(self) -> str:

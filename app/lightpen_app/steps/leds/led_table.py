@@ -298,7 +298,7 @@ class _DraftModel(QAbstractTableModel):
         return "" if flaw is None else worded(flaw.message)
 
     def _tell(self, first: int, last: int) -> None:
-        """Have columns shown anew; a cell among them that is typed in starts over."""
+        """Have columns shown again; a cell among them that is typed in starts over."""
         end = self.index(self.rowCount() - 1, last)
         self.dataChanged.emit(self.index(0, first), end)
 

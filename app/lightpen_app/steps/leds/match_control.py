@@ -26,7 +26,7 @@ class PenWatch(QObject):
     Signals
     -------
     value_changed(PenMatch)
-        How the pen fits the views so far; None when that has to be found out anew.
+        How the pen fits the views so far; None when that must be found out again.
     """
 
     value_changed = Signal(object)

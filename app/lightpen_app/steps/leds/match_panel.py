@@ -86,7 +86,7 @@ class FixableMessage(Translated, QWidget):
         self.set_mendable(self._finding)
 
 
-N_SMOOTHED = 20  # images that are told of together: one second
+N_SMOOTHED = 20  # images that are reported together: one second
 N_FINDINGS = 4
 TALLEST = 0.9  # height of the image over its width; sensors are flatter
 

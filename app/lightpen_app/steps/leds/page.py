@@ -33,7 +33,7 @@ class LedsPage(ResponsiveLayout, Page):
     """Opens, shows, mends and saves the LED file.
 
     The table shows a draft. The live match follows it at once; a swing needs a file, so
-    a draft that differs from the file in use has to be saved before the next step.
+    a draft that differs from the file in use must be saved before the next step.
     """
 
     key = "leds"

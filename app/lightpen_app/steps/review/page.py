@@ -108,7 +108,7 @@ class ReviewPage(Page):
 
     @override
     def main_action(self) -> MainAction:
-        # The second click of a double one must not go on at once.
+        # The second click of a double one must not continue at once.
         status, painted = self._run.status, self._painted
         is_read = painted is status.assessment and not self._reading.isActive()
         is_new = self._accepted.isActive()

@@ -27,7 +27,7 @@ from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.plots import Axes, Curve
 from lightpen_app.widgets.translated import Translated
 
-SETTLED = 1e-5  # mm; later steps of the iteration cannot be told apart on a plot
+SETTLED = 1e-5  # mm; later steps of the iteration cannot be distinguished on a plot
 
 
 class PlotsPanel(Translated, QWidget):

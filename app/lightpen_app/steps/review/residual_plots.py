@@ -24,8 +24,8 @@ class MisfitPlot(Plot):
     """The misfit of each image over its number; a click chooses an image.
 
     Images that do not take part are crosses. Where they are far off, they are drawn at
-    the upper rim, so that the others can still be told apart. A line above those that
-    take part can be drawn down to the worse half of them, to take them out.
+    the upper rim, so that the others can still be distinguished. A line above those
+    that take part can be drawn down to the worse half of them, to take them out.
 
     Signals
     -------
@@ -136,7 +136,7 @@ class MisfitPlot(Plot):
     @override
     def png(self, mark: str = "") -> bytes:
         was_visible = self._limit.isVisible()
-        self._limit.hide()  # it is there to be drawn, not to be looked at
+        self._limit.hide()  # only the curve is drawn
         picture = super().png(mark)
         self._limit.setVisible(was_visible)
         return picture

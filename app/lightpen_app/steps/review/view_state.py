@@ -167,7 +167,7 @@ def review_action(
 
 
 def repeat_question() -> Question:
-    """Return whether to swing anew."""
+    """Return whether to swing again."""
     translate = QCoreApplication.translate
     return Question(
         translate(

@@ -119,7 +119,7 @@ def readiness(
     file_doubt: str,
     verification: VerificationStatus,
 ) -> tuple[ReadinessItem, ...]:
-    """Return what a swing needs, in the order in which it is looked at."""
+    """Return what a swing needs, in the order in which it is examined."""
     return (
         ReadinessItem("camera", _camera_message(now, camera)),
         ReadinessItem("leds", _leds_message(now, statuses, camera, file_doubt)),

@@ -19,7 +19,7 @@ ROW_HEIGHT, SENTENCE_HEIGHT = 7 * GRID, 17 * GRID
 class RowKind(StrEnum):
     """Possible actions for interrupted work."""
 
-    OFFERED = "offered"  # to go on with
+    OFFERED = "offered"  # to continue with
     UNDER_WAY = "under way"  # in another program
     DAMAGED = "damaged"
 

@@ -1,6 +1,6 @@
 """Interrupted swings and verifications, to resume or discard.
 
-One that another program captures, or that is damaged, is told of and not offered.
+One that another program captures, or that is damaged, is reported and not offered.
 """
 
 from PySide6.QtCore import Qt, Signal

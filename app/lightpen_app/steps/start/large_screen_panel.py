@@ -69,7 +69,7 @@ class LargeScreenPanel(QWidget):
             self._job.cancel()
 
     def _on_failed(self, _: str) -> None:
-        self._show(None)  # History tells why
+        self._show(None)  # History shows why
 
     def _show(self, trend: "Trend | None") -> None:
         has_trend = trend is not None and len(trend.entries) >= LEAST_TREND

@@ -51,7 +51,7 @@ class LastResultPresenter(QObject):
         self.show_status()
 
     def look_up(self) -> None:
-        """Look for the result in force."""
+        """Look for the current result."""
         self._look_up(lambda result: None)
 
     def look_up_tip(self) -> None:

@@ -45,7 +45,7 @@ LONGEST_REASON = 200  # characters
 
 @dataclass(frozen=True)
 class RequestedChange:
-    """A change that is asked for.
+    """A change that is requested.
 
     Attributes
     ----------
@@ -314,7 +314,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
             self._start_editing(item, item.id, is_new=False)
 
     def _on_retire_clicked(self) -> None:
-        """Retire an item or bring it back: a reason is asked for, nothing else."""
+        """Retire an item or bring it back: a reason is requested, nothing else."""
         item = self.current()
         if item is None:
             return

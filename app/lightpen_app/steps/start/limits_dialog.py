@@ -28,7 +28,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
     Signals
     -------
     signed(StationLimits, Signature, str)
-        Limits to be laid down, who signs, and a new password or none.
+        Limits to be set, who signs, and a new password or none.
     """
 
     signed = Signal(object, object, str)
@@ -105,7 +105,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         self._refresh()
 
     def tell(self, trouble: str) -> None:
-        """Say why nothing was laid down."""
+        """Say why nothing was set."""
         self._is_signed = False
         self._fault.set_value(StatusMessage(trouble, Sign.CROSS, Tone.BAD))
         self._supervisor.clear_password()

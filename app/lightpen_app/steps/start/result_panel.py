@@ -43,7 +43,7 @@ SIZES = (  # of age, words and figures, where there is little room, plenty, and 
 
 @dataclass(frozen=True, eq=False)
 class LastResult:
-    """What is known of the tip in force.
+    """What is known of the current tip.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class LastResult:
     trouble : str
         Why it cannot be told; else empty.
     is_simulated : bool
-        Whether it is asked for a simulated pen.
+        Whether the pen is simulated.
     """
 
     result: Result | None = None
@@ -69,7 +69,7 @@ class LastResultPanel(Translated, QGroupBox):
     Parameters
     ----------
     now : callable
-        Returns the date and time that ages are told by.
+        Returns the date and time for ages.
 
     Signals
     -------

@@ -20,7 +20,7 @@ class SpinRecorder(QObject):
     Signals
     -------
     told(str)
-        How far the spin is, or why it does not tell the axis yet.
+        How far the spin is, or why it does not show the axis yet.
     """
 
     told = Signal(str)
@@ -32,7 +32,7 @@ class SpinRecorder(QObject):
         self._is_on = False
 
     def start(self) -> None:
-        """Begin anew."""
+        """Restart."""
         self.stop()
         self._rotations.clear()
         self._is_on = True
@@ -53,7 +53,7 @@ class SpinRecorder(QObject):
         Raises
         ------
         CalibrationError
-            The spin does not tell it.
+            The spin does not show it.
         """
         return fit_spin(np.array(self._rotations).reshape(-1, 3, 3))
 

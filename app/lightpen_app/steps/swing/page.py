@@ -118,7 +118,7 @@ class SwingPage(Page):
 
     @override
     def first_control(self) -> QWidget:
-        return self._face.dial  # no button: Space pauses, Enter goes on
+        return self._face.dial  # no button: Space pauses, Enter continues
 
     @override
     def entered(self) -> None:
@@ -246,4 +246,4 @@ class SwingPage(Page):
             self._notices.tell(self.key, why_not)
             return
         self._runner.start_over()
-        self._face.dial.setFocus()  # Enter would begin anew again
+        self._face.dial.setFocus()  # Enter would restart

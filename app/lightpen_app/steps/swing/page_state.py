@@ -91,7 +91,7 @@ class SwingProgress:
     Attributes
     ----------
     to_go : RemainingImages or None
-        How many images are told to be to go; None as long as nothing is told.
+        Displayed number of remaining images; None if none is displayed.
     """
 
     kept: AcceptedImages
@@ -313,7 +313,7 @@ def other_choices_question() -> Question:
 
 
 def start_over_question(status: SwingStatus) -> Question:
-    """Return whether to set a swing aside and begin anew."""
+    """Return whether to abandon a swing and restart."""
     translate = QCoreApplication.translate
     text = translate(
         "SwingPage",

@@ -118,7 +118,7 @@ class SwingPlots(Translated, QWidget):
             self._uncertainty.set_limit(self._limit, words)
 
     def _retranslate(self) -> None:
-        """Set the titles anew."""
+        """Translate the titles."""
         self._misfit.set_axes(Axes(self.tr("RMS residual per image / px")))
         self._scatter.set_axes(Axes(self.tr("Tip per image / µm")))
         self._estimate.set_axes(Axes(self.tr("Tip estimate / µm")))

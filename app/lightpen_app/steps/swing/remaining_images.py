@@ -6,14 +6,14 @@ from typing import Self
 
 # Of the images to go: from so many on, rounded up to this.
 STEPS = ((30, 10), (10, 5), (-1, 1))
-LEAST_RISE = 2  # by which a small figure has to be wrong before it is told
+LEAST_RISE = 2  # by which a small figure must be wrong before it is reported
 
 
 @dataclass(frozen=True)
 class RemainingImages:
     """Displayed number of remaining images.
 
-    What is estimated anew with each image goes up and down. Told is the least of it,
+    What is estimated again with each image goes up and down. Told is the least of it,
     but for a rise that is more than chance, and after images were dropped.
 
     Attributes

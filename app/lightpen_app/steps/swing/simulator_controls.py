@@ -110,7 +110,7 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
     def _follow_connection(self) -> None:
         super()._follow_connection()
         if self.follows() and self._live.operator is not self._led:
-            self._lead()  # of a camera that was opened anew
+            self._lead()  # of a camera that was opened again
 
     def _on_follow_toggled(self, follows: bool) -> None:
         if follows:

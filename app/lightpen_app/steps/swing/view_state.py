@@ -42,9 +42,9 @@ from lightpen_app.widgets.state_banner import State
 ENDED = (Phase.SOLVING, Phase.VERDICT)
 FLAWS = (Code.FEW_LEDS, Code.TOO_FAST, Code.BAD_FIT)  # images that are not kept
 UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
-PACE_S, N_PACING = 15.0, 6  # the last seconds and images by which time left is told
+PACE_S, N_PACING = 15.0, 6  # last seconds and images for the remaining time
 LONG_S = 90.0  # told in minutes
-FEW = 5  # images by which a misfit is told of
+FEW = 5  # images by which a misfit is reported
 
 _LOOKS: dict[Phase, tuple[Sign, Tone]] = {
     Phase.WAIT: (Sign.WAIT, Tone.QUIET),
@@ -120,7 +120,7 @@ class SwingViewState:
 
     @property
     def knows_side(self) -> bool:
-        """Whether the arrow goes by where the operator stands."""
+        """Whether the arrow accounts for the operator's position."""
         is_capturing = self.state.phase is Phase.CAPTURING
         return is_capturing and self.state.heading is not None
 

@@ -28,7 +28,7 @@ class RingValue:
     angles : tuple of float
         Of the touches: from the right against the clock as the camera sees them, rad.
     covered, needed : float
-        Degrees: all but the largest gap, and how much of it is asked for.
+        Degrees: all but the largest gap, and how much of it is requested.
     """
 
     angles: tuple[float, ...] = ()

@@ -64,7 +64,7 @@ class ProbingSimulatorControls(SimulatorControls):
     @override
     def _follow_connection(self) -> None:
         super()._follow_connection()
-        if self._touch.isChecked():  # of a camera opened anew
+        if self._touch.isChecked():  # of a camera opened again
             self._live.set_touching(self._live.operator is not None)
 
     def _on_lift_clicked(self) -> None:

@@ -38,7 +38,7 @@ class NumberOptionField(NumberField):
         self.setValue(number)
 
     def retranslate(self) -> None:
-        """Set its texts anew."""
+        """Translate its texts."""
         self.setSpecialValueText(worded(self._option.unknown))
 
 
@@ -66,7 +66,7 @@ class SurfaceField(ChoiceField):
         self.setCurrentIndex(self.findData(surface))
 
     def retranslate(self) -> None:
-        """Set its texts anew."""
+        """Translate its texts."""
         for index, label in enumerate(self._option.labels):
             self.setItemText(index, worded(label))
 

@@ -23,7 +23,7 @@ def diagnose(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Message | None
     """Name the likely cause why LEDs are not found where the pen file has them.
 
     Pens and cameras with one thing changed are tried on a few images; the first that
-    explains clearly more spots tells.
+    explains clearly more spots shows.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Hypotheses of the pose of a pen from a few of its spots.
 
 A triple of spots is supposed to be a triple of LEDs, which fixes up to four poses.
-There are hundreds of triples of LEDs; the size of a spot tells its distance, and with
+There are hundreds of triples of LEDs; the size of a spot shows its distance, and with
 it the sides of the triangle, so the likeliest can be tried first.
 """
 
@@ -56,7 +56,7 @@ class SearchEffort:
     n_settled : int
         Labellings refined.
     sized : bool
-        Believe that the size of a spot tells its distance.
+        Believe that the size of a spot shows its distance.
     """
 
     n_triples: int
@@ -203,7 +203,7 @@ def _led_triples(
     """Return which spot triple (H,) is supposed to be which LED triple (H, 3).
 
     The sides of the triangle that the ranges suggest are compared with those of the pen
-    by their Mahalanobis distance; the best go on.
+    by their Mahalanobis distance; the best continue.
     """
     if not effort.sized:
         some = pen.triples[:: 1 + len(pen.triples) // (2 * effort.n_hypotheses)]

@@ -1,6 +1,6 @@
 """Assignment of spots to LEDs.
 
-A triple of spots is supposed to be a triple of LEDs; the size of the spots tells their
+A triple of spots is supposed to be a triple of LEDs; the size of the spots shows their
 distance, which orders the suppositions by plausibility. Each fixes a pose (P3P), which
 predicts the other LEDs. A pose is believed when it explains at least six spots at the
 noise level, when chance would hardly do as well, and when no other labelling comes near
@@ -143,7 +143,7 @@ def label_images(
     Returns
     -------
     list of Labels
-        One per image. A labelling is right or refused; `Labels.reason` tells. An LED
+        One per image. A labelling is right or refused; `Labels.reason` shows. An LED
         that in most images has a spot beside its place, rather than at it, is taken to
         be displaced in the pen file and gets these spots; the poses do without it.
     """
@@ -219,7 +219,7 @@ def track_spots(
 
 
 def _is_five(spots: Spots, labels: Labels, pen: Constellation) -> bool:
-    """Tell whether an image that was refused shows five whole spots and no others."""
+    """Return whether an image that was refused shows five whole spots and no others."""
     refused = labels.reason in (LabelStatus.TOO_FEW, LabelStatus.NO_FIT)
     n_whole = np.count_nonzero(spots.flaws & UNWHOLE == 0)
     return bool(refused and n_whole == FEWEST_LEDS < pen.min_leds)

@@ -4,7 +4,7 @@ Where a camera file states no uncertainty, the prior assumed in its place must a
 a bad file. Where the images do not show the file to be off, its values are better than
 an estimate from one swing. So the estimate is taken with the assumed prior shrunk to
 the deviation that the images show (empirical Bayes); its uncertainty is that of the
-unshrunk prior, and the shift of the estimate by shrinkage is a contribution of its own.
+unshrunk prior, and the shift of the estimate by shrinkage is a separate contribution.
 """
 
 from dataclasses import dataclass, replace

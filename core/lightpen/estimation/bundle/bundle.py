@@ -286,7 +286,7 @@ def _started(
 def _solve(
     unknowns: Unknowns, now: _Linearised, weight_sigma: float, with_components: bool
 ) -> _Solved:
-    """Solve the normal equations about a state, with new components if asked for."""
+    """Solve the normal equations about a state, with new components if requested."""
     components, used = now.components, now.used
     jitter = components.jitter.covariance
     eliminated = eliminate(now.views, used, weight_sigma, jitter)

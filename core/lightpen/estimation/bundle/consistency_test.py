@@ -168,7 +168,7 @@ class FileFit:
         return float(by @ self.stated @ by)
 
     def _is_observable(self, i: int) -> bool:
-        """Tell whether the images determine a number at all."""
+        """Return whether the images determine a number at all."""
         by, prior = self.numbers[i].by, self._prior_variance(i)
         return float(prior - by @ self._as_stated.covariance @ by) > ROUNDING * prior
 
@@ -194,7 +194,7 @@ class FileFit:
         return {i: deviations for i, deviations in each.items() if deviations > LIMIT}
 
     def _is_inconsistent(self, i: int, released: tuple[int, ...]) -> bool:
-        """Tell whether a released number is inconsistent when it alone is not."""
+        """Return whether a released number is inconsistent when it alone is not."""
         others = tuple(j for j in released if j != i)
         return self._deviations(i, others) > LIMIT
 

@@ -3,7 +3,7 @@
 The information about the unknowns of all effects takes one pass about the fit, with all
 other unknowns marginalised. An effect whose likelihood gains is a candidate: it
 is fitted. The others are held at 0, and what they may be all the same moves tip and
-cone by a covariance of its own.
+cone by its own covariance.
 """
 
 from dataclasses import dataclass

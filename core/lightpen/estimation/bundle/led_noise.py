@@ -2,7 +2,7 @@
 
 The logarithms of the LEDs' variances are normal about a common mean. Their spread is
 that beyond what as few residuals scatter by, and each is shrunk to the mean by what is
-known of it. LEDs that are alike are not told apart.
+known of it. LEDs that are alike are not distinguished.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from lightpen.estimation.statistics.variance_components import CERTAIN
 from lightpen.model.quantiles import chi_square_quantile
 
 WORTH_IT = 1.25  # times the noise of another LED; less is not worth a new fit
-MIN_FREE = 10.0  # degrees of freedom of an LED that is told apart
+MIN_FREE = 10.0  # degrees of freedom of an LED that is distinguished
 LEAST = 1e-12  # px^2
 
 

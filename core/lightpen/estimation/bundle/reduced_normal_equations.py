@@ -74,7 +74,7 @@ class ImageRows:
         ----------
         coefficients : (B,) array
             f of equation (12), for noise of variance 1. Where the image before does not
-            show a coordinate, it starts anew.
+            show a coordinate, it starts again.
         jitter : (3, 3) array or None
             Covariance of the jitter of the seat, mm^2 for that noise.
         """

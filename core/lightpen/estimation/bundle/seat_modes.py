@@ -15,7 +15,7 @@ from lightpen.model.rigid import skew
 
 FULL_LEAN = 0.15  # sine of the tilt at which a mode reaches half its weight
 MODE_COUNTS = (2, 2, 2, 1)  # of one, two, three waves round the cone, and of the tilt
-UPRIGHT = 0.966  # cosine of 15 degrees, to which 15 images tell where a cone opens
+UPRIGHT = 0.966  # cosine of 15 degrees, to which 15 images show where a cone opens
 SMALLEST = 1e-9  # size of a mode; less is rounding
 
 

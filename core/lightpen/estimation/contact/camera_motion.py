@@ -150,7 +150,7 @@ def without_field(camera: Camera, observations: Observations) -> Observations:
 def _turns(camera: Camera, path: CameraPath) -> FloatArray:
     """Return the turn of the camera in each image, (N, 3, 3).
 
-    Up, down and sideways; lamps hardly tell how it turns about its own axis.
+    Up, down and sideways; lamps hardly show how it turns about its own axis.
     """
     plane = camera.unproject_with_jacobian(path.lamps.mean(axis=0))
     x, y = plane.points

@@ -27,7 +27,7 @@ TRUSTED_WEIGHT = 0.2  # of the Cauchy loss, at eight standard deviations
 
 @dataclass(frozen=True, eq=False)
 class PosedImages:
-    """The images of one camera, each by itself.
+    """The images of one camera, each alone.
 
     Attributes
     ----------

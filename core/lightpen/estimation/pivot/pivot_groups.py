@@ -2,7 +2,7 @@
 
 A tip exchanged or a cone moved halfway, or a share of poses that agree with each other
 elsewhere, leave one average fit with residuals that look like noise. Two splits are
-tried: at the one pose that leaves the least when each side has a fit of its own, and by
+tried: at the one pose that leaves the least when each side has its own fit, and by
 what the poses agree with, wherever they stand. A split counts where the two fits differ
 by far more than the residuals that they leave explain, hanging together as they do.
 """

@@ -1,12 +1,12 @@
 """Detection of other conventions of poses: frames, order of numbers, units.
 
 Poses in another convention are rotations and translations, too, and may even fit a tip
-badly. Only the scatter tells: each usual mistake is undone in turn, and one that brings
+badly. Only the scatter shows: each usual mistake is undone in turn, and one that brings
 the poses much closer to a common tip is what happened.
 
 Inverted poses are the exception. They fit as well, since ``R tip + t = pivot`` also
 reads ``R^T pivot - R^T t = tip``: tip and pivot change places. Only a tip farther from
-its pen than from the camera gives them away, which may be true: that is told, not
+its pen than from the camera gives them away, which may be true: that is reported, not
 refused.
 """
 

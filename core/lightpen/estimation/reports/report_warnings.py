@@ -74,7 +74,7 @@ def _copy_warnings(calibration: Calibration) -> list[Message]:
 
 
 def _noise_warnings(calibration: Calibration) -> list[Message]:
-    """Return what is told of LEDs that are far noisier than the others."""
+    """Return what is reported of LEDs that are far noisier than the others."""
     bundle = calibration.bundle
     noise = bundle.unknowns.noise.max(axis=0)
     return [

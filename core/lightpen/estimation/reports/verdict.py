@@ -89,7 +89,7 @@ class NextStep(StrEnum):
 
     @property
     def message(self) -> Message:
-        """It in words."""
+        """The reason as text."""
         return _TOLD[self]
 
 
@@ -126,7 +126,7 @@ class Verdict:
         return next(filter(None, causes), _NEXT_STEPS[Code(self.reason.code)])
 
 
-# By what a reason names, which its code alone does not tell.
+# By what a reason names, which its code alone does not show.
 _BY_CAUSE = {
     _ADVICE[ContributionName.CAMERA].code: NextStep.CHECK_CAMERA,
     _ADVICE[ContributionName.EXTRINSICS].code: NextStep.CHECK_RIG,
@@ -194,7 +194,7 @@ class Change:
         return bool(beyond.any())
 
     def told(self, date: str) -> Message:
-        """Return the verdict in words, with the date of the earlier tip."""
+        """Return the verdict as text, with the date of the earlier tip."""
         lengths = np.abs(self.difference)
         axis = int(np.argmax(lengths / np.maximum(self.expanded_uncertainty, TINY)))
         return tip_changed(
@@ -243,7 +243,7 @@ def judge_change(
     verdict : Verdict
         Verdict on the tip alone; its findings take precedence.
     change : Change or None
-        Since the result in force; None if there is none.
+        Since the current result; None if there is none.
     limit : float, optional
         See `change_doubt`.
     """

@@ -16,7 +16,7 @@ from lightpen.estimation.pivot.pivot import median_distance
 from lightpen.model.rigid import nearest_rotation, vector_from_rotation
 
 MIN_PAIRS = 6  # moments that two cameras see
-NEAR = 4.0  # times the median turn: pairs by which the cameras are told
+NEAR = 4.0  # times the median turn: pairs by which the cameras are judged
 ROUNDS = 3
 APART = 8.0  # times the median turn: images of other moments
 MANY = 0.25  # of the moments; a pairing that is wrong and no single image

@@ -1,7 +1,7 @@
 """Covariance of a least-squares fit with residuals correlated from pose to pose.
 
 Plain least squares counts every pose as independent. A tracker's error drifts and
-follows the swing instead, so that hundreds of poses may tell no more than a dozen. With
+follows the swing instead, so that hundreds of poses may show no more than a dozen. With
 design A_i (3 x P) and residuals e_i of covariance ``S c(i - j)`` the covariance of the
 least-squares solution is
 
@@ -12,10 +12,10 @@ correlation that falls off with distance: the noise has a spectrum g(k), and pos
 to each other become frequencies k, independent of each other. The spectra tried are
 those of white noise plus a first-order autoregression, of many shares and lengths.
 Their restricted likelihoods [1]_, which count what the unknowns have absorbed, weigh
-the covariances that follow, so that what the poses cannot tell of their correlation
+the covariances that follow, so that what the poses cannot show of their correlation
 widens the uncertainty too.
 
-Only those frequencies are looked at in which the pen swings. The unknowns feel no
+Only those frequencies are examined in which the pen swings. The unknowns feel no
 others, and a model that had to match them also would be swayed by how smoothly a
 tracker filters its poses.
 
@@ -31,8 +31,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 
-SWING_SHARE = 0.99  # of what the design tells; the frequencies beyond are left out
-MIN_FREQUENCIES = 30  # fewer do not tell white noise from other
+SWING_SHARE = 0.99  # of what the design shows; the frequencies beyond are left out
+MIN_FREQUENCIES = 30  # fewer do not distinguish white noise from other
 SHARES = (0.1, 0.25, 0.5, 0.75, 0.9, 0.97, 0.999)  # of the noise, that is correlated
 N_LENGTHS = 10
 SHORTEST = 0.7  # poses

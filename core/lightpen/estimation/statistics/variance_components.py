@@ -54,7 +54,7 @@ class Component(NamedTuple):
     expected_sigma: float = 0.0
 
     def exceeds(self, chance: float) -> bool:
-        """Tell whether chance alone makes such a gain less often."""
+        """Return whether chance alone makes such a gain less often."""
         return self.gain > chi_square_quantile(1, chance)
 
     @property
@@ -160,7 +160,7 @@ def find_jitter(
     negative is taken as none.
 
     What is found is itself uncertain, the more the fewer images there are. One variance
-    counts as of as many degrees of freedom n as its own variance tells [1]_, and is
+    counts as of as many degrees of freedom n as its own variance shows [1]_, and is
     raised by ``n / (n - 2)`` to the mean of what it may be, as JCGM 101, 6.4.9 has it.
 
     References

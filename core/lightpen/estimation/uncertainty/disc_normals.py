@@ -34,7 +34,7 @@ class NormalEffect(NamedTuple):
     gain : (p, 2) array
         Change of the unknowns by the turn, a rad.
     information : (2, 2) array
-        What the images tell of the turn, all else unknown, 1/rad^2.
+        What the images show of the turn, all else unknown, 1/rad^2.
     """
 
     gain: FloatArray

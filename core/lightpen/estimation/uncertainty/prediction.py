@@ -4,8 +4,8 @@ During a swing tip and cone are fitted with the parameters of the files held. U 
 of the whole budget all the same (`budget.contributions_of`), by one step of the bundle
 adjustment about the joint fit: its normal equations are kept, and a new image adds its
 own. What lens, sag, loose stylus and camera tilt may add is searched for when all
-images are linearised anew, as it needs the LEDs one by one. Correlated noise is left to
-the calibration.
+images are linearised again, as it needs the LEDs one by one. Correlated noise is left
+to the calibration.
 """
 
 from collections.abc import Sequence
@@ -54,7 +54,7 @@ from lightpen.model.rig import Rig
 T = TypeVar("T", bound=np.generic)
 
 SEAT_ROUNDS = 2  # in which the jitter of the seat is found beside other errors
-GROWTH = 1.25  # of the number of images, after which all are linearised anew
+GROWTH = 1.25  # of the number of images, after which all are linearised again
 ENDLESS = 100.0  # times the images, more than anyone takes
 
 

@@ -51,7 +51,7 @@ class CalibrationFile:
     accepted : datetime or None
         None of such a record, too.
     reason : str
-        Why it was accepted though it was to be checked, or put in force again, in the
+        Why it was accepted though it was to be checked, or reinstated, in the
         words of who did.
     change : TipChange or None
         Since the tip that was in force before.

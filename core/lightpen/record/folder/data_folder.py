@@ -117,7 +117,7 @@ def sweep_leftovers(data: Path) -> None:
     sweep_parts(data / RESULTS)
     for root in (data, data / SIMULATED):
         sweep_parts(root / VERIFICATIONS / UNDER_WAY)
-    with suppress(OSError):  # the search for interrupted swings tells it
+    with suppress(OSError):  # the search for interrupted swings shows it
         for folder in list((data / RECORDS).iterdir()):
             with suppress(OSError, FileError):
                 _sweep_record(folder)

@@ -1,6 +1,6 @@
 """The library of pens, tips and cones: what there is, by which limits, due when.
 
-Each change is a file of its own in the data folder, numbered in their order and never
+Each change is a separate file in the data folder, numbered in their order and never
 changed, as limits are: it holds the whole of one item as it is from then on, and who
 changed it. The newest file of an item counts, so what the library says follows from
 its history alone, and each of these files is owed an entry of the archive. An item is
@@ -121,7 +121,7 @@ class ListedPen(Item, frozen=True, kw_only=True, tag="pen"):
     led_file : LedFile or None
         None until one was opened for the pen.
     expansion : float or None
-        Of the pen by warmth, 1/K, where its LED file states none; None for the default
+        Of the pen, 1/K, where its LED file states none; None for the default
         of the station.
     """
 
@@ -151,7 +151,7 @@ class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
     axis_origin : AxisOrigin or None
         None without an axis.
     max_change_mm : float or None
-        Distance from the tip in force before that a calibration may find; None for no
+        Distance from the current tip before that a calibration may find; None for no
         limit but the uncertainty of the change.
     max_days, max_swings : int or None
         Its own `DueRule`; None for that of the station.

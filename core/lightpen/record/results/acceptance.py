@@ -7,7 +7,7 @@ without its verdict next concludes it.
 
 The grade decides how: a tip that passes is accepted as it is, one that is to be checked
 only with a reason, which is stored, and one that is to be repeated not at all. Where a
-supervisor has laid down a password, one beyond the limit of U is accepted by a
+supervisor has set a password, one beyond the limit of U is accepted by a
 supervisor only.
 """
 
@@ -152,7 +152,7 @@ def _approval(
 def require_in_use(archive: FolderArchive, name: str) -> None:
     """Reject a retired tip.
 
-    A library that cannot be read is told of with the verdict.
+    A library that cannot be read is reported with the verdict.
 
     Raises
     ------

@@ -2,8 +2,8 @@
 
 A file is written once and never changed. Its name is a number: the order of acceptance.
 Where its swing is recorded is written as a path from the data folder, so that the whole
-of it can be moved, or copied to another machine. Results of simulated pens are in a
-folder of their own.
+of it can be moved, or copied to another machine. Results of simulated pens are in their
+own folder.
 """
 
 import logging
@@ -51,7 +51,7 @@ _logger = logging.getLogger(__name__)
 class FolderArchive:
     """Keeps every result that was accepted; the newest of a pen and tip is in force.
 
-    Results are added and never changed or removed: one that is taken back is kept, and
+    Results are added and never changed or removed: one that is revoked is kept, and
     the one before is in force again. Those of a simulated pen are kept apart, and none
     of them is in force for a real one. All methods may take as long as a disk or a
     network does, and may be called from any thread. Of a result of another pen, tip or
@@ -128,7 +128,7 @@ class FolderArchive:
         AcceptanceError
             There is a password, and no supervisor or no reason.
         FileError
-            It is not in force any more, or what takes it back cannot be kept.
+            It is not in force any more, or what revokes it cannot be kept.
         """
         names, supervision = result.names, self.supervision()
         key = approval_of_change(supervision, signature, reason)
@@ -195,7 +195,7 @@ class FolderArchive:
         return tuple(filter(None, dict.fromkeys(found)))
 
     def files_of_pen(self, pen: str, *, is_simulated: bool = False) -> tuple[Path, ...]:
-        """Return the results of a pen that are not taken back, the newest first.
+        """Return the results of a pen that are not revoked, the newest first.
 
         Raises
         ------
@@ -230,7 +230,7 @@ class FolderArchive:
     def of_record(self, folder: Path) -> Result | None:
         """Return the last accepted result of the swing in a folder, or None.
 
-        Results that cannot be read or that were taken back are passed over.
+        Results that cannot be read or that were revoked are passed over.
 
         Raises
         ------
@@ -275,7 +275,7 @@ class FolderArchive:
         return (absolute.relative_to(self._data) if inside else absolute).as_posix()
 
     def file_of(self, result: Result) -> Path:
-        """Return the file of a result that is not taken back.
+        """Return the file of a result that is not revoked.
 
         Raises
         ------
@@ -301,7 +301,7 @@ class FolderArchive:
     def _standing(
         self, root: Path, *, passes_over_damage: bool = False
     ) -> Iterator[tuple[Path, ResultHeading]]:
-        """Yield the results that are not taken back, the newest first."""
+        """Yield the results that are not revoked, the newest first."""
         revoked, supervision = set[str](), read_supervision(self._data)
         for file in numbered_files(root):
             try:

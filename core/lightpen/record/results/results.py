@@ -4,8 +4,8 @@ A result is one JSON object. Its first entries, the head, say who accepted what 
 when, and which swing it comes from; they end with their checksum. The last entry,
 ``calibration``, is the whole record of the calibration, as
 `lightpen.estimation.reports.report` makes it; its checksum is in the head, so that a
-head is known to be sound without the rest. A result that is taken back stays: what
-takes it back is a file of its own, a head without a calibration.
+head is known to be sound without the rest. A result that is revoked stays: what
+revokes it is a separate file, a head without a calibration.
 """
 
 import math
@@ -63,7 +63,7 @@ class ResultHeading(Struct):
     origin : str or None
         Origin of the images; None if not stated.
     takes_back : str or None
-        Name of the result's file, without suffix, that is taken back; None of a result.
+        Name of the result's file, without suffix, that is revoked; None of a result.
     """
 
     format: Annotated[int, Meta(ge=1)]

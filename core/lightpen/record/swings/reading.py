@@ -23,7 +23,7 @@ before it acknowledges the image; `lightpen.record.swings.lock` keeps a second p
 from writing meanwhile. An image without a line is what a crash leaves: it was not
 acknowledged and is passed over. Header, lines and images each have their checksum.
 Everything needed to calibrate again is in the images and the two files; the centres in
-the journal spare reading the images when an interrupted swing goes on.
+the journal spare reading the images when an interrupted swing continues.
 """
 
 from collections.abc import Mapping, Sequence
@@ -119,7 +119,7 @@ class Record:
     verdict : str or None
         The last one; None if the swing was interrupted.
     more : pair of int or None
-        Least and greatest number of images that were asked for after a verdict.
+        Least and greatest number of images that were requested after a verdict.
     length : int
         Length of the journal that was read, bytes.
     """

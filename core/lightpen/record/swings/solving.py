@@ -2,7 +2,7 @@
 
 The wizard, its review and the command line compute the tip of a record here, always
 from the images on the disk, so that they agree to the last digit. What was seen in the
-images does not depend on which of them take part; taking one out solves anew and reads
+images does not depend on which of them take part; taking one out solves again and reads
 nothing.
 """
 

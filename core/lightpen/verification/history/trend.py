@@ -32,9 +32,9 @@ LIMIT = "max_uncertainty_mm"  # among the settings of an entry
 
 @dataclass(frozen=True, eq=False)
 class Trend:
-    """The calibrations of a tip that were accepted and not taken back.
+    """The calibrations of a tip that were accepted and not revoked.
 
-    One whose tip was put in force again stands for itself once.
+    One whose tip was reinstated stands for itself once.
 
     Attributes
     ----------

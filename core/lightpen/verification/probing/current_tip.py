@@ -1,4 +1,4 @@
-"""The tip in force of a station, and the instrument that it makes with its files."""
+"""The current tip of a station, and the instrument that it makes with its files."""
 
 from dataclasses import dataclass, replace
 
@@ -72,7 +72,7 @@ class CurrentTip:
 
 
 def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> CurrentTip:
-    """Return the tip in force of the pen and tip that are chosen.
+    """Return the current tip of the pen and tip that are chosen.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ class VerificationChoices:
         return replace(self, kinds=tuple(t.kind for t in ALL_TASKS if t.kind in kinds))
 
     def missing(self, ball_diameter: float | None) -> Message | None:
-        """Return what has to be entered before, with a ball of this diameter, mm."""
+        """Return what must be entered before, with a ball of this diameter, mm."""
         if not self.kinds:
             return message("verification.no-task")
         each = (t.missing(self.options_of(t), ball_diameter) for t in self.tasks)

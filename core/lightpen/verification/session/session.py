@@ -1,9 +1,9 @@
 """A whole verification in one go, without a key: the tasks one after the other.
 
-`advance_session` takes the state and what the next image shows. Each task ends by
-itself when its points suffice, and the next begins when the pen moves on; live images
-and recorded ones go through the same steps. Points that can be none of the task are
-dropped with a message.
+`advance_session` takes the state and what the next image shows. Each task ends
+automatically when its points suffice, and the next begins when the pen moves on; live
+images and recorded ones go through the same steps. Points that can be none of the task
+are dropped with a message.
 """
 
 from collections.abc import Sequence
@@ -142,7 +142,7 @@ def touch_again(
 ) -> SessionState:
     """Return the session with earlier touches of the current run.
 
-    One that would end the run has to be taken again: so it was not ended by it.
+    One that would end the run must be taken again: so it was not ended by it.
     """
     task = state.task(setup)
     if task is None:
@@ -238,9 +238,9 @@ def with_other_choices(
 ) -> tuple[SessionSetup, SessionState]:
     """Return a verification that continues by other choices.
 
-    What was found of another artefact than is chosen now is found anew; all else stays.
-    Where another task is to be probed now, the points at hand are forgotten, and the
-    state has another `touching`.
+    What was found of another artefact than is chosen now is found again; all else
+    stays. Where another task is to be probed now, the points at hand are forgotten, and
+    the state has another `touching`.
     """
     at_hand = state.task(setup)
     for task in ALL_TASKS:
@@ -266,7 +266,7 @@ def rules_of(setup: SessionSetup, task: AnyTask) -> ProbingRules:
 
 
 def with_touch(setup: SessionSetup, state: SessionState, task: AnyTask) -> SessionState:
-    """Measure anew with the last point; drop it if it can be none of the task."""
+    """Measure again with the last point; drop it if it can be none of the task."""
     points = measure_touches(setup.instrument, state.touching.taken)
     state = replace(state, touches=points)
     screening = _screened(setup, state, task)

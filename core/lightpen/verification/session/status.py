@@ -43,7 +43,7 @@ class SessionEventKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class VerificationStatus:
-    """A verification from the tip in force to its verdict; nothing of it is changed.
+    """A verification from the current tip to its verdict; nothing of it is changed.
 
     Attributes
     ----------

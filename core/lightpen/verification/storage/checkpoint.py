@@ -1,6 +1,6 @@
 """The checkpoint of an open verification, from which it is resumed after a crash.
 
-It has a file of its own beside the records of verifications, replaced whole at each
+It has its own file beside the records of verifications, replaced whole at each
 step, and locked by the window that it is in; the lock goes when the process ends,
 however it ends. The file is removed with the conclusion. One without a lock was
 interrupted. What was touched is in the records of the touches; the file says which
@@ -161,7 +161,7 @@ class CheckpointFile:
             descriptor = os.open(lock, os.O_RDWR | os.O_CREAT)
         except OSError as error:
             raise unreadable(lock, WHAT, error) from error
-        with suppress(OSError):  # a disk that knows no locks
+        with suppress(OSError):  # a disk that supports no locks
             if not locked(descriptor):
                 os.close(descriptor)
                 raise FileError("under-way.held", file=printable(self._path.name))

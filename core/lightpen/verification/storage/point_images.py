@@ -1,6 +1,6 @@
 """The images of live touches on the disk, from which a verification can be repeated.
 
-Each run is a record of its own, see `lightpen.record.swings.reading`: an image is
+Each run is a separate record, see `lightpen.record.swings.reading`: an image is
 written before it counts, with the touch that it is of; one that counts no more is taken
 out. So a run can be given to whatever takes recorded images, and what a crash leaves is
 whole.

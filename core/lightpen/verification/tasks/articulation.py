@@ -100,7 +100,7 @@ class Articulation(Found):
     expected : float
         Mean of these location errors, mm.
     tip : TipEvidence
-        What the points tell of the tip.
+        The evidence of the points on the tip.
     """
 
     names: tuple[str, ...]

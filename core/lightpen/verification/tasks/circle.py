@@ -133,7 +133,7 @@ class Circle(Found):
     uncertainty : float
         U (k = 2) of the mean radius and the certified one together, mm.
     tip : TipEvidence
-        What the points tell of the tip.
+        The evidence of the points on the tip.
     """
 
     runs: tuple[CircleRun, ...]
@@ -221,7 +221,7 @@ def _known_uncertainty(conditions: Conditions, options: CircleOptions) -> float:
 def _tip_evidence(
     runs: Sequence[CircleRun], conditions: Conditions, options: CircleOptions
 ) -> TipEvidence:
-    """Return what the points tell of the tip; each run has a ring of its own."""
+    """Return the evidence of the points on the tip; each run has its own ring."""
     points = [touch for run in runs for touch in run.touches]
     rings = [ring_residuals(run.fit, len(run.touches)) for run in runs]
     off = [

@@ -121,7 +121,7 @@ class Length(Found):
     uncertainties : (N,) array
         U (k = 2) of each error, mm.
     tip : TipEvidence
-        What the lengths tell of the tip.
+        The evidence of the lengths on the tip.
     """
 
     runs: tuple[LengthRun, ...]

@@ -128,7 +128,7 @@ class Flatness(Found):
     uncertainty : float
         U (k = 2) of the measured flatness, mm.
     tip : TipEvidence
-        What the points tell of the tip.
+        The evidence of the points on the tip.
     """
 
     points: tuple[ProbedPoint, ...]

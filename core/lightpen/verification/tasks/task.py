@@ -63,7 +63,7 @@ class NumberOption:
     argument, help : str
         Option of the command line; empty where it has none.
     is_of_artefact : bool
-        Whether a task has to be done again when it changes.
+        Whether a task must be done again when it changes.
     """
 
     name: str
@@ -313,7 +313,7 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     rule_of : callable
         Returns the decision rule in words, by options and limits.
     missing : callable
-        Returns what has to be entered before, by options and ball diameter.
+        Returns what must be entered before, by options and ball diameter.
     is_each_run_measured : bool
         Whether a single run gives a result.
     check : callable

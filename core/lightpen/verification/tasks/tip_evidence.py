@@ -51,7 +51,7 @@ LARGEST = 1.0  # mm: what shows no smaller error shows none
 
 @dataclass(frozen=True, eq=False)
 class TipEvidence:
-    """What points tell of the tip.
+    """The evidence of points on the tip.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ def tip_evidence(
     by_artefact: FloatArray,
     artefact_covariance: FloatArray | None = None,
 ) -> TipEvidence:
-    """Return what residuals of points tell of the tip.
+    """Return the evidence of residuals of points on the tip.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _detectable(covariance: FloatArray) -> float:
 
 @cache
 def _detected_deviations() -> float:
-    """Return how many standard deviations off a tip has to be to be found."""
+    """Return how many standard deviations off a tip must be to be found."""
     from scipy.special import chndtrinc
 
     gate = chi_square_quantile(3, BY_CHANCE)
@@ -215,7 +215,7 @@ def not_the_tip(found: TipEvidence, limits: VerificationLimits) -> Message:
 def points_evidence(
     points: Sequence[ProbedPoint], instrument: Instrument, drift: FloatArray
 ) -> TipEvidence:
-    """Return what points in one cone tell of the tip.
+    """Return the evidence of points in one cone on the tip.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def points_evidence(
 
 
 def tip_entries(found: TipEvidence) -> dict[str, Any]:
-    """Return what points tell of the tip as it is recorded."""
+    """Return the evidence of points on the tip as it is recorded."""
     return {
         "tip_change_mm": found.change,
         "tip_change_expanded_uncertainty_mm": found.uncertainty,
