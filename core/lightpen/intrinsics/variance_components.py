@@ -8,9 +8,9 @@ independent noise. Their variances follow from restricted maximum likelihood [1]
 the fixed point of [2]_. The cameras are estimated together with the effects, so what
 the views cannot separate from an effect is in their covariance. One set of views hardly
 determines amplitude and length of the fields: the estimate is the mean over a grid of
-both, weighted by the likelihood; the grid is even in the logarithm of the amplitude, the
-prior of a scale [3]_. Over 387 simulated sets 95 % intervals cover 94.6 to 96.9 %; with
-all amplitudes as likely before, 95.3 to 98.7 %.
+both, weighted by the likelihood; the grid is even in the logarithm of the amplitude,
+the prior of a scale [3]_. Over 387 simulated sets 95 % intervals cover 94.6 to 96.9 %;
+with all amplitudes as likely before, 95.3 to 98.7 %.
 
 References
 ----------
