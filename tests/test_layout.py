@@ -70,18 +70,18 @@ def test_a_name_given_twice_is_noticed(tmp_path: Path) -> None:
     assert set(names_given_twice([tmp_path])) == {"Verdict", "judge"}
 
 
-@pytest.mark.parametrize("package", PACKAGES)
 def test_no_page_is_long() -> None:
     pages = (PACKAGES["lightpen_app"] / "steps").glob("*/page.py")
     lengths = {
-        page.parent.name: len(page.read_text(encoding="utf-8").splitlines())
-        for page in pages
+        each.parent.name: len(each.read_text(encoding="utf-8").splitlines())
+        for each in pages
     }
 
     assert lengths
     assert max(lengths.values()) <= LONGEST_PAGE, lengths
 
 
+@pytest.mark.parametrize("package", PACKAGES)
 def test_every_package_has_its_place_in_the_order_of_imports(
     contracts: list[dict[str, Any]], package: str
 ) -> None:
