@@ -214,7 +214,7 @@ def test_names_that_tell_nothing_are_paired_in_order_with_a_note(
     [
         (("left",), (), "files given: 1. The rig has 2 cameras"),
         (("left", "right", "left"), (), "files given: 3"),
-        (("left", "left"), (), "A folder or file is given twice. The rig has 2 cameras"),
+        (("left", "left"), (), "or file is given twice. The rig has 2 cameras"),
         ((), ("--camera", "left.yaml"), "Omit --camera"),
     ],
 )

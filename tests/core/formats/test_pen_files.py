@@ -186,7 +186,7 @@ def test_normals_in_few_digits_get_unit_length(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("2,-0.2", "3,-0.2", "Line 3 of leds.csv: LED 3 is listed at the position of LED 2"),
+        ("2,-0.2", "3,-0.2", "Line 3 of leds.csv: LED 3 is listed at the position"),
         ("\n3,", "\n2,", "Line 4 of leds.csv: LED 2 is listed already on line 3"),
         ("\n1,", "\n0,", "Line 2 of leds.csv: LED 0 is in the place of LED 1"),
         ("\n3,", "\n2.5,", 'Line 4 of leds.csv: "2.5" is not a whole number'),
@@ -213,7 +213,7 @@ def test_rows_out_of_order_are_refused(tmp_path: Path) -> None:
     lines = table().splitlines()
     lines[2:4] = lines[3], lines[2]
     text = refusal(tmp_path, "\n".join(lines))
-    assert "Line 3 of leds.csv: LED 3 is listed at the position of LED 2" in text
+    assert "Line 3 of leds.csv: LED 3 is listed at the position" in text
     assert "in ascending order" in text
 
 
