@@ -76,13 +76,15 @@ class ImagesRow(Translated, QWidget):
         self._is_still.setText(self.tr("Held still"))
         self._is_still.setToolTip(
             self.tr(
-                "A touch is several images through which the pen is held still; else "
-                "each image is a touch."
+                "On: a point is several images with the pen held still. Off: "
+                "each image is a point."
             )
         )
         self._read.setText(self.tr("Read"))
         self._read.setToolTip(
-            self.tr("Do this task with recorded images: a folder, or one of folders.")
+            self.tr(
+                "Do this task with recorded images: a folder, or a folder of folders."
+            )
         )
         self._cancel.setText(self.tr("Cancel"))
         self._progress.setAccessibleName(self.tr("Progress of reading"))

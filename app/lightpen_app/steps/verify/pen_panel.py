@@ -270,12 +270,10 @@ class PenPanel(Translated, QWidget):
         if self._shown is None and self._reading is None:
             return StatusMessage()
         if self._shown is None:
-            return StatusMessage(
-                self.tr("The swings of the pen are being read."), Sign.WAIT
-            )
+            return StatusMessage(self.tr("Reading the swings of the pen."), Sign.WAIT)
         text = self.tr(
-            "Two accepted swings with this LED file are needed to tell how pen {0} "
-            "changes; there are {1}."
+            "Two accepted swings of pen {0} with this LED file are needed; there are "
+            "{1}."
         )
         pen, n_swings = shortened(self._shown.names.pen), len(self._shown.swings)
         return StatusMessage(text.format(pen, n_swings), Sign.RING)
@@ -283,21 +281,21 @@ class PenPanel(Translated, QWidget):
     def _left_out_text(self) -> str:
         if self._shown is None or not self._shown.n_left_out:
             return ""
-        text = self.tr("Swings with another LED file, or that cannot be read: {0}.")
+        text = self.tr("Swings with another LED file, or unreadable: {0}.")
         return text.format(self._shown.n_left_out)
 
     def _why_not_improve(self) -> str:
         found = self._shown
         if found is None or found.camera is None:
-            return self.tr("Nothing is read yet.")
+            return self.tr("The swings are not read yet.")
         if found.n_missing:
             text = self.tr(
-                "It takes four accepted swings with this LED file and camera file; {0} "
-                "more."
+                "Four accepted swings with this LED file and camera file are needed; "
+                "missing: {0}."
             )
             return text.format(found.n_missing)
         if found.health is not None and found.health.moved:
-            return self.tr("An LED has moved: no file is right for all swings.")
+            return self.tr("An LED has moved: no LED file fits all swings.")
         return ""
 
     def _told_message(self) -> StatusMessage:
@@ -309,8 +307,8 @@ class PenPanel(Translated, QWidget):
             )
         improved = self._new.improved
         text = self.tr(
-            "Written as {0}: the swing held out fits it to {1} px, the old file to {2} "
-            "px. A tip belongs to its LED file: calibrate again with the new one."
+            "Saved as {0}: residuals of the swing held out {1} px, with the old file {2} "
+            "px. Calibrate the tip again with the new file."
         )
         after, before = improved.sigma_after, improved.sigma_before
         words = (self._new.path.name, number_text(after, 4), number_text(before, 4))

@@ -179,19 +179,19 @@ class VerifyPresenter(QObject):
         status = self._status
         setup, state = status.setup, status.state
         if status.reading is ReadingState.IMAGES:
-            hint = self.tr("The points in recorded images are measured.")
+            hint = self.tr("Measuring the points in the recorded images.")
             return Instruction(self.tr("Reading images"), hint)
         if status.refusal is not None:
             return Instruction(self._refused(), worded(status.refusal))
         if setup is None or state is None:
-            return Instruction(
-                self.tr("Wait"), self.tr("The current tip is being read.")
-            )
+            return Instruction(self.tr("Wait"), self.tr("Reading the current tip."))
         if status.assessment is not None and status.is_done:
             short = self._verdict(status.assessment)
             return Instruction(short, worded(status.assessment.next_step))
         if self._live.connection is not Connection.STREAMING:
-            hint = self.tr("The camera sends none. Probing continues when they arrive.")
+            hint = self.tr(
+                "The camera sends no images. Probing continues when they arrive."
+            )
             return Instruction(self.tr("No images"), hint)
         if status.is_paused:
             return Instruction(self.tr("Paused"), self.tr("Press Space to continue."))

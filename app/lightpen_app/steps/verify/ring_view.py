@@ -121,7 +121,7 @@ class RingView(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        words = self.tr("Ring: {0} of {1} degrees by {2} touches")
+        words = self.tr("Ring: {0} of {1} degrees, points: {2}")
         self.setAccessibleName(
             words.format(
                 round(self._value.covered),

@@ -49,7 +49,7 @@ class ProbingSimulatorControls(SimulatorControls):
         set_words(
             self._touch,
             self.tr("Let the simulated operator probe"),
-            self.tr("It probes all tasks by itself."),
+            self.tr("Probes all tasks automatically."),
         )
         set_words(
             self._lift, self.tr("Lift"), self.tr("Take the tip away for a moment.")

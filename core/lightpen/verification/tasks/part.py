@@ -281,7 +281,7 @@ def _entries(found: Part, instrument: Instrument) -> dict[str, Any]:
 
 def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
     part = found.part
-    frame = "part.in-part" if part.alignment is not None else "part.in-camera"
+    in_part, in_camera = message("part.in-part"), message("part.in-camera")
     features = ResultTable(
         message("part.features"),
         (
@@ -290,7 +290,7 @@ def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
             message("part.kind"),
         ),
         _rows(feature_rows(part)),
-        (message(frame),),
+        (in_camera if part.alignment is None else in_part,),
     )
     characteristics = ResultTable(
         message("part.characteristics"),

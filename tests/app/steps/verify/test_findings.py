@@ -25,7 +25,7 @@ def test_a_ring_says_how_much_of_it_is_covered(qtbot: QtBot) -> None:
     qtbot.addWidget(view)
     view.set_value(RingValue((0.0, 1.0, 2.0), 114.6))
 
-    assert view.accessibleName() == "Ring: 115 of 270 degrees by 3 touches"
+    assert view.accessibleName() == "Ring: 115 of 270 degrees, points: 3"
 
 
 def test_a_field_of_the_dial_is_full_that_was_touched_in() -> None:

@@ -58,8 +58,7 @@ def test_what_comes_of_the_pen_before_is_not_told_of_the_next_one(
     QCoreApplication.processEvents()
 
     assert words(panel) == (
-        "Two accepted swings with this LED file are needed to tell how pen LP-05 "
-        "changes; there are 0."
+        "Two accepted swings of pen LP-05 with this LED file are needed; there are 0."
     )
 
 
@@ -69,7 +68,7 @@ def test_swings_are_said_to_be_read_only_as_long_as_they_are(
     panel = PenPanel(workbench)
     qtbot.addWidget(panel)
     panel.show()
-    assert words(panel) == "The swings of the pen are being read."
+    assert words(panel) == "Reading the swings of the pen."
     QThreadPool.globalInstance().waitForDone()
     QCoreApplication.processEvents()
     assert words(panel).startswith("Two accepted swings")
