@@ -295,7 +295,7 @@ def test_what_a_crash_left_behind_is_passed_over(
 @pytest.mark.parametrize(
     ("numbers", "note"),
     [
-        ([21], "images/000021.png is in the folder but not in the journal; it was"),
+        ([21], "images/000021.png is in the folder but not in the journal; its"),
         ([22, 21], "images/000021.png, images/000022.png are in the folder"),
         ([24, 23, 22, 21], "4 images, the first images/000021.png, are in the folder"),
     ],

@@ -307,8 +307,8 @@ class PenPanel(Translated, QWidget):
             )
         improved = self._new.improved
         text = self.tr(
-            "Saved as {0}: residuals of the swing held out {1} px, with the old file {2} "
-            "px. Calibrate the tip again with the new file."
+            "Saved as {0}: residuals of the swing held out {1} px, with the old file "
+            "{2} px. Calibrate the tip again with the new file."
         )
         after, before = improved.sigma_after, improved.sigma_before
         words = (self._new.path.name, number_text(after, 4), number_text(before, 4))
