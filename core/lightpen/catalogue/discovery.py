@@ -17,7 +17,7 @@ MESSAGES = {
     "discover.same-led": "The length is between LED {number} and itself. Give the numbers of two LEDs.",
     "discover.lengths-contradict": "The lengths contradict each other: LEDs {first} and {second} are stated {stated:.3f} mm apart; the other lengths give {implied:.3f} mm. Check the numbers of the LEDs, and measure again.",
     "discover.length-of-others": "The length of {length:g} mm does not fit LEDs {first} and {second}: it gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. It may be the length between LEDs {other} and {another}. Check which LEDs were measured, and the diameter of the discs.",
-    "discover.no-length": "A pen file needs one known length. Measure the distance between two LEDs and give it with --length.",
+    "discover.no-length": "A pen file needs one known length. Measure the distance between two LEDs and state it.",
     "discover.relative": "No length is given: all lengths are in hundredths of the largest distance between two LEDs.",
     "discover.length-limits": "The length limits U: a standard uncertainty of {sigma:.3f} mm would reduce U from {now:.0f} to {then:.0f} µm.",
     "discover.centers-outside": "Most centres are outside the image: they extend to ({x:.0f}, {y:.0f}) px; the images have {width} x {height} px. Check the size of the images.",

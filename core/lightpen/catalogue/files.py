@@ -176,7 +176,7 @@ MESSAGES = {
     "number.missing": "a cell is empty where a number is needed.",
     "number.not-finite": "{cell} is not a finite number.",
     "table.line": "Line {line} of {name}: {flaw}",
-    "table.points-and-commas": "the file has decimal points and decimal commas; line {line} differs from this line. Use one of them throughout.",
+    "table.points-and-commas": "the file has decimal points and decimal commas; the other form is on line {line}. Use one form throughout.",
     "table.no-rows": "{name} has no rows. Check that it is complete.",
     "table.only-header": "{name} has a header but no rows below it.",
     "number.look-alike": "{cell} is not a number ({meaning}).",

@@ -105,7 +105,7 @@ def test_a_video_gives_its_frames(tmp_path: Path) -> None:
         (lambda data: data[:-4], "cut off"),
         (lambda data: data[:100] + bytes([data[100] ^ 255]) + data[101:], "checksum"),
         (lambda data: data[:8], "cut off"),
-        (lambda data: b"not an image at all", "no image"),
+        (lambda data: b"not an image at all", "not a supported image"),
     ],
 )
 def test_a_damaged_image_is_named(

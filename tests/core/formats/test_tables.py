@@ -164,7 +164,7 @@ def test_a_wrong_number_of_columns_without_header_is_refused() -> None:
 @pytest.mark.parametrize(
     ("text", "flaw"),
     [
-        ("# nothing\n\n", "no lines but comments"),
+        ("# nothing\n\n", "only comments"),
         ("sep=;\n", "no rows"),
         ("led,x\n", "no rows below"),
         ('led,x\n1,"2\n', "Line 2 of .* quotation marks do not pair up"),
