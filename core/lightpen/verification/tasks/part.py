@@ -228,23 +228,31 @@ def _assessment(part: MeasuredPart, missing: tuple[str, ...]) -> VerificationAss
 
     out, unclear = named(Decision.REJECTED), named(Decision.OPEN)
     n_judged = len(out) + len(unclear) + len(named(Decision.ACCEPTED))
-    counts: dict[str, str | int] = {"part": part.plan.name, "n_judged": n_judged}
+    name = part.plan.name
     if out:
-        said = message("part.out", n_out=len(out), names=_listed(out), **counts)
+        said = message(
+            "part.out", n_out=len(out), names=_listed(out), part=name, n_judged=n_judged
+        )
         return refused(said, message("part.rework"))
     if missing and n_judged:
-        said = message("part.incomplete", part=part.plan.name, names=_listed(missing))
+        said = message("part.incomplete", part=name, names=_listed(missing))
         return check(said, message("part.complete"))
     if unclear:
         said = message(
-            "part.unclear", n_open=len(unclear), names=_listed(unclear), **counts
+            "part.unclear",
+            n_open=len(unclear),
+            names=_listed(unclear),
+            part=name,
+            n_judged=n_judged,
         )
         return check(said, message("part.more-points"))
     if not n_judged:
         n_features = len(part.features)
         said = message("part.measured", part=part.plan.name, n_features=n_features)
         return accepted(said, message("part.done"))
-    return accepted(message("part.good", **counts), message("part.done"))
+    return accepted(
+        message("part.good", part=name, n_judged=n_judged), message("part.done")
+    )
 
 
 def _listed(names: Sequence[str]) -> str:
