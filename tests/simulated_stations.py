@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.discovery.discover import Discovery, Request, discover
+from lightpen.discovery.discover import Request, discover
+from lightpen.discovery.found import Discovery
 from lightpen.discovery.numbering import number_by_sketch
 from lightpen.discovery.scale import MeasuredLength
 from lightpen.discovery.sightings import Sightings, sightings_of_centers

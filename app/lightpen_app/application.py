@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from PySide6.QtCore import (
     QMessageLogContext,
@@ -45,6 +45,9 @@ from lightpen_app.work.job import Job
 from lightpen_app.work.settings import Preferences, Settings, data_folder, settings_file
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
+
+if TYPE_CHECKING:
+    from lightpen_app.discovery.discovery_window import DiscoveryWindow
 
 # s after which a thread that computes lets the window continue. A change of theme calls
 # thousands of methods, and by Python's 5 ms each would wait for the live images.
@@ -101,9 +104,13 @@ class Wizard(QObject):
         self._apply_appearance()
         self.workbench.live.set_watched(self.window.page().shows_images)
         self.crash_hook = CrashHook(folder / "crashes", self)
+        self._discovery: DiscoveryWindow | None = None  # made when it is asked for
 
         # Connections
+        self.window.closing.connect(self._close_discovery)
         self.window.closing.connect(self.workbench.shut_down)
+        for page in pages:
+            page.discovery_requested.connect(self._show_discovery)
         self.window.attention_changed.connect(self.workbench.live.set_watched)
         self.workbench.folder_watch.counted.connect(self._on_others_counted)
         self.workbench.folder_watch.doubted.connect(self._on_folder_doubted)
@@ -117,6 +124,20 @@ class Wizard(QObject):
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
 
         self._stream()
+
+    def _show_discovery(self) -> None:
+        """Show the window in which pen and camera are found without files."""
+        if self._discovery is None:
+            from lightpen_app.discovery.discovery_window import DiscoveryWindow
+
+            self._discovery = DiscoveryWindow(self.workbench, self.window)
+            self._discovery.continued.connect(lambda: self.window.show_step("swing"))
+        self._discovery.show()
+        self._discovery.raise_()
+
+    def _close_discovery(self) -> None:
+        if self._discovery is not None:
+            self._discovery.close()
 
     def _show_subject(self) -> None:
         """Show the current swing on every page, or the selection."""

@@ -181,6 +181,10 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._refresh()
         self._focus_page()
 
+    def show_step(self, key: str) -> None:
+        """Show the page of a step by its key, or say why it is locked."""
+        self.go_to([page.key for page in self._pages].index(key))
+
     def go_back(self) -> None:
         """Show the page before this one."""
         if self._now > 0:
@@ -305,7 +309,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         for question in questions:
             question.asking_changed.connect(self._refresh)
         page.advance_requested.connect(self.advance)
-        page.step_requested.connect(self._on_step_requested)
+        page.step_requested.connect(self.show_step)
         page.operator_value_changed.connect(self._operator_view.set_value)
         page.data_folder_requested.connect(self._on_data_folder_asked)
 
@@ -435,10 +439,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         page = self.page()
         if page.is_hands_free() and page.is_complete():
             self._on_advance_pressed()
-
-    def _on_step_requested(self, key: str) -> None:
-        keys = [page.key for page in self._pages]
-        self.go_to(keys.index(key))
 
     def _on_space_pressed(self) -> None:
         """Press the button that has the focus; pause where none has."""

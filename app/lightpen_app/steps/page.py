@@ -58,6 +58,8 @@ class Page(Translated, QWidget):
         What the operator view shows.
     data_folder_requested()
         Another data folder is to be chosen.
+    discovery_requested()
+        Pen and camera are to be found without files.
     """
 
     key = ""
@@ -67,6 +69,7 @@ class Page(Translated, QWidget):
     step_requested = Signal(str)
     operator_value_changed = Signal(object)
     data_folder_requested = Signal()
+    discovery_requested = Signal()
 
     def title(self) -> str:
         """Return the name of the step, one to three words."""

@@ -29,7 +29,7 @@ from lightpen.cameras.worker_events import (
 )
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.errors import LightpenError
-from lightpen.live.pipeline import Live, LiveImage
+from lightpen.live.pipeline import Live, LiveImage, Sink
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.hand import Operator
@@ -153,6 +153,7 @@ class LiveView(QObject):
         self._chosen = 0
         self._states = [_CameraState()]
         self._region = RegionOfInterest()
+        self._sink: Sink | None = None
         self._is_watched = True
         self._simulated: list[SimulatedCamera] = []
         self._operator: Operator | None = None
@@ -189,6 +190,7 @@ class LiveView(QObject):
             stream=self._stream,
         )
         live.set_region(self._region)
+        live.set_sink(self._sink)
         self._simulated = [c for c in cameras if isinstance(c, SimulatedCamera)]
         self.set_watched(self._is_watched)
         live.start()
@@ -321,6 +323,12 @@ class LiveView(QObject):
         self._region = region
         if self._live is not None:
             self._live.set_region(region)
+
+    def set_sink(self, sink: Sink | None) -> None:
+        """Give every image to a function on the pipeline's thread, or to none."""
+        self._sink = sink
+        if self._live is not None:
+            self._live.set_sink(sink)
 
     def set_watched(self, watched: bool) -> None:
         """Set whether images are displayed, for present and later cameras."""

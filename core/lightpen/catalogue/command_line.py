@@ -49,5 +49,6 @@ MESSAGES = {
     "cli.discover-output-twice": "{file} would replace an input file or another result. Give each result a different name.",
     "cli.discover-suffix": "{file} does not end in {suffix}. Choose a name that does.",
     "cli.discover-images-or-centers": "Give either IMAGES or --centers FILE.csv.",
+    "cli.discover-swings-and-cone": "A second cone is supported with a single swing only. Omit --second-cone, or give one swing.",
     "cli.discover-no-size": "LED centres do not state the image size. Give it: --image-size 2448x2048.",
 }

@@ -3,12 +3,21 @@
 import argparse
 import re
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from lightpen.commands.arguments import above_zero, finite
+from lightpen.commands.calibrate_options import separation_of
 from lightpen.commands.console import are_same, printing, progress, shown, write_record
-from lightpen.discovery.discover import Request, discover
-from lightpen.discovery.report import discovery_record, discovery_text
+from lightpen.discovery.discover import Request, SecondSightings, discover
+from lightpen.discovery.picture import picture_of_pen
+from lightpen.discovery.report import (
+    discovery_record,
+    discovery_text,
+    swings_record,
+    swings_text,
+)
 from lightpen.discovery.scale import MeasuredLength
 from lightpen.discovery.sightings import (
     Report,
@@ -16,10 +25,12 @@ from lightpen.discovery.sightings import (
     find_spots,
     sightings_of_centers,
 )
+from lightpen.discovery.together import discover_together
 from lightpen.errors import UsageError
 from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.images import find_images
+from lightpen.formats.files import write_whole
+from lightpen.formats.images import SUFFIXES, find_images
 from lightpen.formats.observation_files import read_unlabelled_centers
 from lightpen.formats.pen_files import read_unchecked_pen, write_pen
 from lightpen.model.camera import Camera
@@ -39,14 +50,17 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         metavar="IMAGES",
         help="image folder, file name pattern, video or record of a swing, in the "
-        "order of time, 10 images a second or more",
+        "order of time, 10 images a second or more; several folders or videos are "
+        "swings of the same pen and tip, adjusted together",
     )
     parser.add_argument(
         "--centers",
         type=Path,
+        nargs="+",
+        default=[],
         metavar="FILE.csv",
         help="spot centres (frame,x_px,y_px), which LED they are being unknown, "
-        "instead of IMAGES; with --image-size",
+        "instead of IMAGES, one file a swing; with --image-size",
     )
     parser.add_argument(
         "--image-size", type=_size, metavar="WxH", help="size of the images, 2448x2048"
@@ -66,6 +80,21 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         default=CALIPER,
         metavar="MM",
         help=f"standard uncertainty of each length ({CALIPER})",
+    )
+    parser.add_argument(
+        "--second-cone",
+        metavar="IMAGES",
+        help="a swing in a second cone, given like the first; the camera must not have "
+        "moved. With --distance it gives the scale",
+    )
+    parser.add_argument(
+        "--distance", type=above_zero, metavar="MM", help="distance of the two cones"
+    )
+    parser.add_argument(
+        "--distance-sigma",
+        type=above_zero,
+        metavar="MM",
+        help="standard uncertainty of the distance",
     )
     parser.add_argument(
         "--led-diameter",
@@ -98,6 +127,12 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
             help=f"write the {what}",
         )
     parser.add_argument(
+        "--picture",
+        type=Path,
+        metavar="FILE.png",
+        help="draw the pen with the numbers of its LEDs",
+    )
+    parser.add_argument(
         "--json", type=Path, metavar="FILE", help="write the record as JSON"
     )
 
@@ -117,35 +152,64 @@ def _size(text: str) -> tuple[int, int]:
 @printing
 def _discover(options: argparse.Namespace) -> None:
     lengths = tuple(_length(words, options.length_sigma) for words in options.length)
-    if not lengths and options.out_pen is not None:
+    separation = separation_of(options)
+    if not lengths and separation is None and options.out_pen is not None:
         raise UsageError("discover.no-length")
     camera = None if options.camera is None else read_camera(options.camera)
     sketch = _sketch(options.pen_sketch or options.pen)
     _check_outputs(options)
+    places = _places(options)
+    if len(places) > 1 and separation is not None:
+        raise UsageError("cli.discover-swings-and-cone")
+    n_read = len(places) + (separation is not None)
+    read = partial(_sightings, options, camera)
     with progress("Finding pen and camera") as report:
-        sightings = _sightings(options, camera, report)
-        if camera is not None and camera.image_size != sightings.size:
-            raise UsageError(
-                "cli.camera-of-other-size",
-                file=str(options.camera),
-                width=camera.width,
-                height=camera.height,
-                seen_width=sightings.size[0],
-                seen_height=sightings.size[1],
-            )
-        start = 0.0 if options.centers is not None else SEARCHING
-        found = discover(
-            sightings,
-            Request(lengths, _diameter(options, sketch), camera, sketch),
-            lambda done: report(start + (1 - start) * done),
-        )
+        share = 0.0 if options.centers else SEARCHING
+        each = share / n_read
+        swings = [
+            read(place, partial(_report_part, report, each * k, each))
+            for k, place in enumerate(places)
+        ]
+        request = Request(lengths, _diameter(options, sketch), camera, sketch)
+        if separation is not None:
+            last = partial(_report_part, report, each, each)
+            other = read([options.second_cone], last)
+            request = replace(request, second=SecondSightings(other, separation))
+        rest = partial(_report_part, report, share, 1 - share)
+        together = None
+        if len(swings) > 1:
+            together = discover_together(swings, request, rest)
+        found = together.found if together else discover(swings[0], request, rest)
     if options.out_pen is not None:
         write_pen(found.pen, options.out_pen)
     if options.out_camera is not None:
         write_camera(found.camera, options.out_camera)
+    if options.picture is not None:
+        write_whole(options.picture, picture_of_pen(found))
+    record = discovery_record(found)
+    if together is not None:
+        record |= swings_record(together)
     if options.json is not None:
-        write_record(options.json, discovery_record(found))
+        write_record(options.json, record)
     print(shown(discovery_text(found)))
+    if together is not None:
+        print(shown(swings_text(together)))
+
+
+def _report_part(report: Report, start: float, share: float, fraction: float) -> None:
+    report(start + share * fraction)
+
+
+def _places(options: argparse.Namespace) -> list[list[str]]:
+    """Return the places of the images of each swing."""
+    if bool(options.images) == bool(options.centers):
+        raise UsageError("cli.discover-images-or-centers")
+    if options.centers:
+        return [[str(path)] for path in options.centers]
+    suffixes = {Path(place).suffix.lower() for place in options.images}
+    if suffixes <= set(SUFFIXES):  # a pattern, as a shell makes it
+        return [options.images]
+    return [[place] for place in options.images]
 
 
 def _length(words: Sequence[str], sigma: float) -> MeasuredLength:
@@ -172,10 +236,11 @@ def _diameter(options: argparse.Namespace, sketch: Pen | None) -> float:
 
 def _check_outputs(options: argparse.Namespace) -> None:
     """Refuse outputs that replace an input or each other, or of another suffix."""
-    inputs = [options.centers, options.camera, options.pen, options.pen_sketch]
+    inputs = [*options.centers, options.camera, options.pen, options.pen_sketch]
     inputs = [path for path in inputs if path is not None]
     seen: list[Path] = []
-    for path in (options.out_pen, options.out_camera, options.json):
+    outputs = (options.out_pen, options.out_camera, options.picture, options.json)
+    for path in outputs:
         if path is None:
             continue
         if any(are_same(path, other) for other in (*inputs, *seen)):
@@ -184,6 +249,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
     for path, suffixes in (
         (options.out_pen, (".json",)),
         (options.out_camera, (".yaml", ".yml")),
+        (options.picture, (".png",)),
     ):
         if path is not None and path.suffix.lower() not in suffixes:
             raise UsageError(
@@ -192,16 +258,28 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _sightings(
-    options: argparse.Namespace, camera: Camera | None, report: Report
+    options: argparse.Namespace,
+    camera: Camera | None,
+    places: Sequence[str],
+    report: Report,
 ) -> Sightings:
-    if bool(options.images) == (options.centers is not None):
-        raise UsageError("cli.discover-images-or-centers")
-    if options.centers is None:
-        source = find_images(*options.images)
-        return find_spots(source, lambda done: report(SEARCHING * done))
-    size = options.image_size or (None if camera is None else camera.image_size)
-    if size is None:
-        raise UsageError("cli.discover-no-size")
-    given = read_unlabelled_centers(options.centers)
-    names = tuple(f"frame {frame}" for frame in given.frames)
-    return sightings_of_centers(names, given.centers, size)
+    """Read a swing, which must be of the images of the camera file."""
+    if not options.centers:
+        sightings = find_spots(find_images(*places), report)
+    else:
+        size = options.image_size or (None if camera is None else camera.image_size)
+        if size is None:
+            raise UsageError("cli.discover-no-size")
+        given = read_unlabelled_centers(Path(places[0]))
+        names = tuple(f"frame {frame}" for frame in given.frames)
+        sightings = sightings_of_centers(names, given.centers, size)
+    if camera is not None and camera.image_size != sightings.size:
+        raise UsageError(
+            "cli.camera-of-other-size",
+            file=str(options.camera),
+            width=camera.width,
+            height=camera.height,
+            seen_width=sightings.size[0],
+            seen_height=sightings.size[1],
+        )
+    return sightings

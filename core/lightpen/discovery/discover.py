@@ -17,12 +17,12 @@ from lightpen.detection.observations import Observations
 from lightpen.detection.pose import MIN_POSE_LEDS
 from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import EXACT_SIGMA
+from lightpen.discovery.found import Discovery, discovery_of
 from lightpen.discovery.hypotheses import Hypothesis, camera_prior, solve_seed
 from lightpen.discovery.labelling import Labelled, label, pixels_of
-from lightpen.discovery.normals import FACING, towards_camera
+from lightpen.discovery.normals import towards_camera
 from lightpen.discovery.numbering import framed, number_by_place, number_by_sketch
 from lightpen.discovery.scale import (
-    EXACT_SCALE,
     MeasuredLength,
     known_lengths,
     nearest_pair,
@@ -40,13 +40,11 @@ from lightpen.discovery.tracks import find_lamps, follow, without_lamps
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.consistency_findings import DIAMETER
 from lightpen.estimation.bundle.linearised import BundleState
+from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
-from lightpen.estimation.uncertainty.disc_normals import effect_of_normals
-from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mixing
+from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
-from lightpen.model.information import inverse
 from lightpen.model.pen import Pen
 from lightpen.model.posture import tilts_of
 from lightpen.model.rigid import fit_rigid
@@ -80,71 +78,57 @@ class Request:
         Of a camera file, with its covariance.
     sketch : Pen or None
         Rough LEDs, which give numbers and frame.
+    second : SecondSightings or None
+        A swing in a second cone, before the same camera, not moved. The distance of
+        the cones gives the scale where there is no length.
     """
 
     lengths: tuple[MeasuredLength, ...]
     diameter: float
     camera: Camera | None = None
     sketch: Pen | None = None
+    second: "SecondSightings | None" = None
+
+    @property
+    def is_relative(self) -> bool:
+        """Whether nothing gives the scale."""
+        return not self.lengths and self.second is None
+
+    @property
+    def rough_leds(self) -> FloatArray | None:
+        """LEDs of the sketch, (L, 3), mm."""
+        return None if self.sketch is None else self.sketch.leds
 
 
 @dataclass(frozen=True, eq=False)
-class Discovery:
-    """Tip, pen and camera that a swing showed.
+class SecondSightings:
+    """A swing of the pen in a second cone, at a certified distance from the first."""
+
+    sightings: Sightings
+    separation: ConeSeparation
+
+
+@dataclass(frozen=True, eq=False)
+class _Swing:
+    """A swing with its spots labelled.
 
     Attributes
     ----------
-    pen : Pen
-        In its frame, with the covariance of its LEDs.
-    camera : Camera
-        With its covariance.
-    tip_pen : (3,) array
-        mm.
-    covariance : (q, q) array
-        Of tip, camera, diameter and LEDs, as `parameters` has them, in the frame in
-        which the LEDs fit the true ones best.
-    calibration : Calibration
-        By which they were adjusted.
-    lengths : tuple of KnownLength
-    is_relative : bool
-        Whether there was no length.
-    hypotheses : tuple of Hypothesis
-    n_lamps : int
-        Lights that did not move with the pen.
+    centers, kept : tuple of array
+        Spots that are no lamps, px, and the numbers that they have in the sightings.
     """
 
-    pen: Pen
-    camera: Camera
-    tip_pen: FloatArray
-    covariance: FloatArray
-    calibration: Calibration
-    lengths: tuple[KnownLength, ...]
-    is_relative: bool
+    sightings: Sightings
+    centers: tuple[FloatArray, ...]
+    kept: tuple[IntArray, ...]
+    found: Labelled
     hypotheses: tuple[Hypothesis, ...]
     n_lamps: int
 
     @property
-    def parameters(self) -> Parameters:
-        """Indices of each kind of parameter in the covariance."""
-        return self.calibration.instrument.parameters
-
-    @property
-    def expanded_uncertainty(self) -> FloatArray:
-        """U (k = 2) of the tip, (3,), mm."""
-        return COVERAGE_FACTOR * np.sqrt(np.diag(self.covariance)[:3])
-
-    @property
-    def intrinsics_sigma(self) -> FloatArray:
-        """Standard uncertainties of the camera's intrinsics."""
-        at = self.parameters.cameras[0]
-        return np.sqrt(np.diag(self.covariance)[at])
-
-    @property
-    def led_uncertainty(self) -> FloatArray:
-        """U (k = 2) of each LED coordinate, (L, 3), mm."""
-        at = self.parameters.leds
-        sigmas = np.sqrt(np.diag(self.covariance)[at])
-        return COVERAGE_FACTOR * sigmas.reshape(-1, 3)
+    def numbers(self) -> IntArray:
+        """Spot of each LED in the sightings, (N, L); -1 without one."""
+        return _in_sightings(self.found.spots, self.kept)
 
 
 def discover(
@@ -164,6 +148,31 @@ def discover(
     CalibrationError
         The images do not determine them; the text says what to do.
     """
+    swing = _labelled_swing(sightings, request, report)
+    swing = replace(swing, found=_numbered(swing.found, request))
+    report(0.5)
+    pixels = pixels_of(swing.found.spots, swing.centers)
+    start, lengths = _scaled_start(request, swing.found, pixels)
+    report(0.6)
+    second = None
+    if request.second is not None:
+        start, second = _with_second(start, request, report)
+        lengths = lengths if request.lengths else ()
+    observations = _observations(sightings, start, swing.found.images, swing.numbers)
+    camera = _camera_to_adjust(start, request)
+    pen = with_lengths_known(start.pen, lengths)
+    calibration = calibrate(camera, pen, observations, second=second)
+    _require_length(calibration, request, lengths)
+    report(0.95)
+    discovery = discovery_of(
+        calibration, lengths, request.rough_leds, is_relative=request.is_relative
+    )
+    _require_certain(discovery)
+    return replace(discovery, hypotheses=swing.hypotheses, n_lamps=swing.n_lamps)
+
+
+def _labelled_swing(sightings: Sightings, request: Request, report: Report) -> _Swing:
+    """Return a swing with its spots labelled, LEDs in any order."""
     _require_enough(sightings)
     width = sightings.size[0]
     lamps, centers, kept = _without_lamps(sightings)
@@ -173,21 +182,35 @@ def discover(
     report(0.4)
     found = label(seed, joined, certain, centers, width)
     _require_one_pen(found)
-    found = _numbered(found, request)
-    report(0.5)
-    pixels = pixels_of(found.spots, centers)
-    start, lengths = _scaled_start(request, found, pixels)
-    report(0.6)
-    numbers = _in_sightings(found.spots, kept)
-    observations = _observations(sightings, start, found.images, numbers)
-    camera = _camera_to_adjust(start, request)
-    pen = with_lengths_known(start.pen, lengths)
-    calibration = calibrate(camera, pen, observations)
-    _require_length(calibration, request, lengths)
-    report(0.95)
-    discovery = _discovery_of(calibration, request, lengths)
-    _require_certain(discovery)
-    return replace(discovery, hypotheses=seed.hypotheses, n_lamps=len(lamps))
+    return _Swing(sightings, centers, kept, found, seed.hypotheses, len(lamps))
+
+
+def _with_second(
+    start: BundleState, request: Request, report: Report
+) -> tuple[BundleState, SecondSwing]:
+    """Return a start with the scale by two cones, and the second swing in its frame."""
+    assert request.second is not None
+    separation, sightings = request.second.separation, request.second.sightings
+    swing = _labelled_swing(sightings, request, lambda done: report(0.6 + 0.3 * done))
+    state = swing.found.state
+    order = number_by_sketch(state.pen.leds, start.pen.leds)
+    leds = state.pen.leds[order]
+    leds_there = start.pen.leds - start.pen.leds.mean(axis=0)
+    ratio = np.linalg.norm(leds_there) / np.linalg.norm(leds - leds.mean(axis=0))
+    R, _ = fit_rigid(ratio * leds, start.pen.leds)
+    cone = ratio * state.cone_rig
+    factor = 1.0
+    if not request.lengths:
+        apart = float(np.linalg.norm(cone - start.cone_rig))
+        factor = separation.distance / max(apart, LEAST_LENGTH_SIGMA)
+    start = scaled_to(start, factor)
+    start = replace(start, pen=replace(start.pen, diameter=request.diameter))
+    there = replace(start, cone_rig=factor * cone, rotations=state.rotations @ R.T)
+    swing = replace(
+        swing, found=replace(swing.found, spots=swing.found.spots[:, order])
+    )
+    observations = _observations(sightings, there, swing.found.images, swing.numbers)
+    return start, SecondSwing(observations, separation)
 
 
 def _require_enough(sightings: Sightings) -> None:
@@ -282,8 +305,7 @@ def _scaled_start(
     every = replace(part, rotations=state.rotations @ turned.T)
     prior = camera_prior(part.rig.cameras[0], known)
     every = adjust_start(every, pixels, prior, 8, lengths).state
-    sketch = None if request.sketch is None else request.sketch.leds
-    pen, R, t = framed(every.pen, every.tip_pen, sketch)
+    pen, R, t = framed(every.pen, every.tip_pen, request.rough_leds)
     return replace(
         every, pen=pen, tip_pen=R @ every.tip_pen + t, rotations=every.rotations @ R.T
     ), lengths
@@ -393,49 +415,3 @@ def _require_certain(discovery: Discovery) -> None:
         raise CalibrationError(
             "discover.weak-swing", U=U, focal=100 * focal, tilt=float(np.ptp(tilts))
         )
-
-
-def _discovery_of(
-    calibration: Calibration, request: Request, lengths: tuple[KnownLength, ...]
-) -> Discovery:
-    bundle, instrument = calibration.bundle, calibration.instrument
-    state, tip = bundle.state, calibration.joint.tip_pen
-    # The start found the normal, by the same images.
-    normals = effect_of_normals(bundle)
-    of_turn = inverse(normals.information + FACING**-2 * np.eye(2))
-    by = instrument_mixing(bundle)
-    covariance = instrument.covariance + by @ normals.covariance(of_turn) @ by.T
-    at = instrument.parameters
-    budget = calibration.budget.covariance[:3, :3] - instrument.covariance[:3, :3]
-    values, vectors = np.linalg.eigh(budget)
-    covariance[:3, :3] += (vectors * np.maximum(values, 0.0)) @ vectors.T
-    sketch = None if request.sketch is None else request.sketch.leds
-    pen, R, t = framed(state.pen, tip, sketch)
-    turn = np.eye(len(covariance))
-    turn[at.tip, at.tip] = R
-    turn[at.leds, at.leds] = np.kron(np.eye(pen.n_leds), R)
-    covariance = turn @ covariance @ turn.T
-    camera = replace(
-        state.rig.cameras[0], covariance=covariance[at.cameras[0], at.cameras[0]]
-    )
-    diameter_sigma = float(np.sqrt(covariance[at.diameter, at.diameter][0, 0]))
-    pen = replace(
-        pen,
-        led_covariance=covariance[at.leds, at.leds],
-        scale_sigma=EXACT_SCALE,
-        diameter_sigma=diameter_sigma,
-        normal_sigma=float(np.sqrt(np.linalg.eigvalsh(of_turn)[-1])),
-        nominal_tip=None,
-        expansion=None,
-    )
-    return Discovery(
-        pen=pen,
-        camera=camera,
-        tip_pen=R @ tip + t,
-        covariance=covariance,
-        calibration=calibration,
-        lengths=lengths,
-        is_relative=not request.lengths,
-        hypotheses=(),
-        n_lamps=0,
-    )

@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from lightpen.discovery.discover import Discovery
+from lightpen.discovery.found import Discovery
+from lightpen.discovery.together import Together
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.formats.json_records import plain, record_heading
 from lightpen.local_time import local_now
@@ -120,10 +121,53 @@ def discovery_text(discovery: Discovery) -> str:
     return "\n".join(lines)
 
 
+def swings_record(together: Together) -> dict[str, Any]:
+    """Return what several swings add to the record."""
+    held_out = together.held_out
+    record: dict[str, Any] = plain(
+        {
+            "swings": [
+                {
+                    "tip_pen_mm": each.tip_pen,
+                    "expanded_uncertainty_mm": each.expanded_uncertainty,
+                    "focal_length_px": each.camera.fx,
+                    "images": {
+                        "total": len(each.calibration.used),
+                        "used": int(each.calibration.used.sum()),
+                    },
+                }
+                for each in together.swings
+            ],
+            "held_out": {
+                "tip_difference_mm": held_out.tip,
+                "tip_standard_uncertainty_mm": held_out.tip_sigma,
+                "focal_length_difference_px": held_out.focal_length,
+                "focal_length_standard_uncertainty_px": held_out.focal_length_sigma,
+            },
+        }
+    )
+    return record
+
+
+def swings_text(together: Together) -> str:
+    """Return what the proof by the last swing came to, in English."""
+    held_out, um = together.held_out, TO_MICROMETRES
+    x, y, z = (um * held_out.tip).tolist()
+    u = COVERAGE_FACTOR * um * held_out.tip_sigma
+    return (
+        f"{len(together.swings)} swings. The last one against the others: tip "
+        f"{x:+.1f} {y:+.1f} {z:+.1f} um, U {u[0]:.1f} {u[1]:.1f} {u[2]:.1f}; fx "
+        f"{held_out.focal_length:+.2f} px, U "
+        f"{COVERAGE_FACTOR * held_out.focal_length_sigma:.2f}."
+    )
+
+
 def remarks_of(discovery: Discovery) -> tuple[Message, ...]:
     """Return what limits the uncertainty, and what is to be known of the result."""
     if discovery.is_relative:
         return (message("discover.relative"),)
+    if not discovery.lengths:
+        return ()
     at = discovery.parameters
     tip = discovery.tip_pen - discovery.pen.leds.mean(axis=0)
     far = int(np.argmax(np.abs(tip)))

@@ -1,6 +1,6 @@
 """Spots in the images of a swing, before pen and camera are known."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,14 +104,15 @@ def find_spots(
         assert trouble is not None
         raise FileError("images.none-readable", n_images=n_images, why=trouble.message)
     size = max(set(sizes), key=sizes.count)
-    return _sightings(
+    return sightings_of_spots(
         source.names, [s if own == size else Spots.none() for s, own in found], size
     )
 
 
-def _sightings(
-    names: tuple[str, ...], every: list[Spots], size: tuple[int, int]
+def sightings_of_spots(
+    names: tuple[str, ...], every: Sequence[Spots], size: tuple[int, int]
 ) -> Sightings:
+    """Return the sightings of spots; of each image those that are whole and sharp."""
     good = [np.flatnonzero((spots.flaws & UNFIT) == 0) for spots in every]
     pairs = list(zip(every, good, strict=True))
     widths = [

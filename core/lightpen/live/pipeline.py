@@ -8,12 +8,12 @@ has been replayed to its end counts as at rest.
 """
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from threading import Event, Thread
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from lightpen.cameras.clock import Clock
 from lightpen.cameras.pairing import FramePairs, held_up
@@ -68,6 +68,9 @@ class LiveImage:
     spots: Spots
     detection: PenDetection | None
     camera: int = 0
+
+
+Sink: TypeAlias = Callable[[LiveImage], None]
 
 
 class LiveListener(Protocol):
@@ -137,6 +140,7 @@ class Live:
         self._verifiers = tuple(verifiers)
         self._stream = stream
         self._region = RegionOfInterest()
+        self._sink: Sink | None = None
         self._wanted: RegionOfInterest | SwingSetup = self._region
         self._last: dict[int, PenDetection] = {}  # by camera
         self._is_watched = True
@@ -193,6 +197,13 @@ class Live:
         self._region = region
         self._pass_seq = self._seen_seq
 
+    def set_sink(self, sink: Sink | None) -> None:
+        """Give every image of the first camera, in order, to a function, or to none.
+
+        It is called on the pipeline's thread, for a recording without a swing.
+        """
+        self._sink = sink
+
     def set_watched(self, watched: bool) -> None:
         """Set whether images are displayed; a capture continues regardless."""
         self._is_watched = watched
@@ -231,8 +242,9 @@ class Live:
         status, verified = self._runner.status, self._verified()
         is_swing = verified is None and status.is_capturing
         captured = _Capture(status.setup if is_swing else None, verified)
-        if self._measures is not (captured.wanted is not None):
-            self._measures = captured.wanted is not None
+        measures = captured.wanted is not None or self._sink is not None
+        if self._measures is not measures:
+            self._measures = measures
             for worker in self._workers:
                 worker.measure(self._measures)
             self._pairs.forget()
@@ -251,7 +263,8 @@ class Live:
 
     def _rest(self) -> float | None:
         """Return the pause after each image, s; None to stop."""
-        if self._stream is not None and self._stream.is_heard:
+        is_heard = self._stream is not None and self._stream.is_heard
+        if is_heard or self._sink is not None:
             return 0.0
         if self._moved_ns is None:  # the first image gives the size
             return 0.0
@@ -354,6 +367,9 @@ class Live:
             verifier.take(frame, detection, captured.verification)
         else:
             self._hand_over(frame, detection, captured.swing)
+        sink = self._sink
+        if sink is not None:
+            sink(images[0])
         for image in images:
             self._listener.on_image(image)
 

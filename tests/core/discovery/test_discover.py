@@ -11,7 +11,8 @@ from tests.simulated_stations import (
     seen_station,
 )
 
-from lightpen.discovery.discover import Discovery, discover
+from lightpen.discovery.discover import discover
+from lightpen.discovery.found import Discovery
 from lightpen.discovery.scale import MeasuredLength
 from lightpen.discovery.sightings import Sightings
 from lightpen.errors import CalibrationError

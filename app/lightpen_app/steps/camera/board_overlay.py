@@ -6,7 +6,7 @@ from lightpen.intrinsics.calibration import CameraCalibration
 from lightpen.intrinsics.coverage import cells_of
 from lightpen_app.steps.camera.board_calibration import uncertainty_over_image
 from lightpen_app.steps.camera.board_capture import CaptureState
-from lightpen_app.steps.camera.board_view import BoardOverlay
+from lightpen_app.widgets.board_view import BoardOverlay
 
 
 def board_overlay(

@@ -25,7 +25,7 @@ from lightpen_app.steps.camera.board_capture import (
 from lightpen_app.steps.camera.board_form import BoardForm
 from lightpen_app.steps.camera.board_overlay import board_overlay
 from lightpen_app.steps.camera.board_progress import BoardProgress
-from lightpen_app.steps.camera.board_view import BoardView
+from lightpen_app.widgets.board_view import BoardView
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.path_field import EnterEdit

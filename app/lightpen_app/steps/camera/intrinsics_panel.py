@@ -32,10 +32,13 @@ class IntrinsicsPanel(Translated, QGroupBox):
         A file is to be read.
     calibration_requested()
         The camera is to be calibrated by a board.
+    discovery_requested()
+        There is no such file: the camera is to be found by a swing.
     """
 
     path_chosen = Signal(str)
     calibration_requested = Signal()
+    discovery_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -49,6 +52,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._open = PushButton()
         self._path.add_button(self._open)
         self._calibrate = PushButton()
+        self._discover = PushButton()
         self._problem = SignLabel()
         self._check = SignLabel()
         self._doubt = SignLabel()
@@ -65,6 +69,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
             self._doubt,
             self._by_pen,
             self._calibrate,
+            self._discover,
         )
         grid = grid_layout(layout, spacing=(2 * GRID, GRID // 2))
         grid.setColumnStretch(1, 1)
@@ -78,6 +83,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         FileDrops(self).dropped.connect(self._path.take)
         self._open.clicked.connect(self._on_open_clicked)
         self._calibrate.clicked.connect(self.calibration_requested)
+        self._discover.clicked.connect(self.discovery_requested)
 
         self._retranslate()
 
@@ -135,6 +141,10 @@ class IntrinsicsPanel(Translated, QGroupBox):
         edit.setPlaceholderText(self.tr("Intrinsics file"))
         self._open.setText(self.tr("Open..."))
         self._calibrate.setText(self.tr("Calibrate camera..."))
+        self._discover.setText(self.tr("I have no such file..."))
+        self._discover.setToolTip(
+            self.tr("Find pen, camera and tip by one swing and one length.")
+        )
         for label, name in zip(
             self._names,
             (

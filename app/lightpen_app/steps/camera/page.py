@@ -58,6 +58,7 @@ class CameraPage(Page):
         view.source.retry_requested.connect(workbench.camera.open)
         view.source.samples_requested.connect(workbench.files.use_samples)
         view.images.camera_chosen.connect(self._on_camera_chosen)
+        view.intrinsics.discovery_requested.connect(self.discovery_requested)
         view.settings.settings_changed.connect(self._live.configure)
         workbench.selection.changed.connect(self._on_workbench_changed)
         workbench.run.changed.connect(self._on_swing_changed)

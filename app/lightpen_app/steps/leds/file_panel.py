@@ -37,6 +37,8 @@ class LedFilePanel(Translated, QWidget):
         The file of the simulated pen is to be used.
     exchange_requested(pair of int)
         Two LEDs, by number, are to be exchanged.
+    discovery_requested()
+        There is no such file: the LEDs are to be found by a swing.
     """
 
     path_chosen = Signal(str)
@@ -44,6 +46,7 @@ class LedFilePanel(Translated, QWidget):
     save_chosen = Signal(object)
     samples_requested = Signal()
     exchange_requested = Signal(object)
+    discovery_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -60,6 +63,7 @@ class LedFilePanel(Translated, QWidget):
         self._path.add_button(self._open)
         self._save = PushButton()
         self._samples = PushButton()
+        self._discover = PushButton()
         self._label.setBuddy(self._path.edit())
         self._units = _UnitsRow()
         self._problem = SignLabel()
@@ -70,7 +74,8 @@ class LedFilePanel(Translated, QWidget):
         # Layout
         layout = vertical_layout(self)
         horizontal_layout(
-            layout, self._label, (self._path, 1), self._save, self._samples
+            layout,
+            *(self._label, (self._path, 1), self._save, self._samples, self._discover),
         )
         layout.addWidget(self._units)
         horizontal_layout(
@@ -87,6 +92,7 @@ class LedFilePanel(Translated, QWidget):
         self._open.clicked.connect(self._on_open_clicked)
         self._save.clicked.connect(self._on_save_clicked)
         self._samples.clicked.connect(self.samples_requested)
+        self._discover.clicked.connect(self.discovery_requested)
         self._exchange.clicked.connect(self._on_exchange_clicked)
         self._units.value_changed.connect(self._on_units_chosen)
         self._question.agreed.connect(self._on_agreed)
@@ -229,6 +235,10 @@ class LedFilePanel(Translated, QWidget):
         self._open.setText(self.tr("Open..."))
         self._save.setText(self.tr("Save as..."))
         self._samples.setText(self.tr("Use file of the simulated pen"))
+        self._discover.setText(self.tr("I have no such file..."))
+        self._discover.setToolTip(
+            self.tr("Find pen, camera and tip by one swing and one length.")
+        )
         self.set_exchange(self._pair)
         self._refresh_save_words()
 

@@ -10,7 +10,7 @@ from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.steps.leds.pen_view import PenPicture, PenView
+from lightpen_app.widgets.pen_view import PenPicture, PenView
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated

@@ -17,11 +17,11 @@ from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.steps.leds.frame_panel import FramePanel
 from lightpen_app.steps.leds.match_control import MatchControl
 from lightpen_app.steps.leds.match_panel import MatchPanel
-from lightpen_app.steps.leds.pen_view import PenPicture
 from lightpen_app.steps.leds.simulator_controls import LedSimulatorControls
 from lightpen_app.steps.leds.table_panel import LedTablePanel
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
+from lightpen_app.widgets.pen_view import PenPicture
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.widgets.undo_buttons import UndoButtons
 from lightpen_app.work.workbench import Workbench
@@ -76,6 +76,7 @@ class LedsPage(ResponsiveLayout, Page):
         vertical_layout(self, scroll)
 
         # Connections
+        self._file.discovery_requested.connect(self.discovery_requested)
         self._file.exchange_requested.connect(self._on_exchange_requested)
         self._files.status_changed.connect(workbench.notifications.show_status)
         self._table.value_changed.connect(self._leds.edit)

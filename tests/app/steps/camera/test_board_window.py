@@ -29,8 +29,8 @@ from lightpen.simulator.sensor import Sensor
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.pooling import pooled
 from lightpen_app.steps.camera.board_progress import BoardProgress
-from lightpen_app.steps.camera.board_view import BoardView
 from lightpen_app.steps.camera.board_window import BoardWindow
+from lightpen_app.widgets.board_view import BoardView
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.live_view import DisplayedImage

@@ -45,10 +45,10 @@ from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.steps.leds.led_table import MISFIT, LedTable
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.page import LedsPage
-from lightpen_app.steps.leds.pen_view import PenView
 from lightpen_app.steps.leds.simulator_controls import LedSimulatorControls
 from lightpen_app.steps.leds.table_panel import LedTablePanel
 from lightpen_app.widgets.image_view import ImageView
+from lightpen_app.widgets.pen_view import PenView
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.work.live_view import DisplayedImage

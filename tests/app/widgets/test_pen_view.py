@@ -9,7 +9,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.simulator.samples import fanned_pen
 from lightpen.simulator.swings import paper_pen
-from lightpen_app.steps.leds.pen_view import PenPicture, PenView
+from lightpen_app.widgets.pen_view import PenPicture, PenView
 
 LEFT = Qt.MouseButton.LeftButton
 PEN = paper_pen()

@@ -1,0 +1,1 @@
+"""Tip, pen and camera from a swing without files: captured, solved, saved."""

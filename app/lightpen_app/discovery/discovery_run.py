@@ -1,0 +1,297 @@
+"""A swing of a pen without files: recorded image by image, and solved now and then."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtCore import QObject, Signal
+
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.detection.spots import Spots
+from lightpen.discovery.discover import Request, discover
+from lightpen.discovery.found import Discovery
+from lightpen.discovery.guiding import Guide, guide_of
+from lightpen.discovery.sightings import sightings_of_spots
+from lightpen.errors import FileError
+from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.decoding import encode_png
+from lightpen.formats.files import write_whole
+from lightpen.formats.images import IMAGE_FOLDER
+from lightpen.formats.opened_files import OpenedFiles, open_files
+from lightpen.formats.pen_files import write_pen
+from lightpen.formats.simulated_files import mark_simulated
+from lightpen.live.pipeline import LiveImage
+from lightpen.messages import Message
+from lightpen.model.posture import Posture, posture_of
+from lightpen.record.swings.writing import make_record_folder
+from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen_app.look.sentences import worded
+from lightpen_app.work.job import Job, Report
+from lightpen_app.work.live_view import Mailbox
+from lightpen_app.work.workbench import Workbench
+
+DISCOVERIES = "discoveries"  # in the data folder
+FIRST_TRIAL, LATER = 60, 1.5  # images at the first trial; times as many at the next
+N_USUAL, N_MOST = 300, 600  # images
+
+
+@dataclass(frozen=True, eq=False)
+class DiscoveryState:
+    """A swing without files at one moment.
+
+    Attributes
+    ----------
+    n_images : int
+        Recorded so far.
+    found : Discovery or None
+        Solution of the images up to the last trial; relative during the capture.
+    guide : Guide or None
+        Postures so far, and the next one; None before the first solution.
+    posture : Posture or None
+        Of the pen in the last image.
+    progress : float or None
+        Of the final computation; None while there is none.
+    trouble : str
+        Why the last trial found nothing.
+    is_saved : bool
+        Whether its files are in use, and the images are being opened.
+    """
+
+    is_capturing: bool = False
+    n_images: int = 0
+    found: Discovery | None = None
+    guide: Guide | None = None
+    posture: Posture | None = None
+    progress: float | None = None
+    trouble: str = ""
+    is_saved: bool = False
+
+    @property
+    def is_final(self) -> bool:
+        """Whether pen and camera are found to scale."""
+        return self.found is not None and not self.found.is_relative
+
+
+@dataclass(eq=False)
+class _Recording:
+    """Images of a swing: spots and pose by image, and the folder in which they are."""
+
+    folder: Path
+    size: tuple[int, int] = (0, 0)
+    spots: list[Spots] = field(default_factory=list)
+    detections: list[PenDetection | None] = field(default_factory=list)
+
+
+class DiscoveryRun(QObject):
+    """Records and solves a swing of a pen of which nothing is known.
+
+    Signals
+    -------
+    changed()
+        `state` is different.
+    found_changed()
+        So is what is found.
+    saved()
+        Both files and the images are in use, and the first of these was read.
+    """
+
+    changed = Signal()
+    found_changed = Signal()
+    saved = Signal()
+    _unwritten = Signal(object)
+
+    def __init__(self, workbench: Workbench, parent: QObject) -> None:
+        super().__init__(parent)
+        self._workbench, self._live = workbench, workbench.live
+        self._state = DiscoveryState()
+        self._recording: _Recording | None = None
+        self._job: Job | None = None
+        self._next_trial = FIRST_TRIAL
+        self._taken = Mailbox(self)  # the GUI may be slower than the images
+
+        # Connections
+        self._taken.ready.connect(self._on_taken)
+        self._unwritten.connect(self._on_unwritten)
+        workbench.selection.changed.connect(self._on_selected)
+
+    @property
+    def state(self) -> DiscoveryState:
+        """The present state."""
+        return self._state
+
+    def start(self) -> None:
+        """Begin a new recording; the one before stays on the disk."""
+        self.give_up()
+        names = self._workbench.selection.preparation.names
+        root, now = self._workbench.folder / DISCOVERIES, self._workbench.around.now()
+        is_simulated = self._live.operator is not None
+
+        def make(_: Report) -> Path:
+            folder = make_record_folder(root, names, now)
+            (folder / IMAGE_FOLDER).mkdir()
+            if is_simulated:
+                mark_simulated(folder)
+            return folder
+
+        self._run(make, self._on_begun)
+
+    def stop(self) -> None:
+        """End the capture."""
+        if self._state.is_capturing:
+            self._live.set_sink(None)
+            self._become(is_capturing=False)
+            if self._live.operator is not None:
+                self._live.operator.seat()
+
+    def give_up(self) -> None:
+        """End capture and computation, and detect what is selected again."""
+        self.stop()
+        self._drop_job()
+        self._recording = None
+        self._live.set_region(self._workbench.selection.preparation.region)
+        self._become(**vars(DiscoveryState()))
+
+    def solve(self, request: Request) -> None:
+        """Find pen and camera to scale, by all images."""
+        self.stop()
+        self._become(progress=0.0, trouble="", is_saved=False)
+        self._try(request)
+        if self._job is not None:
+            self._job.progressed.connect(lambda done: self._become(progress=done))
+
+    def save(self) -> None:
+        """Write both files beside the images, and use all of them."""
+        recording, found = self._recording, self._state.found
+        if recording is None or found is None:
+            return
+        folder, serial = recording.folder, self._live.serial
+
+        def write(_: Report) -> OpenedFiles:
+            camera, pen = folder / "camera.yaml", folder / "pen.json"
+            write_camera(replace(found.camera, serial=serial), camera)
+            write_pen(found.pen, pen)
+            return open_files(camera, pen)
+
+        self._run(write, self._on_saved)
+
+    def _become(self, **changes: object) -> None:
+        before, self._state = self._state, replace(self._state, **changes)  # type: ignore[arg-type]
+        self.changed.emit()
+        if self._state.found is not before.found:
+            self.found_changed.emit()
+
+    def _run(
+        self, function: Callable[[Report], object], take: Callable[..., None]
+    ) -> None:
+        self._drop_job()
+        self._job = job = Job(function, self)
+
+        def on_succeeded(result: object) -> None:
+            self._job = None
+            take(result)
+
+        # Connections
+        job.succeeded.connect(on_succeeded)
+        job.failed.connect(self._on_failed)
+        job.start()
+
+    def _drop_job(self) -> None:
+        if self._job is not None:
+            self._job.cancel()
+            self._job = None
+
+    def _on_begun(self, folder: Path) -> None:
+        self._recording = recording = _Recording(folder)
+        self._next_trial = FIRST_TRIAL
+        self._live.set_region(RegionOfInterest())
+        if self._live.operator is not None:
+            self._live.operator.swing()
+        self._become(is_capturing=True)
+        self._live.set_sink(partial(self._take, recording))
+
+    def _take(self, recording: _Recording, seen: LiveImage) -> None:
+        """Record an image, on the thread of the images."""
+        height, width = seen.frame.image.shape
+        if recording.size not in ((0, 0), (width, height)):
+            return
+        number = len(recording.spots) + 1
+        path = recording.folder / IMAGE_FOLDER / f"{number:06}.png"
+        try:
+            write_whole(path, encode_png(seen.frame.image))
+        except FileError as error:
+            self._unwritten.emit(error.message)
+            return
+        recording.size = width, height
+        recording.detections.append(seen.detection)
+        recording.spots.append(seen.spots)
+        self._taken.put(recording)
+
+    def _on_taken(self) -> None:
+        recording, state = self._recording, self._state
+        if recording is not self._taken.take() or not state.is_capturing:
+            return
+        assert recording is not None
+        n_images, guide, posture = len(recording.spots), state.guide, None
+        new = recording.detections[state.n_images : n_images]
+        seen = [each.rotation for each in new if each is not None and each.has_pose]
+        if guide is not None and seen:
+            guide = guide.with_postures(np.array(seen))
+            posture = posture_of(guide.pen, seen[-1])
+        self._become(n_images=n_images, guide=guide, posture=posture)
+        if n_images >= self._next_trial and self._job is None:
+            self._next_trial = round(LATER * n_images)
+            self._try(Request((), 0.0))
+        is_covered = guide is not None and guide.is_complete
+        if n_images >= (N_USUAL if is_covered else N_MOST):
+            self.stop()
+
+    def _on_unwritten(self, why: Message) -> None:
+        if self._state.is_capturing:
+            self.stop()
+            self._become(trouble=worded(why))
+
+    def _try(self, request: Request) -> None:
+        recording = self._recording
+        if recording is None:
+            return
+        spots, size = tuple(recording.spots), recording.size
+
+        def find(report: Report) -> Discovery:
+            names = tuple(f"{number:06}.png" for number in range(1, len(spots) + 1))
+            return discover(sightings_of_spots(names, spots, size), request, report)
+
+        self._run(find, self._on_found)
+
+    def _on_found(self, found: Discovery) -> None:
+        guide = guide_of(found)
+        mask = self._workbench.selection.preparation.mask
+        self._live.set_region(RegionOfInterest(found.camera, found.pen, mask))
+        self._become(found=found, guide=guide, trouble="", progress=None)
+
+    def _on_failed(self, sentence: str) -> None:
+        self._job = None
+        self._become(trouble=sentence, progress=None)
+
+    def _on_saved(self, opened: OpenedFiles) -> None:
+        """Use the files with the camera, then with the images."""
+        recording, selection = self._recording, self._workbench.selection
+        if recording is None or opened.camera_file is None or opened.pen_file is None:
+            return
+        files = {"camera_file": opened.camera_file, "pen_file": opened.pen_file}
+        now = replace(selection.preparation, **files)  # type: ignore[arg-type]
+        selection.set_preparation(now)
+        self._workbench.pens.keep(opened.pen_file)
+        place = str(recording.folder / IMAGE_FOLDER)
+        recorded = now.with_source(SourceChoice(SourceKind.RECORDED, place))
+        selection.set_preparation(replace(recorded, **files))  # type: ignore[arg-type]
+        self._become(is_saved=True)
+
+    def _on_selected(self) -> None:
+        """Announce the files once the first of the recorded images is there."""
+        now = self._workbench.selection.preparation
+        if self._state.is_saved and now.image_size is not None:
+            self._become(is_saved=False)
+            self.saved.emit()

@@ -1,0 +1,272 @@
+"""The window in which tip, pen and camera are found without files."""
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import QWidget
+from typing_extensions import override
+
+from lightpen.discovery.discover import Request
+from lightpen.discovery.found import Discovery
+from lightpen.discovery.guiding import TURNS_NEEDED
+from lightpen.discovery.report import remarks_of
+from lightpen.discovery.scale import MeasuredLength
+from lightpen.intrinsics.uncertainty_map import map_uncertainty
+from lightpen.model.pen import DISC_DIAMETER
+from lightpen_app.discovery.discovery_run import DiscoveryRun, DiscoveryState
+from lightpen_app.look.layouts import (
+    fill,
+    grid_layout,
+    horizontal_layout,
+    vertical_layout,
+)
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.board_view import BoardOverlay, BoardView
+from lightpen_app.widgets.fitted_window import FittedWindow
+from lightpen_app.widgets.live_markers import live_markers
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.page_scroll import PageScroll
+from lightpen_app.widgets.pen_view import PenPicture, PenView
+from lightpen_app.widgets.posture_dial import DialValue, PostureDial
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.workbench import Workbench
+
+SIDE_WIDTH = 52 * GRID
+LEAST_PICTURE = 34 * GRID  # px, of the pen and of the dial
+LONGEST, LARGEST_U, LARGEST_DISC = 2000.0, 10.0, 100.0  # mm
+USUAL_U = 0.04  # mm, of a caliper
+UM = 1000.0
+
+
+class DiscoveryWindow(FittedWindow, Translated, QWidget):
+    """Guides a swing without files, asks for one length, and shows what is found.
+
+    Signals
+    -------
+    continued()
+        Both files and the images of the swing are in use.
+    """
+
+    continued = Signal()
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__(parent, Qt.WindowType.Window)
+        self.setObjectName("discovery")
+        self.resize(150 * GRID, 96 * GRID)
+        self._run = DiscoveryRun(workbench, self)
+
+        # Widgets
+        self._image = BoardView()
+        self._instruction = SignLabel()
+        self._count = text_label(TextSize.BODY)
+        self._begin = PushButton()
+        self._dial = PostureDial()
+        self._pen = PenView()
+        self._how = text_label(TextSize.BODY)
+        self._length = NumberField("mm", (0.0, LONGEST), 4)
+        self._u = NumberField("mm", (0.0001, LARGEST_U), 4)
+        self._disc = NumberField("mm", (0.1, LARGEST_DISC), 2)
+        self._names = [text_label(TextSize.BODY) for _ in range(3)]
+        self._compute = PushButton()
+        self._facts = text_label(TextSize.BODY)
+        self._save = PushButton()
+        self._u.setValue(USUAL_U)
+        self._disc.setValue(DISC_DIAMETER)
+
+        # Layout
+        panel = QWidget()
+        side = vertical_layout(panel, self._begin, self._count, margins=None)
+        fill(side, self._dial, self._pen, self._how)
+        grid = grid_layout(side, spacing=(GRID, GRID // 2))
+        fields = (self._length, self._u, self._disc)
+        for row, (name, edit) in enumerate(zip(self._names, fields, strict=True)):
+            grid.addWidget(name, row, 0)
+            grid.addWidget(edit, row, 1)
+            name.setBuddy(edit)
+        fill(side, self._compute, self._facts, self._save, 1)
+        for picture in (self._dial, self._pen):
+            picture.setMinimumHeight(LEAST_PICTURE)
+        scroll = PageScroll()
+        scroll.setWidget(panel)
+        scroll.setFixedWidth(SIDE_WIDTH)
+        layout = horizontal_layout(self, spacing=2 * GRID, margins=2 * GRID)
+        vertical_layout(
+            layout, self._instruction, (self._image, 1), stretch=1, spacing=-1
+        )
+        layout.addWidget(scroll)
+
+        # Connections
+        workbench.live.image_shown.connect(self._on_image_shown)
+        self._run.changed.connect(self._refresh)
+        self._run.found_changed.connect(self._show_found)
+        self._run.saved.connect(self._on_saved)
+        self._begin.clicked.connect(self._on_begin_clicked)
+        self._compute.clicked.connect(self._on_compute_clicked)
+        self._save.clicked.connect(self._run.save)
+        for edit in fields:
+            edit.valueChanged.connect(self._refresh)
+
+        self._retranslate()
+
+    @override
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self._run.give_up()
+        super().closeEvent(event)
+
+    def _on_image_shown(self, shown: DisplayedImage) -> None:
+        if self.isVisible() and not self._run.state.is_final:
+            self._image.set_half(shown.half, shown.size, live_markers(shown.seen))
+
+    def _on_begin_clicked(self) -> None:
+        if self._run.state.is_capturing:
+            self._run.stop()
+        else:
+            self._run.start()
+
+    def _on_compute_clicked(self) -> None:
+        sigma = self._u.value() / 2
+        length = MeasuredLength(None, self._length.value(), sigma)
+        self._run.solve(Request((length,), self._disc.value()))
+
+    def _on_saved(self) -> None:
+        self.continued.emit()
+        self.close()
+
+    def _retranslate(self) -> None:
+        self.setWindowTitle(self.tr("Find pen and camera"))
+        self._image.set_message(self.tr("No image"))
+        self._compute.setText(self.tr("Find pen and camera"))
+        self._save.setText(self.tr("Save both files and calibrate the tip"))
+        for label, name in zip(
+            self._names,
+            (
+                self.tr("Length"),
+                self.tr("U (k = 2) of length"),
+                self.tr("Disc diameter"),
+            ),
+            strict=True,
+        ):
+            label.setText(name)
+        self._show_found()
+
+    def _refresh(self) -> None:
+        state = self._run.state
+        self._begin.setText(self.tr("Stop") if state.is_capturing else self.tr("Start"))
+        self._count.setText(self.tr("Images: {0}").format(state.n_images))
+        self._instruction.set_value(self._instructed(state))
+        self._dial.set_value(_dial_value(state))
+        why_not = "" if state.found else self.tr("Swing the pen first.")
+        if not why_not and not self._length.value():
+            why_not = self.tr("Enter the length.")
+        if state.progress is not None:
+            why_not = self.tr("Being computed.")
+        self._compute.set_why_not(why_not)
+        nothing = self.tr("Find pen and camera first.")
+        self._save.set_why_not("" if state.is_final else nothing)
+
+    def _show_found(self) -> None:
+        """Show pen, camera and numbers of the last solution."""
+        found, is_final = self._run.state.found, self._run.state.is_final
+        self._dial.setVisible(not is_final)
+        self._pen.setVisible(found is not None)
+        pair = _longest_pair(found)
+        self._how.setText(self._how_to_measure(pair))
+        self._facts.setText(self._found_text(found) if is_final else "")
+        overlay = BoardOverlay()
+        if found is not None:
+            self._pen.set_value(PenPicture(found.pen, found.tip_pen, frozenset(pair)))
+        if found is not None and is_final and found.camera.covariance is not None:
+            by_image = map_uncertainty(found.camera, found.camera.covariance)
+            overlay = BoardOverlay(uncertainty=by_image)
+            self._image.set_markers(())
+        self._image.set_overlay(overlay)
+        self._refresh()
+
+    def _instructed(self, state: DiscoveryState) -> StatusMessage:
+        """Return what to do now."""
+        if state.progress is not None:
+            words = self.tr("Computing: {0:.0%}").format(state.progress)
+            return StatusMessage(words, Sign.WAIT, Tone.QUIET)
+        if state.trouble:
+            return StatusMessage(state.trouble, Sign.WARNING, Tone.WARN)
+        if state.is_final:
+            words = self.tr(
+                "Pen and camera found. The image shows the projection uncertainty / px."
+            )
+            return StatusMessage(words, Sign.CHECK, Tone.GOOD)
+        if not state.is_capturing and state.found is not None:
+            words = self.tr("Enter the distance between the two marked LEDs.")
+        elif not state.is_capturing:
+            words = self.tr(
+                "Lock zoom, focus and exposure. Seat the tip in the cone, hold the "
+                "LEDs towards the camera, and press Start."
+            )
+        elif state.guide is None:
+            words = self.tr(
+                "Swing the pen slowly: tilt it by 30 degrees in all directions, and "
+                "turn it about its axis."
+            )
+        elif state.guide.is_complete:
+            words = self.tr("All directions are covered. Keep swinging and turning.")
+        else:
+            words = self.tr("Tilt and turn the pen as the arrow shows.")
+        return StatusMessage(words, Sign.NONE, Tone.PLAIN)
+
+    def _how_to_measure(self, pair: tuple[int, ...]) -> str:
+        if not pair:
+            return ""
+        words = self.tr(
+            "Measure LEDs {0} and {1}, the marked ones, from centre to centre: with a "
+            "caliper over the outer edges of both discs, minus one disc diameter. "
+            "Measure at the temperature of the swing."
+        )
+        return words.format(*pair)
+
+    def _found_text(self, found: Discovery | None) -> str:
+        if found is None:
+            return ""
+        tip, u = found.tip_pen, found.expanded_uncertainty
+        fx, u_fx = found.camera.fx, 2 * float(found.intrinsics_sigma[0])
+        rows = [
+            self.tr("Tip {0}: {1:.4f} \u00b1 {2:.4f} mm").format(axis, value, each)
+            for axis, value, each in zip("xyz", tip.tolist(), u.tolist(), strict=True)
+        ]
+        calibration = found.calibration
+        rows += [
+            self.tr("LEDs: {0}, U (k = 2) up to {1:.1f} \u00b5m").format(
+                found.pen.n_leds, UM * float(found.led_uncertainty.max())
+            ),
+            self.tr("Focal length: {0:.2f} \u00b1 {1:.2f} px").format(fx, u_fx),
+            self.tr("Images used: {0} of {1}, noise {2:.3f} px").format(
+                int(calibration.used.sum()),
+                len(calibration.used),
+                calibration.bundle.sigma,
+            ),
+            *map(worded, remarks_of(found)),
+        ]
+        return "\n".join(rows)
+
+
+def _dial_value(state: DiscoveryState) -> DialValue:
+    guide = state.guide
+    if guide is None:
+        return DialValue()
+    return DialValue(
+        counts=guide.counts[1:],
+        needed=guide.needed[1:],
+        posture=state.posture,
+        target=guide.target if state.is_capturing else None,
+        turns=guide.turns,
+        turns_needed=TURNS_NEEDED,
+    )
+
+
+def _longest_pair(found: Discovery | None) -> tuple[int, ...]:
+    """Return the numbers of the two LEDs that are farthest apart."""
+    if found is None:
+        return ()
+    return found.lengths[0].first + 1, found.lengths[0].second + 1

@@ -1,0 +1,134 @@
+"""Tip, pen and camera as found, with their joint covariance."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.discovery.hypotheses import Hypothesis
+from lightpen.discovery.normals import FACING
+from lightpen.discovery.numbering import framed
+from lightpen.discovery.scale import EXACT_SCALE
+from lightpen.discovery.starts import KnownLength
+from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.estimation.uncertainty.disc_normals import effect_of_normals
+from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mixing
+from lightpen.model.camera import Camera
+from lightpen.model.information import inverse
+from lightpen.model.pen import Pen
+
+
+@dataclass(frozen=True, eq=False)
+class Discovery:
+    """Tip, pen and camera that a swing showed.
+
+    Attributes
+    ----------
+    pen : Pen
+        In its frame, with the covariance of its LEDs.
+    camera : Camera
+        With its covariance.
+    tip_pen : (3,) array
+        mm.
+    covariance : (q, q) array
+        Of tip, camera, diameter and LEDs, as `parameters` has them, in the frame in
+        which the LEDs fit the true ones best.
+    calibration : Calibration
+        By which they were adjusted.
+    lengths : tuple of KnownLength
+    is_relative : bool
+        Whether there was no length.
+    hypotheses : tuple of Hypothesis
+    n_lamps : int
+        Lights that did not move with the pen.
+    """
+
+    pen: Pen
+    camera: Camera
+    tip_pen: FloatArray
+    covariance: FloatArray
+    calibration: Calibration
+    lengths: tuple[KnownLength, ...]
+    is_relative: bool
+    hypotheses: tuple[Hypothesis, ...]
+    n_lamps: int
+
+    @property
+    def parameters(self) -> Parameters:
+        """Indices of each kind of parameter in the covariance."""
+        return self.calibration.instrument.parameters
+
+    @property
+    def expanded_uncertainty(self) -> FloatArray:
+        """U (k = 2) of the tip, (3,), mm."""
+        return COVERAGE_FACTOR * np.sqrt(np.diag(self.covariance)[:3])
+
+    @property
+    def intrinsics_sigma(self) -> FloatArray:
+        """Standard uncertainties of the camera's intrinsics."""
+        at = self.parameters.cameras[0]
+        return np.sqrt(np.diag(self.covariance)[at])
+
+    @property
+    def led_uncertainty(self) -> FloatArray:
+        """U (k = 2) of each LED coordinate, (L, 3), mm."""
+        at = self.parameters.leds
+        sigmas = np.sqrt(np.diag(self.covariance)[at])
+        return COVERAGE_FACTOR * sigmas.reshape(-1, 3)
+
+
+def discovery_of(
+    calibration: Calibration,
+    lengths: tuple[KnownLength, ...],
+    sketch: FloatArray | None,
+    *,
+    is_relative: bool,
+) -> Discovery:
+    """Return what a calibration with wide priors has found.
+
+    Parameters
+    ----------
+    sketch : (L, 3) array or None
+        Rough LEDs in the frame that the pen is given, mm.
+    """
+    bundle, instrument = calibration.bundle, calibration.instrument
+    state, tip = bundle.state, calibration.joint.tip_pen
+    # The start found the normal, by the same images.
+    normals = effect_of_normals(bundle)
+    of_turn = inverse(normals.information + FACING**-2 * np.eye(2))
+    by = instrument_mixing(bundle)
+    covariance = instrument.covariance + by @ normals.covariance(of_turn) @ by.T
+    at = instrument.parameters
+    budget = calibration.budget.covariance[:3, :3] - instrument.covariance[:3, :3]
+    values, vectors = np.linalg.eigh(budget)
+    covariance[:3, :3] += (vectors * np.maximum(values, 0.0)) @ vectors.T
+    pen, R, t = framed(state.pen, tip, sketch)
+    turn = np.eye(len(covariance))
+    turn[at.tip, at.tip] = R
+    turn[at.leds, at.leds] = np.kron(np.eye(pen.n_leds), R)
+    covariance = turn @ covariance @ turn.T
+    camera = replace(
+        state.rig.cameras[0], covariance=covariance[at.cameras[0], at.cameras[0]]
+    )
+    diameter_sigma = float(np.sqrt(covariance[at.diameter, at.diameter][0, 0]))
+    pen = replace(
+        pen,
+        led_covariance=covariance[at.leds, at.leds],
+        scale_sigma=EXACT_SCALE,
+        diameter_sigma=diameter_sigma,
+        normal_sigma=float(np.sqrt(np.linalg.eigvalsh(of_turn)[-1])),
+        nominal_tip=None,
+        expansion=None,
+    )
+    return Discovery(
+        pen=pen,
+        camera=camera,
+        tip_pen=R @ tip + t,
+        covariance=covariance,
+        calibration=calibration,
+        lengths=lengths,
+        is_relative=is_relative,
+        hypotheses=(),
+        n_lamps=0,
+    )

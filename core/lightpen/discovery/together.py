@@ -1,0 +1,207 @@
+"""Several swings of one pen before one camera, adjusted together.
+
+Each swing is adjusted by itself. What they found is joined by its information, in which
+the lengths, which all of them share, count once; so it is the adjustment of all images
+to first order. The last swing, held out, is the proof: it is compared with the others.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.discovery.discover import Report, Request, discover
+from lightpen.discovery.found import Discovery
+from lightpen.discovery.sightings import Sightings
+from lightpen.discovery.starts import gradient_of
+from lightpen.errors import CalibrationError
+from lightpen.estimation.bundle.unknowns import whole_moves
+from lightpen.model.information import inverse
+from lightpen.model.rigid import fit_rigid
+
+CONTRADICTING = 4.0  # standard deviations of a held-out swing
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """A swing that took no part, against the others.
+
+    The common error of the lengths is no part of the differences.
+
+    Attributes
+    ----------
+    tip : (3,) array
+        Difference of the tips, mm.
+    tip_sigma : (3,) array
+        Its standard uncertainty, mm.
+    focal_length, focal_length_sigma : float
+        The same of fx, px.
+    """
+
+    tip: FloatArray
+    tip_sigma: FloatArray
+    focal_length: float
+    focal_length_sigma: float
+
+    @property
+    def worst(self) -> float:
+        """The largest difference in standard deviations."""
+        tip = float(np.abs(self.tip / self.tip_sigma).max())
+        return max(tip, abs(self.focal_length) / self.focal_length_sigma)
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """What several swings found.
+
+    Attributes
+    ----------
+    found : Discovery
+        Of all; its calibration is that of the first swing.
+    swings : tuple of Discovery
+        Of each.
+    held_out : HeldOut
+        The last against the others.
+    """
+
+    found: Discovery
+    swings: tuple[Discovery, ...]
+    held_out: HeldOut
+
+
+def discover_together(
+    swings: Sequence[Sightings],
+    request: Request,
+    report: Report = lambda fraction: None,
+) -> Together:
+    """Find tip, pen and camera by two or more swings of the same pen and tip.
+
+    Raises
+    ------
+    CalibrationError
+        A swing determines nothing, or the last contradicts the others.
+    """
+    found: list[Discovery] = []
+    for k, sightings in enumerate(swings):
+        own = request if not found else replace(request, sketch=found[0].pen)
+        if sightings.size != swings[0].size:
+            raise CalibrationError("discover.other-size", number=k + 1)
+        each = discover(sightings, own, partial(_report_part, report, k, len(swings)))
+        if each.pen.n_leds != (found or [each])[0].pen.n_leds:
+            raise CalibrationError("discover.other-pen", number=k + 1)
+        found.append(each)
+    held_out = _compared(joined(found[:-1]), found[-1])
+    if held_out.worst > CONTRADICTING:
+        raise CalibrationError(
+            "discover.swings-contradict",
+            tip=float(np.linalg.norm(held_out.tip)),
+            times=held_out.worst,
+        )
+    return Together(joined(found), tuple(found), held_out)
+
+
+def _report_part(report: Report, k: int, n: int, fraction: float) -> None:
+    report((k + fraction) / n)
+
+
+def joined(swings: Sequence[Discovery]) -> Discovery:
+    """Return what swings found together, in the frame of the first."""
+    first, at = swings[0], swings[0].parameters
+    if len(swings) == 1:
+        return first
+    basis = _free_of(first)
+    parts = [_parted(each) for each in swings]
+    information = [inverse(basis.T @ each.fit @ basis) for each in parts]
+    covariance = inverse(np.sum(information, axis=0))
+    start = _values(first, first)
+    right = sum(
+        known @ basis.T @ (_values(each, first) - start)
+        for known, each in zip(information, swings, strict=True)
+    )
+    whole = start + basis @ covariance @ right
+    shared = np.mean([each.shared for each in parts], axis=0)
+    spread = basis @ covariance @ basis.T + shared
+    pen = replace(
+        first.pen,
+        leds=whole[at.leds].reshape(-1, 3),
+        diameter=float(whole[at.diameter][0]),
+        led_covariance=spread[at.leds, at.leds],
+        diameter_sigma=float(np.sqrt(spread[at.diameter, at.diameter][0, 0])),
+    )
+    camera = first.camera.with_intrinsics(whole[at.cameras[0]])
+    camera = replace(camera, covariance=spread[at.cameras[0], at.cameras[0]])
+    return replace(
+        first, pen=pen, camera=camera, tip_pen=whole[at.tip], covariance=spread
+    )
+
+
+def _compared(others: Discovery, last: Discovery) -> HeldOut:
+    """Compare a swing with others; the length of all is the same, and cancels."""
+    at = others.parameters
+    difference = _values(last, others) - _values(others, others)
+    covariance = _parted(others).fit + _parted(last).fit
+    sigmas = np.sqrt(np.diag(covariance))
+    fx = at.cameras[0].start
+    return HeldOut(
+        tip=difference[at.tip],
+        tip_sigma=sigmas[at.tip],
+        focal_length=float(difference[fx]),
+        focal_length_sigma=float(sigmas[fx]),
+    )
+
+
+def _values(each: Discovery, frame: Discovery) -> FloatArray:
+    """Return the parameters, (q,), with the LEDs turned onto those of another."""
+    at = each.parameters
+    R, t = fit_rigid(each.pen.leds, frame.pen.leds)
+    values = np.empty(at.number)
+    values[at.tip] = R @ each.tip_pen + t
+    values[at.cameras[0]] = each.camera.intrinsics
+    values[at.diameter] = each.pen.diameter
+    values[at.leds] = (each.pen.leds @ R.T + t).ravel()
+    return values
+
+
+class _Parts(NamedTuple):
+    """Covariance of a discovery, (q, q) each: by its own images, and as all share it.
+
+    Lengths are shared, and what goes beyond the fit: lens and mechanics.
+    """
+
+    fit: FloatArray
+    shared: FloatArray
+
+
+def _parted(each: Discovery) -> _Parts:
+    at, lengths = each.parameters, _length_rows(each)
+    beyond = np.zeros_like(each.covariance)
+    own = each.calibration.budget.covariance[:3, :3]
+    own = own - each.calibration.instrument.covariance[:3, :3]
+    values, vectors = np.linalg.eigh(own)
+    beyond[at.tip, at.tip] = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    fit = each.covariance - beyond
+    gain = fit @ lengths
+    by_lengths = gain @ np.linalg.pinv(lengths.T @ gain) @ gain.T
+    return _Parts(fit - by_lengths, beyond + by_lengths)
+
+
+def _length_rows(each: Discovery) -> FloatArray:
+    """Return the derivatives of the lengths by all parameters, (q, m)."""
+    at = each.parameters
+    rows = np.zeros((at.number, len(each.lengths)))
+    for k, known in enumerate(each.lengths):
+        rows[at.leds, k] = gradient_of(each.pen.leds, known)
+    return rows
+
+
+def _free_of(each: Discovery) -> FloatArray:
+    """Return a basis of the parameters without lengths and moves of the whole pen."""
+    at = each.parameters
+    moves = np.zeros((at.number, 6))
+    moves[at.leds] = whole_moves(each.pen.leds)
+    held = np.concatenate([moves, _length_rows(each)], axis=1)
+    complete = np.linalg.qr(held, mode="complete")[0]
+    return np.asarray(complete[:, held.shape[1] :])

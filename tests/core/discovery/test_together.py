@@ -1,0 +1,75 @@
+import numpy as np
+import pytest
+from tests.simulated_stations import Station, errors_of, random_station, seen_station
+
+from lightpen.discovery.discover import Request, SecondSightings, discover
+from lightpen.discovery.picture import picture_of_pen
+from lightpen.discovery.together import Together, discover_together
+from lightpen.errors import CalibrationError
+from lightpen.estimation.bundle.priors import ConeSeparation
+from lightpen.simulator.postures import FRAME_RATE, operator_postures
+from lightpen.simulator.swings import swing_from_postures
+
+N = 100  # images
+FIRST = random_station(6, n_images=N)
+APART = np.array([25.0, 2.0, 30.0])  # mm, from cone to cone
+
+
+def again(seed: int, moved: np.ndarray | float = 0.0) -> Station:
+    """Return another swing of the same pen, in the same cone or in another."""
+    swing = FIRST.swing
+    postures = operator_postures(np.arange(N) / FRAME_RATE, seed)
+    other = swing_from_postures(postures, swing.tip_pen, swing.cone_cam + moved)
+    rng = np.random.default_rng(seed)
+    return seen_station(FIRST.camera, FIRST.pen, other, 0.03, 0.02, rng)
+
+
+@pytest.fixture(scope="module")
+def together() -> Together:
+    return discover_together((FIRST.sightings, again(1).sightings), FIRST.request)
+
+
+def test_two_swings_know_more_than_each_and_are_true(together: Together) -> None:
+    found = together.found
+    for each in together.swings:
+        assert (found.expanded_uncertainty < each.expanded_uncertainty).all()
+        assert (found.intrinsics_sigma < each.intrinsics_sigma).all()
+    errors = errors_of(found, FIRST)
+    assert (np.abs(errors.tip) < 1.75 * found.expanded_uncertainty).all()
+    assert (np.abs(errors.intrinsics) < 3.5 * found.intrinsics_sigma).all()
+
+
+def test_the_length_is_common_to_all_swings(together: Together) -> None:
+    (known,) = together.found.lengths
+    leds = together.found.pen.leds
+    length = float(np.linalg.norm(leds[known.first] - leds[known.second]))
+    assert length == pytest.approx(known.length, abs=2e-4)
+
+
+def test_the_swing_held_out_agrees_with_the_others(together: Together) -> None:
+    assert together.held_out.worst < 3.5
+    assert np.abs(together.held_out.tip).max() < 0.1
+
+
+def test_swings_with_images_of_two_sizes_are_refused() -> None:
+    other = random_station(6, n_images=N).sightings
+    smaller = type(other)(other.names, other.centers, (2448, 2040))
+    with pytest.raises(CalibrationError, match="another size"):
+        discover_together((FIRST.sightings, smaller), FIRST.request)
+
+
+def test_a_second_cone_at_a_known_distance_gives_the_scale() -> None:
+    separation = ConeSeparation(float(np.linalg.norm(APART)), 1e-3)
+    second = SecondSightings(again(2, APART).sightings, separation)
+    request = Request((), FIRST.pen.diameter, second=second)
+
+    found = discover(FIRST.sightings, request)
+
+    assert not found.is_relative
+    errors = errors_of(found, FIRST)
+    assert (np.abs(errors.tip) < 1.75 * found.expanded_uncertainty).all()
+    assert errors.led_rms < 0.02
+
+
+def test_the_picture_shows_the_pen_upright(together: Together) -> None:
+    assert picture_of_pen(together.found).startswith(b"\x89PNG")
