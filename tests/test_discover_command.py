@@ -73,7 +73,7 @@ def test_a_swing_of_centres_and_a_length_give_pen_camera_and_record(
         ([], "one known length"),
         (["--length", "1", "180"], "is not a length"),
         (["--length", "1", "99", "180"], "no LED 99"),
-        (["--length", "2", "2", "180"], "to itself"),
+        (["--length", "2", "2", "180"], "and itself"),
     ],
 )
 def test_what_cannot_be_done_is_told_and_nothing_is_written(

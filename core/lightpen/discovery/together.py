@@ -84,11 +84,12 @@ def discover_together(
     CalibrationError
         A swing determines nothing, or the last contradicts the others.
     """
+    for k, sightings in enumerate(swings):
+        if sightings.size != swings[0].size:
+            raise CalibrationError("discover.other-size", number=k + 1)
     found: list[Discovery] = []
     for k, sightings in enumerate(swings):
         own = request if not found else replace(request, sketch=found[0].pen)
-        if sightings.size != swings[0].size:
-            raise CalibrationError("discover.other-size", number=k + 1)
         each = discover(sightings, own, partial(_report_part, report, k, len(swings)))
         if each.pen.n_leds != (found or [each])[0].pen.n_leds:
             raise CalibrationError("discover.other-pen", number=k + 1)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.simulated_stations import Station, errors_of, random_station, seen_station
@@ -52,8 +54,7 @@ def test_the_swing_held_out_agrees_with_the_others(together: Together) -> None:
 
 
 def test_swings_with_images_of_two_sizes_are_refused() -> None:
-    other = random_station(6, n_images=N).sightings
-    smaller = type(other)(other.names, other.centers, (2448, 2040))
+    smaller = replace(FIRST.sightings, size=(2448, 2040))
     with pytest.raises(CalibrationError, match="another size"):
         discover_together((FIRST.sightings, smaller), FIRST.request)
 

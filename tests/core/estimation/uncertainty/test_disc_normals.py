@@ -55,3 +55,20 @@ def test_the_effect_of_a_turn_is_the_change_of_the_tip_by_it() -> None:
     largest = np.abs(change).max()
     np.testing.assert_allclose(effect.gain[:3] @ TURN, change, atol=0.1 * largest)
     assert (np.linalg.eigvalsh(effect.information) > 0).all()
+
+
+def test_the_effect_of_a_turn_is_found_beside_that_of_a_stylus_that_gives_way() -> None:
+    rng = np.random.default_rng(3)
+    swing = swing_poses(120, rng, pen=PEN, camera=CAMERA)
+    sideways = swing.rotations[:, :, 1] * [1.0, 0.0, 1.0]  # of the pen's axis
+    translations = swing.translations + 0.03 * sideways
+    pixels = simulate_centers(CAMERA, PEN, swing.rotations, translations, 0.005, rng)
+    centers = Centers(np.arange(len(pixels)), pixels, Path("centers.csv"))
+    pen = replace(PEN, normal_sigma=0.3)
+
+    bundle = calibrate(CAMERA, pen, observe_centers(centers, CAMERA, pen)).bundle
+
+    assert bundle.unknowns.effects
+    effect = effect_of_normals(bundle)
+    assert effect.gain.shape == (bundle.unknowns.number, 2)
+    assert (np.linalg.eigvalsh(effect.information) > 0).all()
