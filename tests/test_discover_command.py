@@ -92,5 +92,5 @@ def test_a_length_between_the_wrong_leds_is_told(
 
     assert main(arguments(centers, *length)) == 1
 
-    assert "discs would be" in capsys.readouterr().err
+    assert "disc diameter of" in capsys.readouterr().err
     assert not any((centers.parent / name).exists() for name in OUTPUTS)
