@@ -114,8 +114,10 @@ TOGETHER = "all together"
 COVERED = 93.0, 97.0  # per cent, of all together; of 95 % chance alone makes +- 3 SE
 MOST_PASSED_BEYOND = 5.0  # per cent of PASS
 NORMAL_95 = 1.959964
+FEW_IMAGES = 60
 MORE_TRIALS = 100
 FEWER_TRIALS = 40
+LEAST_TRIALS = 25  # of 300 images, which take seconds each
 
 
 class StationCase(NamedTuple):
@@ -128,9 +130,10 @@ class StationCase(NamedTuple):
     @property
     def n_trials(self) -> int:
         """Number of stations drawn."""
-        if self.name == TOGETHER and self.n_cameras == 1:
-            return MORE_TRIALS
-        return FEWER_TRIALS
+        if self.n_images > FEW_IMAGES:
+            return LEAST_TRIALS
+        is_usual = self.name == TOGETHER and self.n_cameras == 1
+        return MORE_TRIALS if is_usual else FEWER_TRIALS
 
     @property
     def drawn(self) -> list[tuple["StationCase", int]]:
@@ -139,8 +142,9 @@ class StationCase(NamedTuple):
 
 
 ROWS = [
-    *(StationCase(name, n, 1) for name in CASES for n in (60, 300)),
-    *(StationCase(TOGETHER, n, 2) for n in (60, 300)),
+    *(StationCase(name, FEW_IMAGES, 1) for name in CASES),
+    StationCase(TOGETHER, 300, 1),
+    *(StationCase(TOGETHER, n, 2) for n in (FEW_IMAGES, 300)),
 ]
 
 

@@ -63,6 +63,7 @@ class EffectName(StrEnum):
     STROBE = "leds in turn"
 
 
+TIMING = EffectName.DELAY, EffectName.SHUTTER, EffectName.STROBE
 # Largest standard deviations, mm, px or image intervals; a larger one is another fault.
 LARGEST = {
     EffectName.LENS: 0.08,
@@ -119,7 +120,8 @@ class EffectComponent(NamedTuple):
     covariance : (k, k) array
         Of the unknowns with that.
     expected : (k, k) array
-        Their mean square given the images, averaged over what their size may be.
+        Of the unknowns, averaged over what their size may be; of timing their mean
+        square given the images.
     """
 
     sigma: float
@@ -165,10 +167,12 @@ def size_of(effect: Effect, S: FloatArray, right: FloatArray) -> EffectComponent
     else:
         weights = np.exp(-0.5 * (all_costs + gain)) * (1 - P_NONE) / all_costs.size
         weights /= weights.sum() + P_NONE * np.exp(-0.5 * gain)
-        expected = np.sum(
-            [x.second_moment(sigmas, w) for x, w in zip(spectra, weights, strict=True)],
-            axis=0,
-        )
+        if effect.name in TIMING:  # well seen, so the values are known as well
+            moments = zip(spectra, weights, strict=True)
+            expected = np.sum([x.second_moment(sigmas, w) for x, w in moments], axis=0)
+        else:  # what one effect is given that the others are 0 would be too little
+            variances = weights @ sigmas**2
+            expected = np.einsum("s,sij->ij", variances, np.array(effect.shapes))
     sigma = float(sigmas[i])
     return EffectComponent(sigma, gain, sigma**2 * effect.shapes[s], expected)
 
