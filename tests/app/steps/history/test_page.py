@@ -220,6 +220,23 @@ def test_the_newest_entries_come_first_and_can_be_chosen_by_tip_and_day(
     assert desk.statuses[-1] == "2 entries"
 
 
+def test_a_pass_that_was_not_accepted_is_listed_as_repeated(desk: Desk) -> None:
+    logbook = desk.workbench.run.logbook.opened()
+    for n, grade in enumerate((Grade.PASS, Grade.CHECK, Grade.REPEAT)):
+        event = Event(
+            kind=Kind.REFUSED,
+            at=NOON + timedelta(days=n),
+            names=names("T-10"),
+            program="lightpen 1",
+            grade=grade,
+            swing=f"2026-01-0{n + 2}",
+        )
+        append(logbook.database, logbook.chain, event)
+    desk.open()
+
+    assert desk.column(WHAT) == ["Rejected", "Rejected", "Repeated"]
+
+
 def test_what_is_not_of_a_live_camera_is_marked_and_no_practice_is_in_force(
     desk: Desk,
 ) -> None:
