@@ -10,7 +10,8 @@ import pytest
 from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.hashes import InputFile
-from lightpen.formats.json_records import record_bytes
+from lightpen.formats.json_records import record_bytes, record_heading
+from lightpen.local_time import local_now
 from lightpen.record.folder.verifications import read_verification
 from lightpen.verification.reports.records import verification_record
 from lightpen.verification.tasks.assessment import (
@@ -92,3 +93,50 @@ def test_a_tampered_record_is_not_put_on_paper(
         write_paper(record, out, "en")
 
     assert not out.exists()
+
+
+def test_a_measured_part_is_put_on_paper(
+    script: Callable[..., CompletedProcess[str]], tmp_path: Path
+) -> None:
+    touch = {"feature": "hole", "deviation_cam_mm": [0.001, 0.0, 0.0]}
+    characteristic = {
+        "name": "diameter hole",
+        "nominal": 20.0,
+        "actual": 20.01,
+        "deviation": 0.01,
+        "expanded_uncertainty": 0.004,
+        "independent_expanded_uncertainty": 0.006,
+        "probability_of_conformity": 0.9,
+        "decision": "accepted",
+        "budget": {"points": 0.003, "tip": 0.001},
+    }
+    feature = {
+        "name": "hole",
+        "kind": "circle",
+        "origin_mm": [0.0, 1.0, 2.0],
+        "expanded_uncertainty": [0.1] * 7,
+        "sizes": {"radius": 10.005},
+        "form_error_mm": 0.002,
+        "n_touches": 3,
+    }
+    record = {
+        **record_heading(local_now()),
+        "verification": "part",
+        "pen": "LP-04",
+        "tip": "T-10",
+        "alignment": None,
+        "characteristics": [characteristic],
+        "features": [feature],
+        "plan": {"features": [{"name": "hole", "kind": "circle"}]},
+        "touches": [
+            {**touch, "point_cam_mm": [float(i), float(i * i), 900.0]} for i in range(3)
+        ],
+        "inputs": {},
+    }
+    file, out = tmp_path / "part.json", tmp_path / "part.pdf"
+    file.write_bytes(record_bytes(record))
+
+    outcome = script("report", file, "--out", out, environment=UNSEEN)
+
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert out.read_bytes().startswith(b"%PDF-1.4")

@@ -6,7 +6,9 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.swings.names import Names
+from lightpen.simulator.plate import plate_plan
 from lightpen.swing.state import Phase
+from lightpen.verification.tasks.part import PartOptions
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.work.workbench import Workbench
@@ -21,7 +23,7 @@ LONGEST_S = 200.0  # on a page, s; a slow machine takes a minute for the swing
 
 
 class Demo(QObject):
-    """Goes on from each page when its step is done, and swings the pen.
+    """Goes on from each page when its step is done, swings the pen, measures a part.
 
     Parameters
     ----------
@@ -53,6 +55,7 @@ class Demo(QObject):
         self._key = ""
         self._n_ticks = 0
         self._is_accepted = False
+        self._is_measuring = False
 
         # Widgets
         self._timer = QTimer(self)
@@ -84,13 +87,25 @@ class Demo(QObject):
         status = self._workbench.run.status
         if status.result is not None:
             self._is_accepted = True
-            self._end(self._farewell())
+            self._go_on_accepted(key)
         elif self._has_failed() or self._n_ticks * TICK_MS > 1000 * LONGEST_S:
             self._end(self.tr("Demo ended: no tip to accept."))
         elif key == "start":  # its main button leaves out what is ready
             self._window.advance()
         elif key != "swing" or status.solution is not None:
             self._window.press_main()
+
+    def _go_on_accepted(self, key: str) -> None:
+        """Measure the simulated plate for somebody who looks on; else end."""
+        if self._is_watched and not self._is_measuring:
+            self._is_measuring = True
+            self._window.show_step("measure")
+            return
+        is_at_it = key == "measure" and not self._workbench.measuring.status.is_done
+        if self._is_watched and is_at_it:
+            self._workbench.live.set_touching(True)
+        else:
+            self._end(self._farewell())
 
     def _has_failed(self) -> bool:
         status = self._workbench.run.status
@@ -110,6 +125,9 @@ class Demo(QObject):
                 "No key is needed up to the verdict."
             ),
             "review": self.tr("Demo: review the tip and its uncertainty."),
+            "measure": self.tr(
+                "Demo: the simulated operator measures a plate of ten features."
+            ),
         }
         if key in words:  # else somebody looks round
             self.told.emit(words[key])
@@ -118,6 +136,10 @@ class Demo(QObject):
             operator.seat()
         if key == "swing":
             self._workbench.live.set_following(True)
+        elif key == "measure":
+            selection = self._workbench.selection
+            plate = PartOptions(plate_plan())
+            selection.set_choices(selection.choices.with_options(plate))
 
     def _show(self, words: str) -> None:
         self._workbench.notifications.tell(self, words, Tone.ACTIVE)
