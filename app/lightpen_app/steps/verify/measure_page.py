@@ -4,6 +4,7 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen_app.look.sounds import Sounds
+from lightpen_app.look.theme import GRID
 from lightpen_app.steps.verify.measure_presenter import MeasurePresenter
 from lightpen_app.steps.verify.plan_panel import PlanPanel
 from lightpen_app.steps.verify.probing_page import ProbingPage
@@ -14,6 +15,7 @@ class MeasurePage(ProbingPage):
     """Shows a part that is measured and leads through its plan."""
 
     key = "measure"
+    narrow_below = 1000 * GRID  # px: the tables need the room of the live image
 
     def __init__(
         self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
