@@ -758,12 +758,119 @@
         <translation>演示：复核测头及其不确定度。</translation>
     </message>
     <message>
+        <source>Demo: the simulated operator measures a plate of ten features.</source>
+        <translation>演示：模拟操作员测量一块含十个要素的平板。</translation>
+    </message>
+    <message>
         <source>Tip accepted. Demo data is not saved.</source>
         <translation>测头已接受。演示数据不会保存。</translation>
     </message>
     <message>
         <source>Demo finished. You can look around; demo data is not saved. To calibrate a tip, start the program without the demo.</source>
         <translation>演示结束。您可以随意查看；演示数据不会保存。要标定测头，请不带演示启动程序。</translation>
+    </message>
+</context>
+<context>
+    <name>DiscoveryWindow</name>
+    <message>
+        <source>Find pen and camera</source>
+        <translation>求光笔和相机</translation>
+    </message>
+    <message>
+        <source>No image</source>
+        <translation>无图像</translation>
+    </message>
+    <message>
+        <source>Save both files and calibrate the tip</source>
+        <translation>保存两个文件并标定测头</translation>
+    </message>
+    <message>
+        <source>Length</source>
+        <translation>长度</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of length</source>
+        <translation>长度的 U (k = 2)</translation>
+    </message>
+    <message>
+        <source>Disc diameter</source>
+        <translation>圆盘直径</translation>
+    </message>
+    <message>
+        <source>Stop</source>
+        <translation>停止</translation>
+    </message>
+    <message>
+        <source>Start</source>
+        <translation>开始</translation>
+    </message>
+    <message>
+        <source>Images: {0}</source>
+        <translation>图像：{0}</translation>
+    </message>
+    <message>
+        <source>Swing the pen first.</source>
+        <translation>请先摆动光笔。</translation>
+    </message>
+    <message>
+        <source>Enter the length.</source>
+        <translation>请输入长度。</translation>
+    </message>
+    <message>
+        <source>Being computed.</source>
+        <translation>正在计算。</translation>
+    </message>
+    <message>
+        <source>Find pen and camera first.</source>
+        <translation>请先求光笔和相机。</translation>
+    </message>
+    <message>
+        <source>Computing: {0:.0%}</source>
+        <translation>正在计算：{0:.0%}</translation>
+    </message>
+    <message>
+        <source>Pen and camera found. The image shows the projection uncertainty / px.</source>
+        <translation>已求得光笔和相机。图中为投影不确定度 / px。</translation>
+    </message>
+    <message>
+        <source>Enter the distance between the two marked LEDs.</source>
+        <translation>请输入两个所标 LED 之间的距离。</translation>
+    </message>
+    <message>
+        <source>Lock zoom, focus and exposure. Seat the tip in the cone, hold the LEDs towards the camera, and press Start.</source>
+        <translation>锁定变焦、对焦和曝光。将测头放入锥孔，LED 朝向相机，然后按“开始”。</translation>
+    </message>
+    <message>
+        <source>Swing the pen slowly: tilt it by 30 degrees in all directions, and turn it about its axis.</source>
+        <translation>缓慢摆动光笔：向各方向倾斜 30 度，并绕其轴线转动。</translation>
+    </message>
+    <message>
+        <source>All directions are covered. Keep swinging and turning.</source>
+        <translation>各方向均已覆盖。请继续摆动和转动。</translation>
+    </message>
+    <message>
+        <source>Tilt and turn the pen as the arrow shows.</source>
+        <translation>按箭头所示倾斜并转动光笔。</translation>
+    </message>
+    <message>
+        <source>Measure LEDs {0} and {1}, the marked ones, from centre to centre: with a caliper over the outer edges of both discs, minus one disc diameter. Measure at the temperature of the swing.</source>
+        <translation>测量所标 LED {0} 与 {1} 的中心距：用卡尺测两圆盘外缘之间的尺寸，再减去一个圆盘直径。请在摆动时的温度下测量。</translation>
+    </message>
+    <message>
+        <source>Tip {0}: {1:.4f} ± {2:.4f} mm</source>
+        <translation>测头 {0}：{1:.4f} ± {2:.4f} mm</translation>
+    </message>
+    <message>
+        <source>LEDs: {0}, U (k = 2) up to {1:.1f} µm</source>
+        <translation>LED：{0} 个，U (k = 2) 最大 {1:.1f} µm</translation>
+    </message>
+    <message>
+        <source>Focal length: {0:.2f} ± {1:.2f} px</source>
+        <translation>焦距：{0:.2f} ± {1:.2f} px</translation>
+    </message>
+    <message>
+        <source>Images used: {0} of {1}, noise {2:.3f} px</source>
+        <translation>使用图像：{0} / {1}，噪声 {2:.3f} px</translation>
     </message>
 </context>
 <context>
@@ -1498,16 +1605,16 @@
         <translation>握住不动</translation>
     </message>
     <message>
-        <source>A touch is several images through which the pen is held still; else each image is a touch.</source>
-        <translation>一次触测是光笔握住不动的几幅图像；否则每幅图像就是一次触测。</translation>
+        <source>On: a point is several images with the pen held still. Off: each image is a point.</source>
+        <translation>开启：光笔静止时的多幅图像为一个点。关闭：每幅图像为一个点。</translation>
+    </message>
+    <message>
+        <source>Do this task with recorded images: a folder, or a folder of folders.</source>
+        <translation>用已录图像执行此任务：一个文件夹，或包含多个文件夹的文件夹。</translation>
     </message>
     <message>
         <source>Read</source>
         <translation>读取</translation>
-    </message>
-    <message>
-        <source>Do this task with recorded images: a folder, or one of folders.</source>
-        <translation>用录制的图像完成该项：一个文件夹，或由多个文件夹组成的文件夹。</translation>
     </message>
     <message>
         <source>Cancel</source>
@@ -1652,6 +1759,14 @@
     <message>
         <source>Calibrate camera...</source>
         <translation>标定相机...</translation>
+    </message>
+    <message>
+        <source>I have no such file...</source>
+        <translation>我没有此文件...</translation>
+    </message>
+    <message>
+        <source>Find pen, camera and tip by one swing and one length.</source>
+        <translation>由一次摆动和一个长度求光笔、相机和测头。</translation>
     </message>
     <message>
         <source>In use</source>
@@ -2119,6 +2234,14 @@
     <message>
         <source>Use file of the simulated pen</source>
         <translation>使用模拟光笔的文件</translation>
+    </message>
+    <message>
+        <source>I have no such file...</source>
+        <translation>我没有此文件...</translation>
+    </message>
+    <message>
+        <source>Find pen, camera and tip by one swing and one length.</source>
+        <translation>由一次摆动和一个长度求光笔、相机和测头。</translation>
     </message>
     <message>
         <source>Save the LEDs and use the saved file</source>
@@ -2767,6 +2890,44 @@
     </message>
 </context>
 <context>
+    <name>MeasurePage</name>
+    <message>
+        <source>Measure</source>
+        <translation>测量</translation>
+    </message>
+</context>
+<context>
+    <name>MeasurePresenter</name>
+    <message>
+        <source>{0}  {1}  {2}  ± {3} mm</source>
+        <translation>{0}  {1}  {2}  ± {3} mm</translation>
+    </message>
+    <message>
+        <source>Measure features of a part with the current tip.</source>
+        <translation>用当前测头测量工件的要素。</translation>
+    </message>
+    <message>
+        <source>Nothing to measure</source>
+        <translation>没有可测量的内容</translation>
+    </message>
+    <message>
+        <source>Part measured</source>
+        <translation>工件已测量</translation>
+    </message>
+    <message>
+        <source>Not proven</source>
+        <translation>未证明</translation>
+    </message>
+    <message>
+        <source>Out of tolerance</source>
+        <translation>超差</translation>
+    </message>
+    <message>
+        <source>NOT OK</source>
+        <translation>不合格</translation>
+    </message>
+</context>
+<context>
     <name>MethodsPanel</name>
     <message>
         <source>Objective / mm²</source>
@@ -3031,6 +3192,17 @@
     </message>
 </context>
 <context>
+    <name>PartView</name>
+    <message>
+        <source>The part in space: {0} points, {1} lines of features</source>
+        <translation>工件三维图：{0} 个点，{1} 条要素线</translation>
+    </message>
+    <message>
+        <source>Deviations are drawn {0} times as large. Drag to turn the part.</source>
+        <translation>偏差放大 {0} 倍显示。拖动可旋转工件。</translation>
+    </message>
+</context>
+<context>
     <name>PenFiles</name>
     <message>
         <source>{0} is the LED file of pen {1}, not of pen {2}.</source>
@@ -3095,32 +3267,32 @@
         <translation>摆动序号</translation>
     </message>
     <message>
-        <source>The swings of the pen are being read.</source>
+        <source>Reading the swings of the pen.</source>
         <translation>正在读取该光笔的摆动。</translation>
     </message>
     <message>
-        <source>Two accepted swings with this LED file are needed to tell how pen {0} changes; there are {1}.</source>
-        <translation>判断光笔 {0} 的变化需要两次使用此 LED 文件并已接受的摆动，目前有 {1} 次。</translation>
+        <source>Two accepted swings of pen {0} with this LED file are needed; there are {1}.</source>
+        <translation>需要光笔 {0} 用此 LED 文件的两次已接受摆动；现有 {1} 次。</translation>
     </message>
     <message>
-        <source>Swings with another LED file, or that cannot be read: {0}.</source>
-        <translation>使用其他 LED 文件或无法读取的摆动：{0} 次。</translation>
+        <source>Swings with another LED file, or unreadable: {0}.</source>
+        <translation>使用其他 LED 文件或无法读取的摆动：{0}。</translation>
     </message>
     <message>
-        <source>Nothing is read yet.</source>
-        <translation>尚未读取任何内容。</translation>
+        <source>The swings are not read yet.</source>
+        <translation>尚未读取摆动。</translation>
     </message>
     <message>
-        <source>It takes four accepted swings with this LED file and camera file; {0} more.</source>
-        <translation>需要四次使用此 LED 文件和相机文件并已接受的摆动，还差 {0} 次。</translation>
+        <source>Four accepted swings with this LED file and camera file are needed; missing: {0}.</source>
+        <translation>需要用此 LED 文件和相机文件的四次已接受摆动；还缺：{0}。</translation>
     </message>
     <message>
-        <source>An LED has moved: no file is right for all swings.</source>
-        <translation>有 LED 发生了移位：没有一个文件适用于所有摆动。</translation>
+        <source>An LED has moved: no LED file fits all swings.</source>
+        <translation>有 LED 移动过：没有 LED 文件能符合所有摆动。</translation>
     </message>
     <message>
-        <source>Written as {0}: the swing held out fits it to {1} px, the old file to {2} px. A tip belongs to its LED file: calibrate again with the new one.</source>
-        <translation>已写入 {0}：留出的摆动与新文件相差 {1} px，与旧文件相差 {2} px。测头与其 LED 文件对应：请用新文件重新标定。</translation>
+        <source>Saved as {0}: residuals of the swing held out {1} px, with the old file {2} px. Calibrate the tip again with the new file.</source>
+        <translation>已保存为 {0}：留出摆动的残差为 {1} px，旧文件为 {2} px。请用新文件重新标定测头。</translation>
     </message>
     <message>
         <source>size</source>
@@ -3148,6 +3320,77 @@
     <message>
         <source>Drag or press the arrow keys to rotate, 0 to reset.</source>
         <translation>拖动或按方向键旋转，按 0 复位。</translation>
+    </message>
+</context>
+<context>
+    <name>PlanPanel</name>
+    <message>
+        <source>Open plan...</source>
+        <translation>打开测量计划...</translation>
+    </message>
+    <message>
+        <source>Measure by a plan in a YAML file.</source>
+        <translation>按 YAML 文件中的测量计划测量。</translation>
+    </message>
+    <message>
+        <source>Without a plan</source>
+        <translation>不使用计划</translation>
+    </message>
+    <message>
+        <source>Features are recognised while they are probed; end with the main button.</source>
+        <translation>探测时自动识别要素；用主按钮结束。</translation>
+    </message>
+    <message>
+        <source>Use simulated plate</source>
+        <translation>使用模拟平板</translation>
+    </message>
+    <message>
+        <source>Feature</source>
+        <translation>要素</translation>
+    </message>
+    <message>
+        <source>Kind of the feature that is probed</source>
+        <translation>正在探测的要素类型</translation>
+    </message>
+    <message>
+        <source>Recognise</source>
+        <translation>识别</translation>
+    </message>
+    <message>
+        <source>Save plan...</source>
+        <translation>保存测量计划...</translation>
+    </message>
+    <message>
+        <source>Save a plan with the measured features as nominals.</source>
+        <translation>以测得的要素为公称值保存测量计划。</translation>
+    </message>
+    <message>
+        <source>Export...</source>
+        <translation>导出...</translation>
+    </message>
+    <message>
+        <source>Open a measuring plan</source>
+        <translation>打开测量计划</translation>
+    </message>
+    <message>
+        <source>Measuring plans ({0})</source>
+        <translation>测量计划 ({0})</translation>
+    </message>
+    <message>
+        <source>Part</source>
+        <translation>工件</translation>
+    </message>
+    <message>
+        <source>Save the measuring plan</source>
+        <translation>保存测量计划</translation>
+    </message>
+    <message>
+        <source>Export the measured part</source>
+        <translation>导出测得的工件</translation>
+    </message>
+    <message>
+        <source>Saved: {0}</source>
+        <translation>已保存：{0}</translation>
     </message>
 </context>
 <context>
@@ -3243,14 +3486,37 @@
     </message>
 </context>
 <context>
+    <name>ProbingPage</name>
+    <message>
+        <source>The work is not finished. The points of the current task are lost; results are kept.</source>
+        <translation>工作尚未完成。当前任务的点将丢失；结果会保留。</translation>
+    </message>
+    <message>
+        <source>No image yet</source>
+        <translation>尚无图像</translation>
+    </message>
+    <message>
+        <source>Tasks</source>
+        <translation>任务</translation>
+    </message>
+    <message>
+        <source>Live image</source>
+        <translation>实时图像</translation>
+    </message>
+</context>
+<context>
     <name>ProbingSimulatorControls</name>
     <message>
         <source>Simulated pen</source>
         <translation>模拟光笔</translation>
     </message>
     <message>
-        <source>Its ring has a radius of {0} mm, its bar a length of {1} mm.</source>
-        <translation>其圆环半径为 {0} mm，标准棒长度为 {1} mm。</translation>
+        <source>Probes all tasks automatically.</source>
+        <translation>自动探测所有任务。</translation>
+    </message>
+    <message>
+        <source>Its ring has a radius of {0} mm, its bar a length of {1} mm, its sphere a diameter of {2} mm by the ball centres.</source>
+        <translation>其环规半径为 {0} mm，长度杆长 {1} mm，标准球直径为 {2} mm（按球心计）。</translation>
     </message>
     <message>
         <source>Lift</source>
@@ -3259,10 +3525,6 @@
     <message>
         <source>Let the simulated operator probe</source>
         <translation>让模拟操作员触测</translation>
-    </message>
-    <message>
-        <source>It probes all tasks by itself.</source>
-        <translation>它自行触测各项任务。</translation>
     </message>
     <message>
         <source>Take the tip away for a moment.</source>
@@ -3296,20 +3558,28 @@
         <translation>说明理由后使用测头</translation>
     </message>
     <message>
+        <source>Undo point</source>
+        <translation>撤销点</translation>
+    </message>
+    <message>
+        <source>Discard the last point of the current task.</source>
+        <translation>丢弃当前任务的最后一个点。</translation>
+    </message>
+    <message>
         <source>Start over</source>
         <translation>重新开始</translation>
     </message>
     <message>
-        <source>Discard all points and verify the current tip from the start.</source>
-        <translation>丢弃所有测点，从头验证当前测头。</translation>
+        <source>Discard all points, and start with the current tip.</source>
+        <translation>丢弃所有点，并用当前测头重新开始。</translation>
+    </message>
+    <message>
+        <source>Start over? Results are kept.</source>
+        <translation>重新开始？结果会保留。</translation>
     </message>
     <message>
         <source>Progress</source>
         <translation>进度</translation>
-    </message>
-    <message>
-        <source>Start the verification over? Results are kept.</source>
-        <translation>重新开始验证？已得到的结果保留。</translation>
     </message>
     <message>
         <source>Continue</source>
@@ -3453,6 +3723,10 @@
     <message>
         <source>No earlier result</source>
         <translation>无更早结果</translation>
+    </message>
+    <message>
+        <source>LEDs predict each other: {0} (by chance up to {1})</source>
+        <translation>LED 互相预测：{0}（偶然最多 {1}）</translation>
     </message>
     <message>
         <source>Odd - even</source>
@@ -3818,8 +4092,8 @@
         <translation>共需 {0}°</translation>
     </message>
     <message>
-        <source>Ring: {0} of {1} degrees by {2} touches</source>
-        <translation>圆环：{2} 次触测覆盖 {0} 度，需 {1} 度</translation>
+        <source>Ring: {0} of {1} degrees, points: {2}</source>
+        <translation>环规：{0} / {1} 度，点数：{2}</translation>
     </message>
 </context>
 <context>
@@ -4984,24 +5258,8 @@ mm</translation>
         <translation>验证</translation>
     </message>
     <message>
-        <source>No image yet</source>
-        <translation>还没有图像</translation>
-    </message>
-    <message>
-        <source>The verification is not finished. The points of the current task are lost; results are kept.</source>
-        <translation>验证尚未完成。当前项的测点将丢失；已得到的结果保留。</translation>
-    </message>
-    <message>
-        <source>Tasks</source>
-        <translation>各项</translation>
-    </message>
-    <message>
         <source>Pen</source>
         <translation>光笔</translation>
-    </message>
-    <message>
-        <source>Live image</source>
-        <translation>实时图像</translation>
     </message>
 </context>
 <context>
@@ -5071,10 +5329,6 @@ mm</translation>
         <translation>重新摆动</translation>
     </message>
     <message>
-        <source>The points in recorded images are measured.</source>
-        <translation>正在测量录制图像中的测点。</translation>
-    </message>
-    <message>
         <source>Reading images</source>
         <translation>正在读取图像</translation>
     </message>
@@ -5085,10 +5339,6 @@ mm</translation>
     <message>
         <source>Wait</source>
         <translation>请稍候</translation>
-    </message>
-    <message>
-        <source>The current tip is being read.</source>
-        <translation>正在读取当前测头。</translation>
     </message>
     <message>
         <source>Tip verified</source>
@@ -5103,12 +5353,20 @@ mm</translation>
         <translation>需检查</translation>
     </message>
     <message>
-        <source>Not verified</source>
-        <translation>测头未通过验证</translation>
+        <source>Measuring the points in the recorded images.</source>
+        <translation>正在测量已录图像中的点。</translation>
     </message>
     <message>
-        <source>The camera sends none. The verification continues when they arrive.</source>
-        <translation>相机没有送来图像。图像一到，验证便自动继续。</translation>
+        <source>Reading the current tip.</source>
+        <translation>正在读取当前测头。</translation>
+    </message>
+    <message>
+        <source>The camera sends no images. Probing continues when they arrive.</source>
+        <translation>相机未发送图像。收到图像后继续探测。</translation>
+    </message>
+    <message>
+        <source>Not verified</source>
+        <translation>测头未通过验证</translation>
     </message>
     <message>
         <source>No images</source>
@@ -5258,8 +5516,16 @@ mm</translation>
         <translation>以固定不动的锥孔作为漂移参考点：它在相邻两次触测之间的位移计入其间所测结果的 U。</translation>
     </message>
     <message>
+        <source>A pen file needs one known length. Measure the distance between two LEDs and state it, or swing in a second cone at a known distance.</source>
+        <translation>光笔文件需要一个已知长度。请测量两个 LED 的距离并给出，或在已知距离的第二个锥孔中摆动。</translation>
+    </message>
+    <message>
         <source>A pen needs {least} to {most} LEDs; the file has {n_leds}. Check that it is the complete file of a pen.</source>
         <translation>光笔需要 {least} 至 {most} 个 LED；文件有 {n_leds} 个。请检查是否为一支光笔的完整文件。</translation>
+    </message>
+    <message>
+        <source>Actual</source>
+        <translation>实际值</translation>
     </message>
     <message>
         <source>An archive on a server needs the package psycopg, which is not installed. Install it with: pip install &quot;lightpen[postgres]&quot;.</source>
@@ -5282,6 +5548,10 @@ mm</translation>
         <translation>平均值 - 标定的锥孔</translation>
     </message>
     <message>
+        <source>CSV, a row for each characteristic</source>
+        <translation>CSV，每个特性一行</translation>
+    </message>
+    <message>
         <source>Camera {camera}: {trouble}</source>
         <translation>相机 {camera}：{trouble}</translation>
     </message>
@@ -5292,6 +5562,10 @@ mm</translation>
     <message>
         <source>Certified</source>
         <translation>证书值</translation>
+    </message>
+    <message>
+        <source>Certified diameter</source>
+        <translation>校准直径</translation>
     </message>
     <message>
         <source>Certified flatness</source>
@@ -5312,6 +5586,14 @@ mm</translation>
     <message>
         <source>Change the posture</source>
         <translation>改变姿态</translation>
+    </message>
+    <message>
+        <source>Characteristics / mm, degrees</source>
+        <translation>特性 / mm，度</translation>
+    </message>
+    <message>
+        <source>Check the part, its clamping and its cleanliness; then measure it again.</source>
+        <translation>检查工件、装夹和清洁度，然后重新测量。</translation>
     </message>
     <message>
         <source>Complete the line; if it is the last one, the file is cut short.</source>
@@ -5338,6 +5620,14 @@ mm</translation>
         <translation>触测部位</translation>
     </message>
     <message>
+        <source>Coordinates in the frame of the camera, U (k = 2).</source>
+        <translation>相机坐标系中的坐标，U (k = 2)。</translation>
+    </message>
+    <message>
+        <source>Coordinates in the frame of the part, U (k = 2).</source>
+        <translation>工件坐标系中的坐标，U (k = 2)。</translation>
+    </message>
+    <message>
         <source>Covered / °</source>
         <translation>覆盖 / °</translation>
     </message>
@@ -5346,8 +5636,32 @@ mm</translation>
         <translation>当前测头：平均值</translation>
     </message>
     <message>
+        <source>DXF, the measured geometry</source>
+        <translation>DXF，测得的几何</translation>
+    </message>
+    <message>
+        <source>Decision</source>
+        <translation>判定</translation>
+    </message>
+    <message>
+        <source>Deviation</source>
+        <translation>偏差</translation>
+    </message>
+    <message>
         <source>Deviation from the ring / mm</source>
         <translation>与圆环的偏差 / mm</translation>
+    </message>
+    <message>
+        <source>Deviation from the sphere / mm</source>
+        <translation>与球面的偏差 / mm</translation>
+    </message>
+    <message>
+        <source>Diameter</source>
+        <translation>直径</translation>
+    </message>
+    <message>
+        <source>Diameter / mm; certified {certified:.4f} mm</source>
+        <translation>直径 / mm；校准值 {certified:.4f} mm</translation>
     </message>
     <message>
         <source>Diameter of the discs: {flaw}</source>
@@ -5386,6 +5700,10 @@ mm</translation>
         <translation>预期标准差</translation>
     </message>
     <message>
+        <source>Features / mm</source>
+        <translation>要素 / mm</translation>
+    </message>
+    <message>
         <source>File name too long</source>
         <translation>文件名过长</translation>
     </message>
@@ -5418,6 +5736,10 @@ mm</translation>
         <translation>平面度 {flatness:.4f} mm（U {uncertainty:.4f} mm），证书值 {certified:.4f} mm：超出量大于限值 {limit:.4f} mm。测头、LED 文件或相机文件可能有误，或平板不清洁。</translation>
     </message>
     <message>
+        <source>Form error</source>
+        <translation>形状误差</translation>
+    </message>
+    <message>
         <source>Frame {number} of the video</source>
         <translation>视频第 {number} 帧</translation>
     </message>
@@ -5428,6 +5750,10 @@ mm</translation>
     <message>
         <source>GigE and USB3 Vision (Aravis)</source>
         <translation>GigE 和 USB3 Vision (Aravis)</translation>
+    </message>
+    <message>
+        <source>Half of the LEDs predict the others only to {value:.2f} times their uncertainty (at most {limit:.2f} by chance), depending on the posture: LEDs, pen or lens deviate from the model, and U may be too small. Check for bent or unevenly bright LEDs, a loose pen and a window before the lens, then verify the tip on an artefact.</source>
+        <translation>一半 LED 对其余 LED 的预测误差为其不确定度的 {value:.2f} 倍（偶然最多 {limit:.2f} 倍），且与姿态有关：LED、光笔或镜头偏离模型，U 可能偏小。请检查 LED 是否弯斜或亮度不均、光笔是否松动、镜头前是否有玻璃窗，然后用标准器验证测头。</translation>
     </message>
     <message>
         <source>Harvesters is not installed. With the GenTL producer of its vendor it drives any GenICam camera: {python} -m pip install harvesters genicam</source>
@@ -5446,8 +5772,16 @@ mm</translation>
         <translation>输入/输出错误</translation>
     </message>
     <message>
+        <source>Keep the tip in the cone for a moment. The program then learns your position.</source>
+        <translation>请将测头在锥孔中保持片刻，程序随后会记住您的位置。</translation>
+    </message>
+    <message>
         <source>Keep the tip pressed into the cone.</source>
         <translation>保持测头压紧在锥孔中。</translation>
+    </message>
+    <message>
+        <source>Kind</source>
+        <translation>类型</translation>
     </message>
     <message>
         <source>LED centres</source>
@@ -5458,16 +5792,24 @@ mm</translation>
         <translation>LED {led} 已在第 {line} 行列出。</translation>
     </message>
     <message>
+        <source>LED {led} is listed at the position of LED {needed}, and LED {needed} is missing. Number the LEDs from 1 without gaps.</source>
+        <translation>LED {led} 列在 LED {needed} 的位置，且缺少 LED {needed}。请从 1 开始连续编号。</translation>
+    </message>
+    <message>
+        <source>LED {led} is listed at the position of LED {needed}. List the LEDs from 1 to {n_leds} in ascending order.</source>
+        <translation>LED {led} 列在 LED {needed} 的位置。请按 1 到 {n_leds} 升序列出 LED。</translation>
+    </message>
+    <message>
+        <source>LED {led} is noisier than the others: {sigma:.3f} px, usual is {usual:.3f} px; its weight is reduced accordingly. Clean it, and check its brightness and its supply.</source>
+        <translation>LED {led} 的噪声高于其他 LED：{sigma:.3f} px，通常为 {usual:.3f} px；已相应降低其权重。请清洁它，并检查亮度和供电。</translation>
+    </message>
+    <message>
         <source>LED {led} is {distance:.2f} mm off the line of LEDs 1 to 4.</source>
         <translation>LED {led} 偏离 LED 1 至 4 的直线 {distance:.2f} mm。</translation>
     </message>
     <message>
         <source>LED {led} is {distance:.2f} mm off the plane of LEDs 5 to 10.</source>
         <translation>LED {led} 偏离 LED 5 至 10 的平面 {distance:.2f} mm。</translation>
-    </message>
-    <message>
-        <source>LED {led} is {distance:.6g} m from the origin, which no pen is. Check the numbers and their units.</source>
-        <translation>LED {led} 距原点 {distance:.6g} m，光笔不会这么大。请检查数值及其单位。</translation>
     </message>
     <message>
         <source>LED {led} of {name}</source>
@@ -5508,10 +5850,6 @@ mm</translation>
     <message>
         <source>Length / mm; certified {certified:.4f} mm, U (k = 2) {uncertainty:.4f} mm</source>
         <translation>长度 / mm；证书值 {certified:.4f} mm，U (k = 2) {uncertainty:.4f} mm</translation>
-    </message>
-    <message>
-        <source>Length error at {run} {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Is it the certified length of this bar? Else the scale of the LED file or the camera file is wrong, or the pen is warmer than at its measurement.</source>
-        <translation>{run} 处的长度误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。这是该标准棒的证书长度吗？否则 LED 文件的尺度或相机文件有误，或光笔比测量时更暖。</translation>
     </message>
     <message>
         <source>Length error {error:+.4f} mm at most (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
@@ -5562,12 +5900,28 @@ mm</translation>
         <translation>位置误差</translation>
     </message>
     <message>
+        <source>Measure the missing features.</source>
+        <translation>请测量缺少的要素。</translation>
+    </message>
+    <message>
         <source>Measured</source>
         <translation>实测</translation>
     </message>
     <message>
+        <source>Most centres are outside the image: they extend to ({x:.0f}, {y:.0f}) px; the images have {width} x {height} px. Check the size of the images.</source>
+        <translation>多数中心在图像之外：最远到 ({x:.0f}, {y:.0f}) px；图像为 {width} x {height} px。请检查图像尺寸。</translation>
+    </message>
+    <message>
         <source>Moves of the drift reference / mm</source>
         <translation>漂移参考点的位移 / mm</translation>
+    </message>
+    <message>
+        <source>NOT PROVEN</source>
+        <translation>未证明</translation>
+    </message>
+    <message>
+        <source>Next feature</source>
+        <translation>下一要素</translation>
     </message>
     <message>
         <source>Next point</source>
@@ -5598,12 +5952,28 @@ mm</translation>
         <translation>没有安装 GenTL 生产者：{variable} 指定的文件夹中没有 {suffix} 文件。请安装相机的软件，或打开它的 {suffix} 文件。</translation>
     </message>
     <message>
+        <source>No feature of the plan was probed. Probe at least one.</source>
+        <translation>未探测计划中的任何要素。请至少探测一个。</translation>
+    </message>
+    <message>
         <source>No image came for {waited:.1f} s. Check the camera.</source>
         <translation>{waited:.1f} s 内没有收到图像。请检查相机。</translation>
     </message>
     <message>
+        <source>No length is given: all lengths are in hundredths of the largest distance between two LEDs.</source>
+        <translation>未给出长度：所有长度以两个 LED 间最大距离的百分之一为单位。</translation>
+    </message>
+    <message>
+        <source>No measuring plan is chosen. Open a plan, or measure without one.</source>
+        <translation>未选择测量计划。请打开测量计划，或不使用计划测量。</translation>
+    </message>
+    <message>
         <source>No nominal tip is specified to compare with.</source>
         <translation>未指定可供比较的标称测头。</translation>
+    </message>
+    <message>
+        <source>No pen, no camera and no fixed tip explain the tracks: the residuals are {misfit:.1f} px. Check that the tip stayed in the cone, that the LEDs are fixed to one pen, and that camera and cone stand still.</source>
+        <translation>没有任何光笔、相机和固定测头能解释这些轨迹：残差为 {misfit:.1f} px。请检查测头是否一直在锥孔中、LED 是否固定在同一支光笔上，以及相机和锥孔是否静止。</translation>
     </message>
     <message>
         <source>No space left on device</source>
@@ -5612,6 +5982,14 @@ mm</translation>
     <message>
         <source>No such file or directory</source>
         <translation>没有那个文件或目录</translation>
+    </message>
+    <message>
+        <source>No task is selected. Select at least one.</source>
+        <translation>未选择任务。请至少选择一个。</translation>
+    </message>
+    <message>
+        <source>Nominal</source>
+        <translation>公称值</translation>
     </message>
     <message>
         <source>Nominal tip, {axis}: {flaw}</source>
@@ -5630,6 +6008,18 @@ mm</translation>
         <translation>不是目录</translation>
     </message>
     <message>
+        <source>OK</source>
+        <translation>合格</translation>
+    </message>
+    <message>
+        <source>OUT OF TOLERANCE</source>
+        <translation>超差</translation>
+    </message>
+    <message>
+        <source>One swing does not show changes of a pen; give at least two.</source>
+        <translation>一次摆动无法显示光笔的变化；请至少给出两次。</translation>
+    </message>
+    <message>
         <source>Operation not permitted</source>
         <translation>不允许的操作</translation>
     </message>
@@ -5642,8 +6032,16 @@ mm</translation>
         <translation>离面偏差</translation>
     </message>
     <message>
+        <source>P</source>
+        <translation>P</translation>
+    </message>
+    <message>
         <source>PLUS (XML)</source>
         <translation>PLUS (XML)</translation>
+    </message>
+    <message>
+        <source>Part</source>
+        <translation>工件</translation>
     </message>
     <message>
         <source>Permission denied</source>
@@ -5662,12 +6060,20 @@ mm</translation>
         <translation>测点数</translation>
     </message>
     <message>
+        <source>Points of {name} ({kind}), camera frame / mm</source>
+        <translation>{name}（{kind}）的点，相机坐标系 / mm</translation>
+    </message>
+    <message>
         <source>Points on the plate and their distance from the plane / mm</source>
         <translation>平板上的测点及其到平面的距离 / mm</translation>
     </message>
     <message>
         <source>Port {port} is in use already, by another window or another program. Choose another port, or close that one.</source>
         <translation>端口 {port} 已被另一个窗口或程序占用。请选择其他端口，或关闭那个程序。</translation>
+    </message>
+    <message>
+        <source>Position {position} shares {n_shared} features with the first one; at least {needed} datum points have to be probed in both. Probe more of them again.</source>
+        <translation>位置 {position} 与第一个位置有 {n_shared} 个共同要素；两处至少都要探测 {needed} 个基准点。请再探测更多基准点。</translation>
     </message>
     <message>
         <source>Postures</source>
@@ -5686,12 +6092,20 @@ mm</translation>
         <translation>触测平板</translation>
     </message>
     <message>
+        <source>Probe a reference sphere</source>
+        <translation>探测标准球</translation>
+    </message>
+    <message>
         <source>Probe a ring</source>
         <translation>触测圆环</translation>
     </message>
     <message>
         <source>Probe both ends</source>
         <translation>触测长度两端</translation>
+    </message>
+    <message>
+        <source>Probe more points, or use a precise probing, for a smaller U.</source>
+        <translation>探测更多点，或采用更精密的探测，以减小 U。</translation>
     </message>
     <message>
         <source>Probe one end</source>
@@ -5718,6 +6132,10 @@ mm</translation>
         <translation>光笔竖直，触测锥孔</translation>
     </message>
     <message>
+        <source>Probe the feature</source>
+        <translation>探测要素</translation>
+    </message>
+    <message>
         <source>Probe the other end</source>
         <translation>触测另一端</translation>
     </message>
@@ -5738,12 +6156,32 @@ mm</translation>
         <translation>沿环规整圈测量，并在每个点保持静止。点数：{n_touches}；已覆盖：{covered:.0f} / {needed:.0f} 度。</translation>
     </message>
     <message>
+        <source>Probe the sphere</source>
+        <translation>探测球</translation>
+    </message>
+    <message>
+        <source>Probe the upper half of the sphere all over and hold still on each point: {n_points} of {needed}.</source>
+        <translation>在球的整个上半部探测，并在每个点保持静止：{n_points} / {needed}。</translation>
+    </message>
+    <message>
+        <source>Probe the {kind} {name}: {n_points} of {needed} points.</source>
+        <translation>探测{kind} {name}：{n_points} / {needed} 个点。</translation>
+    </message>
+    <message>
         <source>Probed points in the camera frame / mm</source>
         <translation>相机坐标系中的测点 / mm</translation>
     </message>
     <message>
         <source>Q-DAS (AQDEF)</source>
         <translation>Q-DAS (AQDEF)</translation>
+    </message>
+    <message>
+        <source>Q-DAS (AQDEF), for statistics</source>
+        <translation>Q-DAS (AQDEF)，用于统计</translation>
+    </message>
+    <message>
+        <source>QIF 3.0 results</source>
+        <translation>QIF 3.0 结果</translation>
     </message>
     <message>
         <source>ROS (YAML)</source>
@@ -5834,6 +6272,22 @@ mm</translation>
         <translation>模拟光笔</translation>
     </message>
     <message>
+        <source>Size</source>
+        <translation>尺寸</translation>
+    </message>
+    <message>
+        <source>Size error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm), form error {form:.4f} mm.</source>
+        <translation>尺寸误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm），形状误差 {form:.4f} mm。</translation>
+    </message>
+    <message>
+        <source>Size error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The tip, the LED file, the camera file or the ball diameter may be wrong.</source>
+        <translation>尺寸误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头、LED 文件、相机文件或球径可能有误。</translation>
+    </message>
+    <message>
+        <source>Sphere</source>
+        <translation>球</translation>
+    </message>
+    <message>
         <source>Spread</source>
         <translation>离散</translation>
     </message>
@@ -5848,6 +6302,14 @@ mm</translation>
     <message>
         <source>Streaming needs the package pyigtl, which is not installed. Install it with: pip install &quot;lightpen[stream]&quot;.</source>
         <translation>实时数据流需要 pyigtl 软件包，但尚未安装。安装命令：pip install &quot;lightpen[stream]&quot;。</translation>
+    </message>
+    <message>
+        <source>Stylus, seat or stand yield with the tilt, by {size:.4f} mm at 90°; the result is corrected and U includes the rest. Press gently, use a stiffer stylus, and clamp the cone.</source>
+        <translation>探针、锥座或支架随倾斜变形，90° 时为 {size:.4f} mm；结果已修正，其余计入 U。请轻压、使用更刚的探针并夹紧锥孔。</translation>
+    </message>
+    <message>
+        <source>Swing {number} shows another number of LEDs than the first. Give swings of one pen.</source>
+        <translation>摆动 {number} 的 LED 数与第一次不同。请给出同一支光笔的摆动。</translation>
     </message>
     <message>
         <source>Swing: max. U (k = 2)</source>
@@ -5866,24 +6328,8 @@ mm</translation>
         <translation>LED 中心最远到 ({x:.0f}, {y:.0f}) px，而内参文件适用于 {width} × {height} px。请选择这台相机的文件。</translation>
     </message>
     <message>
-        <source>The LEDs are a mirror image of the pen: seen from the front with LED 4 above LED 1, LEDs 5 to 7 must be on the left and 8 to 10 on the right. If the machine&apos;s axes are left-handed, change the sign of one coordinate; if the columns are exchanged, number them anew.</source>
-        <translation>LED 是光笔的镜像：从正面看，LED 4 在 LED 1 上方时，LED 5 至 7 必须在左，8 至 10 在右。若测量机为左手坐标系，请改变一个坐标的符号；若两列颠倒，请重新编号。</translation>
-    </message>
-    <message>
         <source>The LEDs are out of order: LED {places}. LEDs 1 to 4 must follow each other along the back line, and 5 to 7 and 8 to 10 along the columns in the same direction. Number them so.</source>
         <translation>LED 编号顺序错误：{places}。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 沿两列同方向依次排列。请照此编号。</translation>
-    </message>
-    <message>
-        <source>The LEDs do not stand as the pen frame needs it: ten LEDs, 1 to 4 in a line behind the plane of 5 to 10, and these in two columns of three parallel to the line, all within {tolerance:g} mm. {misfit} Measure the LEDs again, or give a pen of another layout in a frame of its own.</source>
-        <translation>LED 的排列不符合光笔坐标系的要求：十个 LED，1 至 4 在 5 至 10 的平面后方成一直线，5 至 10 分成两列、每列三个并与该直线平行，偏差均在 {tolerance:g} mm 以内。{misfit}请重新测量 LED，或用其自身坐标系给出其他布局的光笔。</translation>
-    </message>
-    <message>
-        <source>The LEDs span only {extent:.4g} mm, less than one disc of {diameter:g} mm. Are the coordinates in metres? Then name the units, such as in the header: x_m, y_m, z_m.</source>
-        <translation>LED 的跨度仅 {extent:.4g} mm，小于一个 {diameter:g} mm 的发光面。坐标是以米为单位吗？那就请指定单位，例如在表头中写 x_m, y_m, z_m。</translation>
-    </message>
-    <message>
-        <source>The LEDs span {extent:.6g} m; a pen spans at most {most:g} m. Check that the coordinates are in millimetres, in the header too, or name their units.</source>
-        <translation>LED 的跨度为 {extent:.6g} m；光笔最多为 {most:g} m。请检查坐标及表头是否以毫米为单位，或指定单位。</translation>
     </message>
     <message>
         <source>The archive is closed: the program ends.</source>
@@ -5892,26 +6338,6 @@ mm</translation>
     <message>
         <source>The ball diameter is not specified; a ring or a length probed on its surfaces needs it. Enter it with the tip.</source>
         <translation>未指定测球直径；触测圆环或长度的表面时需要它。请在测头处输入。</translation>
-    </message>
-    <message>
-        <source>The board is seen in {n_views} images; at least {least} are needed, {enough} are better. Add views with the board tilted by 20 to 40 degrees to each side, and in each corner of the image.</source>
-        <translation>有 {n_views} 幅图像看到标定板，至少需要 {least} 幅，最好有 {enough} 幅。请补充标定板向各侧倾斜 20 至 40 度以及位于图像各角的视图。</translation>
-    </message>
-    <message>
-        <source>The board {board} is {width:.0f} x {height:.0f} mm large and needs {foot:g} mm of white round it, more than the paper has. Choose a larger paper, or a smaller board.</source>
-        <translation>标定板 {board} 大小为 {width:.0f} x {height:.0f} mm，四周还需 {foot:g} mm 白边，超出纸张。请选更大的纸张或更小的标定板。</translation>
-    </message>
-    <message>
-        <source>The board {text} has {columns} x {rows} points or squares; {least} to {most} are needed along each side. Count them again: of a chessboard it is the inner corners that count.</source>
-        <translation>标定板 {text} 有 {columns} x {rows} 个点或格子，每边需要 {least} 至 {most} 个。请重新数：棋盘格按内角点计。</translation>
-    </message>
-    <message>
-        <source>The board {text} names markers that are not known here. Name the dictionary as OpenCV does, such as DICT_5X5_100.</source>
-        <translation>标定板 {text} 指定的标记字典未知。请按 OpenCV 的写法命名字典，例如 DICT_5X5_100。</translation>
-    </message>
-    <message>
-        <source>The board {text} needs {needed} markers, {dictionary} has {known}. Name the dictionary that it was printed from.</source>
-        <translation>标定板 {text} 需要 {needed} 个标记，而 {dictionary} 只有 {known} 个。请指定打印时所用的字典。</translation>
     </message>
     <message>
         <source>The camera is stable: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
@@ -5974,10 +6400,6 @@ mm</translation>
         <translation>各测点位于同一处或一条直线上，不能确定平面。请在整个平板上触测。</translation>
     </message>
     <message>
-        <source>The points lie {rms:.2f} px from where a flat board {board} has them: it has other squares than said, is bent, or the images are not of one camera with one focus. Count and measure its squares again.</source>
-        <translation>各点与平整标定板 {board} 的应有位置相差 {rms:.2f} px：格子与所指定的不符、板面弯曲，或图像不是同一相机在同一对焦下拍摄。请重新数并测量格子。</translation>
-    </message>
-    <message>
         <source>The program failed on this image ({kind}: {problem}). Keep the image, and report it.</source>
         <translation>程序处理该图像时出错（{kind}: {problem}）。请保留该图像并反馈此问题。</translation>
     </message>
@@ -6018,32 +6440,8 @@ mm</translation>
         <translation>测头沿 {axis} 的重复性为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm）；各次标定给出 {stated:.4f} mm。</translation>
     </message>
     <message>
-        <source>The views are too alike: the board is tilted by {apart:.0f} degrees from view to view at most, and the focal length is known to {share:.1%} only. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image.</source>
-        <translation>视图过于相似：各视图间标定板的倾斜最多相差 {apart:.0f} 度，焦距只能确定到 {share:.1%}。请补充标定板向各侧倾斜 20 至 40 度并伸入图像各角的视图。</translation>
-    </message>
-    <message>
-        <source>The views leave the camera open: they are too alike. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image.</source>
-        <translation>这些视图无法确定相机：它们过于相似。请补充标定板向各侧倾斜 20 至 40 度并伸入图像各角的视图。</translation>
-    </message>
-    <message>
         <source>The {what} of this camera cannot be set. Use the aperture of the lens.</source>
         <translation>此相机的{what}无法设定。请使用镜头光圈。</translation>
-    </message>
-    <message>
-        <source>The {what} {path} has a name that no file can have. Check the name.</source>
-        <translation>{what} {path} 的名称不可能是文件名。请检查名称。</translation>
-    </message>
-    <message>
-        <source>There are entries of the chain {chain}, which the archive does not know.</source>
-        <translation>存在链 {chain} 的条目，但档案库中没有这条链。</translation>
-    </message>
-    <message>
-        <source>There are {n_few} images of {few} and {n_many} of {many}, and their names, such as {example} and {other}, do not tell which are of the same moment. Give the images of one moment the same name or number.</source>
-        <translation>{few} 有 {n_few} 幅图像，{many} 有 {n_many} 幅，而它们的名称（例如 {example} 和 {other}）不能表明哪些属于同一时刻。请让同一时刻的图像具有相同的名称或编号。</translation>
-    </message>
-    <message>
-        <source>There is a file {file} already. Give the export another name.</source>
-        <translation>文件 {file} 已存在。请为导出文件另取名称。</translation>
     </message>
     <message>
         <source>There is no camera {place}{why}. Check its power, its cable and its address, then search again.</source>
@@ -6104,10 +6502,6 @@ mm</translation>
     <message>
         <source>U (k = 2) of the flatness is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not verify the tip.</source>
         <translation>平面度的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。</translation>
-    </message>
-    <message>
-        <source>U (k = 2) of the tip along its weakest direction is compared with the limit of {limit:.4f} mm by simple acceptance (ILAC-G8:09/2019, 4.2.1; JCGM 106:2012, 8.2): what is judged is U itself, so the guard band is zero. U up to the limit is PASS, above it CHECK, above {far:.4f} mm, {times:g} times the limit, REPEAT.</source>
-        <translation>测头沿最弱方向的 U (k = 2) 按简单接受准则（ILAC-G8:09/2019 第 4.2.1 条；JCGM 106:2012 第 8.2 条）与限值 {limit:.4f} mm 比较：被判定的量就是 U 本身，故保护带为零。U 不超过限值判为“合格”，超过限值判为“需检查”，超过 {far:.4f} mm（限值的 {times:g} 倍）判为“重做”。</translation>
     </message>
     <message>
         <source>U {axis}</source>
@@ -6230,8 +6624,20 @@ mm</translation>
         <translation>封印文件</translation>
     </message>
     <message>
+        <source>the compliance of stylus, seat and stand. Use a stiffer stylus, press gently, and clamp cone and camera</source>
+        <translation>探针、锥座和支架的柔度。请使用更刚的探针、轻压，并夹紧锥孔和相机</translation>
+    </message>
+    <message>
+        <source>the covariance c11 to c66 has a direction without uncertainty, which is implausible. Correct or remove these columns.</source>
+        <translation>协方差 c11 至 c66 有一个方向没有不确定度，这不合理。请更正或删除这些列。</translation>
+    </message>
+    <message>
         <source>the diameter of the LED discs. State it and its uncertainty in the LED file</source>
         <translation>LED 发光面的直径。请在 LED 文件中给出直径及其不确定度</translation>
+    </message>
+    <message>
+        <source>the file has decimal points and decimal commas; the other form is on line {line}. Use one form throughout.</source>
+        <translation>文件同时含有小数点和小数逗号；另一种形式在第 {line} 行。请统一使用一种形式。</translation>
     </message>
     <message>
         <source>tip and U for Q-DAS (.dfq)</source>
@@ -6250,8 +6656,16 @@ mm</translation>
         <translation>向上</translation>
     </message>
     <message>
+        <source>what is not simultaneous. Trigger all cameras by one signal, use a global shutter, and light all LEDs at once</source>
+        <translation>不同步的影响。请用同一信号触发所有相机、使用全局快门，并同时点亮所有 LED</translation>
+    </message>
+    <message>
         <source>x, y, z in mm, separated by tabs</source>
         <translation>x、y、z，单位 mm，以制表符分隔</translation>
+    </message>
+    <message>
+        <source>{address} is not an address of this computer. Give its address in the network of the clients, or {loopback} for this computer only.</source>
+        <translation>{address} 不是本机的地址。请给出本机在客户端网络中的地址；仅限本机时用 {loopback}。</translation>
     </message>
     <message>
         <source>{count}, run {run} of {n_runs}</source>
@@ -6262,12 +6676,36 @@ mm</translation>
         <translation>{covered:.0f}° / {needed:.0f}°</translation>
     </message>
     <message>
+        <source>{file} has an end of no known format. End its name with one of {suffixes}.</source>
+        <translation>{file} 的扩展名不属于已知格式。请使用以下扩展名之一：{suffixes}。</translation>
+    </message>
+    <message>
+        <source>{file} is not an exported archive, or was modified (line {line}). Export it again with this version of the program.</source>
+        <translation>{file} 不是导出的存档，或已被修改（第 {line} 行）。请用此版本程序重新导出。</translation>
+    </message>
+    <message>
+        <source>{n_duplicates} views repeat the board position of another view and do not count; {n_views} views remain: {names}. Move the board between views.</source>
+        <translation>{n_duplicates} 个视图与其他视图的标定板位置重复，不计入；剩余 {n_views} 个视图：{names}。请在视图之间移动标定板。</translation>
+    </message>
+    <message>
+        <source>{n_found} LEDs are found; the sketch has {n_sketched}. Give a sketch with all LEDs of the pen, or none.</source>
+        <translation>找到 {n_found} 个 LED；草图中有 {n_sketched} 个。请给出包含光笔全部 LED 的草图，或不给草图。</translation>
+    </message>
+    <message>
         <source>{n_left_out} points lie off the plane and are excluded, the first {first}: the pen was lifted or slipped.</source>
         <translation>{n_left_out} 个测点不在平面上，已排除，第一个为 {first}：光笔曾抬起或滑动。</translation>
     </message>
     <message>
+        <source>{n_left_out} points lie off the sphere and are excluded, the first {first}: the pen was lifted or slipped.</source>
+        <translation>{n_left_out} 个点偏离球面，已排除，第一个为 {first}：光笔被抬起或打滑。</translation>
+    </message>
+    <message>
         <source>{n_off} of {n_points} points do not lie on the plane of the others, and these scatter by {off:.2f} mm. Probe one plate, and hold the pen on it.</source>
         <translation>{n_points} 个测点中有 {n_off} 个不在其余各点的平面上，其余各点的离散为 {off:.2f} mm。请只触测一块平板，并使光笔与其保持接触。</translation>
+    </message>
+    <message>
+        <source>{n_others} lights move together, but not with the pen: there is a second pen, or a mirror. Remove or cover it, and repeat the swing.</source>
+        <translation>{n_others} 个光点一起运动，但不随光笔运动：存在第二支光笔或反光镜。请移开或遮住，然后重新摆动。</translation>
     </message>
     <message>
         <source>{n_points} of {needed} points</source>
@@ -6278,12 +6716,24 @@ mm</translation>
         <translation>有 {n_points} 个可用的测点，平面至少需要 {needed} 个。请在整个平板上触测。</translation>
     </message>
     <message>
+        <source>{n_tips} calibration does not show repeatability; give at least two, usually ten.</source>
+        <translation>{n_tips} 次标定无法显示重复性；请至少给出两次，通常十次。</translation>
+    </message>
+    <message>
+        <source>{n_views} images show the board; at least {least} are needed, {enough} are better. Add views with the board tilted by 20 to 40 degrees to each side, and in each corner of the image.</source>
+        <translation>{n_views} 幅图像显示标定板；至少需要 {least} 幅，{enough} 幅更好。请增加标定板向各侧倾斜 20 至 40 度以及位于图像各角的视图。</translation>
+    </message>
+    <message>
         <source>{name}</source>
         <translation>{name}</translation>
     </message>
     <message>
         <source>{name} begins with {start} and has no named values. Check that this is the right file.</source>
         <translation>{name} 以 {start} 开头，其中没有命名的值。请检查是否选对了文件。</translation>
+    </message>
+    <message>
+        <source>{name} cannot be written in the form of Kalibr: its model radtan has only k1 k2 p1 p2, and this camera has more coefficients. Write it in the form of OpenCV.</source>
+        <translation>{name} 无法以 Kalibr 形式写出：其 radtan 模型只有 k1 k2 p1 p2，而此相机有更多系数。请以 OpenCV 形式写出。</translation>
     </message>
     <message>
         <source>{name} contains more than one YAML document. Keep one of them.</source>
@@ -6318,6 +6768,26 @@ mm</translation>
         <translation>{name} 未注明坐标单位。请在表头中注明：led,x_mm,y_mm,z_mm。</translation>
     </message>
     <message>
+        <source>{name} has more than {most:,} values. Check that this is the right file.</source>
+        <translation>{name} 的值超过 {most:,} 个。请检查文件是否正确。</translation>
+    </message>
+    <message>
+        <source>{name} has more than {most} lines. Check that this is the right file, or split it.</source>
+        <translation>{name} 超过 {most} 行。请检查文件是否正确，或将其拆分。</translation>
+    </message>
+    <message>
+        <source>{name} has no column {column}; {what} need the columns {wanted}. Its header is {header}. Rename the columns.</source>
+        <translation>{name} 没有列 {column}；{what} 需要列 {wanted}。其表头为 {header}。请重命名列。</translation>
+    </message>
+    <message>
+        <source>{name} has no {entry}. Check that this is the right file and that it is complete.</source>
+        <translation>{name} 没有 {entry}。请检查文件是否正确且完整。</translation>
+    </message>
+    <message>
+        <source>{name} has only comments. Check that it is complete.</source>
+        <translation>{name} 只有注释。请检查其是否完整。</translation>
+    </message>
+    <message>
         <source>{name} has the calibration_temperature {celsius:g}; degrees Celsius from {coldest:g} to {warmest:g} are needed. Correct or remove it.</source>
         <translation>{name} 中 calibration_temperature 为 {celsius:g}；应为 {coldest:g} 至 {warmest:g} 摄氏度。请更正或删除。</translation>
     </message>
@@ -6342,12 +6812,60 @@ mm</translation>
         <translation>{name} 的数值类型为 {value_type}；需要 8 或 16 位灰度值。请不经转换保存图像。</translation>
     </message>
     <message>
+        <source>{name} has {n_cells:,} cells; at most {most:,} are read. Check that this is the right file, or split it.</source>
+        <translation>{name} 有 {n_cells:,} 个单元格；最多读取 {most:,} 个。请检查文件是否正确，或将其拆分。</translation>
+    </message>
+    <message>
+        <source>{name} has {n_frames} frames; at most {most} are read. Check that this is the right file, or split it.</source>
+        <translation>{name} 有 {n_frames} 帧；最多读取 {most} 帧。请检查文件是否正确，或将其拆分。</translation>
+    </message>
+    <message>
         <source>{name} has {width} x {height} px, {first} has {first_width} x {first_height} px. Give images of one camera, with one region and binning.</source>
         <translation>{name} 为 {width} x {height} px，{first} 为 {first_width} x {first_height} px。请提供同一相机、相同区域和像素合并设置的图像。</translation>
     </message>
     <message>
+        <source>{name} is a TIFF with the compression {compression}, which is not supported. Save the images as PNG, or without compression.</source>
+        <translation>{name} 是压缩方式为 {compression} 的 TIFF，不受支持。请将图像保存为 PNG 或不压缩。</translation>
+    </message>
+    <message>
+        <source>{name} is damaged or not a supported image (PNG, JPEG, BMP, TIFF, PGM, WebP). Capture or copy it again.</source>
+        <translation>{name} 已损坏或不是支持的图像（PNG、JPEG、BMP、TIFF、PGM、WebP）。请重新采集或复制。</translation>
+    </message>
+    <message>
+        <source>{name} is nested more than {n_levels} levels deep. Check that this is the right file.</source>
+        <translation>{name} 的嵌套超过 {n_levels} 层。请检查文件是否正确。</translation>
+    </message>
+    <message>
         <source>{name} is {width} x {height} px, the other images are {usual_width} x {usual_height} px. Replay only images of one camera together.</source>
         <translation>{name} 为 {width} × {height} px，其他图像为 {usual_width} × {usual_height} px。请只回放同一台相机的图像。</translation>
+    </message>
+    <message>
+        <source>{n} points are usable; a sphere needs at least {needed}, 25 are usual. Probe its upper half all over.</source>
+        <translation>可用点 {n} 个；球至少需要 {needed} 个，通常为 25 个。请在整个上半部探测。</translation>
+    </message>
+    <message>
+        <source>{other} was calibrated with another LED file than {first}. Give calibrations of one pen with one LED file.</source>
+        <translation>{other} 使用的 LED 文件与 {first} 不同。请给出同一支光笔、同一 LED 文件的标定。</translation>
+    </message>
+    <message>
+        <source>{part}: all {n_judged} characteristics are within their tolerances.</source>
+        <translation>{part}：全部 {n_judged} 个特性均在公差内。</translation>
+    </message>
+    <message>
+        <source>{part}: not all features were probed. Missing: {names}.</source>
+        <translation>{part}：并非所有要素都已探测。缺少：{names}。</translation>
+    </message>
+    <message>
+        <source>{part}: {n_features} features measured; the plan has no tolerances.</source>
+        <translation>{part}：已测量 {n_features} 个要素；计划未规定公差。</translation>
+    </message>
+    <message>
+        <source>{part}: {n_open} of {n_judged} characteristics are neither proven within nor out of tolerance: {names}.</source>
+        <translation>{part}：{n_judged} 个特性中有 {n_open} 个既未证明合格也未证明超差：{names}。</translation>
+    </message>
+    <message>
+        <source>{part}: {n_out} of {n_judged} characteristics are out of tolerance: {names}.</source>
+        <translation>{part}：{n_judged} 个特性中有 {n_out} 个超差：{names}。</translation>
     </message>
     <message>
         <source>{path} cannot be written: {reason} The images recorded so far are safe.</source>
@@ -6382,24 +6900,80 @@ mm</translation>
         <translation>{folder} 的限值中缺少一个文件。在从副本恢复该文件夹之前，不接受任何结果。</translation>
     </message>
     <message>
-        <source>A length from LED {number} to itself is none. Give the numbers of two LEDs.</source>
-        <translation>LED {number} 到自身的长度没有意义。请给出两个 LED 的编号。</translation>
-    </message>
-    <message>
         <source>The swing is paused.</source>
         <translation>摆动已暂停。</translation>
+    </message>
+    <message>
+        <source>The swing is too weak: U of the tip is {U:.2g} mm, the focal length is uncertain by {focal:.2g} %, and the pen&apos;s tilt varies by {tilt:.0f} degrees. Tilt the pen by 30 degrees in all directions, and turn it about its axis.</source>
+        <translation>摆动不充分：测头 U 为 {U:.2g} mm，焦距不确定度为 {focal:.2g} %，光笔倾斜变化 {tilt:.0f} 度。请向各方向倾斜 30 度，并绕轴线转动光笔。</translation>
+    </message>
+    <message>
+        <source>The tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position, {distance:.4f} mm in all (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The difference is significant.</source>
+        <translation>测头偏离标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm，合计 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。差异显著。</translation>
+    </message>
+    <message>
+        <source>The tip of entry {number} does not follow from the LED centres of its record: recomputed it differs by {distance:.4f} mm, with U {uncertainty:.4f} mm instead of {stated:.4f} mm. It was computed by {program}. Recompute it with that version, and calibrate the tip again.</source>
+        <translation>条目 {number} 的测头无法由其记录的 LED 中心得出：重新计算相差 {distance:.4f} mm，U 为 {uncertainty:.4f} mm，而不是 {stated:.4f} mm。原由 {program} 计算。请用该版本重新计算，并重新标定测头。</translation>
+    </message>
+    <message>
+        <source>The tip of entry {number} does not follow from the LED centres of its record: {why}</source>
+        <translation>条目 {number} 的测头无法由其记录的 LED 中心得出：{why}</translation>
+    </message>
+    <message>
+        <source>The tip of entry {number} was accepted before it was computed: the clock of the station was set back, or the entry was falsified.</source>
+        <translation>条目 {number} 的测头在计算之前已被接受：工位时钟曾被调回，或条目被篡改。</translation>
+    </message>
+    <message>
+        <source>The tip of entry {number} was not recomputed: {why}</source>
+        <translation>未重新计算条目 {number} 的测头：{why}</translation>
     </message>
     <message>
         <source>The tip rests in the cone. Keep it pressed in.</source>
         <translation>测头已在锥孔中。请保持压紧。</translation>
     </message>
     <message>
+        <source>The tip scatters by {of_tip:.4f} mm over the calibrations, a fixed point probed with it by only {of_point:.4f} mm. A calibration error would shift both alike, so something moved with the pen between the calibrations. Look for a tip that is not screwed in firmly, a loose or knocked LED, or LEDs that were measured too coarsely.</source>
+        <translation>测头在各次标定间的分散为 {of_tip:.4f} mm，而用其探测的固定点仅为 {of_point:.4f} mm。标定误差会使两者同样偏移，因此在各次标定之间光笔上有部件移动。请检查测头是否拧紧、LED 是否松动或被碰，或 LED 测量是否过粗。</translation>
+    </message>
+    <message>
+        <source>The touches of {name} do not show its kind. Probe more points of it, or state its kind: {kinds}.</source>
+        <translation>{name} 的触测点无法确定其类型。请探测更多点，或指定类型：{kinds}。</translation>
+    </message>
+    <message>
+        <source>The two points are {distance:.2f} mm apart, certified are {certified} mm: they are not the two ends. Probe the end opposite to the last point.</source>
+        <translation>两点相距 {distance:.2f} mm，校准值为 {certified} mm：它们不是两端。请探测与上一点相对的一端。</translation>
+    </message>
+    <message>
+        <source>The verification belongs to {result}, which is no longer current for tip {tip} of pen {pen}. Close the verification and start another one.</source>
+        <translation>此验证属于 {result}，它已不是光笔 {pen} 测头 {tip} 的当前结果。请关闭此验证并重新开始。</translation>
+    </message>
+    <message>
+        <source>The verification was started with another camera file or LED file than the selected one. Select that file, then continue.</source>
+        <translation>此验证开始时使用的相机文件或 LED 文件与当前所选不同。请选择该文件，然后继续。</translation>
+    </message>
+    <message>
         <source>The video {path} cannot be decoded within {most:.0f} MB. Save its frames as images.</source>
         <translation>视频 {path} 无法在 {most:.0f} MB 内存内解码。请将其各帧另存为图像。</translation>
     </message>
     <message>
+        <source>The video {path} cannot be read: this installation has no FFmpeg and reads Motion JPEG in .avi files only. Save the video in this form, or save its frames as images.</source>
+        <translation>无法读取视频 {path}：此安装不含 FFmpeg，只能读取 .avi 文件中的 Motion JPEG。请以该格式保存视频，或将其帧保存为图像。</translation>
+    </message>
+    <message>
         <source>The video {path} has more than {most} frames. Cut out the swing, or save its frames as images.</source>
         <translation>视频 {path} 超过 {most} 帧。请截取摆动部分，或将各帧另存为图像。</translation>
+    </message>
+    <message>
+        <source>The views are too similar: the board tilt differs by at most {apart:.0f} degrees between views, and the focal length is uncertain by {share:.1%}. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image.</source>
+        <translation>视图过于相似：各视图间标定板倾斜最多相差 {apart:.0f} 度，焦距不确定度为 {share:.1%}。请增加标定板向各侧倾斜 20 至 40 度并伸入图像各角的视图。</translation>
+    </message>
+    <message>
+        <source>The views do not determine the camera: they are too similar. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image.</source>
+        <translation>这些视图无法确定相机：它们过于相似。请增加标定板向各侧倾斜 20 至 40 度并伸入图像各角的视图。</translation>
+    </message>
+    <message>
+        <source>The views fit only if the board {board} is bent by {bend:.0f} mm, which is implausible. Check the number and size of its squares, and that all images are from one camera with one setting.</source>
+        <translation>只有标定板 {board} 弯曲 {bend:.0f} mm 时视图才相符，这不合理。请检查方格的数量和尺寸，以及所有图像是否来自同一相机、同一设置。</translation>
     </message>
     <message>
         <source>The {what} {path} does not exist. Check the name and the folder.</source>
@@ -6586,10 +7160,6 @@ mm</translation>
         <translation>内参文件。请标定相机，并在文件中给出协方差</translation>
     </message>
     <message>
-        <source>the covariance c11 to c66 leaves a direction without any uncertainty, which no measurement does. Correct or remove these columns.</source>
-        <translation>协方差 c11 至 c66 使某个方向没有不确定度，这在测量中不可能。请改正或删除这些列。</translation>
-    </message>
-    <message>
         <source>the direction ({x:.2f}, {y:.2f}, {z:.2f}) of the pen</source>
         <translation>光笔的方向 ({x:.2f}, {y:.2f}, {z:.2f})</translation>
     </message>
@@ -6604,10 +7174,6 @@ mm</translation>
     <message>
         <source>the file ends within the number {number}, which has {n_decimals} decimals where all others have {n_others}. Copy the file again, or remove the line.</source>
         <translation>文件在数字 {number} 处中断：它有 {n_decimals} 位小数，而其他都有 {n_others} 位。请重新复制文件，或删除该行。</translation>
-    </message>
-    <message>
-        <source>the file has decimal points and decimal commas, the other ones on line {line}. Use one of them throughout.</source>
-        <translation>文件中小数点和小数逗号混用，另一种在第 {line} 行。请统一使用一种。</translation>
     </message>
     <message>
         <source>the file would be larger than allowed here. Write to another disk.</source>
@@ -6704,10 +7270,6 @@ mm</translation>
     <message>
         <source>your disk quota is used up. Free some space, or write elsewhere.</source>
         <translation>磁盘配额已用完。请清理空间，或写到其他地方。</translation>
-    </message>
-    <message>
-        <source>{address} is no address of this computer. Give one that it has in the network that may listen, or {loopback} for this computer alone.</source>
-        <translation>{address} 不是本机的地址。请填写本机在允许接收的网络中的地址，或填写 {loopback} 仅限本机。</translation>
     </message>
     <message>
         <source>{cell} is not a finite number.</source>
@@ -6850,18 +7412,6 @@ mm</translation>
         <translation>{name} 的主点位于 ({cx:g}, {cy:g}) px，远在 {width} × {height} px 的图像之外。请检查两者是否属于同一台相机和同一图像尺寸。</translation>
     </message>
     <message>
-        <source>{name} has more than {most:,} values. Check that the right file is named.</source>
-        <translation>{name} 中的值超过 {most:,} 个。请检查文件是否选对。</translation>
-    </message>
-    <message>
-        <source>{name} has more than {most} lines. Check that the right file is named, or divide it.</source>
-        <translation>{name} 超过 {most} 行。请检查是否选对了文件，或把它分开。</translation>
-    </message>
-    <message>
-        <source>{name} has no column {column}; {what} need the columns {wanted}. Its header is {header}. Name the columns so.</source>
-        <translation>{name} 没有 {column} 列；{what}需要 {wanted} 各列。其表头为 {header}。请照此命名各列。</translation>
-    </message>
-    <message>
         <source>{name} has no header and {n_columns} columns; poses need the 12 columns r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm, with the number of the pose before them and the covariance c11 to c66 behind them if known. Put a header line with these names on top.</source>
         <translation>{name} 没有表头，有 {n_columns} 列；位姿需要 12 列 r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm，如已知，前面是位姿编号，后面是协方差 c11 至 c66。请在最上面加一行含这些名称的表头。</translation>
     </message>
@@ -6870,16 +7420,8 @@ mm</translation>
         <translation>{name} 没有表头，有 {n_columns}；{what}需要 {n_needed} 列 {wanted}。请在最上面加一行含这些名称的表头，并用逗号、分号或制表符分隔各列。</translation>
     </message>
     <message>
-        <source>{name} has no lines but comments. Check that it is complete.</source>
-        <translation>{name} 只有注释行。请检查文件是否完整。</translation>
-    </message>
-    <message>
         <source>{name} has no rows. Check that it is complete.</source>
         <translation>{name} 没有数据行。请检查文件是否完整。</translation>
-    </message>
-    <message>
-        <source>{name} has no {entry}. Check that the right file is named and that it is complete.</source>
-        <translation>{name} 中没有 {entry}。请检查是否选对了文件，文件是否完整。</translation>
     </message>
     <message>
         <source>{name} has the focal lengths {fx:g} and {fy:g} px along u and v; with the pixels of a camera these are nearly alike. Export the file again, or calibrate the camera again.</source>
@@ -6906,20 +7448,8 @@ mm</translation>
         <translation>{name} 中有含义相同的 {first} 和 {second}。请保留正确的一个。</translation>
     </message>
     <message>
-        <source>{name} has {n_cells:,} cells; at most {most:,} are read. Check that the right file is named, or divide it.</source>
-        <translation>{name} 有 {n_cells:,} 个单元格；最多读取 {most:,} 个。请检查文件是否选对，或将其拆分。</translation>
-    </message>
-    <message>
-        <source>{name} has {n_frames} frames; at most {most} are read. Check that the right file is named, or divide it.</source>
-        <translation>{name} 有 {n_frames} 帧；最多读取 {most} 帧。请检查是否选对了文件，或把它分开。</translation>
-    </message>
-    <message>
         <source>{name} is a JPEG of {n_scans} scans; at most {most} are read. Save the images as PNG.</source>
         <translation>{name} 是含 {n_scans} 次扫描的 JPEG；最多读取 {most} 次。请将图像保存为 PNG。</translation>
-    </message>
-    <message>
-        <source>{name} is a TIFF with the compression {compression}, which is not read here. Save the images as PNG, or without compression.</source>
-        <translation>{name} 是压缩方式为 {compression} 的 TIFF，此处不支持。请将图像保存为 PNG，或不压缩保存。</translation>
     </message>
     <message>
         <source>{name} is an animation. Save its images one by one.</source>
@@ -6932,14 +7462,6 @@ mm</translation>
     <message>
         <source>{name} is damaged (wrong checksum). Capture or copy it again.</source>
         <translation>{name} 已损坏（校验和错误）。请重新拍摄或复制。</translation>
-    </message>
-    <message>
-        <source>{name} is damaged or no image that can be read here (PNG, JPEG, BMP, TIFF, PGM, WebP). Capture or copy it again.</source>
-        <translation>{name} 已损坏，或不是此处可读取的图像（PNG、JPEG、BMP、TIFF、PGM、WebP）。请重新采集或复制。</translation>
-    </message>
-    <message>
-        <source>{name} is nested more than {n_levels} levels deep. Check that the right file is named.</source>
-        <translation>{name} 的嵌套超过 {n_levels} 层。请检查是否选对了文件。</translation>
     </message>
     <message>
         <source>A fixed point scatters by {of_point:.4f} mm, the tip by only {of_tip:.4f} mm over the calibrations. The tip is stable: the cone or the camera moved between the points, or the tip did not rest in the cone.</source>
@@ -6956,10 +7478,6 @@ mm</translation>
     <message>
         <source>A name, the camera images or a file is missing. Complete the earlier steps, then continue the verification.</source>
         <translation>缺少名称、相机图像或文件。请完成前面的步骤，然后继续验证。</translation>
-    </message>
-    <message>
-        <source>A pen file needs one known length. Measure the distance between two LEDs, and give it.</source>
-        <translation>光笔文件需要一个已知长度。请测量两个 LED 之间的距离并给出。</translation>
     </message>
     <message>
         <source>A point {distance:.1f} mm from the others does not count: the tip was not in the cone. Put it into the cone and hold it still.</source>
@@ -7020,10 +7538,6 @@ mm</translation>
     <message>
         <source>Ball diameter {diameter:g} mm is not valid; the range is above 0 to {most:g} mm. Enter the measured diameter, or leave it empty.</source>
         <translation>测球直径 {diameter:g} mm 无效；范围为大于 0 至 {most:g} mm。请输入测得的直径，或留空。</translation>
-    </message>
-    <message>
-        <source>Beside one pen {n_others} other lights move with each other: there is a second pen, or a mirror. Remove or cover it, and repeat the swing.</source>
-        <translation>除一支光笔外，另有 {n_others} 个光点一起移动：存在第二支光笔或镜子。请移走或遮住，然后重新摆动。</translation>
     </message>
     <message>
         <source>Both cameras see the board in {n_pairs} views; at least {least} are needed. Add views in which both cameras see the whole board.</source>
@@ -7166,10 +7680,6 @@ mm</translation>
         <translation>鱼眼模型 (Kannala-Brandt)：其他模型均不适合。交叉验证误差：{held_out:.4f} px。</translation>
     </message>
     <message>
-        <source>For a moment, the tip in the cone. Then the program learns where you stand.</source>
-        <translation>请保持片刻，测头在锥孔中。随后程序识别您所站的位置。</translation>
-    </message>
-    <message>
         <source>Frame rate {sent:.1f} fps instead of {wanted:.1f} fps, limited by link or exposure. Lower the frame rate, or use a smaller region or a shorter exposure.</source>
         <translation>帧率为 {sent:.1f} 幅/秒，而不是设定的 {wanted:.1f} 幅/秒，受链路或曝光限制。请降低帧率，或使用更小的区域或更短的曝光。</translation>
     </message>
@@ -7230,24 +7740,16 @@ mm</translation>
         <translation>LED 位置与图像不符：{sigma:.1f} px，通常不超过 {usual} px。请检查 LED 文件是否属于这支光笔且编号顺序正确，内参文件是否属于这台相机。</translation>
     </message>
     <message>
-        <source>LED {led} is in the place of LED {needed}, and LED {needed} is missing. Number the LEDs from 1 without gaps.</source>
-        <translation>应为 LED {needed} 的地方是 LED {led}，而且没有一行是 LED {needed}。请从 1 开始连续编号。</translation>
-    </message>
-    <message>
-        <source>LED {led} is in the place of LED {needed}. List the LEDs from 1 to {n_leds} in ascending order.</source>
-        <translation>应为 LED {needed} 的地方是 LED {led}。请按升序列出 LED 1 至 {n_leds}。</translation>
-    </message>
-    <message>
-        <source>LED {led} is noisier than the others: {sigma:.3f} px, usual is {usual:.3f} px; it counts accordingly less. Clean it, and check its brightness and its supply.</source>
-        <translation>LED {led} 的噪声大于其他 LED：{sigma:.3f} px，通常为 {usual:.3f} px；其权重相应降低。请清洁它，并检查其亮度和供电。</translation>
-    </message>
-    <message>
         <source>LED {led} is {distance:.2f} mm from its file position. Check that the LED file belongs to this pen.</source>
         <translation>LED {led} 与文件中的位置相差 {distance:.2f} mm。请检查 LED 文件是否属于此光笔。</translation>
     </message>
     <message>
         <source>LED {led} is {distance:.3f} mm from its file position. Check the LED file, or measure the pen again.</source>
         <translation>LED {led} 与文件中的位置相差 {distance:.3f} mm。请检查 LED 文件，或重新测量光笔。</translation>
+    </message>
+    <message>
+        <source>LED {led} is {distance:.6g} m from the origin, which is implausible for a pen. Check the numbers and their units.</source>
+        <translation>LED {led} 距原点 {distance:.6g} m，对光笔而言不合理。请检查数值及其单位。</translation>
     </message>
     <message>
         <source>LED {led} moved by {distance:.3f} mm between the swings {first} and {swing}; no LED file fits both. Give only later swings.</source>
@@ -7280,6 +7782,10 @@ mm</translation>
     <message>
         <source>LEDs {first} and {second} are swapped. LEDs 1 to 4 must be in order along the back line, and 5 to 7 and 8 to 10 along the columns in the same direction. Swap their coordinates.</source>
         <translation>LED {first} 和 {second} 互换了：各自在对方的位置上。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 沿两列同方向依次排列。请交换它们的坐标。</translation>
+    </message>
+    <message>
+        <source>Length error at {run} {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Check the certified length of this bar. Otherwise the scale of the LED file or the camera file is wrong, or the pen is warmer than at its measurement.</source>
+        <translation>{run} 处长度误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。请检查该长度杆的校准长度。否则 LED 文件或相机文件的比例有误，或光笔温度高于其测量时的温度。</translation>
     </message>
     <message>
         <source>Line {line} of {file} is damaged. Restore the file from a copy, or remove the line to continue without that image.</source>
@@ -7332,10 +7838,6 @@ mm</translation>
     <message>
         <source>Max. change {limit:g} mm is not valid. Enter a value above 0 and up to {most:g} mm.</source>
         <translation>最大变化 {limit:g} mm 无效。请输入大于 0 且不超过 {most:g} mm 的值。</translation>
-    </message>
-    <message>
-        <source>Most centres are outside the image: they reach to ({x:.0f}, {y:.0f}) px, and the images have {width} x {height} px. Check the size of the images.</source>
-        <translation>大多数中心位于图像之外：最远到 ({x:.0f}, {y:.0f}) px，而图像为 {width} x {height} px。请检查图像尺寸。</translation>
     </message>
     <message>
         <source>Most images show fewer than {n_needed} spots (median {median:.0f}); at least {n_needed} of the {n_leds} LEDs are needed. Check that the LEDs are lit and in the image, and check the exposure.</source>
@@ -7462,20 +7964,8 @@ mm</translation>
         <translation>图像中没有标定板 {board}，看到的是 {other}：列数与行数颠倒了。请指定该标定板。</translation>
     </message>
     <message>
-        <source>No length is known: all lengths are in hundredths of the largest distance between two LEDs.</source>
-        <translation>没有已知长度：所有长度以两个 LED 之间最大距离的百分之一为单位。</translation>
-    </message>
-    <message>
-        <source>No pen, no camera and no fixed tip explain the tracks: they miss by {misfit:.1f} px. Check that the tip stayed in the cone, that the LEDs are fixed to one pen, and that camera and cone stand still.</source>
-        <translation>没有任何光笔、相机和固定测头能解释这些轨迹：偏差 {misfit:.1f} px。请检查测头是否始终在锥孔中，LED 是否固定在同一支光笔上，以及相机和锥孔是否静止。</translation>
-    </message>
-    <message>
         <source>No supervisor password is set. Set it at Start, All limits.</source>
         <translation>尚未设置主管密码。请在“开始”步骤的“所有限值”中设置。</translation>
-    </message>
-    <message>
-        <source>No task is chosen. Choose at least one.</source>
-        <translation>没有选择任何项。请至少选择一项。</translation>
     </message>
     <message>
         <source>No touches of {name} are given. Give them as {name}=IMAGES, or as a folder of that name.</source>
@@ -7504,10 +7994,6 @@ mm</translation>
     <message>
         <source>On the server: {finding}</source>
         <translation>服务器上：{finding}</translation>
-    </message>
-    <message>
-        <source>One swing does not show how a pen changes; give two at least.</source>
-        <translation>仅凭一次摆动看不出光笔的变化；请至少给出两次。</translation>
     </message>
     <message>
         <source>Only {n_used} of {n_images} images agree on one tip. Press the tip into the cone, clamp cone and camera, and repeat the swing.</source>
@@ -7562,10 +8048,6 @@ mm</translation>
         <translation>设置已保存，但另一个程序将 {file} 锁定了 {seconds:g} s。如果该程序无响应，请结束它，否则它可能覆盖设置。</translation>
     </message>
     <message>
-        <source>Stylus, seat or stand give way with the tilt, by {size:.4f} mm at 90°; the result is corrected and U includes the rest. Press gently, use a stiffer stylus, and clamp the cone.</source>
-        <translation>测杆、锥座或支架随倾斜而变形，90° 时为 {size:.4f} mm；结果已修正，U 包含其余部分。请轻压，使用刚性更好的测杆，并夹紧锥座。</translation>
-    </message>
-    <message>
         <source>Swings given: {n_swings}. {needed} are needed for pooling, and one more for confirmation.</source>
         <translation>给出的摆动次数：{n_swings}。合并需要 {needed} 次，另需一次来确认所得结果。</translation>
     </message>
@@ -7578,6 +8060,10 @@ mm</translation>
         <translation>LED 坐标的误差约为 {sigma:.3f} mm（标准差），仅此即使 U (k = 2) = {uncertainty:.4f} mm。请检查 LED 文件是否属于此光笔。增加图像作用不大。</translation>
     </message>
     <message>
+        <source>The LED layout does not define the pen frame, which needs ten LEDs, 1 to 4 in a line behind the plane of 5 to 10, and these in two columns of three parallel to the line, all within {tolerance:g} mm. {misfit} Measure the LEDs again, or give the coordinates of another layout in its own frame.</source>
+        <translation>LED 布局无法定义光笔坐标系：需要十个 LED，1 至 4 在一条直线上且位于 5 至 10 所在平面之后，5 至 10 排成与该直线平行的两列、每列三个，偏差均在 {tolerance:g} mm 以内。{misfit} 请重新测量 LED，或以其自身坐标系给出其他布局的坐标。</translation>
+    </message>
+    <message>
         <source>The LED layout of this pen is symmetric, so the LEDs cannot be identified. Move an LED, or give the LED centres.</source>
         <translation>这支光笔的 LED 布局对称，无法识别各 LED。请移动一个 LED，或直接给出 LED 中心。</translation>
     </message>
@@ -7588,6 +8074,10 @@ mm</translation>
     <message>
         <source>The LEDs are a mirror image of the pen, in another frame. Change the sign of one coordinate, then transform them to the pen frame.</source>
         <translation>LED 是光笔的镜像，且不在光笔坐标系中。请改变一个坐标的符号，再转换到光笔坐标系。</translation>
+    </message>
+    <message>
+        <source>The LEDs are a mirror image of the pen: seen from the front with LED 4 above LED 1, LEDs 5 to 7 must be on the left and 8 to 10 on the right. If the machine&apos;s axes are left-handed, change the sign of one coordinate; if the columns are swapped, renumber them.</source>
+        <translation>LED 是光笔的镜像：从正面看，LED 4 在 LED 1 上方时，LED 5 至 7 必须在左，8 至 10 在右。若测量机坐标轴为左手系，请改变一个坐标的符号；若两列互换，请重新编号。</translation>
     </message>
     <message>
         <source>The LEDs are collinear within {off_line:.2f} mm over {extent:.0f} mm; a rotation about this line is not observable. At least one LED must be {needed:.1f} mm from the line.</source>
@@ -7604,18 +8094,6 @@ mm</translation>
     <message>
         <source>The LEDs are {width:.1f} px wide in most images; at least {needed:.0f} px are needed. Bring the camera nearer, or use a longer focal length or a camera of higher resolution.</source>
         <translation>大多数图像中 LED 宽度为 {width:.1f} px；至少需要 {needed:.0f} px。请将相机移近，或使用更长的焦距或更高分辨率的相机。</translation>
-    </message>
-    <message>
-        <source>The LEDs cannot be followed from image to image: in no {needed} of {n_images} images in a row the same 5 LEDs are seen. Give the images in the order in which they were taken, 10 or more a second, with the whole pen in view.</source>
-        <translation>无法逐幅跟踪 LED：在 {n_images} 幅图像中，没有连续 {needed} 幅看到相同的 5 个 LED。请按拍摄顺序给出图像，每秒 10 幅或更多，且整支光笔在视野内。</translation>
-    </message>
-    <message>
-        <source>The LEDs found do not resemble the sketch, in whatever order. Check that it is of this pen, right-handed and in millimetres to 5 mm.</source>
-        <translation>找到的 LED 无论按何种顺序都与草图不符。请检查草图是否属于本光笔、是否为右手系、单位为毫米且误差不超过 5 mm。</translation>
-    </message>
-    <message>
-        <source>The adjustment did not converge in {n_steps} iterations: the views are too similar, or show another board. Add views with the board tilted by 20° to 40° to each side and in each corner of the image; otherwise count and measure the squares again.</source>
-        <translation>平差在 {n_steps} 次迭代内未收敛：视图过于相似，或标定板与所指定的不符。请补充标定板向各侧倾斜 20° 至 40° 以及位于图像各角的视图；否则请重新清点并测量格子。</translation>
     </message>
     <message>
         <source>The archive of this data folder is not the one its limits belong to. Nothing is accepted until the archive is restored from a copy.</source>
@@ -7648,6 +8126,22 @@ mm</translation>
     <message>
         <source>The board is bent by {bend:.2f} mm; {stated:.2f} mm was assumed. The bend is taken into account; mount the board on a flat plate.</source>
         <translation>标定板弯曲 {bend:.2f} mm，假定值为 {stated:.2f} mm。计算中已考虑，但请将其固定在平板上。</translation>
+    </message>
+    <message>
+        <source>The board {board} is {width:.0f} x {height:.0f} mm and needs a white margin of {foot:g} mm, which exceeds the paper. Choose a larger paper, or a smaller board.</source>
+        <translation>标定板 {board} 为 {width:.0f} x {height:.0f} mm，还需 {foot:g} mm 白边，超出纸张。请选择更大的纸张或更小的标定板。</translation>
+    </message>
+    <message>
+        <source>The board {text} has {columns} x {rows} points or squares; {least} to {most} are needed along each side. Count them again; of a chessboard count the inner corners.</source>
+        <translation>标定板 {text} 有 {columns} x {rows} 个点或方格；每边需要 {least} 至 {most} 个。请重新计数；棋盘格请数内角点。</translation>
+    </message>
+    <message>
+        <source>The board {text} names an unknown dictionary of markers. Name the dictionary as in OpenCV, such as DICT_5X5_100.</source>
+        <translation>标定板 {text} 给出的标记字典未知。请按 OpenCV 命名，例如 DICT_5X5_100。</translation>
+    </message>
+    <message>
+        <source>The board {text} needs {needed} markers; {dictionary} has {known}. Name the dictionary of the print.</source>
+        <translation>标定板 {text} 需要 {needed} 个标记；{dictionary} 有 {known} 个。请给出印制时的字典。</translation>
     </message>
     <message>
         <source>The board&apos;s squares are stated as {pitch:g} mm, which makes a board of {side:.3g} m. Lengths are in mm: check them. Intrinsics do not depend on it; distances do.</source>
@@ -7726,16 +8220,8 @@ mm</translation>
         <translation>特性 {name} 需要其要素的标称原点。请将其加入计划。</translation>
     </message>
     <message>
-        <source>The columns of pixels are not perpendicular to the rows, by {degrees:.2f}°: the images were sheared by software, an interlaced source, or a rolling shutter before a moving board. Use images as the sensor reads them, of a board at rest.</source>
-        <translation>像素列与行不垂直，偏差 {degrees:.2f}°：图像因软件、隔行信号源或标定板移动时的卷帘快门而错切。请使用传感器的原始图像，并使标定板静止。</translation>
-    </message>
-    <message>
         <source>The cone has {n_touches} usable points, at least {needed} are needed, {usual} are usual. Probe it again, each time in another posture.</source>
         <translation>锥孔有 {n_touches} 个可用的测点，至少需要 {needed} 个，通常为 {usual} 个。请再次触测，每次换一个姿态。</translation>
-    </message>
-    <message>
-        <source>The cone is done: this point does not count. Continue with the next artefact.</source>
-        <translation>锥孔已完成：此测点不计入。请继续触测下一个标准器。</translation>
     </message>
     <message>
         <source>The cone moved by {distance:.4f} mm relative to the camera during the swing; U includes this. Clamp both, let the camera warm up, and repeat the swing.</source>
@@ -7762,10 +8248,6 @@ mm</translation>
         <translation>数据文件夹 {folder} 无法写入：{reason}</translation>
     </message>
     <message>
-        <source>The database {name} is empty. Its administrator sets it up as the page on the archive in the documents says.</source>
-        <translation>数据库 {name} 为空。请由其管理员按文档中的档案页面进行设置。</translation>
-    </message>
-    <message>
         <source>The datum points are on one line, which leaves the rotation about it undetermined. Add a point beside that line.</source>
         <translation>基准点位于同一条直线上，绕该直线的转动不能确定。请在直线之外增加一点。</translation>
     </message>
@@ -7776,10 +8258,6 @@ mm</translation>
     <message>
         <source>The distortion of the camera file is not invertible for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.</source>
         <translation>内参文件的镜头畸变在某些像点无法消除：其系数使图像折叠。请检查畸变系数，或重新标定相机。</translation>
-    </message>
-    <message>
-        <source>The drift reference moved by {distance:.4f} mm between {first} and {visit} (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the cone is not clamped, or the camera had not warmed up. Points measured in between are off by as much.</source>
-        <translation>漂移参考点在 {first} 与 {visit} 之间移动了 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：相机或锥孔未固定，或相机未充分预热。其间的测点有同样大小的误差。</translation>
     </message>
     <message>
         <source>The drift reference stays within {distance:.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
@@ -7820,6 +8298,10 @@ mm</translation>
     <message>
         <source>The file agrees with the images if those of {one} and {other} are swapped. Give the images in the order of the rig file, {names}.</source>
         <translation>若将 {one} 与 {other} 的图像对调，则与图像一致：请按相机组文件中的顺序（{names}）给出图像。</translation>
+    </message>
+    <message>
+        <source>The file {file} exists already. Give the export another name.</source>
+        <translation>文件 {file} 已存在。请为导出另取名称。</translation>
     </message>
     <message>
         <source>The file {file} has no entry in the archive yet. Start the program to enter it.</source>
@@ -7864,10 +8346,6 @@ mm</translation>
     <message>
         <source>The folder {folder} is not empty: it contains {example}. Choose another folder, or empty it; nothing is overwritten.</source>
         <translation>文件夹 {folder} 不是空的：其中有 {example}。请选择其他文件夹，或将其清空；不会覆盖任何内容。</translation>
-    </message>
-    <message>
-        <source>The image shifts by {size:.3f} px with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand, apart from where you step.</source>
-        <translation>图像随光笔倾斜移动 {size:.3f} px：相机随操作者的移动而转动。结果已修正，U 包含其余部分。请将相机放在远离踩踏处的稳固支架上。</translation>
     </message>
     <message>
         <source>The images are from two cameras, or one camera with two zoom or focus settings (fx {fx:.1f} and {other_fx:.1f} px): {n_named} of {n_views} differ from the others: {names}. Give the images of one camera with one setting.</source>
@@ -7934,10 +8412,6 @@ mm</translation>
         <translation>联合拟合在 {n_steps} 次迭代内未收敛。请检查两个文件是否属于这支光笔和这台相机。</translation>
     </message>
     <message>
-        <source>The key of the station with chain {chain} is not in this user account, so that nothing can be signed. Use the account and computer of the station, copy the key here, or let a supervisor introduce another (documents: security).</source>
-        <translation>链 {chain} 所属工作站的密钥不在此用户账户中，因此无法签名。请使用该工作站的账户和计算机，将密钥复制到此处，或由主管引入新密钥（见文档：安全）。</translation>
-    </message>
-    <message>
         <source>The lamp at {x:.0f}, {y:.0f} px moved by {shift:.2f} px during the swing, but the pen did not. No correction is made. Fix or cover the lamp.</source>
         <translation>位于 {x:.0f}, {y:.0f} px 的灯在摆动过程中移动了 {shift:.2f} px，而光笔没有随之移动。未作任何扣除。请固定该灯，或将其遮住。</translation>
     </message>
@@ -7950,24 +8424,8 @@ mm</translation>
         <translation>未指定长度。请输入证书值。</translation>
     </message>
     <message>
-        <source>The length limits U: known to {sigma:.3f} mm it would reduce U from {now:.0f} to {then:.0f} um.</source>
-        <translation>长度限制了 U：若其已知到 {sigma:.3f} mm，U 将从 {now:.0f} 降至 {then:.0f} um。</translation>
-    </message>
-    <message>
-        <source>The length of {length:g} mm is not that between LEDs {first} and {second}: by it the discs would be {found:.2f} mm wide, and {stated:g} mm is stated. It may be that between LEDs {other} and {another}. Check which LEDs were measured, and the diameter of the discs.</source>
-        <translation>长度 {length:g} mm 不是 LED {first} 与 {second} 之间的长度：由它得出的圆盘直径为 {found:.2f} mm，而给出的是 {stated:g} mm。它可能是 LED {other} 与 {another} 之间的长度。请检查测量的是哪两个 LED 以及圆盘直径。</translation>
-    </message>
-    <message>
-        <source>The lengths contradict each other: LEDs {first} and {second} are {stated:.3f} mm apart as measured, and {implied:.3f} mm by the other lengths. Check the numbers of the LEDs, and measure again.</source>
-        <translation>各长度相互矛盾：LED {first} 与 {second} 的测得距离为 {stated:.3f} mm，而由其他长度得出 {implied:.3f} mm。请检查 LED 编号并重新测量。</translation>
-    </message>
-    <message>
         <source>The lengths of the board {text} are not valid: they must be above 0 mm, and markers or circles smaller than their squares. Measure them again.</source>
         <translation>标定板 {text} 的尺寸不合理：单位为 mm，须大于 0，且标记或圆须小于其所在的格子。请重新测量。</translation>
-    </message>
-    <message>
-        <source>The lens leaves {size:.3f} px (rms) beyond its distortion model; the result is corrected and U includes the rest. Calibrate the camera with views that fill the image; its file then states the lens field.</source>
-        <translation>镜头在畸变模型之外残留 {size:.3f} px（均方根）；结果已修正，U 包含其余部分。请用布满图像的视图标定相机；其文件将给出镜头残差场。</translation>
     </message>
     <message>
         <source>The limits and the supervisor password in {folder} are missing, or older than those seen here before. Nothing is accepted until the folder is restored. To begin anew without them, an administrator removes {memory}.</source>
@@ -8038,14 +8496,6 @@ mm</translation>
         <translation>光笔已抬起。放回测头即可继续。</translation>
     </message>
     <message>
-        <source>The pen tilt differs from that of the first visit, so this point does not count. Hold the pen as then: systematic errors of the pen then cancel.</source>
-        <translation>光笔的倾斜与首次触测时不同，此测点不计入。请保持与当时相同的姿态：这样光笔的系统误差相互抵消。</translation>
-    </message>
-    <message>
-        <source>The pen tilt differs from that of the points before, so this point does not count. Keep the tilt until the posture is done.</source>
-        <translation>光笔的倾斜与前面的测点不同，此测点不计入。在该姿态完成之前请保持倾斜不变。</translation>
-    </message>
-    <message>
         <source>The pen was lifted or moved before the point was recorded, so it does not count. Hold it still until it is recorded.</source>
         <translation>测点记录之前光笔被抬起或移动，因此不计入。请保持不动直到记录完成。</translation>
     </message>
@@ -8074,20 +8524,12 @@ mm</translation>
         <translation>各测点位于同一处或一条直线上，不能确定圆。请沿环一周触测。</translation>
     </message>
     <message>
-        <source>The points lie on a circle of radius {measured:.3f} mm, certified are {certified} mm. Is it this ring, and its radius rather than its diameter?</source>
-        <translation>测点所在圆的半径为 {measured:.3f} mm，证书值为 {certified} mm。是这个环吗？给出的是半径而不是直径吗？</translation>
-    </message>
-    <message>
         <source>The points of {run} cover {covered:.0f} degrees of the ring, at least {needed:.0f} are needed to determine its radius. Probe the ring also between {first} and {second}.</source>
         <translation>{run} 的测点覆盖环的 {covered:.0f}°，确定半径至少需要 {needed:.0f}°。请在 {first} 与 {second} 之间也触测。</translation>
     </message>
     <message>
         <source>The points of {run} deviate by up to {form:.4f} mm from a circle in a plane (limit {limit:.4f} mm): the tip slipped, the ring is dirty, or the tip is wrong.</source>
         <translation>{run} 的测点最多偏离平面圆 {form:.4f} mm（限值 {limit:.4f} mm）：测头滑动，环不清洁，或测头有误。</translation>
-    </message>
-    <message>
-        <source>The points of {run} lie at more than two places: {touch} is {distance:.2f} mm from the others of its end. Was the pen lifted there? Probe only the two ends.</source>
-        <translation>{run} 的测点不止两处：{touch} 与同一端的其他点相距 {distance:.2f} mm。光笔是否在该处抬起？请只触测两端。</translation>
     </message>
     <message>
         <source>The points of {run} lie on no circle: {n_off} of {n_touches} are outliers, and the others deviate by up to {off:.2f} mm. Probe one ring, in one plane.</source>
@@ -8162,10 +8604,6 @@ mm</translation>
         <translation>与 {name} 相同。</translation>
     </message>
     <message>
-        <source>The seal {file} is missing: entries that were removed from the end of the archive are not found by it.</source>
-        <translation>封印 {file} 缺失：无法据此发现从档案末尾删除的记录。</translation>
-    </message>
-    <message>
         <source>The server had the entries {first} to {last} of this station and no longer shows them. Ask its administrator whether they were removed or the user was changed. They are delivered again only on request.</source>
         <translation>服务器曾有本工作站的第 {first} 至 {last} 条记录，现在不再显示。请询问其管理员是否已删除这些记录或更改了用户。仅在要求时才会重新传送。</translation>
     </message>
@@ -8218,10 +8656,6 @@ mm</translation>
         <translation>{folder} 中的摆动在计算测头后有变化。请重新计算，然后接受。</translation>
     </message>
     <message>
-        <source>The swing is too weak: U of the tip is {U:.2g} mm, the focal length is known to {focal:.2g} %, and the pen&apos;s tilt varies by {tilt:.0f} degrees. Tilt the pen by 30 degrees in all directions, and turn it about its axis.</source>
-        <translation>摆动的几何条件太弱：测头的 U 为 {U:.2g} mm，焦距已知到 {focal:.2g} %，光笔倾斜变化 {tilt:.0f} 度。请将光笔向各方向倾斜 30 度，并绕其轴线转动。</translation>
-    </message>
-    <message>
         <source>The swing {swing} does not confirm the new LED file: residuals {after:.4f} px, with the old file {before:.4f} px. The old file is as good, or the pen changed in between.</source>
         <translation>未参与合并的摆动 {swing} 不支持新的 LED 文件：新文件的残差为 {after:.4f} px，旧文件为 {before:.4f} px。旧文件同样好，或光笔在此期间有变化。</translation>
     </message>
@@ -8262,10 +8696,6 @@ mm</translation>
         <translation>测头距光笔原点 {tip:.0f} mm，比支点距相机原点（{pivot:.0f} mm）更远。位姿求逆后正是如此：如果给出的是 pen_from_cam，则测头与支点应互换。</translation>
     </message>
     <message>
-        <source>The tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position, {distance:.4f} mm in all (U {uncertainty:.4f} mm, limit {limit:.4f} mm). That is more than chance.</source>
-        <translation>测头偏离其标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm，总计 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。这超出偶然误差。</translation>
-    </message>
-    <message>
         <source>The tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position, {distance:.4f} mm in all (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Was the tip replaced, bent or refitted, or is it that of another pen?</source>
         <translation>测头偏离其标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm，总计 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头是否被更换、弯曲或重新安装，或属于另一支光笔？</translation>
     </message>
@@ -8286,10 +8716,6 @@ mm</translation>
         <translation>测头随倾斜在锥孔中移动约 {distance:.4f} mm，已计入 U。请检查测头和锥孔的形状误差、磨损和污物。</translation>
     </message>
     <message>
-        <source>The tip of entry {number} was accepted before it was computed: the clock of the station was set back, or the entry is not what happened.</source>
-        <translation>第 {number} 条记录的测头在计算之前已被接受：工作站的时钟被调回，或记录与实际不符。</translation>
-    </message>
-    <message>
         <source>The tip of entry {number} was accepted earlier than the one before: the clock of the station was set back.</source>
         <translation>第 {number} 条记录的测头的接受时间早于前一条：工作站的时钟被调回。</translation>
     </message>
@@ -8304,10 +8730,6 @@ mm</translation>
     <message>
         <source>The tip scatters by {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm. Probe a fixed point several times: whether it scatters alike shows what moved.</source>
         <translation>测头沿 {axis} 的散布为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm）；各次标定给出 {stated:.4f} mm。请多次触测一个固定点：它是否同样散布可说明是什么在移动。</translation>
-    </message>
-    <message>
-        <source>The tip scatters by {of_tip:.4f} mm over the calibrations, a fixed point probed with it by only {of_point:.4f} mm. A calibration error would move both alike, so something moved with the pen between the calibrations. Look for a tip that is not screwed in firmly, a loose or knocked LED, or LEDs that were measured too coarsely.</source>
-        <translation>各次标定的测头离散为 {of_tip:.4f} mm，而用它触测的固定点仅离散 {of_point:.4f} mm。标定误差会使二者同样变化，因此两次标定之间光笔上有东西移动。请检查测头是否拧紧、LED 是否松动或被碰撞，或 LED 的测量是否过于粗糙。</translation>
     </message>
     <message>
         <source>The tip seating varied by {distance:.4f} mm (standard deviation) from image to image; U includes this. Clean tip and cone, check for wear, and press the tip in.</source>
@@ -8330,10 +8752,6 @@ mm</translation>
         <translation>平移似乎以米为单位：若按毫米计，其长度只有 {typical:.3f} mm（中位数）。需要毫米：请将 tx、ty、tz 乘以 1000。</translation>
     </message>
     <message>
-        <source>The two points are {distance:.2f} mm apart, certified are {certified} mm: they are not its two ends. Probe the end opposite to the last point.</source>
-        <translation>两个测点相距 {distance:.2f} mm，证书值为 {certified} mm：它们不是该长度的两端。请触测与上一个测点相对的一端。</translation>
-    </message>
-    <message>
         <source>The two recordings have different numbers of images. Choose two simultaneous recordings.</source>
         <translation>两台相机的录像图像数量不同。请选择同时录制的两组录像。</translation>
     </message>
@@ -8354,20 +8772,8 @@ mm</translation>
         <translation>{file} 的验证已在另一窗口中打开。请在那里继续，或关闭该窗口后重试。</translation>
     </message>
     <message>
-        <source>The verification was of {result}, but another result is in use for tip {tip} of pen {pen} now. Close the verification and start another one.</source>
-        <translation>该验证针对 {result}，但光笔 {pen} 的测头 {tip} 现已使用另一结果。请关闭该验证并重新开始。</translation>
-    </message>
-    <message>
-        <source>The verification was started with another camera file or LED file than is chosen now. Choose that file, and continue it.</source>
-        <translation>该验证开始时所用的相机文件或 LED 文件与当前选择的不同。请选择当时的文件，然后继续。</translation>
-    </message>
-    <message>
         <source>The video {path} cannot be opened or contains no frames. Check that it plays, or save its frames as images.</source>
         <translation>视频 {path} 无法打开，或没有帧。请检查能否播放，或把各帧保存为图像。</translation>
-    </message>
-    <message>
-        <source>The video {path} cannot be read: this installation has no FFmpeg and reads Motion JPEG in .avi files only. Save the video so, or save its frames as images.</source>
-        <translation>无法读取视频 {path}：此安装不含 FFmpeg，只能读取 .avi 文件中的 Motion JPEG。请以该格式保存视频，或将其帧保存为图像。</translation>
     </message>
     <message>
         <source>The video {path} has the unsupported codec {codec}. Save it with FFV1 or MJPG, or save its frames as images.</source>
@@ -8380,10 +8786,6 @@ mm</translation>
     <message>
         <source>The views do not cover the image corners, where the estimated distortion would fold the image. {coefficients} was reduced just enough to avoid this; the corners are extrapolated. Add views with the board in each corner, or keep the pen out of the corners.</source>
         <translation>视图未覆盖图像四角，由其得出的畸变会使图像在那里折叠。已将 {coefficients} 减小到恰好不折叠；四角为外推值。请补充标定板位于各角的视图，或不要让光笔进入四角。</translation>
-    </message>
-    <message>
-        <source>The views fit only a board {board} that is bent by {bend:.0f} mm, as no board is. Check the number and size of its squares, and that all images are from one camera with one setting.</source>
-        <translation>视图只与弯曲 {bend:.0f} mm 的标定板 {board} 相符，而这不可能。请检查方格的数量和尺寸，并确认所有图像来自同一相机的同一设置。</translation>
     </message>
     <message>
         <source>The views from {name} on differ from those before by {px:.2f} px over the image (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px), more than by chance. Check whether zoom, focus or mount changed there.</source>
@@ -8418,6 +8820,10 @@ mm</translation>
         <translation>{what} {path} 只有空白。请重新保存。</translation>
     </message>
     <message>
+        <source>The {what} {path} has a name that is not valid for files. Check the name.</source>
+        <translation>{what} {path} 的名称对文件无效。请检查名称。</translation>
+    </message>
+    <message>
         <source>The {what} {path} has {size:.1f} MB; the maximum is {limit:g} MB. Check that this is the right file.</source>
         <translation>{what} {path} 有 {size:.1f} MB，超过此类文件允许的 {limit:g} MB。请检查是否选对了文件。</translation>
     </message>
@@ -8438,6 +8844,10 @@ mm</translation>
         <translation>{what} {path} 不是文本：第 {line} 行含有控制字符 {character}。请检查是否选对了文件，或另存为 UTF-8。</translation>
     </message>
     <message>
+        <source>There are {n_few} images of {few} and {n_many} of {many}, and their names, such as {example} and {other}, do not show which are simultaneous. Give simultaneous images the same name or number.</source>
+        <translation>{few} 有 {n_few} 幅图像，{many} 有 {n_many} 幅，其名称（如 {example} 和 {other}）无法说明哪些是同时的。请给同时的图像相同的名称或编号。</translation>
+    </message>
+    <message>
         <source>There are {n_images} images; at least {needed} are needed, and 300 are usual. Record a swing of 15 seconds or more, 10 images a second or more.</source>
         <translation>现有 {n_images} 幅图像；至少需要 {needed} 幅，通常为 300 幅。请记录 15 秒或更长的摆动，每秒 10 幅或更多。</translation>
     </message>
@@ -8456,6 +8866,10 @@ mm</translation>
     <message>
         <source>This place of the ring was probed before. Probe it elsewhere.</source>
         <translation>圆环的这一处已触测过。请触测别处。</translation>
+    </message>
+    <message>
+        <source>This place of the sphere was probed before. Probe it elsewhere.</source>
+        <translation>球的此处已探测过。请探测其他位置。</translation>
     </message>
     <message>
         <source>This posture was recorded before. Keep the tip in the cone and change the pen tilt.</source>
@@ -8510,12 +8924,20 @@ mm</translation>
         <translation>请将 LED 朝向相机。没有数据丢失。</translation>
     </message>
     <message>
+        <source>U (k = 2) of the diameter is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not verify the tip.</source>
+        <translation>直径的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：这不能验证测头。</translation>
+    </message>
+    <message>
         <source>U (k = 2) of the length at {run} is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not verify the tip. Probe each end more often, and lay the length across the view.</source>
         <translation>{run} 处长度的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。请对每端多次触测，并使长度方向横对视线。</translation>
     </message>
     <message>
         <source>U (k = 2) of the radius is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not verify the tip.</source>
         <translation>半径的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of the tip along its weakest direction is compared with the limit of {limit:.4f} mm by simple acceptance (ILAC-G8:09/2019, 4.2.1; JCGM 106:2012, 8.2): U itself is the quantity judged, so the guard band is zero. U up to the limit is PASS, above it CHECK, above {far:.4f} mm, {times:g} times the limit, REPEAT.</source>
+        <translation>测头沿最弱方向的 U (k = 2) 按简单接受规则（ILAC-G8:09/2019，4.2.1；JCGM 106:2012，8.2）与限值 {limit:.4f} mm 比较：被判定的量就是 U 本身，因此保护带为零。U 不超过限值为 PASS，超过为 CHECK，超过 {far:.4f} mm（限值的 {times:g} 倍）为 REPEAT。</translation>
     </message>
     <message>
         <source>U (k = 2) of the tip is {uncertainty:.4f} mm, limit {limit:.4f} mm. Capture more images in other postures.</source>
@@ -8528,6 +8950,14 @@ mm</translation>
     <message>
         <source>U (k = 2) of the tip is {uncertainty:.4f} mm, limit {limit:.4f} mm; {share:.4f} mm is assumed for {advice}. More images hardly help.</source>
         <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。其中 {share:.4f} mm 为假定值，来自{advice}。增加图像几乎没有帮助。</translation>
+    </message>
+    <message>
+        <source>U alone</source>
+        <translation>单独 U</translation>
+    </message>
+    <message>
+        <source>U alone: U (k = 2) if the points shared no error. P: probability of conformity (JCGM 106).</source>
+        <translation>单独 U：各点无共同误差时的 U (k = 2)。P：合格概率 (JCGM 106)。</translation>
     </message>
     <message>
         <source>Verification complete. You can put the pen down.</source>
@@ -8582,6 +9012,10 @@ mm</translation>
         <translation>将点从测头坐标系映射到光笔坐标系的 ITK 变换 (.tfm)</translation>
     </message>
     <message>
+        <source>by the ball centres</source>
+        <translation>按球心计</translation>
+    </message>
+    <message>
         <source>calibration result</source>
         <translation>标定结果</translation>
     </message>
@@ -8612,6 +9046,10 @@ mm</translation>
     <message>
         <source>excluded manually</source>
         <translation>手动剔除</translation>
+    </message>
+    <message>
+        <source>feature</source>
+        <translation>要素</translation>
     </message>
     <message>
         <source>file of an unfinished verification</source>
@@ -8666,8 +9104,16 @@ mm</translation>
         <translation>无对应条目</translation>
     </message>
     <message>
+        <source>not recognised yet</source>
+        <translation>尚未识别</translation>
+    </message>
+    <message>
         <source>not simultaneous</source>
         <translation>不是同一时刻</translation>
+    </message>
+    <message>
+        <source>on its inside</source>
+        <translation>在其内侧</translation>
     </message>
     <message>
         <source>plane</source>
@@ -8730,10 +9176,6 @@ mm</translation>
         <translation>LED 文件。请更准确地测量 LED，并给出其不确定度</translation>
     </message>
     <message>
-        <source>the compliance of stylus, seat and stand. Make the press test, or use a stiffer stylus</source>
-        <translation>测杆、锥座和支架的柔度。请进行按压试验，或使用刚性更好的测杆</translation>
-    </message>
-    <message>
         <source>the distance of the two cones. Measure it more accurately</source>
         <translation>两个锥孔的间距。请更准确地测量</translation>
     </message>
@@ -8786,10 +9228,6 @@ mm</translation>
         <translation>{file} 已损坏：无法继续它所属的验证。其测点图像保留在原处。</translation>
     </message>
     <message>
-        <source>{file} is not an exported archive, or was modified: line {line}. Export it again with this version of the program.</source>
-        <translation>{file} 不是导出的档案库，或与导出时不符：第 {line} 行。请用此版本的程序重新导出。</translation>
-    </message>
-    <message>
         <source>{folder} contains images of a swing, but no {name}. Restore this file from a copy, or move the folder away.</source>
         <translation>{folder} 中有摆动的图像，但没有 {name}。请用备份恢复该文件，或移走文件夹。</translation>
     </message>
@@ -8822,16 +9260,8 @@ mm</translation>
         <translation>{n_images} 幅图像中有 {n_dropped} 幅被剔除。若测头滑动过，请重新摆动。</translation>
     </message>
     <message>
-        <source>{n_duplicates} views show the board where another view shows it, and do not count; {n_views} views remain: {names}. Move the board between views.</source>
-        <translation>{n_duplicates} 个视图中标定板的位姿与另一视图相同，不计入；剩余 {n_views} 个视图：{names}。请在各视图之间移动标定板。</translation>
-    </message>
-    <message>
         <source>{n_failed} of {n_trials} trials failed: the swing is too weak for simulation. Capture more images in other postures.</source>
         <translation>{n_trials} 次模拟中有 {n_failed} 次求不出测头：该摆动太差，无法用模拟重复。请以其他姿态采集更多图像。</translation>
-    </message>
-    <message>
-        <source>{n_found} LEDs are found, and the sketch has {n_sketched}. Give a sketch with all LEDs of the pen, or none.</source>
-        <translation>找到 {n_found} 个 LED，而草图有 {n_sketched} 个。请给出包含光笔所有 LED 的草图，或不给出草图。</translation>
     </message>
     <message>
         <source>{n_leds} LEDs are seen; at least {needed} are needed. Keep the whole pen in view, switch on all LEDs, and check exposure and focus.</source>
@@ -8860,14 +9290,6 @@ mm</translation>
     <message>
         <source>{n_points} points do not determine a {kind}; at least {needed} are needed. Probe more points.</source>
         <translation>{n_points} 个点不能确定{kind}；至少需要 {needed} 个。请触测更多点。</translation>
-    </message>
-    <message>
-        <source>{n_tips} calibration does not show repeatability; give two at least, ten are usual.</source>
-        <translation>{n_tips} 次标定看不出重复性；请至少给出两次，通常为十次。</translation>
-    </message>
-    <message>
-        <source>{name} cannot be written in the form of Kalibr: its model radtan has k1 k2 p1 p2 alone, and this camera needs more. Write it in the form of OpenCV.</source>
-        <translation>{name} 不能以 Kalibr 形式写出：其模型 radtan 只有 k1 k2 p1 p2，而此相机需要更多系数。请以 OpenCV 形式写出。</translation>
     </message>
     <message>
         <source>{name} describes a fisheye lens ({model}). The fisheye model of Kannala and Brandt (equidistant) is supported: calibrate the camera again with it.</source>
@@ -8906,10 +9328,6 @@ mm</translation>
         <translation>{reason} {power}</translation>
     </message>
     <message>
-        <source>{text} is no scale check. Enter the stated length, the measured length and its U (k = 2) in mm, such as 200 200.12 0.04; for a screen the pixel pitch and its U, such as 0.2331 0.0002.</source>
-        <translation>{text} 不是比例核查。请输入标称长度、实测长度及其 U (k = 2)，单位 mm，例如 200 200.12 0.04；屏幕则输入像素间距及其 U，例如 0.2331 0.0002。</translation>
-    </message>
-    <message>
         <source>{unit} is not a supported unit of length. Choose one of {known}.</source>
         <translation>{unit} 不是本程序支持的长度单位。请从 {known} 中选择。</translation>
     </message>
@@ -8934,10 +9352,6 @@ mm</translation>
         <translation>{others}和{last}</translation>
     </message>
     <message>
-        <source>{path} cannot be written: {reason} What was there before is unchanged.</source>
-        <translation>无法写入 {path}：{reason}原有内容未变。</translation>
-    </message>
-    <message>
         <source>{path} does not contain all input data of the calibration. Calibrate from the images.</source>
         <translation>{path} 未包含计算测头所用的全部数据。请用图像标定。</translation>
     </message>
@@ -8948,10 +9362,6 @@ mm</translation>
     <message>
         <source>{path} was written by a later version of the program (format {number}; this version reads up to {known}). Open the record with that version.</source>
         <translation>{path} 由更新版本的程序写入（格式 {number}；本版本最高读取 {known}）。请用该版本打开此记录。</translation>
-    </message>
-    <message>
-        <source>{place}: the normal {normal} does not have the length 1. Correct it, or leave the normals away if all discs face +z.</source>
-        <translation>{place}：法向量 {normal} 的长度不为 1。请改正；若所有发光面都朝 +z，可以不给法向量。</translation>
     </message>
     <message>
         <source>{posture} has {n_touches} usable points, {needed} are needed in each posture.</source>
@@ -8966,8 +9376,16 @@ mm</translation>
         <translation>{run} 有 {n_touches} 个可用的测点；长度需要两端。请对每一端至少触测一次。</translation>
     </message>
     <message>
+        <source>{run}: the pen was not held still for {n_all} images on any point ({n_settling} to settle, {n_frames} that count). Hold it still longer, use fewer images per point, or use each image as a point.</source>
+        <translation>{run}：光笔在任何点上都未静止满 {n_all} 幅图像（{n_settling} 幅用于稳定，{n_frames} 幅计入）。请保持静止更久、减少每点图像数，或将每幅图像作为一个点。</translation>
+    </message>
+    <message>
         <source>{text} is not a board. Use a form such as {forms}; lengths are in mm.</source>
         <translation>{text} 不是标定板。请按如下形式命名：{forms}；长度单位为 mm。</translation>
+    </message>
+    <message>
+        <source>{text} is not a scale check. Enter the stated length, the measured length and its U (k = 2) in mm, such as 200 200.12 0.04; for a screen the pixel pitch and its U, such as 0.2331 0.0002.</source>
+        <translation>{text} 不是比例核查。请输入标称长度、实测长度及其 U (k = 2)，单位 mm，例如 200 200.12 0.04；屏幕则输入像素间距及其 U，例如 0.2331 0.0002。</translation>
     </message>
     <message>
         <source>{told} They have the size of {other}: check that the images are in the order of the cameras of the rig file.</source>
@@ -8980,6 +9398,142 @@ mm</translation>
     <message>
         <source>{reason}. Choose another folder or name.</source>
         <translation>{reason}。请选择其他文件夹或名称。</translation>
+    </message>
+    <message>
+        <source>The LEDs cannot be tracked: no {needed} successive images of {n_images} show the same 5 LEDs. Give the images in the order of capture, 10 or more a second, with the whole pen in view.</source>
+        <translation>无法跟踪 LED：{n_images} 幅图像中没有连续 {needed} 幅显示相同的 5 个 LED。请按采集顺序给出图像，每秒 10 幅以上，且整支光笔在视场内。</translation>
+    </message>
+    <message>
+        <source>The LEDs found do not match the sketch in any order. Check that the sketch is of this pen, right-handed, in millimetres and accurate to 5 mm.</source>
+        <translation>找到的 LED 以任何顺序都与草图不符。请检查草图是否属于此光笔、为右手系、单位为毫米且精度为 5 mm。</translation>
+    </message>
+    <message>
+        <source>The LEDs light one after the other, {size:.4f} image intervals apart; the result is corrected and U includes the rest. Light all LEDs at once, or hold the pen still for each image.</source>
+        <translation>LED 依次点亮，间隔为 {size:.4f} 个图像周期；结果已修正，其余计入 U。请同时点亮所有 LED，或每幅图像时保持光笔静止。</translation>
+    </message>
+    <message>
+        <source>The LEDs span only {extent:.4g} mm, less than one disc of {diameter:g} mm. If the coordinates are in metres, state the unit, for example in the header: x_m, y_m, z_m.</source>
+        <translation>LED 的跨度仅 {extent:.4g} mm，小于一个 {diameter:g} mm 的圆盘。若坐标单位为米，请注明单位，例如在表头写：x_m, y_m, z_m。</translation>
+    </message>
+    <message>
+        <source>The LEDs span {extent:.6g} m; a pen spans at most {most:g} m. Check that the coordinates are in millimetres, also in the header, or state their unit.</source>
+        <translation>LED 的跨度为 {extent:.6g} m；光笔最多 {most:g} m。请检查坐标是否以毫米为单位（表头也是），或注明其单位。</translation>
+    </message>
+    <message>
+        <source>The adjustment did not converge in {n_steps} iterations: the views are too similar, or the board is another one, or far from flat. Add views with the board tilted by 20° to 40° to each side and in each corner of the image; otherwise count and measure the squares again.</source>
+        <translation>平差在 {n_steps} 次迭代内未收敛：视图过于相似，或标定板不是所述的，或远非平面。请增加标定板向各侧倾斜 20° 至 40° 及位于图像各角的视图；否则请重新数并测量方格。</translation>
+    </message>
+    <message>
+        <source>The archive contains entries of chain {chain}, but not the chain itself.</source>
+        <translation>存档含有链 {chain} 的条目，但没有该链本身。</translation>
+    </message>
+    <message>
+        <source>The columns of pixels are not perpendicular to the rows, by {degrees:.2f}°: the images were sheared by software, an interlaced source, or a rolling shutter before a moving board. Use unprocessed images of a board at rest.</source>
+        <translation>像素列与行不垂直，相差 {degrees:.2f}°：图像因软件、隔行信号或卷帘快门拍摄运动标定板而剪切变形。请使用静止标定板的未处理图像。</translation>
+    </message>
+    <message>
+        <source>The cone is complete: this point does not count. Continue with the next artefact.</source>
+        <translation>锥孔已完成：此点不计入。请继续下一个标准器。</translation>
+    </message>
+    <message>
+        <source>The database {name} is empty. Its administrator must set it up as described in docs/archive.md.</source>
+        <translation>数据库 {name} 为空。管理员须按 docs/archive.md 所述进行设置。</translation>
+    </message>
+    <message>
+        <source>The diameter of the sphere is not specified. Enter the certified one.</source>
+        <translation>未指定球的直径。请输入校准值。</translation>
+    </message>
+    <message>
+        <source>The drift reference moved by {distance:.4f} mm between {first} and {visit} (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the cone is not clamped, or the camera had not warmed up. Points measured in between have an error of this size.</source>
+        <translation>漂移参考在 {first} 与 {visit} 之间移动了 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：相机或锥孔未夹紧，或相机未预热。其间测量的点有同样大小的误差。</translation>
+    </message>
+    <message>
+        <source>The image shifts by {size:.3f} px with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it.</source>
+        <translation>图像随光笔倾斜移动 {size:.3f} px：相机随操作员移动而转动。结果已修正，其余计入 U。请将相机放在脚步不会使其移动的稳固支架上。</translation>
+    </message>
+    <message>
+        <source>The images are {size:.3f} image intervals late; the result is corrected and U includes the rest. Trigger all cameras by one signal.</source>
+        <translation>图像延迟 {size:.3f} 个图像周期；结果已修正，其余计入 U。请用同一信号触发所有相机。</translation>
+    </message>
+    <message>
+        <source>The images of swing {number} are of another size than those of the first. Give swings of one camera.</source>
+        <translation>摆动 {number} 的图像尺寸与第一次不同。请给出同一相机的摆动。</translation>
+    </message>
+    <message>
+        <source>The key of the station with chain {chain} is not in this user account; nothing can be signed. Use the account and computer of the station, copy the key here, or let a supervisor introduce another (documents: security).</source>
+        <translation>链 {chain} 所属工位的密钥不在此用户账户中；无法签名。请使用该工位的账户和计算机、将密钥复制到此处，或由主管引入新密钥（见文档：security）。</translation>
+    </message>
+    <message>
+        <source>The last swing contradicts the others: its tip is {tip:.3f} mm off, {times:.0f} standard deviations. Check that pen, tip, zoom and focus were the same in all swings.</source>
+        <translation>最后一次摆动与其他摆动矛盾：其测头相差 {tip:.3f} mm，即 {times:.0f} 倍标准差。请检查所有摆动中光笔、测头、变焦和对焦是否相同。</translation>
+    </message>
+    <message>
+        <source>The length is between LED {number} and itself. Give the numbers of two LEDs.</source>
+        <translation>长度两端都是 LED {number}。请给出两个 LED 的编号。</translation>
+    </message>
+    <message>
+        <source>The length limits U: a standard uncertainty of {sigma:.3f} mm would reduce U from {now:.0f} to {then:.0f} µm.</source>
+        <translation>长度限制了 U：标准不确定度为 {sigma:.3f} mm 时，U 将从 {now:.0f} 降至 {then:.0f} µm。</translation>
+    </message>
+    <message>
+        <source>The length of {length:g} mm does not fit LEDs {first} and {second}: it gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. It may be the length between LEDs {other} and {another}. Check which LEDs were measured, and the diameter of the discs.</source>
+        <translation>长度 {length:g} mm 与 LED {first} 和 {second} 不符：由此得圆盘直径 {found:.2f} mm，给定为 {stated:g} mm。它可能是 LED {other} 与 {another} 之间的长度。请检查测量的是哪些 LED 以及圆盘直径。</translation>
+    </message>
+    <message>
+        <source>The lengths contradict each other: LEDs {first} and {second} are stated {stated:.3f} mm apart; the other lengths give {implied:.3f} mm. Check the numbers of the LEDs, and measure again.</source>
+        <translation>各长度互相矛盾：LED {first} 与 {second} 给定相距 {stated:.3f} mm；由其他长度得 {implied:.3f} mm。请检查 LED 编号并重新测量。</translation>
+    </message>
+    <message>
+        <source>The lens deviates by {size:.3f} px (RMS) from its distortion model; the result is corrected and U includes the rest. Calibrate the camera with views that fill the image; its file then states the lens field.</source>
+        <translation>镜头偏离畸变模型 {size:.3f} px (RMS)；结果已修正，其余计入 U。请用充满图像的视图标定相机；其文件随后会给出镜头残差场。</translation>
+    </message>
+    <message>
+        <source>The part is measured.</source>
+        <translation>工件已测量。</translation>
+    </message>
+    <message>
+        <source>The pen tilt differs from that of the first visit, so this point does not count. Hold the pen as at the first visit, so that systematic errors of the pen cancel.</source>
+        <translation>光笔倾斜与首次探测时不同，因此此点不计入。请按首次的姿态握持光笔，使光笔的系统误差抵消。</translation>
+    </message>
+    <message>
+        <source>The pen tilt differs from that of the points before, so this point does not count. Keep the tilt until the posture is complete.</source>
+        <translation>光笔倾斜与之前的点不同，因此此点不计入。请在该姿态完成前保持倾斜。</translation>
+    </message>
+    <message>
+        <source>The points are {rms:.2f} px from those of a flat board {board}: its squares differ from the description, it is bent, or the images are not from one camera with one focus. Count and measure its squares again.</source>
+        <translation>各点与平面标定板 {board} 的点相差 {rms:.2f} px：方格与描述不符、标定板弯曲，或图像并非来自同一相机同一对焦。请重新数并测量方格。</translation>
+    </message>
+    <message>
+        <source>The points cover too little of a sphere to determine it. Probe its upper half all over, from the pole to the equator.</source>
+        <translation>这些点覆盖的球面太小，无法确定球。请在整个上半部探测，从顶点到赤道。</translation>
+    </message>
+    <message>
+        <source>The points deviate by up to {form:.4f} mm from a sphere (limit {limit:.4f} mm): the tip slipped, the sphere is dirty, or the tip is wrong.</source>
+        <translation>这些点与球面最大偏差 {form:.4f} mm（限值 {limit:.4f} mm）：测头打滑、球不清洁或测头有误。</translation>
+    </message>
+    <message>
+        <source>The points lie on a circle of radius {measured:.3f} mm; certified are {certified} mm. Check that it is this ring, and that the radius is entered, not the diameter.</source>
+        <translation>各点位于半径 {measured:.3f} mm 的圆上；校准值为 {certified} mm。请检查是否为此环规，且填写的是半径而不是直径。</translation>
+    </message>
+    <message>
+        <source>The points lie on a sphere of diameter {measured:.3f} mm, certified are {certified} mm. Is it this sphere, its diameter rather than its radius, and is the ball diameter stated?</source>
+        <translation>这些点位于直径 {measured:.3f} mm 的球面上，校准值为 {certified} mm。是否为此球？填写的是直径而不是半径吗？是否给出了测球直径？</translation>
+    </message>
+    <message>
+        <source>The points lie on no sphere: {n_off} of {n} are outliers, and the others deviate by up to {off:.2f} mm. Probe one sphere.</source>
+        <translation>这些点不在球面上：{n} 个中有 {n_off} 个离群点，其余最大偏差 {off:.2f} mm。请只探测一个球。</translation>
+    </message>
+    <message>
+        <source>The points of {run} are at more than two positions: {touch} is {distance:.2f} mm from the others of its end. Was the pen lifted there? Probe only the two ends.</source>
+        <translation>{run} 的点位于两个以上的位置：{touch} 与其所在端的其他点相距 {distance:.2f} mm。光笔是否在该处被抬起？请只探测两端。</translation>
+    </message>
+    <message>
+        <source>The rows of the images are read one after the other, over {size:.3f} image intervals (rolling shutter); the result is corrected and U includes the rest. Use a global shutter, or hold the pen still for each image.</source>
+        <translation>图像各行依次读出，历时 {size:.3f} 个图像周期（卷帘快门）；结果已修正，其余计入 U。请使用全局快门，或每幅图像时保持光笔静止。</translation>
+    </message>
+    <message>
+        <source>The seal {file} is missing: entries removed from the end of the archive cannot be detected.</source>
+        <translation>缺少封签 {file}：无法发现从存档末尾删除的条目。</translation>
     </message>
     <message>
         <source>{name} is a list; an LED file is a mapping with leds and units. Correct the file.</source>
@@ -9014,16 +9568,16 @@ mm</translation>
         <translation>{name} 与记录时不同（校验和错误）。请用备份恢复。</translation>
     </message>
     <message>
-        <source>{other} was made with another LED file than {first}. Give calibrations of one pen with one LED file.</source>
-        <translation>{other} 所用的 LED 文件与 {first} 不同。请给出同一支光笔、同一 LED 文件的标定结果。</translation>
-    </message>
-    <message>
         <source>{path} cannot be changed: {reason}. Check the write permission.</source>
         <translation>无法更改 {path}：{reason}。请确认您有写入权限。</translation>
     </message>
     <message>
         <source>{path} cannot be written: it is a folder. Choose a file name.</source>
         <translation>无法写入 {path}：它是文件夹。请指定文件。</translation>
+    </message>
+    <message>
+        <source>{path} cannot be written: {reason} The previous content is unchanged.</source>
+        <translation>无法写入 {path}：{reason} 原有内容未改变。</translation>
     </message>
     <message>
         <source>{path} has several cameras or two cones; only records of one camera and one cone can be recomputed. Calibrate from the images.</source>
@@ -9078,16 +9632,16 @@ mm</translation>
         <translation>{place}是相机组的基准，其位置没有不确定度。请删除它的 {key}。</translation>
     </message>
     <message>
+        <source>{place}: the normal {normal} does not have the length 1. Correct it, or omit the normals if all discs face +z.</source>
+        <translation>{place}：法向量 {normal} 的长度不为 1。请更正；若所有圆盘都朝 +z，可省略法向量。</translation>
+    </message>
+    <message>
         <source>{run}: LED positions and images disagree: {rms:.1f} px; usual is {usual} px or less. Check that the images show this pen with this camera.</source>
         <translation>{run}：LED 位置与图像不符：{rms:.1f} px，通常不超过 {usual} px。请检查图像是否属于这支光笔和这台相机。</translation>
     </message>
     <message>
         <source>{run}: none of the {n_images} images shows the pen ({why}). {advice}</source>
         <translation>{run}：{n_images} 幅图像均未显示光笔（{why}）。{advice}</translation>
-    </message>
-    <message>
-        <source>{run}: the pen was not held still for {n_all} images on any point ({n_settling} to settle, {n_frames} that count). Hold it still longer, ask for fewer images of a point, or take each image for a point.</source>
-        <translation>{run}：光笔在任何点上都没有保持静止达 {n_all} 幅图像（{n_settling} 幅用于稳定，{n_frames} 幅计入）。请保持静止更久，减少每点的图像数，或把每幅图像作为一个测点。</translation>
     </message>
     <message>
         <source>{usable}; the tip needs at least {needed}. {advice}</source>
@@ -9382,6 +9936,10 @@ mm</translation>
         <translation>测球直径</translation>
     </message>
     <message>
+        <source>Measured</source>
+        <translation>测得值</translation>
+    </message>
+    <message>
         <source>Computed</source>
         <translation>计算时间</translation>
     </message>
@@ -9402,6 +9960,14 @@ mm</translation>
         <translation>图像来源</translation>
     </message>
     <message>
+        <source>Next due</source>
+        <translation>下次到期</translation>
+    </message>
+    <message>
+        <source>Status</source>
+        <translation>状态</translation>
+    </message>
+    <message>
         <source>[U+...] is the Unicode number of a character missing in the fonts of this report.</source>
         <translation>[U+...] 为本报告字体所缺字符的 Unicode 编码。</translation>
     </message>
@@ -9414,8 +9980,16 @@ mm</translation>
         <translation>前一条目的 SHA-256</translation>
     </message>
     <message>
-        <source>All figures are taken from this file, which is the complete original. They relate only to the items named, in their condition at the time. This is a calibration report, not a certificate of an accredited laboratory. It must not be reproduced except in full.</source>
-        <translation>全部数据取自该文件；该文件为完整的原始记录。数据仅对所列器具在当时的状态有效。本文件为标定报告，不是认可实验室出具的校准证书。未经全文复制不得部分复制。</translation>
+        <source>RETIRED</source>
+        <translation>已停用</translation>
+    </message>
+    <message>
+        <source>OVERDUE</source>
+        <translation>已过期</translation>
+    </message>
+    <message>
+        <source>valid</source>
+        <translation>有效</translation>
     </message>
     <message>
         <source>End of report</source>
@@ -9496,6 +10070,10 @@ mm</translation>
     <message>
         <source>The contributions are combined as root sum of squares. Assumed values are stated in no file; they are set by the station or the program.</source>
         <translation>各分量按平方和合成。“假定”值未在文件中给出，由工位设置或程序取定。</translation>
+    </message>
+    <message>
+        <source>Self-check: half of the LEDs predict the others to {0} times their uncertainty; at most {1} by chance.</source>
+        <translation>自检：一半 LED 对其余 LED 的预测误差为其不确定度的 {0} 倍；偶然最多 {1} 倍。</translation>
     </message>
     <message>
         <source>Image noise</source>
@@ -9738,6 +10316,10 @@ mm</translation>
         <translation>标定人</translation>
     </message>
     <message>
+        <source>All figures are taken from this file, which is the complete original. They relate only to the items named, in their condition at the time. This is a report, not a certificate of an accredited laboratory. It must not be reproduced except in full.</source>
+        <translation>所有数值均取自此文件，它是完整原件。数值仅适用于所列物品当时的状态。本文件是报告，不是认可实验室的证书。除全文外不得复制。</translation>
+    </message>
+    <message>
         <source>Checked by</source>
         <translation>核验人</translation>
     </message>
@@ -9782,6 +10364,10 @@ mm</translation>
         <translation>相机随光笔的倾斜</translation>
     </message>
     <message>
+        <source>Images not of the same moment</source>
+        <translation>图像不是同一时刻</translation>
+    </message>
+    <message>
         <source>Effects too uncertain to be fitted</source>
         <translation>尚不确定而未拟合的影响</translation>
     </message>
@@ -9800,6 +10386,150 @@ mm</translation>
     <message>
         <source>not stated</source>
         <translation>未注明</translation>
+    </message>
+    <message>
+        <source>Characteristics / mm, degrees</source>
+        <translation>特性 / mm，度</translation>
+    </message>
+    <message>
+        <source>Features / mm</source>
+        <translation>要素 / mm</translation>
+    </message>
+    <message>
+        <source>Points</source>
+        <translation>测点数</translation>
+    </message>
+    <message>
+        <source>Measuring plan</source>
+        <translation>测量计划</translation>
+    </message>
+    <message>
+        <source>Characteristic</source>
+        <translation>特性</translation>
+    </message>
+    <message>
+        <source>Nominal</source>
+        <translation>公称值</translation>
+    </message>
+    <message>
+        <source>Actual</source>
+        <translation>实际值</translation>
+    </message>
+    <message>
+        <source>Deviation</source>
+        <translation>偏差</translation>
+    </message>
+    <message>
+        <source>U (k = 2)</source>
+        <translation>U (k = 2)</translation>
+    </message>
+    <message>
+        <source>U alone</source>
+        <translation>单独 U</translation>
+    </message>
+    <message>
+        <source>P</source>
+        <translation>P</translation>
+    </message>
+    <message>
+        <source>Decision</source>
+        <translation>判定</translation>
+    </message>
+    <message>
+        <source>U alone: U (k = 2) if the points shared no error. P: probability of conformity (JCGM 106).</source>
+        <translation>单独 U：各点无共同误差时的 U (k = 2)。P：合格概率 (JCGM 106)。</translation>
+    </message>
+    <message>
+        <source>Uncertainty budget, U (k = 2) by source</source>
+        <translation>不确定度预算，各来源的 U (k = 2)</translation>
+    </message>
+    <message>
+        <source>Feature</source>
+        <translation>要素</translation>
+    </message>
+    <message>
+        <source>Kind</source>
+        <translation>类型</translation>
+    </message>
+    <message>
+        <source>Sizes</source>
+        <translation>尺寸</translation>
+    </message>
+    <message>
+        <source>Form error</source>
+        <translation>形状误差</translation>
+    </message>
+    <message>
+        <source>Coordinates are in the frame of the camera.</source>
+        <translation>坐标为相机坐标系。</translation>
+    </message>
+    <message>
+        <source>Coordinates are in the frame of the part. Camera to part:</source>
+        <translation>坐标为工件坐标系。相机到工件：</translation>
+    </message>
+    <message>
+        <source>Shift</source>
+        <translation>平移</translation>
+    </message>
+    <message>
+        <source>{0} points; deviations are drawn {1} times as large, at most {2} mm.</source>
+        <translation>{0} 个点；偏差放大 {1} 倍显示，最大 {2} mm。</translation>
+    </message>
+    <message>
+        <source>Nominals / mm, degrees</source>
+        <translation>公称值 / mm，度</translation>
+    </message>
+    <message>
+        <source>Verification report</source>
+        <translation>验证报告</translation>
+    </message>
+    <message>
+        <source>Verified by</source>
+        <translation>验证人</translation>
+    </message>
+    <message>
+        <source>Measurement report</source>
+        <translation>测量报告</translation>
+    </message>
+    <message>
+        <source>Measured by</source>
+        <translation>测量人</translation>
+    </message>
+    <message>
+        <source>Pen {0}, tip {1}, {2}</source>
+        <translation>光笔 {0}，测头 {1}，{2}</translation>
+    </message>
+    <message>
+        <source>Item under verification</source>
+        <translation>被验证物品</translation>
+    </message>
+    <message>
+        <source>Task</source>
+        <translation>任务</translation>
+    </message>
+    <message>
+        <source>Verified</source>
+        <translation>已验证</translation>
+    </message>
+    <message>
+        <source>Verdict</source>
+        <translation>结论</translation>
+    </message>
+    <message>
+        <source>Measured, not judged.</source>
+        <translation>已测量，未判定。</translation>
+    </message>
+    <message>
+        <source>Limits / mm</source>
+        <translation>限值 / mm</translation>
+    </message>
+    <message>
+        <source>Figures, as the JSON file names them</source>
+        <translation>数值（名称同 JSON 文件）</translation>
+    </message>
+    <message>
+        <source>yes</source>
+        <translation>是</translation>
     </message>
 </context>
 <context>
@@ -10091,6 +10821,10 @@ mm</translation>
     <message>
         <source>camera tilt</source>
         <translation>相机倾斜</translation>
+    </message>
+    <message>
+        <source>timing</source>
+        <translation>时间同步</translation>
     </message>
     <message>
         <source>unmodelled effects</source>
