@@ -255,7 +255,7 @@ class Stage:
 
     def go_to(self, step: str) -> None:
         """Go to a step and fill it."""
-        self.wizard.window.go_to(STEPS.index(step))
+        self.wizard.window.show_step(step)
         self._settle()
         getattr(self, f"_fill_{step}")()
         self._settle()

@@ -1377,7 +1377,7 @@ def test_a_pen_is_not_written_over_the_measured_leds(
     (tmp_path / "inner").mkdir()
     same = tmp_path / "inner" / ".." / "raw.csv"
 
-    assert_refused(lightpen("pen", raw, same), "replace the measured LEDs")
+    assert_refused(lightpen("pen", raw, same), "replace its input, the measured LEDs")
     assert raw.read_bytes() == before
 
 

@@ -120,7 +120,7 @@ def test_what_a_record_brings_itself_is_refused_beside_it(
     outcome = lightpen("calibrate", "--from-record", calibrated[0], "--units", "mm")
     both = lightpen("calibrate", "images", "--from-record", calibrated[0])
 
-    assert "Leave out --units" in outcome.stderr
+    assert "Omit --units" in outcome.stderr
     assert "Give either IMAGES" in both.stderr
     assert (outcome.returncode, both.returncode) == (2, 2)
 

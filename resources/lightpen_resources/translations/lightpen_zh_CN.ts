@@ -3362,7 +3362,7 @@
     </message>
     <message>
         <source>Save a plan with the measured features as nominals.</source>
-        <translation>以测得的要素为公称值保存测量计划。</translation>
+        <translation>以测得的要素为标称值保存测量计划。</translation>
     </message>
     <message>
         <source>Export...</source>
@@ -5989,7 +5989,7 @@ mm</translation>
     </message>
     <message>
         <source>Nominal</source>
-        <translation>公称值</translation>
+        <translation>标称</translation>
     </message>
     <message>
         <source>Nominal tip, {axis}: {flaw}</source>
@@ -8937,7 +8937,7 @@ mm</translation>
     </message>
     <message>
         <source>U (k = 2) of the tip along its weakest direction is compared with the limit of {limit:.4f} mm by simple acceptance (ILAC-G8:09/2019, 4.2.1; JCGM 106:2012, 8.2): U itself is the quantity judged, so the guard band is zero. U up to the limit is PASS, above it CHECK, above {far:.4f} mm, {times:g} times the limit, REPEAT.</source>
-        <translation>测头沿最弱方向的 U (k = 2) 按简单接受规则（ILAC-G8:09/2019，4.2.1；JCGM 106:2012，8.2）与限值 {limit:.4f} mm 比较：被判定的量就是 U 本身，因此保护带为零。U 不超过限值为 PASS，超过为 CHECK，超过 {far:.4f} mm（限值的 {times:g} 倍）为 REPEAT。</translation>
+        <translation>测头沿最弱方向的 U (k = 2) 按简单接受规则（ILAC-G8:09/2019，4.2.1；JCGM 106:2012，8.2）与限值 {limit:.4f} mm 比较：被判定的量就是 U 本身，因此保护带为零。U 不超过限值判为“合格”，超过判为“需检查”，超过 {far:.4f} mm（限值的 {times:g} 倍）判为“重新摆动”。</translation>
     </message>
     <message>
         <source>U (k = 2) of the tip is {uncertainty:.4f} mm, limit {limit:.4f} mm. Capture more images in other postures.</source>
@@ -10409,7 +10409,7 @@ mm</translation>
     </message>
     <message>
         <source>Nominal</source>
-        <translation>公称值</translation>
+        <translation>标称</translation>
     </message>
     <message>
         <source>Actual</source>
@@ -10477,7 +10477,7 @@ mm</translation>
     </message>
     <message>
         <source>Nominals / mm, degrees</source>
-        <translation>公称值 / mm，度</translation>
+        <translation>标称值 / mm，度</translation>
     </message>
     <message>
         <source>Verification report</source>

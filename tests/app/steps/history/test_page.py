@@ -710,7 +710,7 @@ def test_a_file_that_is_no_archive_is_refused_in_words(
     desk.choose_file(tmp_path / "other.jsonl")
 
     desk.until(lambda: desk.notices)
-    assert "is not an exported archive, or was modified:" in desk.notices[0]
+    assert "is not an exported archive, or was modified (line 2)." in desk.notices[0]
 
 
 def test_no_trend_is_left_of_what_is_no_longer_looked_for(desk: Desk) -> None:
