@@ -138,7 +138,7 @@ def test_the_worst_view_comes_first(found: CameraCalibration) -> None:
 
 
 def test_too_few_views_are_refused(make_views: MakeViews) -> None:
-    with pytest.raises(CalibrationError, match=f"in {MIN_VIEWS - 1} images"):
+    with pytest.raises(CalibrationError, match=f"{MIN_VIEWS - 1} images show"):
         calibrate_camera(make_views(n_views=MIN_VIEWS - 1), BoardTolerances())
 
 
@@ -149,7 +149,7 @@ def test_views_that_are_alike_are_refused(make_views: MakeViews) -> None:
     one = one + rng.uniform(-4, 4, (8, 1, 1, 2))
     alike = replace(views, pixels=one + rng.normal(0, 0.03, one.shape))
 
-    with pytest.raises(CalibrationError, match=r"too (alike|similar)"):
+    with pytest.raises(CalibrationError, match=r"too similar"):
         calibrate_camera(alike, BoardTolerances())
 
 

@@ -693,7 +693,7 @@ def test_a_recording_of_damaged_images_is_told(live: "Seen", tmp_path: Path) -> 
 
     live.enter("Folder, record or video", str(folder))
 
-    live.wait("frame_0.png is damaged or no image")
+    live.wait("frame_0.png is damaged or not a supported image")
 
 
 def test_a_recording_that_begins_damaged_shows_the_others(
@@ -1159,6 +1159,7 @@ def test_every_control_is_named_and_reached_by_tab(
         "Intrinsics file",
         "Open...",
         "Calibrate camera...",
+        "I have no such file...",
         "Use a second camera",
         "Draw mask on the image",
         "Search",
