@@ -3725,8 +3725,8 @@
         <translation>无更早结果</translation>
     </message>
     <message>
-        <source>LEDs predict each other: {0} (by chance up to {1})</source>
-        <translation>LED 互相预测：{0}（偶然最多 {1}）</translation>
+        <source>Self-check of the LEDs: {0}, limit {1}</source>
+        <translation>LED 自检：{0}，限值 {1}</translation>
     </message>
     <message>
         <source>Odd - even</source>

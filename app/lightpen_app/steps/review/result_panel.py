@@ -189,7 +189,7 @@ class ResultPanel(Translated, QFrame):
         """Return how well parts of the LEDs predict the others."""
         if check is None:
             return StatusMessage()
-        text = self.tr("LEDs predict each other: {0} (by chance up to {1})")
+        text = self.tr("Self-check of the LEDs: {0}, limit {1}")
         text = text.format(f"{check.value:.2f}", f"{check.limit:.2f}")
         if check.is_passed:
             return StatusMessage(text, Sign.CHECK, Tone.GOOD)
