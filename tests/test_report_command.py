@@ -58,12 +58,14 @@ def verification(tmp_path: Path) -> Path:
     return file
 
 
-def test_a_verification_is_put_on_paper(verification: Path, tmp_path: Path) -> None:
+def test_a_verification_is_put_on_paper(
+    script: Callable[..., CompletedProcess[str]], verification: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "drift.pdf"
-    write_paper(verification, out, "en")
-    pages = out.read_bytes()
+    outcome = script("report", verification, "--out", out, environment=UNSEEN)
 
-    assert pages.startswith(b"%PDF-1.4")
+    assert outcome.returncode == 0, outcome.stderr
+    assert out.read_bytes().startswith(b"%PDF-1.4")
     content, file = verification.read_bytes(), InputFile(verification, "0" * 64)
     paper = verification_paper(
         InputFile(verification, file.sha256, content),

@@ -12,21 +12,9 @@ from lightpen_app.steps.verify.measure_page import MeasurePage
 from lightpen_app.steps.verify.page import VerifyPage
 from lightpen_app.work.workbench import Workbench
 
-# What the pages show only later, with plots and archive: neither the start nor the one
-# who opens it waits for these.
-LATER = (
-    "lightpen_app.steps.swing.plots_panel",
-    "lightpen_app.steps.review.plots_panel",
-    "lightpen_app.steps.review.images_panel",
-    "lightpen_app.steps.verify.pen_panel",
-    "lightpen_app.steps.history.content",
-    "lightpen_app.steps.camera.board_window",
-)
-
 
 def make_pages(workbench: Workbench, sounds: Sounds) -> tuple[Page, ...]:
     """Return all pages."""
-    workbench.load_later(LATER)
     return (
         StartPage(workbench, sounds),
         CameraPage(workbench, sounds),

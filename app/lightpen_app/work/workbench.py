@@ -1,13 +1,11 @@
 """Shared objects of the pages, created, started and ended together."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from time import monotonic
 
-from PySide6.QtCore import QObject, QThreadPool, QTimer
+from PySide6.QtCore import QObject, QThreadPool
 
 from lightpen.formats.machine_settings import Update, read_update
 from lightpen.live.sources import SourceEnvironment
@@ -23,7 +21,7 @@ from lightpen_app.work.camera_files import FilesOfCameras
 from lightpen_app.work.camera_setup import CameraSetup
 from lightpen_app.work.chosen_files import ChosenFiles
 from lightpen_app.work.folder_watch import FolderWatch
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import Job
 from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView
 from lightpen_app.work.notifications import Notifications
@@ -36,7 +34,6 @@ from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.verification_run import VerificationRun
 
 LONGEST_FAREWELL = 2.0  # s that a camera may hold up the end of the program
-LATER_MS = 1000  # after the first events
 SETTINGS, UPDATE = "settings", "update"  # causes of notifications
 
 
@@ -117,8 +114,6 @@ class Workbench(QObject):
         )
         self.save_place = SavePlace(settings, self.run, around.now)
 
-        self._loading: Job | None = None
-
         # Connections: who computes knows a choice before who shows it
         self.selection.changed.connect(self._tell_runners)
         self.camera = CameraSetup(self.selection, self.live, settings, around, self)
@@ -147,11 +142,6 @@ class Workbench(QObject):
         self.files.start()
         self.camera.open()
 
-    def load_later(self, modules: Sequence[str]) -> None:
-        """Load modules that are not needed at once, after the window is shown."""
-        self._loading = loading = Job(partial(_load, modules), self)
-        QTimer.singleShot(0, self, partial(QTimer.singleShot, LATER_MS, loading.start))
-
     def shut_down(self, timeout_s: float = CLOSING_TIME) -> bool:
         """Close the camera, cancel running jobs and wait for their end.
 
@@ -165,8 +155,6 @@ class Workbench(QObject):
         for told in (self.run, self.verification, self.measuring):
             told.blockSignals(True)  # nothing more is begun because of what they tell
         self.folder_watch.stop()
-        if self._loading is not None:
-            self._loading.cancel()
         self.pens.shut_down()
         self.camera_files.shut_down()
         self.library.shut_down()
@@ -248,9 +236,3 @@ class Workbench(QObject):
 
     def _on_settings_relieved(self) -> None:
         self.notifications.withdraw(SETTINGS)
-
-
-def _load(modules: Sequence[str], report: Report) -> None:
-    for n_loaded, module in enumerate(modules):
-        report(n_loaded / len(modules))
-        import_module(module)

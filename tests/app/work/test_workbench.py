@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -34,7 +33,6 @@ from lightpen.swing.preparation import (
 )
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.work import workbench as workbench_module
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import FilePaths, StoredCamera
 from lightpen_app.work.workbench import Workbench
@@ -502,25 +500,6 @@ def test_shutting_down_twice_does_no_harm(stage: Stage) -> None:
     stage.workbench.shut_down()
 
     assert not stage.workbench.live.is_open
-
-
-def test_modules_are_loaded_later_but_not_after_the_end(
-    stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(workbench_module, "LATER_MS", 0)
-    monkeypatch.syspath_prepend(tmp_path)
-    for name in ("loaded_later", "loaded_never"):
-        (tmp_path / f"lightpen_{name}.py").touch()
-
-    stage.workbench.load_later(["lightpen_loaded_later"])
-    stage.qtbot.waitUntil(lambda: "lightpen_loaded_later" in sys.modules)
-    stage.workbench.load_later(["lightpen_loaded_never"])
-    stage.workbench.shut_down()
-    for _ in range(3):
-        QApplication.processEvents()
-        QThreadPool.globalInstance().waitForDone()
-
-    assert "lightpen_loaded_never" not in sys.modules
 
 
 def test_what_is_told_after_shutting_down_begins_nothing(stage: Stage) -> None:

@@ -121,7 +121,7 @@ def test_one_swing_and_swings_of_two_pens_are_refused(swing: Swing) -> None:
     inputs = structs.replace(other.calibration.inputs, pen=pen)
     record = structs.replace(other.calibration, inputs=inputs)
     of_other_pen = replace(other, calibration=record)
-    with pytest.raises(UsageError, match=r"swing 2\.json was made with another"):
+    with pytest.raises(UsageError, match=r"swing 2\.json was calibrated with another"):
         examine_pen([one, of_other_pen], paper_camera(), PEN_FILE.leds)
 
 

@@ -124,7 +124,7 @@ def test_a_touch_between_the_ends_is_refused_by_its_name(
 ) -> None:
     run = ("here", touching(np.array([START, START + np.array([40, 0, 0]), END])))
 
-    with pytest.raises(CalibrationError, match="more than two places: touch"):
+    with pytest.raises(CalibrationError, match="more than two positions: touch"):
         measure_length([run], Conditions(instrument, LIMITS), OPTIONS)
 
 
