@@ -562,7 +562,7 @@ def test_what_must_be_pressed_at_the_screen_is_not_pressed_from_afar(
 
 METHOD = {  # the title of the description, and a word of it
     "en": ("Method: tip centre and uncertainty", "restricted maximum likelihood"),
-    "zh_CN": ("方法：测头中心及其不确定度", "最大似然"),
+    "zh_CN": ("测头中心及其不确定度", "最大似然"),
 }
 
 
