@@ -198,7 +198,8 @@ def _parser(
         description="Calibrate the probe tip of a light pen."
         + (" Without a command, the wizard opens." * has_window),
         epilog="Exit status: 0 done, 1 no result from these data or a modified "
-        "archive, 2 wrong usage or unreadable input.",
+        "archive, 2 wrong usage or unreadable input; with --exit-by-verdict 3 REPEAT "
+        "and 4 CHECK.",
     )
     parser.set_defaults(verbose=False, log_level=None, log_folder=None)
     parser.add_argument("--version", action="version", version=__version__)

@@ -5,9 +5,6 @@ has bytes that belong to neither. As long as nothing was entered since, the file
 as it was sealed, bit by bit. Whatever was entered since, the archive must still hold
 the last entries of then: so one whose last entries were removed, with all that shows
 of them, is found, and one that was replaced by an older copy of itself.
-
-The first seals had one hash of all that. They are read as what they are, and the next
-time the archive is closed it is sealed as now.
 """
 
 from pathlib import Path
@@ -18,7 +15,7 @@ from sqlalchemy import select
 
 from lightpen.archive.chains import heads
 from lightpen.archive.database import Database, is_open
-from lightpen.archive.entries import Chain, ChainHead, text_sha256
+from lightpen.archive.entries import Chain, ChainHead
 from lightpen.archive.tables import ENTRIES
 from lightpen.errors import FileError
 from lightpen.formats.files import MEGABYTE, printable, read_bytes, sha256, write_whole
@@ -36,15 +33,9 @@ class SealedHead(Struct, frozen=True):
 
 
 class Seal(Struct, frozen=True):
-    """What a file was when it was closed.
+    """What a file was when it was closed."""
 
-    Attributes
-    ----------
-    heads : tuple of SealedHead, or str
-        Heads of all chains; in the first version one hash of them all.
-    """
-
-    heads: tuple[SealedHead, ...] | Digest
+    heads: tuple[SealedHead, ...]
     sha256: Digest
 
 
@@ -97,18 +88,15 @@ def read_seal(archive: Path) -> Seal | None:
 def lost_heads(database: Database, seal: Seal) -> tuple[SealedHead, ...]:
     """Return the last entries of then that an archive does not hold any more.
 
-    One of the first seals does not name them.
-
     Raises
     ------
     ArchiveError
         It cannot be read.
     """
-    heads_then = () if isinstance(seal.heads, str) else seal.heads
     with database.reading() as connection:
         return tuple(
             head
-            for head in heads_then
+            for head in seal.heads
             if head.number
             and connection.execute(
                 select(ENTRIES.c.sha256).where(
@@ -129,19 +117,12 @@ def is_sealed_otherwise(archive: Path, ends: tuple[ChainHead, ...], seal: Seal) 
     """
     if is_open(archive):
         return False
-    now = sealed_heads(ends)
-    same = _hash_of(now) if isinstance(seal.heads, str) else now
-    return seal.heads == same and seal.sha256 != sha256(archive)
+    return seal.heads == sealed_heads(ends) and seal.sha256 != sha256(archive)
 
 
 def sealed_heads(ends: tuple[ChainHead, ...]) -> tuple[SealedHead, ...]:
     """Return the heads stored in a seal."""
     return tuple(SealedHead(head.chain, head.number, head.sha256) for head in ends)
-
-
-def _hash_of(ends: tuple[SealedHead, ...]) -> str:
-    told = (f"{head.chain} {head.number} {head.sha256}" for head in ends)
-    return text_sha256(" ".join(told))
 
 
 def _tells_of_change(database: Database, archive: Path) -> bool:

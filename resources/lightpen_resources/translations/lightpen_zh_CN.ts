@@ -696,7 +696,7 @@
     </message>
     <message>
         <source>Tips of this station</source>
-        <translation>本工作站的测头</translation>
+        <translation>本工位的测头</translation>
     </message>
     <message>
         <source>Tip</source>
@@ -728,7 +728,7 @@
     </message>
     <message>
         <source>Set up station...</source>
-        <translation>设置工作站…</translation>
+        <translation>设置工位…</translation>
     </message>
 </context>
 <context>
@@ -1016,7 +1016,7 @@
     </message>
     <message>
         <source>This tip was accepted at another station.</source>
-        <translation>此测头是在另一个工作站接受的。</translation>
+        <translation>此测头是在另一个工位接受的。</translation>
     </message>
     <message>
         <source>This tip is current.</source>
@@ -2781,7 +2781,7 @@
     </message>
     <message>
         <source>Choose the data folder at Set up station or in the options (F10).</source>
-        <translation>请在“设置工作站”或选项 (F10) 中选择数据文件夹。</translation>
+        <translation>请在“设置工位”或选项 (F10) 中选择数据文件夹。</translation>
     </message>
 </context>
 <context>
@@ -3598,7 +3598,7 @@
     </message>
     <message>
         <source>The station is being set up.</source>
-        <translation>工作站正在设置。</translation>
+        <translation>工位正在设置。</translation>
     </message>
     <message>
         <source>The cause was found and has no effect on this tip.</source>
@@ -4258,7 +4258,7 @@
     <name>SetupView</name>
     <message>
         <source>Show the tips of this station</source>
-        <translation>显示本工作站的测头</translation>
+        <translation>显示本工位的测头</translation>
     </message>
 </context>
 <context>
@@ -4473,7 +4473,7 @@
     </message>
     <message>
         <source>Set up station</source>
-        <translation>设置工作站</translation>
+        <translation>设置工位</translation>
     </message>
     <message>
         <source>Choose a tip, seat it in the cone and start the swing.</source>
@@ -7637,7 +7637,7 @@ mm</translation>
     </message>
     <message>
         <source>Entry {number} is not of this station. Only a tip that was accepted here can be reinstated.</source>
-        <translation>第 {number} 条记录不属于本工作站。只有在此接受的测头才能恢复。</translation>
+        <translation>第 {number} 条记录不属于本工位。只有在此接受的测头才能恢复。</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} does not match its predecessor: one of the two was replaced.</source>
@@ -7649,7 +7649,7 @@ mm</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} introduces a station key that neither the key before nor a supervisor approved. Ask the station whether its data folder was moved to another computer.</source>
-        <translation>链 {chain} 的第 {number} 条记录引入了一个工作站密钥，既未经之前的密钥也未经主管批准。请询问该工作站其数据文件夹是否被移到另一台计算机。</translation>
+        <translation>链 {chain} 的第 {number} 条记录引入了一个工位密钥，既未经之前的密钥也未经主管批准。请询问该工位其数据文件夹是否被移到另一台计算机。</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} is missing.</source>
@@ -7661,7 +7661,7 @@ mm</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} is signed by a key that is not the station&apos;s: it was forged, or entered by a copy of the data folder on another computer.</source>
-        <translation>链 {chain} 的第 {number} 条记录不是用本工作站的密钥签名的：它是伪造的，或由另一台计算机上的数据文件夹副本登记。</translation>
+        <translation>链 {chain} 的第 {number} 条记录不是用本工位的密钥签名的：它是伪造的，或由另一台计算机上的数据文件夹副本登记。</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} was modified.</source>
@@ -8309,7 +8309,7 @@ mm</translation>
     </message>
     <message>
         <source>The file {file} is not signed by this station and its supervisor: it was changed or comes from elsewhere. Restore it from a copy, or move it away to continue without it.</source>
-        <translation>文件 {file} 未由本工作站及其主管签名：它被更改或来自别处。请从副本恢复，或将其移走后继续。</translation>
+        <translation>文件 {file} 未由本工位及其主管签名：它被更改或来自别处。请从副本恢复，或将其移走后继续。</translation>
     </message>
     <message>
         <source>The file {file} names no version, such as {{&quot;version&quot;: &quot;1.1.0&quot;}}. Ask the administrator to correct it.</source>
@@ -8437,7 +8437,7 @@ mm</translation>
     </message>
     <message>
         <source>The limits in {file} are not signed by this station and its supervisor: the file was changed or comes from elsewhere. Nothing is accepted until it is restored from a copy or removed.</source>
-        <translation>{file} 中的限值未由本工作站及其主管签名：该文件被更改或来自别处。在从副本恢复或删除之前，不接受任何结果。</translation>
+        <translation>{file} 中的限值未由本工位及其主管签名：该文件被更改或来自别处。在从副本恢复或删除之前，不接受任何结果。</translation>
     </message>
     <message>
         <source>The limits in {file} were modified or damaged after they were saved. Restore the file from a copy.</source>
@@ -8605,19 +8605,19 @@ mm</translation>
     </message>
     <message>
         <source>The server had the entries {first} to {last} of this station and no longer shows them. Ask its administrator whether they were removed or the user was changed. They are delivered again only on request.</source>
-        <translation>服务器曾有本工作站的第 {first} 至 {last} 条记录，现在不再显示。请询问其管理员是否已删除这些记录或更改了用户。仅在要求时才会重新传送。</translation>
+        <translation>服务器曾有本工位的第 {first} 至 {last} 条记录，现在不再显示。请询问其管理员是否已删除这些记录或更改了用户。仅在要求时才会重新传送。</translation>
     </message>
     <message>
         <source>The server has the chains of several stations: {chains}. Choose one.</source>
-        <translation>服务器有多个工作站的链：{chains}。请选择其一。</translation>
+        <translation>服务器有多个工位的链：{chains}。请选择其一。</translation>
     </message>
     <message>
         <source>The server has {there} entries of this station, this data folder only {here}: it was replaced by an older copy. Nothing was delivered. Fetch the missing entries from the server.</source>
-        <translation>服务器有本工作站的 {there} 条记录，而本数据文件夹只有 {here} 条：它被较旧的副本替换。未传送任何内容。请从服务器取回缺失的记录。</translation>
+        <translation>服务器有本工位的 {there} 条记录，而本数据文件夹只有 {here} 条：它被较旧的副本替换。未传送任何内容。请从服务器取回缺失的记录。</translation>
     </message>
     <message>
         <source>The server {name} has no entries of this station. Check the address and the user.</source>
-        <translation>服务器 {name} 没有本工作站的记录。请检查地址和用户。</translation>
+        <translation>服务器 {name} 没有本工位的记录。请检查地址和用户。</translation>
     </message>
     <message>
         <source>The settings for all users in {file} are wrong and were left out: {why}. Ask the administrator to correct the file.</source>
@@ -8637,11 +8637,11 @@ mm</translation>
     </message>
     <message>
         <source>The station key {file} was changed or damaged. Restore it from a copy, or remove it and let a supervisor introduce another (documents: security).</source>
-        <translation>工作站密钥 {file} 被更改或损坏。请从副本恢复，或删除后由主管引入新密钥（见文档：安全）。</translation>
+        <translation>工位密钥 {file} 被更改或损坏。请从副本恢复，或删除后由主管引入新密钥（见文档：安全）。</translation>
     </message>
     <message>
         <source>The station {station} has no limits in this data folder. A supervisor&apos;s approval and a reason are needed, or limits for this station.</source>
-        <translation>工作站 {station} 在本数据文件夹中没有限值。需要主管批准并说明理由，或为该工作站设置限值。</translation>
+        <translation>工位 {station} 在本数据文件夹中没有限值。需要主管批准并说明理由，或为该工位设置限值。</translation>
     </message>
     <message>
         <source>The supervisor password was wrong several times. Wait {seconds:.0f} s, then enter it again.</source>
@@ -8717,7 +8717,7 @@ mm</translation>
     </message>
     <message>
         <source>The tip of entry {number} was accepted earlier than the one before: the clock of the station was set back.</source>
-        <translation>第 {number} 条记录的测头的接受时间早于前一条：工作站的时钟被调回。</translation>
+        <translation>第 {number} 条记录的测头的接受时间早于前一条：工位的时钟被调回。</translation>
     </message>
     <message>
         <source>The tip rested on two points, {distance:.2f} mm apart: cone or tracker moved. First point: poses {first}. Second point: poses {second}. {consequence}</source>
@@ -9161,7 +9161,7 @@ mm</translation>
     </message>
     <message>
         <source>station key</source>
-        <translation>工作站密钥</translation>
+        <translation>工位密钥</translation>
     </message>
     <message>
         <source>systematic errors common to all poses: the scale of the tracker and of the pen, a worn or badly seated tip</source>
@@ -9221,7 +9221,7 @@ mm</translation>
     </message>
     <message>
         <source>{entry} belongs to the chain of this station, but was not entered here. Nothing was imported. If this data folder was replaced by an older copy, fetch the missing entries from the server; if not, the file was forged.</source>
-        <translation>{entry} 属于本工作站的链，但并非在此登记。未导入任何内容。若本数据文件夹被较旧的副本替换，请从服务器取回缺失的记录；否则该文件是伪造的。</translation>
+        <translation>{entry} 属于本工位的链，但并非在此登记。未导入任何内容。若本数据文件夹被较旧的副本替换，请从服务器取回缺失的记录；否则该文件是伪造的。</translation>
     </message>
     <message>
         <source>{file} is damaged: its verification cannot be continued. The images of its points stay where they are.</source>
@@ -9720,7 +9720,7 @@ mm</translation>
     </message>
     <message>
         <source>other station</source>
-        <translation>其他工作站</translation>
+        <translation>其他工位</translation>
     </message>
     <message>
         <source>current</source>

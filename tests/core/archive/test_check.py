@@ -5,7 +5,6 @@ import shutil
 import sqlite3
 from collections.abc import Callable
 from contextlib import closing
-from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -14,11 +13,8 @@ from tests.core.archive.conftest import Station
 from lightpen.archive.chains import copy_entries, records_of
 from lightpen.archive.check import check_archive, check_file
 from lightpen.archive.database import look_into
-from lightpen.archive.entries import text_sha256
-from lightpen.archive.seal import close_sealed, read_seal, seal_of
+from lightpen.archive.seal import close_sealed, seal_of
 from lightpen.errors import ArchiveError
-from lightpen.formats.json_records import json_bytes
-from lightpen.formats.own_json import with_checksum
 
 N_FLIPS = 60
 
@@ -181,30 +177,6 @@ def test_a_damaged_seal_is_named(archive: Path) -> None:
     seal.write_bytes(seal.read_bytes().replace(b"a", b"b"))
 
     assert any("The seal" in each for each in findings(archive))
-
-
-def test_one_of_the_first_seals_is_read_as_what_it_is(
-    archive: Path, make_station: Callable[[str], Station]
-) -> None:
-    """They had one hash of how far all chains had come."""
-    seal = read_seal(archive)
-    assert seal is not None
-    assert not isinstance(seal.heads, str)
-    (head,) = seal.heads
-    told = text_sha256(f"{head.chain} {head.number} {head.sha256}")
-    first = {"heads": told, "sha256": sha256(archive.read_bytes()).hexdigest()}
-    seal_of(archive).write_bytes(with_checksum(json_bytes(first)))
-    assert findings(archive) == []
-
-    data = archive.read_bytes()
-    archive.write_bytes(data + b" ")
-    assert findings(archive) == [f"The file {archive} was changed since it was closed."]
-
-    archive.write_bytes(data)
-    station = make_station(archive.parent.name)
-    station.enter(1, first=5)
-    close_sealed(station.database)
-    assert b'"number": 6' in seal_of(archive).read_bytes()
 
 
 def test_what_is_entered_after_a_seal_is_no_change(
