@@ -149,7 +149,10 @@ class Sidebar(Translated, QFrame):
             text = self.tr("Live stream at {0}, clients: {1}").format(
                 status.place, status.n_clients
             )
-            tone = Tone.ACTIVE if status.place.is_local else Tone.WARN
+            if status.n_slow:
+                text += " " + self.tr("({0} of them miss images)").format(status.n_slow)
+            is_fine = status.place.is_local and not status.n_slow
+            tone = Tone.ACTIVE if is_fine else Tone.WARN
             remark = StatusMessage(text, Sign.RING, tone)
         self._stream.set_value(remark)
 

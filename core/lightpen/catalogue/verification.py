@@ -222,6 +222,7 @@ MESSAGES = {
     "repeatability.point-moved": "A fixed point scatters by {of_point:.4f} mm, the tip by only {of_tip:.4f} mm over the calibrations. The tip is stable: the cone or the camera moved between the points, or the tip did not rest in the cone.",
     "repeatability.good": "The tip repeats within {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm.",
     "repeatability.too-few": "{n_tips} calibration does not show repeatability; give at least two, usually ten.",
+    "repeatability.twice": "{one} and {other} hold the same tip to the last digit. Give each calibration once.",
     "repeatability.scatters": "The tip scatters by {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm. Probe a fixed point several times: whether it scatters alike shows what moved.",
     "verification.another-under-way": "Another verification is not finished. Finish it or start over, then continue the interrupted one.",
     "verification.not-ready": "A name, the camera images or a file is missing. Complete the earlier steps, then continue the verification.",

@@ -111,6 +111,8 @@ def _stream(options: argparse.Namespace) -> None:
     def note(status: StreamStatus) -> None:
         if status.n_clients:
             is_heard.set()
+        if status.n_slow:
+            print(f"Clients that miss poses: {status.n_slow}.", file=sys.stderr)
 
     stream = PoseStream(on_change=note)
     stream.set_tip(listened.tip)

@@ -10,9 +10,10 @@ import logging
 import selectors
 import socket
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from ipaddress import ip_address
 from threading import Lock, Thread
@@ -33,6 +34,8 @@ LAST_PORT = 65535
 MOST_CLIENTS = 16
 ON_THE_WAY = 16_384  # bytes; a slow client misses poses rather than get old ones
 ROOM = 4096  # bytes; what clients send is ignored
+RECENT = 40  # poses offered to a client, of which it is slow if it misses
+SLOW = 4  # or more
 IDLE_S = 20.0  # a client that takes no data for so long is dropped
 # Of the system, so that a client whose line was cut is found.
 _KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
@@ -76,10 +79,13 @@ class StreamStatus:
     ----------
     place : StreamPlace or None
         None while the stream is closed.
+    n_slow : int
+        Clients that miss at least a tenth of the poses.
     """
 
     place: StreamPlace | None = None
     n_clients: int = 0
+    n_slow: int = 0
 
 
 @dataclass(eq=False)
@@ -91,12 +97,19 @@ class _Client:
     newest: bytes = b""
     active_s: float = field(default_factory=time.monotonic)  # it took or sent data
     waiting_s: float = field(default_factory=time.monotonic)  # since when data waits
+    misses: deque[bool] = field(default_factory=lambda: deque(maxlen=RECENT))
 
     def offer(self, data: bytes) -> None:
         """Make data the next to be sent, in place of what waits unsent."""
+        self.misses.append(bool(self.newest))
         if not self.is_waiting:
             self.waiting_s = time.monotonic()
         self.newest = data
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether it misses at least a tenth of the poses."""
+        return sum(self.misses) >= SLOW
 
     @property
     def is_waiting(self) -> bool:
@@ -234,8 +247,10 @@ class PoseStream:
                     if client.is_stuck(now_s):
                         _dismiss(client, selector)
                 clients = _clients(selector)
-                if len(clients) != self._status.n_clients:
-                    self._tell(replace(self._status, n_clients=len(clients)))
+                n_slow = sum(client.is_slow for client in clients)
+                status = StreamStatus(self._status.place, len(clients), n_slow)
+                if status != self._status:
+                    self._tell(status)
                 for client in clients:
                     selector.modify(client.connection, client.awaited, client)
 
@@ -252,7 +267,10 @@ class PoseStream:
 
     def _tell(self, status: StreamStatus) -> None:
         self._status = status
-        _logger.info("stream at %s, %d clients", status.place, status.n_clients)
+        _logger.info(
+            "stream at %s, %d clients, %d slow",
+            *(status.place, status.n_clients, status.n_slow),
+        )
         self._on_change(status)
 
 

@@ -268,6 +268,7 @@ def test_a_client_that_stalls_holds_up_nobody_and_misses_poses(
         for number in range(100):  # more than lies between the two
             stream.take(frame(number), detection)
             assert received(client, "TipToCamera").metadata["Image"] == str(number)
+        assert stream.status.n_slow == 1
 
         stalled.settimeout(LONGEST)
         heard = b""
