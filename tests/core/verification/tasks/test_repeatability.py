@@ -175,7 +175,9 @@ def test_one_calibration_is_refused() -> None:
 
 
 def test_a_tip_beyond_its_control_limits_is_named() -> None:
-    values = PAPER_TIP + 1e-4 * np.arange(20)[:, None] % 2e-4 + 1e-9 * np.eye(20, 3)
+    values = (
+        PAPER_TIP + 1e-4 * np.arange(20)[:, None] % 2e-4 + 1e-9 * np.arange(20)[:, None]
+    )
     values[12] += 0.01
 
     found = measure_repeatability(estimates(values), LIMITS)
