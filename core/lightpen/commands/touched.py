@@ -26,6 +26,7 @@ from lightpen.verification.probing.drift_reference import LampDrift
 from lightpen.verification.probing.image_locations import (
     ImageLocation,
     PenCameras,
+    RecordedTouch,
     read_viewers,
     touch_place,
 )
@@ -190,7 +191,7 @@ class _SeenRun:
 
     name: str
     views: tuple[Observations, ...]
-    touches: tuple[int, ...] | None = None
+    touches: tuple[RecordedTouch, ...] | None = None
 
 
 def _seen(

@@ -130,10 +130,9 @@ def _jacobian(
     """Return distances (M,), their derivatives (M, U), and by the points (N, K, 3)."""
     origin, axes, sizes = at
     q = (points - origin) @ axes
-    values, by_point, by_sizes = surface.distances(q, sizes)
-    by_frame = np.concatenate([-by_point, -np.cross(q[:, None], by_point)], axis=2)
-    J = np.concatenate([by_frame[..., surface.free], by_sizes], axis=2)
-    return values.ravel(), J.reshape(-1, surface.n_unknowns), by_point @ axes.T
+    found, J = surface.derivatives(q, sizes)
+    by_points = found.by_point @ axes.T
+    return found.values.ravel(), J.reshape(-1, surface.n_unknowns), by_points
 
 
 def _moved(surface: FeatureModel, at: Start, step: FloatArray) -> Start:

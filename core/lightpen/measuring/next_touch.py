@@ -126,13 +126,14 @@ def best_places(
     """
     surface = SURFACES[area.kind]
     places = _places(area)
-    J = _rows(area, places)
+    J = surface.derivatives(places, area.sizes)[1]
     unit = float(np.mean(np.sum(J**2, axis=(1, 2)))) / surface.n_unknowns
     scale = np.sqrt(np.mean(J**2, axis=(0, 1))) + 1e-12
     J = J / scale
     known = RIDGE * np.eye(surface.n_unknowns) * max(unit, 1.0)
     if touched is not None and len(touched):
-        own = (_rows(area, area.local(touched)) / scale).reshape(-1, surface.n_unknowns)
+        own = surface.derivatives(area.local(touched), area.sizes)[1] / scale
+        own = own.reshape(-1, surface.n_unknowns)
         known = known + own.T @ own
     is_free = np.ones(len(places), dtype=bool)
     if touched is not None and len(touched):
@@ -157,14 +158,6 @@ def _place(area: ProbedArea, q: FloatArray) -> Place:
     if area.kind is FeatureKind.LINE:
         normal = np.array([0.0, 0.0, 0.0])
     return Place(area.origin + area.axes @ q, area.axes @ normal)
-
-
-def _rows(area: ProbedArea, q: FloatArray) -> FloatArray:
-    """Return the derivatives (N, K, U) of the distances of points by the unknowns."""
-    surface = SURFACES[area.kind]
-    _, by_point, by_sizes = surface.distances(q, area.sizes)
-    by_frame = np.concatenate([-by_point, -np.cross(q[:, None], by_point)], axis=2)
-    return np.concatenate([by_frame[..., surface.free], by_sizes], axis=2)
 
 
 def _places(area: ProbedArea) -> FloatArray:

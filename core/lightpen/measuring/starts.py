@@ -98,14 +98,13 @@ def _by_direction(
     columns = [x, y, np.ones_like(x)]
     if kind is FeatureKind.CONE:
         columns += [z, z**2]
-    A = np.stack(columns, axis=-1)
-    A /= np.linalg.norm(A, axis=1, keepdims=True) + TINY
-    squares = x**2 + y**2
+    A = np.stack(columns, axis=1)  # (D, C, N)
     # Normal equations do for a start; a direction that determines nothing is damped.
-    normal = np.swapaxes(A, 1, 2) @ A + RIDGE * np.eye(A.shape[2])
-    solved = np.linalg.solve(normal, np.swapaxes(A, 1, 2) @ squares[..., None])
-    norms = np.linalg.norm(np.stack(columns[:2], axis=-1), axis=1) + TINY
-    a, b = (solved[:, :2, 0] / norms / 2).T
+    normal = A @ np.swapaxes(A, 1, 2)
+    scale = np.sqrt(np.einsum("dcc->dc", normal)) + TINY
+    normal = normal / (scale[:, None] * scale[..., None]) + RIDGE * np.eye(len(columns))
+    right = A @ (x**2 + y**2)[..., None] / scale[..., None]
+    a, b = (np.linalg.solve(normal, right)[:, :2, 0] / scale[:, :2] / 2).T
     rho = np.hypot(x - a[:, None], y - b[:, None])
     slope, radius = np.zeros(len(x)), rho.mean(axis=1)
     if kind is FeatureKind.CONE:

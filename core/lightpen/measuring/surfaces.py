@@ -70,6 +70,19 @@ class FeatureModel:
     free: tuple[int, ...]
     sizes: tuple[str, ...] = ()
 
+    def derivatives(
+        self, q: FloatArray, sizes: FloatArray
+    ) -> tuple[Distances, FloatArray]:
+        """Return distances, with derivatives (N, K, U) by free motions and sizes."""
+        found = self.distances(q, sizes)
+        (x, y, z), (u, v, w) = q.T[:, :, None], np.moveaxis(found.by_point, 2, 0)
+        columns = [-u, -v, -w, z * v - y * w, x * w - z * u, y * u - x * v]
+        J = np.empty((*found.values.shape, self.n_unknowns))
+        for column, i in enumerate(self.free):
+            J[..., column] = columns[i]
+        J[..., len(self.free) :] = found.by_sizes
+        return found, J
+
     @property
     def n_unknowns(self) -> int:
         """The number of free motions and sizes."""

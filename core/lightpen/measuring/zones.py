@@ -10,6 +10,7 @@ References
    geometric elements", Precision Engineering 19 (1996) 28-36.
 """
 
+from dataclasses import replace
 from enum import Enum
 
 import numpy as np
@@ -96,6 +97,7 @@ def fit_zone(
         about, fixed = FeatureKind.CYLINDER, (3, 4)
     surface = SURFACES[about]
     free = [each for each in surface.free if each not in fixed]
+    surface = replace(surface, free=tuple(free))
     extent = float(np.ptp(points, axis=0).max())
     reach = 0.1 * extent
 
@@ -103,11 +105,9 @@ def fit_zone(
         origin: FloatArray, axes: FloatArray, sizes: FloatArray
     ) -> tuple[FloatArray, FloatArray, float]:
         q = (points - origin) @ axes
-        values, by_point, by_sizes = surface.distances(q, sizes)
-        by_frame = np.concatenate([-by_point, -np.cross(q[:, None], by_point)], axis=2)
-        J = np.concatenate([by_frame[..., free], by_sizes], axis=2)[:, 0]
+        (values, *_), J = surface.derivatives(q, sizes)
         radius = sizes[0] if len(sizes) else 0.0
-        d = values[:, 0]
+        d, J = values[:, 0], J[:, 0]
         match criterion:
             case Criterion.MINIMUM_ZONE:
                 merit = float(np.abs(d).max())

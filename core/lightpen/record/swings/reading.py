@@ -86,6 +86,8 @@ class RecordedImage:
         Simultaneous images of the other cameras of a rig.
     touch : int
         Number of the touch in a verification, from 1; 0 in a swing.
+    approach_cam : (3,) array or None
+        Unit vector along which the tip came to that point.
     """
 
     number: int
@@ -99,6 +101,7 @@ class RecordedImage:
     stats: Stats = field(default_factory=Stats)
     others: tuple[SecondaryImage, ...] = ()
     touch: int = 0
+    approach_cam: FloatArray | None = None
 
     @property
     def rig_pixels(self) -> FloatArray:
@@ -284,6 +287,7 @@ def _recorded_image(folder: Path, line: ImageLine) -> RecordedImage:
         stats=line.camera or Stats(),
         others=line.others,
         touch=line.touch,
+        approach_cam=None if line.approach is None else np.array(line.approach),
     )
 
 

@@ -174,6 +174,7 @@ class RecordWriter:
         stats: Stats | None = None,
         others: Sequence[SecondaryView] = (),
         touch: int = 0,
+        approach: FloatArray | None = None,
     ) -> int:
         """Record an image, or simultaneous images.
 
@@ -195,6 +196,8 @@ class RecordWriter:
             Images of the other cameras of a rig, in their order.
         touch : int
             Number of the touch in a verification, from 1.
+        approach : (3,) array, optional
+            Unit vector along which the tip came to it.
 
         Returns
         -------
@@ -228,6 +231,7 @@ class RecordWriter:
                 camera=stats,
                 others=other_images,
                 touch=touch,
+                approach=None if approach is None else tuple(approach.tolist()),
             )
         )
         self._next_number = number + 1

@@ -48,6 +48,14 @@ class PenCameras:
 
 
 @dataclass(frozen=True, eq=False)
+class RecordedTouch:
+    """The touch of an image, from 1, or 0 for none; and the approach to it, (3,)."""
+
+    number: int
+    approach_cam: FloatArray | None
+
+
+@dataclass(frozen=True, eq=False)
 class ImageLocation:
     """Images of touches, and the files that they bring if they are a record's.
 
@@ -55,9 +63,8 @@ class ImageLocation:
     ----------
     masks : tuple of (M, 3) array or None
         Circles of stray light before each camera: centre x, y and radius, px.
-    touches : tuple of int or None
-        Number of the touch of each image, from 1; 0 if the image belongs to none. None
-        for images without numbers.
+    touches : tuple of RecordedTouch or None
+        Which touch each image is of. None for images without numbers.
     """
 
     name: str
@@ -67,7 +74,7 @@ class ImageLocation:
     pen: Pen | None = None
     pen_file: Path | None = None
     masks: tuple[FloatArray | None, ...] = (None,)
-    touches: tuple[int, ...] | None = None
+    touches: tuple[RecordedTouch, ...] | None = None
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -136,12 +143,15 @@ def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> ImageLocation
     return ImageLocation(where[0], images, origin, masks=(None,) * rig.n_cameras)
 
 
-def _recorded_touches(record: Record) -> tuple[int, ...] | None:
+def _recorded_touches(record: Record) -> tuple[RecordedTouch, ...] | None:
     """Return which touches the images of a verification are of; None of a swing."""
     if not any(image.touch for image in record.images):
         return None
     out = record.taken_out
-    return tuple(0 if i.number in out else i.touch for i in record.images)
+    return tuple(
+        RecordedTouch(0 if i.number in out else i.touch, i.approach_cam)
+        for i in record.images
+    )
 
 
 def _recorded_viewers(own: RecordSource) -> PenCameras:

@@ -297,7 +297,7 @@ def _held(rules: ProbingRules, state: ProbingState) -> ProbingTransition:
     still = StillFrames(
         frames=tuple(each.frame for each in used),
         rejected=state.rejected,
-        approach_cam=_approach(state.path, used[0].tip_cam),
+        approach_cam=approach_of(state, used[0].tip_cam),
     )
     taken = replace(
         state,
@@ -322,9 +322,9 @@ def _is_new(rules: ProbingRules, state: ProbingState, seen: TipObservation) -> b
     return True
 
 
-def _approach(path: tuple[FloatArray, ...], tip_cam: FloatArray) -> FloatArray | None:
+def approach_of(state: ProbingState, tip_cam: FloatArray) -> FloatArray | None:
     """Return the direction in which the tip came, if it came from far enough."""
-    for before in reversed(path):
+    for before in reversed(state.path):
         way = tip_cam - before
         distance = float(np.linalg.norm(way))
         if distance > FAR_ENOUGH:

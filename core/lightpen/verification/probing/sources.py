@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations, observe_images
 from lightpen.detection.pen_detection import PenDetection, detect_from_centers, unseen
 from lightpen.detection.reasons import counted
@@ -33,7 +34,11 @@ from lightpen.verification.probing.drift_reference import (
     LampObservations,
     lamps_in,
 )
-from lightpen.verification.probing.image_locations import ImageLocation, PenCameras
+from lightpen.verification.probing.image_locations import (
+    ImageLocation,
+    PenCameras,
+    RecordedTouch,
+)
 from lightpen.verification.probing.probing import ProbingRules, take_all, touch_frame
 from lightpen.verification.tasks.probed_point import (
     ProbedPoint,
@@ -181,7 +186,7 @@ def touches_of(
     seen: Sequence[Observations],
     instrument: Instrument,
     rules: ProbingRules,
-    touches_known: Sequence[int] | None = None,
+    touches_known: Sequence[RecordedTouch] | None = None,
 ) -> ProbingRun:
     """Return the touches in the observations of each camera; see `touch_run`."""
     images = _detections(seen, instrument)
@@ -239,13 +244,15 @@ def _held(
 
 
 def _held_as_recorded(
-    images: Sequence[tuple[str, PenDetection]], touches: Sequence[int]
+    images: Sequence[tuple[str, PenDetection]], touches: Sequence[RecordedTouch]
 ) -> tuple[StillFrames, ...]:
-    """Return the images of each touch; 0 for images of none."""
+    """Return the images of each touch."""
     by_touch: dict[int, list[tuple[str, PenDetection]]] = {}
+    approaches: dict[int, FloatArray | None] = {}
     for image, touch in zip(images, touches, strict=True):
-        if touch:
-            by_touch.setdefault(touch, []).append(image)
+        if touch.number:
+            by_touch.setdefault(touch.number, []).append(image)
+            approaches.setdefault(touch.number, touch.approach_cam)
     held = (
         StillFrames(
             tuple(touch_frame(*image) for image in own if image[1].has_pose),
@@ -254,8 +261,9 @@ def _held_as_recorded(
                 for name, seen in own
                 if not seen.has_pose
             ),
+            approaches[number],
         )
-        for own in by_touch.values()
+        for number, own in by_touch.items()
     )
     return tuple(still for still in held if still.frames)
 

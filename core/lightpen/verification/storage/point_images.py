@@ -13,6 +13,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.region_of_interest import RegionOfInterest
@@ -34,6 +35,7 @@ from lightpen.verification.probing.probing import (
     ProbingEventKind,
     ProbingPhase,
     ProbingRules,
+    approach_of,
 )
 from lightpen.verification.session.session import (
     SessionTransition,
@@ -103,7 +105,13 @@ class PointImages:
         """Return the runs of a task that are done."""
         return tuple(self._records[r.folder] for r in self._runs if r.task == task.kind)
 
-    def keep(self, frame: Frame, seen: PenDetection, task: AnyTask) -> str:
+    def keep(
+        self,
+        frame: Frame,
+        seen: PenDetection,
+        task: AnyTask,
+        approach: FloatArray | None = None,
+    ) -> str:
         """Put an image on the disk, and return its name in the record.
 
         Raises
@@ -128,6 +136,7 @@ class PointImages:
                 for other, view in zip(others, seen.others, strict=True)
             ],
             touch=self._touch,
+            approach=approach,
         )
         name = touch_image_name(number)
         self._numbers[name] = number
@@ -151,7 +160,8 @@ class PointImages:
                 names.update(event.names)
         if not has_ended:
             doubted = () if touching.doubted is None else (touching.doubted,)
-            names.update(seen.frame.name for seen in (*touching.held, *doubted))
+            held = touching.held if touching.phase is ProbingPhase.HOLDING else ()
+            names.update(seen.frame.name for seen in (*held, *doubted))
         if any(event.what is ProbingEventKind.RECORDED for event in transition.events):
             self._touch += 1
         self._take_out([name for name in self._numbers if name not in names])
@@ -309,4 +319,7 @@ class LivePoints:
             return str(frame.seq)
         if not is_held_on(rules_of(setup, task), state):
             return str(frame.seq)
-        return self._images.keep(frame, seen, task)
+        tip_cam = seen.rotation @ setup.instrument.tip_pen + seen.translation
+        return self._images.keep(
+            frame, seen, task, approach_of(state.touching, tip_cam)
+        )

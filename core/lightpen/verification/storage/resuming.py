@@ -210,7 +210,10 @@ def _held_in(record: Record, n_frames: int) -> tuple[StillFrames, ...]:
     for image in record.used_images:
         by_touch.setdefault(image.touch, []).append(image)
     whole = (images for images in by_touch.values() if len(images) >= n_frames)
-    return tuple(StillFrames(tuple(map(_frame, images))) for images in whole)
+    return tuple(
+        StillFrames(tuple(map(_frame, images)), approach_cam=images[0].approach_cam)
+        for images in whole
+    )
 
 
 def _frame(image: RecordedImage) -> ProbingFrame:

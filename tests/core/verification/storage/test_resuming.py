@@ -6,16 +6,21 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace as replace_entries
 from tests.accepted_tip import Hold, accept_tip, leant, round_a_ring
 from tests.verifying import BAR, CHOICES, NOON, TIMEOUT, Verifier
 
 from lightpen.archive.logbook import Logbook
+from lightpen.measuring.plan import Plan, Side
 from lightpen.record.swings.reading import DISCARDED, open_record
+from lightpen.simulator.plate import plate_plan
 from lightpen.swing.preparation import Preparation
+from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session_state import SessionState
 from lightpen.verification.storage.checkpoint import (
     InterruptedVerification,
@@ -27,6 +32,7 @@ from lightpen.verification.tasks.circle import CIRCLE
 from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.fixed_point import FIXED_POINT
 from lightpen.verification.tasks.length import LENGTH
+from lightpen.verification.tasks.part import PART, PartOptions
 
 ALL = replace(CHOICES, kinds=(*CHOICES.kinds, DRIFT.kind))
 UPRIGHT = (Hold(tilt=0.0),) * 3
@@ -186,6 +192,54 @@ def test_killed_it_is_offered_and_keeps_every_touch(
     state = go_on(verifying())
 
     assert len(touched(state)) in (n_touches, n_touches + 1)  # one may not be told
+
+
+def test_a_part_goes_on_after_a_kill_and_gives_the_same_figures(
+    in_force: Path, verifying: Verifying, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    features = tuple(plate_plan().feature(name) for name in ("dome", "hole 1"))
+    features = tuple(replace_entries(each, side=Side.AUTO) for each in features)
+    plan = Plan("Two features", features)
+    choices = VerificationChoices((PART.kind,), (PartOptions(plan),), n_frames=2)
+    holds = []
+    for run, planned in enumerate(features):
+        for step in range(planned.n_touches):
+            goal = PART.hand(PartOptions(plan), run, step)
+            assert goal.point is not None
+            assert goal.outwards is not None
+            holds += [
+                Hold(tuple((goal.point + away * goal.outwards).tolist()), tilt=0.1)
+                for away in (10.0, 5.0)
+            ]
+    copies = []
+    first = verifying()
+    first.come(choices)
+    for n, (above, at) in enumerate(batched(holds), start=1):
+        first.see(first.holder.still(above, 2))
+        first.touch(at)
+        if n in (3, 8):
+            copy = tmp_path_factory.mktemp("killed") / "data"
+            shutil.copytree(in_force, copy)
+            copies.append((n, copy, deepcopy(first.holder)))
+    (record,) = first.records
+    assert all(each["approach_cam"] for each in record["touches"])
+    assert {each["side_by"] for each in record["features"]} == {"approach"}
+
+    for n, copy, holder in copies:
+        second = verifying(copy)
+        go_on(second)
+        second.holder = holder
+        for above, at in list(batched(holds))[n:]:
+            second.see(second.holder.still(above, 2))
+            second.touch(at)
+        (again,) = second.records
+        for name in ("features", "touches", "characteristics"):
+            assert again[name] == record[name]
+
+
+def batched(holds: list[Hold]) -> Iterator[tuple[Hold, Hold]]:
+    """Return where the ball is above a place, and on it."""
+    return zip(holds[::2], holds[1::2], strict=True)
 
 
 def test_a_touch_that_was_not_complete_does_not_count(
