@@ -30,6 +30,7 @@ from benchmarks.image_sets import data_folder
 from benchmarks.killed import killed_rows
 from benchmarks.labelling import labelling_rows
 from benchmarks.machine import description
+from benchmarks.parts import part_rows
 from benchmarks.plant_view import plant_view_rows
 from benchmarks.published import with_section
 from benchmarks.rows import NEEDS_DATA, Row, table
@@ -38,7 +39,7 @@ from benchmarks.speed import speed_rows
 from benchmarks.station import station_rows
 from benchmarks.tips import repeat_rows, tip_rows
 from benchmarks.tracker import tracker_rows
-from benchmarks.verification import part_rows, verification_rows
+from benchmarks.verification import verification_rows
 from benchmarks.verification_sessions import session_rows
 from benchmarks.whole_program import program_rows
 from benchmarks.wizard import event_rows, idle_rows, link_rows, soak_rows, start_rows

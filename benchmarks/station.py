@@ -229,7 +229,7 @@ def calibrated(
         swing = swing_poses(n_images, rng, kind)  # type: ignore[arg-type]
         swing = seen_from(swing, row.rotations[0], row.translations[0])
     pixels = _centers(effects, rig, pen, swing, rng)
-    file, pen_file = _drawn_rig(rig, rng), _drawn_pen(effects, pen, rng)
+    file, pen_file = drawn_rig(rig, rng), _drawn_pen(effects, pen, rng)
     if effects.copies:
         copied = rng.random(n_images) < effects.copies
         pixels = np.repeat(pixels, np.where(copied, 2, 1), axis=0)
@@ -317,7 +317,8 @@ def _lens_field(
     return raw(pixels) - there @ fitted
 
 
-def _drawn_rig(true: Rig, rng: np.random.Generator) -> Rig:
+def drawn_rig(true: Rig, rng: np.random.Generator) -> Rig:
+    """Return a rig that differs from another by what that states of itself."""
     file = replace(true, cameras=tuple(_drawn(each, rng) for each in true.cameras))
     if true.covariance is None:
         return file

@@ -1,44 +1,42 @@
-"""Coverage of U: of points (``./run bench verify``) and of parts (``measure``).
+"""Coverage of U of points (``./run bench verify``), and the stations for it.
 
-Camera and LEDs differ from their files as the files say they may, tip and LEDs are
-calibrated by a swing, then points are touched about the cone, or the features of the
-simulated plate by its plan.
+Cameras and LEDs differ from their files as the files say they may, tip and LEDs are
+calibrated by a swing, then points are touched about the cone.
 """
 
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from benchmarks.station import BASELINE, drawn_rig
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
-from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.calibrate import calibrate_rig
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.observation_files import Centers
-from lightpen.measuring.plan import CharacteristicKind
-from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.simulator.plate import plate_plan
+from lightpen.model.rig import Rig, from_first, rig_of
+from lightpen.simulator.samples import row_of_cameras
 from lightpen.simulator.swings import (
     PAPER_CONE,
+    PAPER_TIP,
     paper_camera,
     paper_pen,
     perturbed_pen,
+    seen_from,
     simulate_centers,
     swing_poses,
 )
-from lightpen.verification.tasks.part import PART, PartOptions
 from lightpen.verification.tasks.probed_point import (
     ProbingFrame,
     StillFrames,
     measure_touches,
 )
-from lightpen.verification.tasks.task import Conditions
 
 N_IMAGES, N_FRAMES = 60, 5
 SIGMA = 0.03  # px
 LED_SIGMA = 0.002  # mm
-BALL = 10.0  # mm
 ABOUT = 60.0  # mm from the cone, in each direction
 CHI_SQUARE_95 = 7.815  # 3 degrees of freedom
 
@@ -48,11 +46,11 @@ def covered_share(n_calibrations: int, n_touches: int, seed: int) -> float:
     rng = np.random.default_rng(seed)
     inside = []
     for _ in range(n_calibrations):
-        station = _calibrated(rng)
+        station = calibrated_station(rng)
         instrument = station.instrument
-        for _ in range(n_touches):
-            place = PAPER_CONE + rng.uniform(-ABOUT, ABOUT, 3)
-            (touch,) = measure_touches(instrument, [station.touched(place, rng)])
+        places = PAPER_CONE + rng.uniform(-ABOUT, ABOUT, (n_touches, 3))
+        for place, still in zip(places, station.touched(places, rng), strict=True):
+            (touch,) = measure_touches(instrument, [still])
             error = touch.point_cam - place
             covariance = touch.covariance(instrument)
             distance = float(error @ np.linalg.solve(covariance, error))
@@ -60,108 +58,74 @@ def covered_share(n_calibrations: int, n_touches: int, seed: int) -> float:
     return float(np.mean(inside))
 
 
-@dataclass(frozen=True)
-class CoveredPart:
-    """What U (k = 2) of each characteristic of a plate holds, and how large it is.
+@dataclass(frozen=True, eq=False)
+class Station:
+    """The true cameras and pen, and what a swing made of their files.
 
     Attributes
     ----------
-    holds : mapping of str to bool
-        Whether U holds the true value.
-    ratio : float
-        Mean of U of distances by U of independent points.
+    rotation, translation : (3, 3) and (3,) array
+        Of the first camera from where a single one stands.
     """
 
-    holds: dict[str, bool]
-    ratio: float
-
-
-def covered_parts(n_parts: int, seed: int) -> list[CoveredPart]:
-    """Measure the simulated plate by a tip of its own each time."""
-    rng = np.random.default_rng(seed)
-    return [_covered_part(rng) for _ in range(n_parts)]
-
-
-def _covered_part(rng: np.random.Generator) -> CoveredPart:
-    station, options = _calibrated(rng), PartOptions(plate_plan())
-    instrument = station.instrument
-    held, names = [], []
-    for run, planned in enumerate(plate_plan().features):
-        for step in range(planned.n_touches):
-            goal = PART.hand(options, run, step)
-            assert goal.point is not None
-            assert goal.outwards is not None
-            place = PAPER_CONE + goal.point + BALL / 2 * goal.outwards
-            held.append(station.touched(place, rng))
-            names.append(planned.name)
-    points = measure_touches(instrument, held)
-    runs = [
-        (
-            each.name,
-            [p for p, name in zip(points, names, strict=True) if name == each.name],
-        )
-        for each in plate_plan().features
-    ]
-    found = PART.measure(
-        runs, Conditions(instrument, ball_diameter=BALL), PartOptions(plate_plan(), 0.0)
-    )
-    holds, ratios = {}, []
-    for result in found.part.results:
-        if result.quantity is None or result.independent_uncertainty is None:
-            continue  # of a geometrical deviation U is an upper bound
-        error = result.value.value - (result.planned.nominal or 0.0)
-        holds[result.planned.label] = abs(error) <= result.value.uncertainty
-        if result.planned.quantity is CharacteristicKind.DISTANCE:
-            ratios.append(result.value.uncertainty / result.independent_uncertainty)
-    return CoveredPart(holds, float(np.mean(ratios)))
-
-
-@dataclass(frozen=True, eq=False)
-class _Station:
-    """The true camera and pen, and what a swing made of their files."""
-
-    camera: Camera
+    rig: Rig
     pen: Pen
     instrument: Instrument
+    rotation: FloatArray
+    translation: FloatArray
 
-    def touched(self, place: FloatArray, rng: np.random.Generator) -> StillFrames:
-        """Return images of a pen that is held still with its tip on a place."""
-        held = swing_poses(1, rng, pen=self.pen, camera=self.camera, cone_cam=place)
-        R = np.repeat(held.rotations, N_FRAMES, axis=0)
-        t = np.repeat(held.translations, N_FRAMES, axis=0)
-        images = simulate_centers(self.camera, self.pen, R, t, SIGMA, rng)
-        return StillFrames(
-            tuple(
-                ProbingFrame(str(i), each[None], R[i], t[i])
-                for i, each in enumerate(images)
-            )
+    def placed(self, points: FloatArray) -> FloatArray:
+        """Return points (N, 3) before a single camera, in the frame of the first."""
+        return np.asarray(points @ self.rotation.T + self.translation)
+
+    def touched(
+        self, places: FloatArray, rng: np.random.Generator
+    ) -> list[StillFrames]:
+        """Return images of a pen held still with its tip on places (N, 3)."""
+        swing = swing_poses(len(places), rng, pen=self.pen, camera=paper_camera())
+        R = np.repeat(self.rotation @ swing.rotations, N_FRAMES, axis=0)
+        t = np.repeat(places, N_FRAMES, axis=0) - R @ PAPER_TIP
+        images = _seen(self.rig, self.pen, R, t, rng)
+        frames = [
+            ProbingFrame(str(i), *each)
+            for i, each in enumerate(zip(images, R, t, strict=True))
+        ]
+        return [
+            StillFrames(tuple(frames[i : i + N_FRAMES]))
+            for i in range(0, len(frames), N_FRAMES)
+        ]
+
+
+def calibrated_station(rng: np.random.Generator, n_cameras: int = 1) -> Station:
+    """Return a station with a tip that was calibrated there."""
+    pen_file = replace(paper_pen(), led_sigma=LED_SIGMA)
+    file, turn, shift = rig_of(paper_camera()), np.eye(3), np.zeros(3)
+    if n_cameras > 1:
+        row = row_of_cameras(n_cameras, BASELINE)
+        file, turn, shift = from_first(row), row.rotations[0], row.translations[0]
+    rig, pen = drawn_rig(file, rng), _true_pen(pen_file, rng)
+    swing = seen_from(swing_poses(N_IMAGES, rng, pen=pen), turn, shift)
+    pixels = _seen(rig, pen, swing.rotations, swing.translations, rng)
+    numbers, where = np.arange(1, N_IMAGES + 1), Path("simulated.csv")
+    seen = [
+        observe_centers(Centers(numbers, pixels[:, c], where), camera, pen_file)
+        for c, camera in enumerate(file.cameras)
+    ]
+    instrument = calibrate_rig(file, pen_file, seen).instrument
+    return Station(rig, pen, instrument, turn, shift)
+
+
+def _seen(
+    rig: Rig, pen: Pen, R: FloatArray, t: FloatArray, rng: np.random.Generator
+) -> FloatArray:
+    """Return LED centres (N, C, L, 2) of poses in the rig, px."""
+    views = [
+        simulate_centers(camera, pen, turn @ R, t @ turn.T + shift, SIGMA, rng)
+        for camera, turn, shift in zip(
+            rig.cameras, rig.rotations, rig.translations, strict=True
         )
-
-
-def _calibrated(rng: np.random.Generator) -> _Station:
-    file = replace(paper_pen(), led_sigma=LED_SIGMA)
-    camera, pen = _true_camera(rng), _true_pen(file, rng)
-    swing = swing_poses(N_IMAGES, rng, pen=pen, camera=camera)
-    pixels = simulate_centers(
-        camera, pen, swing.rotations, swing.translations, SIGMA, rng
-    )
-    centers = Centers(np.arange(1, N_IMAGES + 1), pixels, Path("simulated.csv"))
-    seen = observe_centers(centers, paper_camera(), file)
-    return _Station(camera, pen, calibrate(paper_camera(), file, seen).instrument)
-
-
-def _true_camera(rng: np.random.Generator) -> Camera:
-    file = paper_camera()
-    assert file.covariance is not None
-    d = rng.multivariate_normal(np.zeros(len(file.covariance)), file.covariance)
-    return replace(
-        file,
-        fx=file.fx + d[0],
-        fy=file.fy + d[1],
-        cx=file.cx + d[2],
-        cy=file.cy + d[3],
-        distortion=file.distortion + d[4:],
-    )
+    ]
+    return np.stack(views, axis=1)
 
 
 def _true_pen(file: Pen, rng: np.random.Generator) -> Pen:

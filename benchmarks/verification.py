@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from benchmarks.rows import Row, numbers, without_data
-from benchmarks.touches import covered_parts, covered_share
+from benchmarks.touches import covered_share
 from benchmarks.whole_verification import verified
 from benchmarks.workers import Workers
 
@@ -28,7 +28,6 @@ NOMINAL_TIP = np.array([0.0, -90.0, -25.0])  # mm, the paper's
 POINT_LIMITS = np.array([2.0, 2.0, 10.0])  # um
 RADIUS, ERROR_LIMIT, SCATTER_LIMIT, N_RUNS = 31.751, 1.5, 1.0, 8  # mm, um
 N_PARTS, N_CALIBRATIONS, N_TOUCHES = 10, 10, 10
-N_SEEDS, N_PLATES = 50, 20
 SHARE_LIMITS = 0.93, 0.97
 LONGEST = 180.0  # s of the operator's time
 FIGURES = (
@@ -61,30 +60,6 @@ def verification_rows(workers: Workers, data: Path | None) -> list[Row]:
             met=low <= share <= high,
         ),
     ]
-
-
-def part_rows(workers: Workers) -> list[Row]:
-    """Return how often U of a part's characteristics holds their true value."""
-    found = [
-        part
-        for parts in workers.map(partial(covered_parts, N_PLATES), range(N_SEEDS))
-        for part in parts
-    ]
-    low, high = SHARE_LIMITS
-    rows = []
-    for name in found[0].holds:
-        share = float(np.mean([part.holds[name] for part in found]))
-        rows.append(
-            Row(
-                f"{len(found)} simulated plates: U (k = 2) of the {name} holds",
-                f"{100 * share:.1f} %",
-                f"{100 * low:.0f} to {100 * high:.0f} %",
-                met=low <= share <= high,
-            )
-        )
-    ratio = float(np.mean([part.ratio for part in found]))
-    words = "U of distances by that of independent points"
-    return [*rows, Row(words, f"{ratio:.2f}", "1", met=ratio < 1)]
 
 
 def _covered(n_calibrations: int, n_touches: int, seed: int) -> float:

@@ -28,7 +28,7 @@ from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind, FeatureMod
 from lightpen.model.rigid import rotation_from_vector, skew
 
 MAX_STEPS = 200
-ROUGHLY, CONVERGED = 1e-9, 1e-15  # of the extent of the points
+ROUGHLY, CONVERGED = 1e-7, 1e-15  # of the extent of the points
 SHRINKS = 0.5  # a step before rounding by this at least
 LARGEST_DAMPING = 1e8
 ROUNDING = 1e-12  # relative, of a sum of squares: within it, no step is worse
@@ -157,9 +157,14 @@ def _solve(
     for _ in range(MAX_STEPS):
         values, J, _by_points = _jacobian(surface, points, at)
         scale = np.linalg.norm(J, axis=0) + np.finfo(float).tiny
-        damped = np.vstack([J / scale, np.sqrt(damping) * np.eye(J.shape[1])])
-        wanted = np.concatenate([-values, np.zeros(J.shape[1])])
-        step = np.linalg.lstsq(damped, wanted)[0] / scale
+        J = J / scale
+        if converged >= ROUGHLY:
+            normal = J.T @ J + damping * np.eye(J.shape[1])
+            step = np.linalg.solve(normal, -J.T @ values) / scale
+        else:
+            damped = np.vstack([J, np.sqrt(damping) * np.eye(J.shape[1])])
+            wanted = np.concatenate([-values, np.zeros(J.shape[1])])
+            step = np.linalg.lstsq(damped, wanted)[0] / scale
         after = _moved(surface, at, step)
         cost_after = _cost(surface, points, after)
         length = float(np.abs(step * scale).max()) / (extent * np.sqrt(len(points)))

@@ -95,14 +95,12 @@ def ball_centres() -> dict[str, tuple[FloatArray, FloatArray]]:
     }
 
 
-def touched(noise: FloatArray | None = None) -> PartTouches:
+def touched() -> PartTouches:
     centres = ball_centres()
     points = np.concatenate([own for own, _ in centres.values()]) @ R.T + T
     approaches = np.concatenate([way for _, way in centres.values()]) @ R.T
     shape = (points - points.mean(axis=0)).ravel() / 100
     covariance = NOISE**2 * np.eye(points.size) + COMMON**2 * np.outer(shape, shape)
-    if noise is not None:
-        points = points + noise.reshape(-1, 3)
     owners = tuple(name for name, (own, _) in centres.items() for _ in own)
     styli = np.tile(R @ UP, (len(points), 1))
     return PartTouches(points, covariance, approaches, styli, owners, BALL)
@@ -136,43 +134,6 @@ def test_features_are_told_in_the_frame_of_the_part(exact: MeasuredPart) -> None
     edge = exact.features["edge"].in_part.values
     assert edge[[0, 2]] == pytest.approx([-50, 0], abs=1e-8)
     assert abs(edge[4]) == pytest.approx(1)
-
-
-def test_u_covers_the_scatter_of_many_parts(plan: Plan, exact: MeasuredPart) -> None:
-    rng = np.random.default_rng(1)
-    root = np.linalg.cholesky(exact.touches.covariance)
-    smooth = [i for i, one in enumerate(exact.results) if one.deviation is not None]
-    plain = replace_characteristics(plan, smooth)
-    values = []
-    for _ in range(80):
-        part = measure_part(plain, touched(root @ rng.standard_normal(len(root))))
-        values.append([result.value.value for result in part.results])
-    # About the truth, as an angle of 90 degrees is told without its sign.
-    errors = np.array(values) - [EXPECTED[i] for i in smooth]
-    spread = np.sqrt(np.mean(errors**2, axis=0))
-    stated = [exact.results[i].value.uncertainty / 2 for i in smooth]
-
-    assert spread == pytest.approx(stated, rel=0.25)
-
-
-def test_u_of_a_geometrical_deviation_bounds_its_error(
-    plan: Plan, exact: MeasuredPart
-) -> None:
-    rng = np.random.default_rng(2)
-    root = np.linalg.cholesky(exact.touches.covariance)
-    deviations = [i for i, one in enumerate(exact.results) if one.deviation is None]
-    some = replace_characteristics(plan, deviations)
-    covered = []
-    for _ in range(40):
-        part = measure_part(some, touched(root @ rng.standard_normal(len(root))))
-        covered.append(
-            [
-                abs(result.value.value - EXPECTED[i]) <= result.value.uncertainty
-                for i, result in zip(deviations, part.results, strict=True)
-            ]
-        )
-
-    assert np.mean(covered, axis=0).min() >= 0.9
 
 
 def test_a_distance_is_known_better_than_by_independent_points(
@@ -237,13 +198,6 @@ def only(touches: PartTouches, name: str) -> PartTouches:
         styli_cam=touches.styli_cam[at],
         owners=len(at) * (name,),
     )
-
-
-def replace_characteristics(plan: Plan, kept: list[int]) -> Plan:
-    import msgspec
-
-    chosen = tuple(plan.characteristics[i] for i in kept)
-    return msgspec.structs.replace(plan, characteristics=chosen)
 
 
 def replace_tolerance(plan: Plan, tolerance: float) -> Plan:

@@ -1,7 +1,6 @@
 """A circle of least squares through points in space.
 
-The points are projected on their best plane, and the circle there is that of least
-squares of the distances from it. The error of the radius is then, to first order,
+The fit is that of `lightpen.measuring`. The error of its radius is, to first order,
 
     dr = sum_i g_i . dX_i
 
@@ -10,13 +9,14 @@ where ``g_i`` lies in the plane along the radius to point i.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.measuring.features import fit_feature
+from lightpen.measuring.surfaces import FeatureKind
 
 LEAST_POINTS = 3  # that determine a circle
 EDGE_ON = 0.9  # of the normal along u
@@ -25,7 +25,6 @@ THIN = 0.02  # of the points' extent: less across is a line
 ASTRAY = 8.0  # times the median distance from the circle
 LIFTED = 0.1  # mm; nearer points count, farther ones may be of a lifted pen
 N_SAMPLES = 500  # of three points each
-ROUNDING = 1e-14  # relative, of centre and radius
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,42 +79,28 @@ def fit_circle(points_cam: FloatArray) -> CircleFit:
     CalibrationError
         They lie in one place or on a line.
     """
-    from scipy.optimize import least_squares  # takes 0.3 s
-
     middle = points_cam.mean(axis=0)
-    _, extents, axes = np.linalg.svd(points_cam - middle, full_matrices=False)
+    extents = np.linalg.svd(points_cam - middle, compute_uv=False)
     if extents[0] / np.sqrt(len(points_cam)) < SMALLEST or (
         extents[1] < THIN * extents[0]
     ):
         raise CalibrationError("circle.line")
-    normal = axes[2] if axes[2][2] < 0 else -axes[2]
+    found = fit_feature(FeatureKind.CIRCLE, points_cam)
+    normal = found.axis if found.axis[2] < 0 else -found.axis
     across = _across(normal)
-    up = np.cross(normal, across)
-    plane = np.stack([across, up])
-    flat = (points_cam - middle) @ plane.T
-    # Kasa's algebraic circle starts the iteration.
-    A = np.column_stack([2 * flat, np.ones(len(flat))])
-    x, y, rest = np.linalg.lstsq(A, np.sum(flat**2, axis=1))[0].tolist()
-    start = [x, y, np.sqrt(rest + x * x + y * y)]
-    found = least_squares(partial(_off_circle, flat), start, method="lm", xtol=ROUNDING)
-    center, radius = found.x[:2], float(found.x[2])
-    spokes = flat - center
+    plane = np.stack([across, np.cross(normal, across)])
+    radius, spokes = found.size("radius"), (points_cam - found.origin) @ plane.T
     outwards = spokes / np.linalg.norm(spokes, axis=1)[:, None]
-    J = np.column_stack([outwards, np.ones(len(flat))])
+    J = np.column_stack([outwards, np.ones(len(spokes))])
     return CircleFit(
-        center_cam=middle + center @ plane,
+        center_cam=found.origin,
         normal_cam=normal,
         radius=radius,
         radial=np.linalg.norm(spokes, axis=1) - radius,
-        axial=(points_cam - middle) @ normal,
+        axial=(points_cam - found.origin) @ normal,
         angles=np.arctan2(spokes[:, 1], spokes[:, 0]),
         weights=np.linalg.pinv(J)[2][:, None] * (outwards @ plane),
     )
-
-
-def _off_circle(points: FloatArray, circle: FloatArray) -> FloatArray:
-    """Return the distances of points (N, 2) from a circle (x, y, radius), (N,)."""
-    return np.asarray(np.linalg.norm(points - circle[:2], axis=1) - circle[2])
 
 
 def ring_so_far(points_cam: FloatArray) -> CircleFit | None:

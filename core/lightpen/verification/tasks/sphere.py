@@ -24,6 +24,8 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.measuring.features import fit_feature
+from lightpen.measuring.surfaces import FeatureKind
 from lightpen.messages import Message, message
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.tasks.assessment import (
@@ -79,7 +81,6 @@ ANOTHER = 0.1  # of the certified radius: then it is another sphere
 NEW_PLACE = 3.0  # mm
 UNUSUAL = 0.001  # chance that an ideal sphere shows more form
 N_TRIALS = 4000
-N_STEPS = 20  # of Gauss and Newton, which converge in five
 LATEST = 6  # points whose residuals are shown
 
 # The points of the standard: so many at so many degrees from the pole.
@@ -237,33 +238,16 @@ def fit_sphere(points_cam: FloatArray) -> SphereFit:
     CalibrationError
         They determine none.
     """
-    A = np.column_stack([2 * points_cam, np.ones(len(points_cam))])
-    middle = points_cam.mean(axis=0)
-    extents = np.linalg.svd(points_cam - middle, compute_uv=False)
-    *center, rest = np.linalg.lstsq(A, np.sum(points_cam**2, axis=1))[0].tolist()
-    squared = rest + float(np.dot(center, center))
-    if squared <= 0 or extents[2] < SPREAD * np.sqrt(squared):
+    try:
+        found = fit_feature(FeatureKind.SPHERE, points_cam)
+    except CalibrationError as error:
+        raise CalibrationError("sphere.flat") from error
+    radius, ways = found.size("radius"), points_cam - found.origin
+    extents = np.linalg.svd(ways - ways.mean(axis=0), compute_uv=False)
+    if extents[2] < SPREAD * radius:
         raise CalibrationError("sphere.flat")
-    unknowns = np.array([*center, np.sqrt(squared)])
-    fit = _fit_at(points_cam, unknowns)
-    for _ in range(N_STEPS):
-        step = np.linalg.lstsq(fit.by_sphere, fit.residuals)[0]
-        unknowns = unknowns - step
-        fit = _fit_at(points_cam, unknowns)
-        if np.abs(step).max() < np.finfo(float).eps * np.abs(unknowns).max():
-            break
-    return fit
-
-
-def _fit_at(points_cam: FloatArray, unknowns: FloatArray) -> SphereFit:
-    ways = points_cam - unknowns[:3]
-    distances = np.linalg.norm(ways, axis=1)
-    return SphereFit(
-        unknowns[:3],
-        float(unknowns[3]),
-        distances - unknowns[3],
-        ways / distances[:, None],
-    )
+    spokes = ways / np.linalg.norm(ways, axis=1)[:, None]
+    return SphereFit(found.origin, radius, found.distances[:, 0], spokes)
 
 
 def _certified_covariance(n: int, uncertainty: float) -> FloatArray:
