@@ -25,6 +25,9 @@ APPLICATION = ROOT / "app" / "lightpen_app"
 CORE = ROOT / "core" / "lightpen"
 TRANSLATIONS = RESOURCES / "translations"
 CHINESE = TRANSLATIONS / "lightpen_zh_CN.ts"
+TRANSLATED = sorted(
+    {*TRANSLATIONS.glob("*.ts")} - {TRANSLATIONS / f"lightpen_{SOURCE_LANGUAGE}.ts"}
+)
 HELP_TOPICS = (
     *("start", "camera", "leds", "swing", "review", "verify", "measure", "history"),
 )
@@ -144,10 +147,11 @@ def plain_errors(source: str) -> list[str]:
     ]
 
 
-def test_every_text_is_translated(tmp_path: Path) -> None:
+@pytest.mark.parametrize("ts_file", TRANSLATED, ids=str)
+def test_every_text_is_translated(ts_file: Path, tmp_path: Path) -> None:
     """The texts are collected anew, so that one added since is found as well."""
-    fresh = tmp_path / CHINESE.name
-    fresh.write_bytes(CHINESE.read_bytes())
+    fresh = tmp_path / ts_file.name
+    fresh.write_bytes(ts_file.read_bytes())
 
     TOOL.collect(fresh, APPLICATION, TOOL.translated_templates())
 
@@ -213,8 +217,11 @@ def places_in(text: str) -> list[str]:
     return sorted(re.findall(r"\{[^{}]*\}|%n", text))
 
 
-def test_a_translation_keeps_the_places_and_formats_of_the_values() -> None:
-    for _, source, translation in messages(CHINESE):
+@pytest.mark.parametrize("ts_file", TRANSLATED, ids=str)
+def test_a_translation_keeps_the_places_and_formats_of_the_values(
+    ts_file: Path,
+) -> None:
+    for _, source, translation in messages(ts_file):
         for text in texts_of(translation):
             assert places_in(text) == places_in(source), source
 

@@ -25,7 +25,7 @@ from lightpen.errors import FileError
 from lightpen.estimation.reports.calibration_record import SpotRecord
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.own_json import with_checksum
-from lightpen.formats.upgrades import RESULT, UPGRADES, Entries
+from lightpen.formats.upgrades import RESULT, UPGRADES, Entries, newest_format
 from lightpen.record.results.result_folder import HEAD, FolderArchive
 from lightpen.record.results.results import CALIBRATION, END, Result
 from lightpen.record.swings.names import Names
@@ -355,11 +355,12 @@ def test_a_result_of_an_earlier_format_is_read_by_its_upgrade(
     with pytest.raises(FileError, match=r"000001\.json is damaged"):
         archive.in_force("LP-04", "T-10")
 
-    monkeypatch.setitem(UPGRADES, RESULT, (with_hall_as_station,))
+    monkeypatch.setitem(UPGRADES, RESULT, (*UPGRADES[RESULT], with_hall_as_station))
 
     assert in_force(archive).names == NAMES
     archive.store(result(6.0))
-    assert [entries_of(each)["format"] for each in files_of(archive)] == [1, 2]
+    formats = [entries_of(each)["format"] for each in files_of(archive)]
+    assert formats == [newest_format(RESULT) - 1, newest_format(RESULT)]
     assert x_in_force(archive) == 2.0
 
 
@@ -367,7 +368,7 @@ def test_a_result_that_its_upgrade_does_not_fit_is_damaged(
     archive: FolderArchive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     archive.store(result(3.0))
-    monkeypatch.setitem(UPGRADES, RESULT, (with_hall_as_station,))
+    monkeypatch.setitem(UPGRADES, RESULT, (*UPGRADES[RESULT], with_hall_as_station))
 
     with pytest.raises(FileError, match=r"000001\.json is damaged"):
         archive.in_force("LP-04", "T-10")

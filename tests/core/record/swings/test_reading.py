@@ -223,12 +223,14 @@ def test_a_record_of_an_earlier_format_is_read_by_its_upgrade(
     tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = recorded(tmp_path / "swing", header, 1)
-    monkeypatch.setitem(UPGRADES, SWING, (lambda old: {**old, "cone": "C-9"},))
+    before, newest = UPGRADES[SWING], newest_format(SWING)
+    monkeypatch.setitem(UPGRADES, SWING, (*before, lambda old: {**old, "cone": "C-9"}))
 
     assert open_record(folder).header.cone == "C-9"
-    assert newest_format(SWING) == 2
+    assert newest_format(SWING) == newest + 1
 
-    monkeypatch.setitem(UPGRADES, SWING, (lambda old: {**old, "cone": old["socket"]},))
+    without_socket = (*before, lambda old: {**old, "cone": old["socket"]})
+    monkeypatch.setitem(UPGRADES, SWING, without_socket)
     with pytest.raises(FileError, match=r"header\.json is damaged"):
         open_record(folder)
 
