@@ -19,7 +19,7 @@ N_IMAGES = 300
 SIGMA = 0.03  # px
 NORMAL_95 = 1.959964
 COVERED = (93.0, 97.0)  # per cent
-TIP_LIMIT, LED_LIMIT, FOCAL_LIMIT = 12.0, 3.0, 0.03  # um, um rms, per cent; medians
+TIP_LIMIT, LED_LIMIT, FOCAL_LIMIT = 12.0, 3.0, 0.03  # µm, µm rms, per cent; medians
 TIME_LIMIT = 20.0  # s
 OFF = 10.0  # standard deviations: a mirror image, or another wrong solution
 
@@ -31,8 +31,8 @@ class _Outcome:
     tip: FloatArray
     leds: FloatArray
     intrinsics: FloatArray  # fx, fy, cx, cy
-    tip_error: float  # um
-    led_rms: float  # um
+    tip_error: float  # µm
+    led_rms: float  # µm
     focal_error: float  # per cent
     seconds: float
 
@@ -53,8 +53,8 @@ def discovery_rows(workers: Workers) -> list[Row]:
     return [
         Row(
             f"{stations}: median error of tip, LEDs (rms), focal length",
-            f"{tip:.1f} um, {leds:.1f} um, {focal:.4f} %",
-            f"<= {TIP_LIMIT:g} um, {LED_LIMIT:g} um, {FOCAL_LIMIT:g} %",
+            f"{tip:.1f} µm, {leds:.1f} µm, {focal:.4f} %",
+            f"<= {TIP_LIMIT:g} µm, {LED_LIMIT:g} µm, {FOCAL_LIMIT:g} %",
             met=tip <= TIP_LIMIT and leds <= LED_LIMIT and focal <= FOCAL_LIMIT,
         ),
         Row(

@@ -3,7 +3,7 @@
 At 20 images a second, one simulated hand leans the pen where the arrow says, another to
 postures drawn at random from those in which all LEDs show; a third swings it round as
 operators do. All are captured by the same rules until U (k = 2) of the tip along its
-weakest direction is 5 um at a noise of 0.05 px. Only LED centres are simulated.
+weakest direction is 5 µm at a noise of 0.05 px. Only LED centres are simulated.
 """
 
 import time
@@ -67,7 +67,7 @@ def guided_rows(workers: Workers) -> list[Row]:
     slowest = max(outcome.slowest_ms for outcome in guided)
     return [
         Row(
-            f"Images to U = {1000 * U_LIMIT:.0f} um at {SIGMA} px, arrow followed; "
+            f"Images to U = {1000 * U_LIMIT:.0f} µm at {SIGMA} px, arrow followed; "
             f"mean (least to most) of {len(SEEDS)} swings",
             _range(guided),
             f"<= {MAX_RATIO:.2f} of random",

@@ -28,7 +28,7 @@ SPOILT = {  # and the reasons that tell the truth about it
     "blurred_away": {Reason.BLURRED, Reason.EMPTY},
     "empty": {Reason.EMPTY},
 }
-TIP_LIMIT = 8.0  # um
+TIP_LIMIT = 8.0  # µm
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ def hard_scene_rows(workers: Workers) -> list[Row]:
         ),
         Row(
             f"{scenes}: tip error",
-            f"{numbers(errors, 1)} um",
-            f"<= {TIP_LIMIT:g} um",
+            f"{numbers(errors, 1)} µm",
+            f"<= {TIP_LIMIT:g} µm",
             "two-stage (paper) "
             f"{numbers([found.two_stage_error for found in outcomes], 1)}",
             max(errors) <= TIP_LIMIT,

@@ -93,7 +93,7 @@ def killed_rows() -> list[Row]:
         ),
         Row(
             "- tip of that swing, distance from the true one",
-            f"{error:.1f} um, {int(calibration.used.sum())} images used",
+            f"{error:.1f} µm, {int(calibration.used.sum())} images used",
         ),
     ]
 

@@ -124,7 +124,7 @@ def coverage_rows(found: Sequence[Sequence[CoveredPart]]) -> list[Row]:
             Row(
                 f"U of the {name}: by all that touches share, one and two cameras; "
                 "if they shared nothing",
-                f"{numbers(shared, 0)} um; {numbers(alone, 0)} um",
+                f"{numbers(shared, 0)} µm; {numbers(alone, 0)} µm",
             )
         )
     return rows
@@ -217,15 +217,15 @@ def feature_rows(workers: Workers) -> list[Row]:
     ]
     for kind, own in others["ours"].items():
         theirs = [
-            f"{name} {UM * others[name][kind]:.1f} um"
+            f"{name} {UM * others[name][kind]:.1f} µm"
             for name in PEERS
             if kind in others[name]
         ]
         rows.append(
             Row(
-                f"{kind.value} of {N_TOUCHES} touches, {UM * FORM:.0f} um of noise: "
+                f"{kind.value} of {N_TOUCHES} touches, {UM * FORM:.0f} µm of noise: "
                 "rms distance of its true points",
-                f"{UM * own:.1f} um",
+                f"{UM * own:.1f} µm",
                 others=", ".join(theirs),
             )
         )

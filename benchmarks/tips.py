@@ -29,16 +29,16 @@ from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.pivot.pivot import PivotFit, fit_pivot
 from lightpen.formats.observation_files import read_centers
 
-TIP_LIMITS = {"swing-full": 3.5, "swing-clean": 4.0, "fixed-point": None}  # um
+TIP_LIMITS = {"swing-full": 3.5, "swing-clean": 4.0, "fixed-point": None}  # µm
 CENTER_LIMIT = 0.006  # px
-REPEAT_LIMITS = np.array([0.7, 1.5, 1.5])  # um
+REPEAT_LIMITS = np.array([0.7, 1.5, 1.5])  # µm
 UM = 1000.0  # in a millimetre
 N_PEER_IMAGES = 60  # of a set, for the centres of others
 
 
 @dataclass(frozen=True, eq=False)
 class _Outcome:
-    """Errors of one image set: tips in um, centres in px."""
+    """Errors of one image set: tips in µm, centres in px."""
 
     joint: float
     two_stage: float
@@ -61,8 +61,8 @@ def tip_rows(workers: Workers, data: Path | None) -> list[Row]:
         rows += [
             Row(
                 f"`{name}`: tip error",
-                f"{found.joint:.1f} um",
-                NO_LIMIT if limit is None else f"<= {limit:g} um",
+                f"{found.joint:.1f} µm",
+                NO_LIMIT if limit is None else f"<= {limit:g} µm",
                 f"two-stage (paper) {found.two_stage:.1f}; algebraic one-step "
                 f"{found.one_step:.1f}, weighted {found.weighted:.1f}",
                 limit is None or found.joint <= limit,
@@ -90,8 +90,8 @@ def repeat_rows(workers: Workers, data: Path | None) -> list[Row]:
     return [
         Row(
             what,
-            f"{numbers(joint, 2)} um",
-            f"<= {numbers(REPEAT_LIMITS, 1)} um",
+            f"{numbers(joint, 2)} µm",
+            f"<= {numbers(REPEAT_LIMITS, 1)} µm",
             f"two-stage (paper) {numbers(two_stage, 1)}; algebraic one-step "
             f"{numbers(one_step, 1)}",
             bool(np.all(joint <= REPEAT_LIMITS)),

@@ -25,8 +25,8 @@ from lightpen.verification.tasks.task import Conditions
 UM = 1000.0  # in a millimetre
 ONE_IMAGE = ProbingRules(n_frames=1, n_settling=0)
 NOMINAL_TIP = np.array([0.0, -90.0, -25.0])  # mm, the paper's
-POINT_LIMITS = np.array([2.0, 2.0, 10.0])  # um
-RADIUS, ERROR_LIMIT, SCATTER_LIMIT, N_RUNS = 31.751, 1.5, 1.0, 8  # mm, um
+POINT_LIMITS = np.array([2.0, 2.0, 10.0])  # µm
+RADIUS, ERROR_LIMIT, SCATTER_LIMIT, N_RUNS = 31.751, 1.5, 1.0, 8  # mm, µm
 N_PARTS, N_CALIBRATIONS, N_TOUCHES = 10, 10, 10
 SHARE_LIMITS = 0.93, 0.97
 LONGEST = 180.0  # s of the operator's time
@@ -90,16 +90,16 @@ def _of_sets(data: Path) -> list[Row]:
     return [
         Row(
             FIGURES[0],
-            f"{numbers(deviation, 1)} um",
-            f"{numbers(POINT_LIMITS, 0)} um",
-            f"nominal tip {numbers(UM * point.nominal.deviation, 0)} um",
+            f"{numbers(deviation, 1)} µm",
+            f"{numbers(POINT_LIMITS, 0)} µm",
+            f"nominal tip {numbers(UM * point.nominal.deviation, 0)} µm",
             met=bool((deviation <= POINT_LIMITS).all()),
         ),
         Row(
             FIGURES[1],
-            f"{error:+.1f}, {scatter:.1f} um",
-            f"{ERROR_LIMIT:g}, {SCATTER_LIMIT:g} um",
-            "paper 17, 8 um",
+            f"{error:+.1f}, {scatter:.1f} µm",
+            f"{ERROR_LIMIT:g}, {SCATTER_LIMIT:g} µm",
+            "paper 17, 8 µm",
             met=abs(error) <= ERROR_LIMIT and scatter <= SCATTER_LIMIT,
         ),
     ]

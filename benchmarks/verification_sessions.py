@@ -34,7 +34,7 @@ def session_rows(workers: Workers) -> list[Row]:
         rows.append(
             Row(
                 f"{N_STATIONS} sessions, {name}: correct tips pass, tips wrong by "
-                f"{1000 * WRONG:.0f} um are found",
+                f"{1000 * WRONG:.0f} µm are found",
                 f"{100 * passed:.0f} %, {100 * found:.0f} %",
                 f"{100 * MIN_PASSED:.0f} %, "
                 + (f"{100 * MIN_FOUND:.0f} %" if claims else "not claimed"),
