@@ -19,6 +19,7 @@ from msgspec import structs
 from skspatial.objects import Cylinder, Line, Plane, Sphere
 
 from lightpen.arrays import FloatArray
+from lightpen.measuring.characteristics import FORMS
 from lightpen.measuring.features import fit_feature
 from lightpen.measuring.part import MeasuredPart, measure_part
 from lightpen.measuring.plan import CharacteristicKind, PlannedCharacteristic
@@ -52,8 +53,10 @@ MORE = (
 
 @cache
 def _plan() -> MeasuringPlan:
+    """Return the plan of the plate without form errors, but with more distances."""
     plan = plate_plan()
-    return structs.replace(plan, characteristics=(*plan.characteristics, *MORE))
+    kept = [each for each in plan.characteristics if each.quantity not in FORMS]
+    return structs.replace(plan, characteristics=(*kept, *MORE))
 
 
 @dataclass(frozen=True)

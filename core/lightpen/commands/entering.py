@@ -8,9 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from lightpen.commands.console import shown, write_record
+from lightpen.local_time import local_now
+from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import NOBODY, CalibrationFile
+from lightpen.record.library.tip_library import read_library
 from lightpen.record.results.opening import data_folder_of
+from lightpen.record.results.result_folder import FolderArchive
 from lightpen.verification.storage.verification_files import keep_verification
 
 
@@ -79,9 +83,19 @@ def keep_record(
     # A fifth of a second, which a result without an entry need not take.
     from lightpen.archive.lazy_logbook import server_address
     from lightpen.archive.logbook import Logbook
+    from lightpen.archive.tip_status import statuses
 
     kept = keep_verification(data, record, is_simulated=is_simulated)
     with closing(Logbook(data, server_address())) as logbook:
         for trouble in logbook.enter_owed():
             print(shown(str(trouble)))
+        if not is_simulated:
+            supervision = FolderArchive(data).supervision()
+            rule = supervision.limits_at(names.station, StationLimits()).due
+            found = statuses(
+                logbook.database, logbook.chain, rule, read_library(data), local_now()
+            )
+            overdue = found.overdue(names.pen, names.tip)
+            if overdue is not None:
+                print(shown(str(overdue)))
     print(shown(f"Entered in the archive: {kept}"))

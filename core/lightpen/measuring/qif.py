@@ -1,8 +1,9 @@
 """A measured part as QIF 3.0 results (ISO 23952), see `measuring.exports`.
 
 Each characteristic has a definition with its tolerance, a nominal, an item and a
-measurement. As a plan can combine features freely, characteristics are user-defined
-linear or angular ones that name what is measured.
+measurement; each feature has its place, direction, size and form in the part's frame.
+As a plan can combine features freely, characteristics are user-defined linear or
+angular ones that name what is measured.
 """
 
 from uuid import uuid4
@@ -11,14 +12,19 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from lightpen import __version__
+from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
-from lightpen.measuring.characteristics import IS_ANGLE
+from lightpen.measuring.characteristics import IS_ANGLE, Measured
+from lightpen.measuring.features import AXIS, PLACE
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
+from lightpen.measuring.quantities import derive
+from lightpen.measuring.surfaces import FeatureKind
 from lightpen.model.decision_rules import Decision
 
 NAMESPACE = "http://qifstandards.org/xsd/qif3"
 VERSION = "3.0.0"
 N_DECIMALS = 12
+NAMES = {FeatureKind.SLOT: "ElongatedCircle"}  # that are other words in QIF
 STATUS = {
     Decision.ACCEPTED: "PASS",
     Decision.REJECTED: "FAIL",
@@ -29,11 +35,12 @@ STATUS = {
 
 def qif_text(part: MeasuredPart) -> str:
     """Return a QIF document with the characteristics of a part."""
-    n = len(part.results)
-    ids = iter(range(1, 4 * n + 3))
+    n, n_features = len(part.results), len(part.features)
+    last_id = 4 * n + n_features + 2
+    ids = iter(range(1, last_id + 1))
     root = ET.Element(
         "QIFDocument",
-        {"xmlns": NAMESPACE, "versionQIF": VERSION, "idMax": str(4 * n + 2)},
+        {"xmlns": NAMESPACE, "versionQIF": VERSION, "idMax": str(last_id)},
     )
     _text(root, "QPId", str(uuid4()))
     application = ET.SubElement(ET.SubElement(root, "Header"), "Application")
@@ -58,6 +65,9 @@ def qif_text(part: MeasuredPart) -> str:
         )
     root.append(results)
     one = ET.SubElement(of_set, "MeasurementResults", {"id": str(next(ids))})
+    of_features = ET.SubElement(one, "MeasuredFeatures", {"n": str(n_features)})
+    for name, feature in part.features.items():
+        _add_feature(of_features, name, feature, part, str(next(ids)))
     if n:
         measured = ET.SubElement(one, "MeasuredCharacteristics")
         group = ET.SubElement(measured, "CharacteristicMeasurements", {"n": str(n)})
@@ -123,7 +133,7 @@ def _add_definition(
     _text(element, "Name", planned.label)
     lower, upper = planned.limits
     if np.isinf([lower, upper]).all():
-        _text(element, "NonTolerance", "NOTOL")
+        _text(element, "NonTolerance", "MEASURED")
     else:
         tolerance = ET.SubElement(element, "Tolerance")
         for name, limit in (("MaxValue", upper), ("MinValue", lower)):
@@ -160,8 +170,72 @@ def _add_measurement(
     status = ET.SubElement(element, "Status")
     _text(status, "CharacteristicStatusEnum", STATUS[result.decision])
     _text(element, "CharacteristicItemId", ids[2])
-    value = _text(element, "Value", _number(result.value.value))
-    value.set("meanError", "0")  # QIF wants both or none
-    value.set(
-        "combinedUncertainty", _number(result.value.uncertainty / COVERAGE_FACTOR)
-    )
+    _value(element, "Value", result.value.value, result.value.uncertainty)
+
+
+def _value(parent: ET.Element, name: str, value: float, uncertainty: float) -> None:
+    """Add a value with its U (k = 2)."""
+    element = _text(parent, name, _number(value))
+    element.set("meanError", "0")  # QIF wants both or none
+    element.set("combinedUncertainty", _number(uncertainty / COVERAGE_FACTOR))
+
+
+def _vector(
+    parent: ET.Element,
+    name: str,
+    vector: FloatArray,
+    uncertainties: FloatArray | None = None,
+) -> None:
+    """Add a direction, or a place with U (k = 2) of its coordinates."""
+    element = _text(parent, name, " ".join(map(_number, vector.tolist())))
+    if uncertainties is not None:
+        for axis, u in zip("xyz", uncertainties.tolist(), strict=True):
+            element.set(f"{axis}MeanError", "0")
+            element.set(f"{axis}CombinedUncertainty", _number(u / COVERAGE_FACTOR))
+
+
+def _add_feature(
+    parent: ET.Element, name: str, one: Measured, part: MeasuredPart, id_: str
+) -> None:
+    """Add place, direction, size and form of a feature in the frame of the part."""
+    kind = NAMES.get(one.kind, one.kind.value.capitalize())
+    element = ET.SubElement(parent, f"{kind}FeatureMeasurement", {"id": id_})
+    _text(element, "FeatureName", name)
+    values, spread = one.in_part.values, part.uncertainty(name)
+    place, axis = values[PLACE], values[AXIS]
+
+    def add_diameter() -> None:
+        _value(element, "Diameter", 2 * values[6], 2 * spread[6])
+
+    match one.kind:
+        case FeatureKind.CYLINDER | FeatureKind.CONE:
+            line = ET.SubElement(element, "Axis")
+            _vector(line, "AxisPoint", place, spread[PLACE])
+            _vector(line, "Direction", axis)
+            add_diameter()
+            if one.kind is FeatureKind.CONE:
+                angle, u = 2 * np.rad2deg([values[7], spread[7]])
+                _value(element, "FullAngle", angle, u)
+        case FeatureKind.SLOT:
+            assert one.feature is not None
+            along, length = one.feature.axes[:, 0], values[7] + 2 * values[6]
+            if part.alignment is not None:
+                along = part.alignment.rotation @ along
+            add_diameter()
+            line = ET.SubElement(element, "CenterLine")
+            _vector(line, "StartPoint", place, spread[PLACE])
+            _vector(line, "Vector", along)
+            _vector(element, "Normal", axis)
+            by_sizes = derive(lambda v: v[7] + 2 * v[6], one.in_part)
+            u_length = by_sizes.uncertainty(part.touches.inputs)[0]
+            _value(element, "Length", length, u_length)
+        case _:
+            _vector(element, "Location", place, spread[PLACE])
+            if one.kind is FeatureKind.LINE:
+                _vector(element, "Direction", axis)
+            elif one.kind in {FeatureKind.PLANE, FeatureKind.CIRCLE}:
+                _vector(element, "Normal", axis)
+            if one.kind in {FeatureKind.CIRCLE, FeatureKind.SPHERE}:
+                add_diameter()
+    if one.feature is not None and one.kind is not FeatureKind.POINT:
+        _text(element, "Form", _number(one.feature.form_error))

@@ -125,7 +125,10 @@ def test_tips_are_valid_overdue_not_calibrated_or_retired(station: Station) -> N
     library = Library()
 
     assert stand(station, library, 29).of_tip("LP-04", "T-10") is TipStatus.VALID
-    assert stand(station, library, 31).of_tip("LP-04", "T-10") is TipStatus.OVERDUE
+    expired = stand(station, library, 31)
+    assert expired.of_tip("LP-04", "T-10") is TipStatus.OVERDUE
+    assert "expired on 2026-02-01" in str(expired.overdue("LP-04", "T-10"))
+    assert stand(station, library, 29).overdue("LP-04", "T-10") is None
     assert stand(station, library, 1).of_tip("LP-05", "T-10") is TipStatus.UNCALIBRATED
     retired = Library(tips={"T-10": ListedTip(id="T-10", is_retired=True)})
     assert stand(station, retired, 1).of_tip("LP-04", "T-10") is TipStatus.RETIRED

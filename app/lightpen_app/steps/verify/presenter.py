@@ -140,10 +140,13 @@ class VerifyPresenter(QObject):
         return tip is not None and tip.calibration.grade == Grade.CHECK
 
     def _tip_status(self) -> str:
-        """Return the status of a tip, a word; nothing of a valid one."""
+        """Return the status of a tip; nothing of a valid one."""
         tip, statuses = self._status.tip, self._tips.statuses
         if tip is None or self._selection.preparation.origin is Origin.SIMULATED:
             return ""
+        overdue = statuses.overdue(tip.names.pen, tip.names.tip)
+        if overdue is not None:
+            return worded(overdue)
         status = statuses.of_tip(tip.names.pen, tip.names.tip)
         return "" if status in (None, TipStatus.VALID) else status_text(status)
 

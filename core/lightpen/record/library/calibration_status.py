@@ -7,6 +7,7 @@ from enum import StrEnum
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.local_time import local_time
+from lightpen.messages import Message, message
 from lightpen.record.library.tip_library import Item, ItemKind, Library
 
 
@@ -67,6 +68,19 @@ class StationStatus:
             return TipStatus.UNCALIBRATED
         is_over = listed is not None and listed.is_overdue(self._today(self.now))
         return TipStatus.OVERDUE if is_over or found.is_due else TipStatus.VALID
+
+    def overdue(self, pen: str, tip: str) -> Message | None:
+        """Return that the calibration of a current tip expired; None if it did not."""
+        due = self.due(pen, tip)
+        is_over = self.of_tip(pen, tip) is TipStatus.OVERDUE
+        if (
+            self.now is None
+            or due is None
+            or not is_over
+            or due > self._today(self.now)
+        ):
+            return None  # due by the number of swings, or by a clock that was set back
+        return message("doubt.calibration-overdue", due=f"{due:%Y-%m-%d}")
 
     def of_item(self, kind: ItemKind, name: str) -> TipStatus | None:
         """Return the status of a pen, a cone or the ball of a tip.

@@ -1,9 +1,14 @@
 """A part as a task of a session: the simulated plate, undone points, what is kept."""
 
+import os
 from dataclasses import dataclass, field, replace
+from io import StringIO
+from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from ezdxf.filemanagement import read as read_drawing
 from msgspec import structs
 from tests.accepted_tip import Hold, Holder
 
@@ -13,6 +18,7 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.part import taught_plan
 from lightpen.measuring.plan import Plan, free_plan
+from lightpen.measuring.qif import qif_text
 from lightpen.measuring.surfaces import FeatureKind
 from lightpen.model.posture import FACING
 from lightpen.model.rigid import rotation_from_vector
@@ -29,6 +35,7 @@ from lightpen.verification.tasks.part import PART, Part, PartOptions, feature_so
 from lightpen.verification.tasks.probed_point import ProbedPoint
 
 BALL = 10.0  # mm
+QIF = Path(os.environ.get("LIGHTPEN_DATA", "no such folder")) / "qif/QIFDocument.xsd"
 NOISE = 0.002  # mm
 RAISED = FACING
 
@@ -156,9 +163,41 @@ def test_every_export_names_the_characteristics(
     text = export.content(part).decode()  # type: ignore[attr-defined]
 
     if export.name == "dxf":  # type: ignore[attr-defined]
-        assert text.count("\nBORE\n") > 2 * 70
+        drawing = read_drawing(StringIO(text))
+        assert not drawing.audit().errors
+        assert len(drawing.modelspace().query('*[layer=="BORE"]')) > 2 * 70
     else:
         assert all(each.planned.label in text for each in part.results)
+
+
+def test_qif_has_every_feature_with_its_place_and_uncertainty(
+    measured: Station,
+) -> None:
+    part = measured.found.part
+    names = {"q": "http://qifstandards.org/xsd/qif3"}
+    root = ElementTree.fromstring(qif_text(part))
+    (features,) = root.iterfind(".//q:MeasuredFeatures", names)
+
+    assert [each.findtext("q:FeatureName", None, names) for each in features] == [
+        *part.features
+    ]
+    (dome,) = features.iterfind("q:SphereFeatureMeasurement", names)
+    place, diameter = (dome.find(f"q:{x}", names) for x in ("Location", "Diameter"))
+    assert place is not None
+    assert diameter is not None
+    assert float(diameter.text or "") == pytest.approx(20, abs=0.02)
+    assert float(place.attrib["xCombinedUncertainty"]) == pytest.approx(
+        part.uncertainty("dome")[0] / 2
+    )
+    ids = [each.attrib["id"] for each in root.iter() if "id" in each.attrib]
+    assert len(ids) == len(set(ids)) == int(root.attrib["idMax"])
+
+
+@pytest.mark.skipif(not QIF.is_file(), reason="The schema of QIF is not there.")
+def test_qif_is_as_its_published_schema_says(measured: Station) -> None:
+    from xmlschema import XMLSchema  # takes long
+
+    assert not [*XMLSchema(QIF).iter_errors(qif_text(measured.found.part))]
 
 
 def test_a_taught_plan_measures_the_same_part_again(measured: Station) -> None:
