@@ -76,7 +76,7 @@ class Page(Translated, QWidget):
         raise NotImplementedError
 
     def heading(self) -> str:
-        """Return what stands above the page; by default, the name of the step."""
+        """Return the heading of the page; by default, the name of the step."""
         return self.title()
 
     def lead(self) -> str:

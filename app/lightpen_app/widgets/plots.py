@@ -115,7 +115,7 @@ class Plot(QWidget):
     Signals
     -------
     titled()
-        It has other words.
+        Title or labels changed.
     """
 
     titled = Signal()

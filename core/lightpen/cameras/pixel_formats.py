@@ -38,7 +38,8 @@ class PixelFormat:
     n_channels : int
         Values of a pixel.
     to_grey : int or None
-        Conversion of OpenCV; None for what is grey, or begins with its luminance.
+        Conversion of OpenCV; None for grey formats, and for those whose values hold the
+        luminance separately.
     luminance : int
         The first of two values is the luminance, or the second.
     """

@@ -239,7 +239,7 @@ class CameraWorker:
             self._reconnect()
 
     def _is_wanted(self) -> bool:
-        """Return whether an image is due after the pause."""
+        """Return whether to fetch an image now; wait here for the rest between two."""
         rest = self._rest
         if rest is not None and self._is_stopped:
             self._is_stopped = False

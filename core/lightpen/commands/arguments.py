@@ -136,7 +136,8 @@ def add_exit_by_verdict(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--exit-by-verdict",
         action="store_true",
-        help="exit status 3 if the verdict is REPEAT, 4 if it is CHECK",
+        help="exit status 3 if the verdict is REPEAT (of a part: out of tolerance), 4 "
+        "if it is CHECK (not proven)",
     )
 
 

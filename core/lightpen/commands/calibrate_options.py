@@ -100,8 +100,8 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         type=number_from(1e-7, 1.0, "compliance", "mm"),
         metavar="MM",
         help=(
-            "standard uncertainty of how far stylus, seat and stand give way, by the "
-            "sine of the tilt (0.004)"
+            "standard uncertainty of the deflection of stylus, seat and stand, which "
+            "is in proportion to the sine of the tilt (0.004)"
         ),
     )
     parser.add_argument(

@@ -59,8 +59,8 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="FILE.csv",
-        help="spot centres (frame,x_px,y_px), which LED they are being unknown, "
-        "instead of IMAGES, one file a swing; with --image-size",
+        help="spot centres without LED numbers (frame,x_px,y_px) instead of IMAGES, "
+        "one file per swing; needs --image-size",
     )
     parser.add_argument(
         "--image-size", type=_size, metavar="WxH", help="size of the images, 2448x2048"
@@ -113,10 +113,7 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         help="LED file with rough coordinates, which gives numbers and frame",
     )
     rough.add_argument(
-        "--pen",
-        type=Path,
-        metavar="FILE",
-        help="LED file that is only roughly true; as --pen-sketch",
+        "--pen", type=Path, metavar="FILE", help="the same as --pen-sketch"
     )
     for name, what in (("pen", "pen file"), ("camera", "camera file")):
         suffix = "json" if name == "pen" else "yaml"

@@ -48,7 +48,7 @@ def add_measure(parser: argparse.ArgumentParser) -> None:
         "--ball-diameter",
         type=not_negative,
         metavar="MM",
-        help="default: that of the calibrated tip, if known; 0 for its centre",
+        help="default: that of the calibrated tip, if known; 0: no compensation",
     )
     parser.add_argument(
         "--ball-uncertainty",
@@ -61,7 +61,7 @@ def add_measure(parser: argparse.ArgumentParser) -> None:
         "--drift",
         type=Path,
         metavar="DRIFT.json",
-        help="record of verify drift of the same session, included in U",
+        help="record of `verify drift` from the same session; U includes the drift",
     )
     parser.add_argument(
         "--export",

@@ -76,9 +76,9 @@ def add_touch_inputs(parser: argparse.ArgumentParser, tip_help: str) -> None:
         type=int,
         choices=range(1, 101),
         metavar="N",
-        help="images of a touch, through which the pen is held still, such as "
-        f"{FAST} or for a precise one {PRECISE}; 1 takes each image for a touch. "
-        f"Unless said {FAST}, or 1 where the pen was held still for none",
+        help="images per touch while the pen is held still, such as "
+        f"{FAST}, or {PRECISE} for a precise point; 1: each image is a touch "
+        f"(default: {FAST}, or 1 if the pen was never held still)",
     )
 
 

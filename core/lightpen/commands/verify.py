@@ -81,7 +81,7 @@ def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
             "--drift",
             type=Path,
             metavar="DRIFT.json",
-            help="record of verify drift of the same session, included in U",
+            help="record of `verify drift` from the same session; U includes the drift",
         )
     _add_common(parser, *task.limits)
     add_verdict(parser)
@@ -103,7 +103,7 @@ def _add_touches(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_touches, decision_rule="simple", max_risk=5.0)
     _add_runs(parser, "points that were touched")
     _add_ball(
-        parser, "of the probe, to give the surface that it touched, not its centre"
+        parser, "ball diameter; the points are then on the surface, not ball centres"
     )
     parser.add_argument(
         "--along",

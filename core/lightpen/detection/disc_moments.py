@@ -466,10 +466,7 @@ def _window_levels(window: Image, level: float) -> Levels:
 
 
 def _moments(soft: MatLike, frame: PixelBox, ramp: float) -> DiscMoments | None:
-    """Return the moments of a soft-thresholded region, None if it is too small.
-
-    So it is, too, if it is too narrow.
-    """
+    """Return the moments of a soft-thresholded region; None if small or narrow."""
     m = cv2.moments(soft)
     area = m["m00"] / 255.0
     if area < MIN_AREA:

@@ -65,7 +65,7 @@ def masked_lights(
 
 
 def fixed_lamps(masked: FloatArray, detections: Sequence[PenDetection]) -> FloatArray:
-    """Return where images show lamps that stay, (N, K, 2), px.
+    """Return where images show lamps that do not move, (N, K, 2), px.
 
     Parameters
     ----------

@@ -61,7 +61,7 @@ class Exposure:
 
     @property
     def n_good(self) -> int:
-        """LEDs between the two."""
+        """LEDs that are neither dark nor saturated."""
         return len(self.peaks) - self.n_dark - self.n_saturated
 
 

@@ -144,12 +144,14 @@ class Spots:
         return len(self.centers)
 
     def rims(self, corner: FloatArray) -> list[EdgeStart]:
-        """Return where to look for the rims of the whole spots in the next image.
+        """Return where to search for the rims of these spots in the next image.
+
+        Merged spots, and those that the border cuts, are left out.
 
         Parameters
         ----------
         corner : (2,) array
-            Pixel of this image that is the first of the next, px.
+            Pixel of this image where the next one, a part of the sensor, begins, px.
         """
         return [
             EdgeStart(center - corner, shape, width / GAUSSIAN_RISE)

@@ -104,7 +104,7 @@ class Seed:
 def solve_seed(
     pieces: Pieces, size: tuple[int, int], known: Camera | None = None
 ) -> Seed:
-    """Solve the part of a swing that shows most pieces for longest.
+    """Solve the part of a swing in which most track pieces are visible for longest.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def solve_seed(
     Raises
     ------
     CalibrationError
-        No part is long enough, or the mirror stays undecided.
+        No part is long enough, or shape and mirror image fit alike.
     """
     images, chosen = _best_part(pieces)
     seed = _solved(pieces, images, chosen, size, known)

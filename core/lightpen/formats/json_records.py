@@ -80,9 +80,9 @@ def record_bytes(record: Mapping[str, Any] | Struct) -> bytes:
 
 
 def json_bytes(record: Mapping[str, Any] | Struct) -> bytes:
-    """Return a record as JSON, readable: one line an entry, and one an image.
+    """Return a record as readable JSON: one line per entry, and one per image.
 
-    The bytes of a file name that is no text in this system's encoding become JSON
+    Bytes of a file name that are no text in the encoding of this system become JSON
     escapes.
     """
     lines = []

@@ -305,7 +305,7 @@ def _beside(
     R: FloatArray,
     t: FloatArray,
 ) -> IntArray:
-    """Return the spot left over near the place of each LED that has none, (N, L)."""
+    """Return the unassigned spot nearest to each LED without a spot, (N, L)."""
     beside = np.full_like(taken, -1)
     there = camera.project(pen.leds @ np.swapaxes(R, 1, 2) + t[:, None])
     for i, each in enumerate(spots):

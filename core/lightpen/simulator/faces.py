@@ -200,7 +200,7 @@ def _sub_pixels(begin: int, end: int) -> FloatArray:
 def _lines_of_sight(
     camera: Camera, columns: FloatArray, rows: FloatArray
 ) -> tuple[LightArray, LightArray]:
-    """Return where sub-pixels are in the normalised plane, by a coarse grid of them."""
+    """Return sub-pixels in the normalised plane, interpolated from a coarse grid."""
     x = np.arange(columns[0] - COARSE, columns[-1] + COARSE, COARSE)
     y = np.arange(rows[0] - COARSE, rows[-1] + COARSE, COARSE)
     grid = camera.unproject(np.stack(np.meshgrid(x, y), axis=-1))

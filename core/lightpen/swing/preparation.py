@@ -265,7 +265,7 @@ class Preparation:
         return self.second.mask
 
     def with_mask(self, camera: int, mask: FloatArray) -> Self:
-        """Return it with other stray light in the images of a camera, from 0."""
+        """Return it with another stray light mask of a camera, counted from 0."""
         if camera == 0 or self.second is None:
             return replace(self, mask=mask)
         return replace(self, second=replace(self.second, mask=mask))

@@ -637,7 +637,7 @@ class _LogbookEntries:
             self._tell_fault(trouble)
 
     def enter_owed(self) -> None:
-        """Enter events that are in files only."""
+        """Enter events in the archive that only files hold so far."""
         if self._logbook is not None:
             self._logbook.enter_owed()
 

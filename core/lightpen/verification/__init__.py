@@ -1,1 +1,1 @@
-"""Proving a tip: the cone again, a ring, a length; the health of pen and camera."""
+"""Verification of a tip on artefacts; the state of pen and camera over time."""

@@ -184,7 +184,7 @@ class ItemForm(Translated, QWidget):
         self._spin.setChecked(False)
 
     def picture(self) -> str:
-        """Return the path of another picture; empty for that of before."""
+        """Return the path of a new picture; empty if it is the previous one."""
         return self._picture.value()
 
     def set_value(self, item: AnyItem, *, is_new: bool) -> None:

@@ -19,7 +19,7 @@ LEAST = 1e-12  # px^2
 def find_led_noise(
     residuals: FloatArray, used: BoolArray, sigma: float, weights: FloatArray
 ) -> FloatArray | None:
-    """Return the noise of each LED by that of a usual one, (C, L); None if alike.
+    """Return the noise of each LED over that of a usual one, (C, L); None if equal.
 
     Parameters
     ----------

@@ -350,8 +350,8 @@ def _instruction(options: ArticulationOptions, progress: TaskProgress) -> Messag
 
 ARTICULATION = VerificationTask(
     kind="articulation",
-    summary="one point, in the form of ISO 10360-12",
-    run_help="one posture; a single run holds five postures, one after the other",
+    summary="one point in five postures (ISO 10360-12)",
+    run_help="one posture; or a single run with all five, one after the other",
     title=message("articulation.title"),
     purpose=message("articulation.purpose"),
     first=message("task.probe-cone"),

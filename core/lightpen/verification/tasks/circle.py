@@ -544,8 +544,7 @@ CIRCLE = VerificationTask(
             (message("circle.groove"), message("circle.bore"), message("circle.boss")),
             argument="--surface",
             words={"bore": Surface.BORE, "boss": Surface.BOSS},
-            ball_help="of the probe, where it touched a bore or a boss and not a "
-            "groove",
+            ball_help="ball diameter, if a bore or a boss was touched, not a groove",
         ),
         count_option("n_runs", message("option.runs"), 1, MOST_RUNS),
     ),

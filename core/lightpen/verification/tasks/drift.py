@@ -218,8 +218,8 @@ def _instruction(options: DriftOptions, progress: TaskProgress) -> Message:
 
 DRIFT = VerificationTask(
     kind="drift",
-    summary="whether the camera moved meanwhile",
-    run_help="one visit of a cone that stands still, in order of time",
+    summary="motion of camera or cone during a session",
+    run_help="one visit of a fixed cone, in order of time",
     title=message("drift.title"),
     purpose=message("drift.purpose"),
     first=message("drift.first"),

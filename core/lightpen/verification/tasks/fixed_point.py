@@ -389,7 +389,7 @@ def _instruction(options: FixedPointOptions, progress: TaskProgress) -> Message:
 
 FIXED_POINT = VerificationTask(
     kind="fixed point",
-    summary="the cone again, in new postures",
+    summary="the cone, probed in new postures",
     run_help="points in the cone, each in another posture",
     title=message("fixed-point.title"),
     purpose=message("fixed-point.purpose"),

@@ -438,7 +438,7 @@ LENGTH = VerificationTask(
             ),
             argument="--faces",
             words={"outer": Surface.BOSS, "inner": Surface.BORE},
-            ball_help="of the probe, where it touched faces and not cones",
+            ball_help="ball diameter, if faces were touched, not cones",
         ),
         count_option("n_places", message("option.places"), 1, MOST_RUNS),
     ),

@@ -426,7 +426,7 @@ PLANE = VerificationTask(
             message("plane.certified-flatness"),
             most=LARGEST_U,
             argument="--certified-flatness",
-            help="of the plate; 0 unless said",
+            help="certified flatness of the plate (0)",
         ),
         count_option("n_points", message("option.points"), MIN_POINTS, MAX_POINTS),
     ),

@@ -438,8 +438,8 @@ SPHERE = VerificationTask(
             ),
             argument="--surface",
             words={"outside": Surface.BOSS, "inside": Surface.BORE},
-            ball_help="of the probe; unless given, the diameter is that of the sphere "
-            "of its centres",
+            ball_help="ball diameter; without it, --diameter is that of the sphere of "
+            "the ball centres",
         ),
         count_option("n_points", message("option.points"), MIN_POINTS, MAX_POINTS),
     ),
