@@ -1,17 +1,24 @@
 """What ``lightpen tips`` keeps and prints, and the exit status it ends with."""
 
 import json
+import shutil
 from collections.abc import Callable
 from contextlib import closing
+from datetime import UTC, datetime
 from pathlib import Path
 from subprocess import CompletedProcess
 
 from lightpen.archive.chains import entries_of, own_chain
 from lightpen.archive.database import open_file
 from lightpen.archive.entries import Kind
-from lightpen.archive.logbook import ARCHIVE
+from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.record.library.guard_files import LIMITS_FOLDER
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.supervision_changes import set_password
 
 Run = Callable[..., CompletedProcess[str]]
+NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
+EVE = Signature("Eve", "correct horse")
 
 
 def test_a_tip_is_added_changed_retired_and_listed(
@@ -82,3 +89,20 @@ def test_a_swing_is_no_spin(
     )
     assert spun.returncode == 1
     assert "stylus" in spun.stderr
+
+
+def test_a_copy_of_a_guarded_folder_without_its_limits_takes_no_change(
+    lightpen: Run, tmp_path: Path
+) -> None:
+    data, copy = tmp_path / "data", tmp_path / "copy"
+    set_password(data, EVE, EVE.password, NOON)
+    with closing(Logbook(data)) as logbook:
+        logbook.enter_owed()
+    shutil.copytree(data, copy)
+    shutil.rmtree(copy / LIMITS_FOLDER)
+
+    for words in (("add", "cone", "C-1"), ("share",)):
+        refused = lightpen("tips", *words, "--data", copy)
+        assert refused.returncode != 0
+        assert f"{LIMITS_FOLDER}/000001.json" in refused.stderr
+    assert not (copy / "library").exists()

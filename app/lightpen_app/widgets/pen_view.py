@@ -12,6 +12,7 @@ from PySide6.QtGui import (
     QPainter,
     QPaintEvent,
     QPen,
+    QPixmap,
     QPolygonF,
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
@@ -98,6 +99,8 @@ class PenView(Translated, QWidget):
         self._yaw, self._pitch = START_YAW, START_PITCH
         self._pressed: QPointF | None = None
         self._dragged = QPointF()
+        self._picture = QPixmap()
+        self._picture_shows: tuple[object, ...] = ()
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         policy = QSizePolicy.Policy.Expanding
         self.setSizePolicy(policy, policy)
@@ -191,8 +194,26 @@ class PenView(Translated, QWidget):
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
-        colors = colors_of(self.palette())
-        painter = QPainter(self)
+        QPainter(self).drawPixmap(0, 0, self._drawn())
+
+    def _drawn(self) -> QPixmap:
+        """Return the drawing, which is kept while the page about it changes."""
+        colors, scale = colors_of(self.palette()), self.devicePixelRatio()
+        shows = (
+            *(self._value, self._chosen, *self.turned(), self.hasFocus()),
+            *(self.size().toTuple(), scale, colors, self.toolTip()),
+        )
+        if shows != self._picture_shows:
+            self._picture_shows = shows
+            self._picture = QPixmap(self.size() * scale)
+            self._picture.setDevicePixelRatio(scale)
+            self._picture.fill(Qt.GlobalColor.transparent)
+            painter = QPainter(self._picture)
+            self._draw(painter, colors)
+            painter.end()
+        return self._picture
+
+    def _draw(self, painter: QPainter, colors: Colors) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         focused = self.hasFocus()
         edge = QPen(

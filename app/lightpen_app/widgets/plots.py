@@ -3,9 +3,11 @@
 Making a plot again costs fifty times more than `setData` on one that is there.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from itertools import zip_longest
 from typing import TypeAlias
 
 import numpy as np
@@ -25,6 +27,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
+from lightpen.formats.csv_cells import csv_table
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import (
     GRID,
@@ -35,6 +38,7 @@ from lightpen_app.look.theme import (
     font,
     scaled,
 )
+from lightpen_app.widgets.plot_canvas import Canvas, ReadableAxis
 
 PNG_SCALE = 2
 MARK_HEIGHT = 3 * GRID  # px, below a saved plot
@@ -42,8 +46,7 @@ LEFT_WIDTH = 7 * GRID  # px, the same for all traces so that they line up
 TITLE_MARGIN = LEFT_WIDTH + 2 * GRID  # px that a title leaves free
 LEAST_TITLE = 9  # px
 LABEL_ROOM = 3.0  # times a limit, for the words above it where y is logarithmic
-N_LEAST = 10  # that have room along a trace, so that its numbers are whole
-LABELLED = (1, 2, 5)  # of each decade
+N_LEAST = 10  # a trace has room for whole multiples, so that its numbers are whole
 MARGIN = 0.06  # of the range, left free around the data
 TONES = (Tone.ACTIVE, Tone.WARN, Tone.GOOD, Tone.BAD, Tone.PLAIN)
 
@@ -51,9 +54,6 @@ PLACES = (0.2, 0.8)  # of the width, where the words of a limit may stand
 ABOVE, BELOW = (0.5, 1.0), (0.5, 0.0)  # which point of the words is on the line
 
 Column: TypeAlias = FloatArray | tuple[str, ...]
-# As pyqtgraph hands them to `drawPicture`: line, ticks, and place, flags and text.
-TextSpec: TypeAlias = tuple[QRectF, Qt.AlignmentFlag, str]
-DrawSpecs: TypeAlias = tuple[tuple[object, ...], list[object], list[TextSpec]]
 
 
 @dataclass(frozen=True)
@@ -71,40 +71,6 @@ class Axes:
     title: str
     x: str = ""
     y: str = ""
-
-
-class _ReadableAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
-    """An axis with decades as 10, 20, 50, 100 instead of 1e+02.
-
-    Of numbers that would overlap only as many are drawn as there is room for.
-    """
-
-    @override
-    def generateDrawSpecs(self, p: QPainter) -> DrawSpecs | None:
-        specs: DrawSpecs | None = super().generateDrawSpecs(p)
-        if specs is None:
-            return None
-        line, ticks, words = specs
-        if self.logMode:
-            words = sorted(words, key=_is_between_decades)
-        free: list[TextSpec] = []
-        for each in words:
-            if each[2] and not any(each[0].intersects(other[0]) for other in free):
-                free.append(each)
-        return line, ticks, free
-
-    @override
-    def logTickStrings(
-        self, values: Sequence[float], scale: float, spacing: float
-    ) -> list[str]:
-        numbers = (10 ** float(value) for value in values)
-        leading = ((number, float(f"{number:e}"[:3])) for number in numbers)
-        return [f"{number:g}" if digit in LABELLED else "" for number, digit in leading]
-
-
-def _is_between_decades(spec: TextSpec) -> bool:
-    """Return whether a number is no power of ten; they are drawn first."""
-    return spec[2].strip("0.") != "1"
 
 
 class Plot(QWidget):
@@ -127,10 +93,8 @@ class Plot(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
         # Widgets
-        left = _ReadableAxis("left")
-        self._graphics = pg.PlotWidget(
-            parent=self, axisItems={"left": left}, enableMenu=False
-        )
+        left = ReadableAxis("left")
+        self._graphics = Canvas(parent=self, axisItems={"left": left}, enableMenu=False)
         self._item = self._graphics.getPlotItem()
         self._item.hideButtons()
         self._item.setMouseEnabled(x=False, y=False)
@@ -186,12 +150,9 @@ class Plot(QWidget):
 
     def csv(self) -> bytes:
         """Return the numbers behind the plot, one column each."""
-        n_rows = max((len(column) for column in self._columns.values()), default=0)
-        lines = [",".join(self._columns)]
-        for row in range(n_rows):
-            values = (_cell(column, row) for column in self._columns.values())
-            lines.append(",".join(values))
-        return ("\n".join(lines) + "\n").encode()
+        rows = zip_longest(*self._columns.values(), fillvalue="")
+        cells = (map(_cell, row) for row in rows)
+        return csv_table([self._columns, *cells]).encode()
 
     def columns(self) -> Mapping[str, Column]:
         """Return the displayed data by CSV column."""
@@ -260,8 +221,19 @@ class Plot(QWidget):
             else:
                 axis.showLabel(False)
 
-    def _fit(self, x: FloatArray, y: FloatArray, *, y_zero: bool = False) -> None:
-        """Show all of the data, and the zero of y if it is requested."""
+    def _fit(
+        self,
+        x: FloatArray,
+        y: FloatArray,
+        *,
+        y_zero: bool = False,
+        is_rounded: bool = False,
+    ) -> None:
+        """Show all of the data, and the zero of y if it is requested.
+
+        A rounded range of y stays as it is while the data change little: to draw axes
+        anew takes most of the time of a plot.
+        """
         x, y = x[np.isfinite(x)], y[np.isfinite(y)]
         if not (len(x) and len(y)):
             return
@@ -270,11 +242,14 @@ class Plot(QWidget):
             low, high = min(low, 0.0), max(high, 0.0)
         margin = MARGIN * (high - low) or 0.5 * abs(high) or 1.0
         bottom = low if y_zero and low == 0 else low - margin
+        top = high + margin
+        if is_rounded:
+            step = 10.0 ** (math.floor(math.log10(top - bottom)) - 1)
+            bottom = math.floor(bottom / step) * step
+            top = math.ceil(top / step) * step
         left, right = float(x.min()), float(x.max())
         self._item.setRange(
-            xRange=(left, max(right, left + 1e-9)),
-            yRange=(bottom, high + margin),
-            padding=0.01,
+            xRange=(left, max(right, left + 1e-9)), yRange=(bottom, top), padding=0.01
         )
 
     def _fit_numbered(self, n: int, y: FloatArray) -> None:
@@ -291,12 +266,12 @@ def title_with_names(title: str, names: Sequence[str], colors: Colors) -> str:
     return "&nbsp; ".join((escape(title), *words))
 
 
-def _cell(column: Column, row: int) -> str:
-    """Return an entry of a CSV file; empty below the end of a short column."""
-    if row >= len(column):
-        return ""
-    value = column[row]
-    return value if isinstance(value, str) else f"{value:.9g}"
+def _cell(value: float | str) -> float | str:
+    """Return an entry of a CSV file; numbers with nine digits."""
+    if isinstance(value, str):
+        return value
+    rounded = float(f"{value:.9g}")
+    return int(rounded) if rounded.is_integer() else rounded
 
 
 @dataclass(frozen=True)
@@ -403,8 +378,11 @@ class TracePlot(Plot):
         if self._limit_at is not None:
             reach = (1.0, LABEL_ROOM if self._y_log else 1.0)
             in_sight.append(self._height(self._limit_at * np.array(reach)))
-        room = np.append(x, x.min() + N_LEAST - 1)
-        self._fit(room, np.concatenate(in_sight), y_zero=self._y_zero)
+        n_steps = max(math.ceil((x.max() - x.min() + 1) / N_LEAST), 1)
+        room = np.append(x, x.min() + n_steps * N_LEAST - 1)
+        self._fit(
+            *(room, np.concatenate(in_sight)), y_zero=self._y_zero, is_rounded=True
+        )
         self._place_words()
         if self._limit_at is not None and self.words_cover():
             self._make_room()

@@ -12,6 +12,7 @@ from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.errors import ArchiveError
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import StationStatus
+from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import Library, read_library
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen_app.work.job import Job, Report
@@ -138,9 +139,10 @@ class LibraryWatch(QObject):
 
     def _change_next(self) -> None:
         asked, change = self._asked.popleft()
-        logbook = self._logbook
+        logbook, folder = self._logbook, self._folder
 
         def make(_: Report) -> None:
+            logbook.confirm(read_supervision(folder))
             change()
             with suppress(ArchiveError):  # it stays owed
                 logbook.opened().enter_owed()

@@ -264,12 +264,7 @@ class Logbook:
         ArchiveError
             The archive cannot be read.
         """
-        if supervision.chain not in ("", self.chain):
-            raise AcceptanceError("limits.other-archive")
-        for file in limits_entered(self.database, self.chain):
-            number = number_of(Path(file.place))
-            if supervision.hashes[number - 1 : number] != (file.sha256,):
-                raise AcceptanceError("limits.not-entered", file=printable(file.place))
+        confirm_limits(self.database, self.chain, supervision)
 
     def delivery(self) -> ReplicationState | None:
         """Return the progress of the replication; None without a server.
@@ -371,3 +366,23 @@ def _set_aside(records: Path) -> Iterator[Path]:
         with suppress(OSError):  # it is no record
             if last_verdict(folder) == DISCARDED:
                 yield folder
+
+
+def confirm_limits(
+    database: Database, chain: str | None, supervision: Supervision
+) -> None:
+    """Confirm that limits are those that were entered in the chain of a data folder.
+
+    Raises
+    ------
+    AcceptanceError
+        They are not.
+    ArchiveError
+        The archive cannot be read.
+    """
+    if supervision.chain not in ("", chain):
+        raise AcceptanceError("limits.other-archive")
+    for file in limits_entered(database, chain) if chain else ():
+        number = number_of(Path(file.place))
+        if supervision.hashes[number - 1 : number] != (file.sha256,):
+            raise AcceptanceError("limits.not-entered", file=printable(file.place))

@@ -3,7 +3,7 @@
 import argparse
 import json
 from collections.abc import Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from lightpen.archive.chains import chain_at_home
 from lightpen.archive.database import look_into
 from lightpen.archive.exchange import deliver
 from lightpen.archive.lazy_logbook import server_address
-from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook import ARCHIVE, Logbook, confirm_limits
 from lightpen.archive.server import open_server
 from lightpen.archive.shared_library import TakenOver, take_over
 from lightpen.archive.tip_status import statuses
@@ -38,6 +38,7 @@ from lightpen.record.library.library_changes import (
     known_item,
     retire_item,
 )
+from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import (
     AnyItem,
     AxisOrigin,
@@ -117,6 +118,7 @@ def _share(options: argparse.Namespace) -> None:
     data, address = _data(options), server_address()
     signature = supervisor_signature(options.supervisor)
     with closing(Logbook(data)) as logbook, ExitStack() as stack:
+        logbook.confirm(read_supervision(data))
         logbook.enter_owed()
         server = None
         if address:
@@ -236,6 +238,10 @@ def _point(option: str, words: list[Any]) -> Any:
 
 
 def _author(options: argparse.Namespace) -> Author:
+    """Return who changes the library, once its guard is confirmed by the archive."""
+    data = _data(options)
+    with suppress(NoArchiveError), closing(look_into(data / ARCHIVE)) as database:
+        confirm_limits(database, chain_at_home(database), read_supervision(data))
     signature = supervisor_signature(options.supervisor)
     return Author(options.station, options.operator, options.reason, signature)
 

@@ -264,6 +264,14 @@ def test_bars_stand_at_their_labels_and_are_saved_with_them(
     ]
 
 
+def test_a_label_in_a_csv_file_is_one_cell_and_no_formula(qtbot: QtBot) -> None:
+    plot = BarPlot(Axes("Parts"), [Curve("x_um", "x")], "part")
+    show(qtbot, plot)
+    plot.set_data(["ball, cone", "=1+1"], np.array([-0.5, 2.0]))
+    lines = ["part,x_um", '"ball, cone",-0.5', "'=1+1,2"]
+    assert plot.csv().decode().splitlines() == lines
+
+
 def test_labels_that_have_no_room_beside_each_other_stand_on_lines(
     qtbot: QtBot,
 ) -> None:

@@ -160,6 +160,7 @@ class MisfitPlot(Plot):
         self._limit.label.fill = pg.mkBrush(colors.panel)  # over the dots
 
     def _pixel(self, x: float, y: float) -> QPoint:
+        self._graphics.fit()
         scene = self._item.vb.mapViewToScene(QPointF(x, y))
         return QPoint(self._graphics.mapFromScene(scene))
 

@@ -105,6 +105,7 @@ class BarPlot(NamedPlot):
         """Write the labels on as many lines as keep them clear of each other."""
         metrics = QFontMetricsF(font(TextSize.SMALL))
         widest = max(map(metrics.horizontalAdvance, self._labels), default=0.0)
+        self._graphics.fit()
         slot = self._item.vb.width() / max(len(self._labels), 1)
         n_lines = min(ceil((widest + GRID) / max(slot, 1.0)), MOST_LINES)
         self._labels_on_lines = tuple(
