@@ -18,7 +18,7 @@ def add_board(parser: argparse.ArgumentParser) -> None:
         metavar="BOARD",
         help="board, for example chessboard:11x8:20, as for intrinsics",
     )
-    parser.add_argument("out", type=Path, metavar="OUT.pdf")
+    parser.add_argument("out", type=Path, metavar="OUT.pdf", help="file to write")
     parser.add_argument(
         "--paper",
         choices=PAPERS,

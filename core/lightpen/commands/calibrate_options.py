@@ -44,7 +44,12 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
             "recomputes the tip from it"
         ),
     )
-    parser.add_argument("--camera", type=Path, metavar="FILE")
+    parser.add_argument(
+        "--camera",
+        type=Path,
+        metavar="FILE",
+        help="camera file: intrinsics of the camera",
+    )
     parser.add_argument(
         "--rig",
         type=Path,
@@ -54,7 +59,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
             "give IMAGES (or FILE.csv) once per camera, in the order of this file"
         ),
     )
-    parser.add_argument("--pen", type=Path, metavar="FILE")
+    parser.add_argument("--pen", type=Path, metavar="FILE", help="LED file of the pen")
     add_pen_options(parser)
     parser.add_argument(
         "--camera-sigma",
@@ -130,9 +135,18 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         metavar="MM",
         help="standard uncertainty of the distance",
     )
-    parser.add_argument("--method", choices=METHODS, default="joint")
     parser.add_argument(
-        "--nominal-tip", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
+        "--method",
+        choices=METHODS,
+        default="joint",
+        help="estimator of the reported tip (joint)",
+    )
+    parser.add_argument(
+        "--nominal-tip",
+        type=finite,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="nominal tip centre, pen frame, mm",
     )
     add_json(parser)
 

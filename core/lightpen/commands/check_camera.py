@@ -33,8 +33,16 @@ def add_check_camera(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "images", nargs="+", metavar="IMAGES", help="images of one swing of the pen"
     )
-    parser.add_argument("--camera", type=Path, required=True, metavar="FILE")
-    parser.add_argument("--pen", type=Path, required=True, metavar="FILE")
+    parser.add_argument(
+        "--camera",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="camera file: intrinsics of the camera",
+    )
+    parser.add_argument(
+        "--pen", type=Path, required=True, metavar="FILE", help="LED file of the pen"
+    )
     add_pen_options(parser)
     parser.add_argument(
         "--temperature",

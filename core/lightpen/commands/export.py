@@ -30,7 +30,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         metavar="RESULT.json",
         help="accepted result, or record written by calibrate --json",
     )
-    parser.add_argument("out", type=Path, metavar="FILE")
+    parser.add_argument("out", type=Path, metavar="FILE", help="file to write")
     parser.add_argument(
         "--for",
         dest="format",

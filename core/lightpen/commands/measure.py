@@ -33,7 +33,7 @@ from lightpen.verification.tasks.probed_point import rejected_entries
 def add_measure(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen measure``."""
     parser.set_defaults(run=_measure, decision_rule="simple", max_risk=5.0)
-    parser.add_argument("plan", type=Path, metavar="PLAN.yaml")
+    parser.add_argument("plan", type=Path, metavar="PLAN.yaml", help="measuring plan")
     parser.add_argument(
         "touches",
         nargs="+",

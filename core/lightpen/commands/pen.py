@@ -12,8 +12,10 @@ from lightpen.formats.pen_files import read_raw_pen, write_pen
 def add_pen(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen pen``."""
     parser.set_defaults(run=_pen)
-    parser.add_argument("raw", type=Path, metavar="RAW.csv")
-    parser.add_argument("out", type=Path, metavar="OUT.csv")
+    parser.add_argument(
+        "raw", type=Path, metavar="RAW.csv", help="LED coordinates as measured"
+    )
+    parser.add_argument("out", type=Path, metavar="OUT.csv", help="LED file to write")
     add_pen_options(parser)
 
 

@@ -65,8 +65,16 @@ def _add_swings(parser: argparse.ArgumentParser) -> None:
         metavar="RESULT.json",
         help="calibrations with this pen, in any order",
     )
-    parser.add_argument("--camera", type=Path, required=True, metavar="FILE")
-    parser.add_argument("--pen", type=Path, required=True, metavar="FILE")
+    parser.add_argument(
+        "--camera",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="camera file: intrinsics of the camera",
+    )
+    parser.add_argument(
+        "--pen", type=Path, required=True, metavar="FILE", help="LED file of the pen"
+    )
     add_pen_options(parser)
 
 

@@ -15,7 +15,12 @@ from lightpen.formats.observation_files import read_poses
 def add_pivot(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen pivot``."""
     parser.set_defaults(run=_pivot)
-    parser.add_argument("poses", type=Path, metavar="POSES.csv")
+    parser.add_argument(
+        "poses",
+        type=Path,
+        metavar="POSES.csv",
+        help="poses in the order of capture (r11 to r33, tx_mm, ty_mm, tz_mm)",
+    )
     parser.add_argument(
         "--least-squares", action="store_true", help="weight all poses equally"
     )

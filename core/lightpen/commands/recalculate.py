@@ -56,8 +56,16 @@ def add_recalculate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "results", nargs="+", type=Path, metavar="RESULT.json", help="calibrations"
     )
-    parser.add_argument("--camera", type=Path, required=True, metavar="FILE")
-    parser.add_argument("--pen", type=Path, required=True, metavar="FILE")
+    parser.add_argument(
+        "--camera",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="camera file: intrinsics of the camera",
+    )
+    parser.add_argument(
+        "--pen", type=Path, required=True, metavar="FILE", help="LED file of the pen"
+    )
     add_pen_options(parser)
     parser.add_argument(
         "--monte-carlo",

@@ -20,8 +20,20 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen simulate``."""
     parser.set_defaults(run=_simulate)
     parser.add_argument("out", type=Path, metavar="OUT", help="folder to write")
-    parser.add_argument("--images", type=_n_images, default=60, metavar="N")
-    parser.add_argument("--seed", type=whole_number, default=0, metavar="S")
+    parser.add_argument(
+        "--images",
+        type=_n_images,
+        default=60,
+        metavar="N",
+        help="number of images (60)",
+    )
+    parser.add_argument(
+        "--seed",
+        type=whole_number,
+        default=0,
+        metavar="S",
+        help="seed of the random numbers (0)",
+    )
     parser.add_argument(
         "--scene",
         choices=("clean", "hard"),
@@ -45,6 +57,7 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         type=number_from(*LED_DIAMETERS, "diameter", "mm"),
         default=DISC_DIAMETER,
         metavar="MM",
+        help=f"diameter of the LED discs ({DISC_DIAMETER:g})",
     )
     parser.add_argument(
         "--blur",
@@ -53,7 +66,9 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         metavar="PX",
         help="standard deviation of the optical blur",
     )
-    parser.add_argument("--bits", type=int, choices=(8, 12, 16), default=8)
+    parser.add_argument(
+        "--bits", type=int, choices=(8, 12, 16), default=8, help="bits per pixel (8)"
+    )
     parser.add_argument(
         "--binning",
         type=int,

@@ -67,8 +67,13 @@ def add_stream(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--producer", default="", metavar="FILE", help="GenTL producer of a camera"
     )
-    parser.add_argument("--camera", type=Path, metavar="FILE")
-    parser.add_argument("--pen", type=Path, metavar="FILE")
+    parser.add_argument(
+        "--camera",
+        type=Path,
+        metavar="FILE",
+        help="camera file: intrinsics of the camera",
+    )
+    parser.add_argument("--pen", type=Path, metavar="FILE", help="LED file of the pen")
     add_pen_options(parser)
     parser.add_argument(
         "--tip",

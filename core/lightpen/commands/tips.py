@@ -60,9 +60,23 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
     for action in (added, changed):
         _add_entries(action)
     spun.add_argument("id", metavar="TIP", help="tip in the library")
-    spun.add_argument("images", type=Path, nargs="+", metavar="IMAGES")
-    spun.add_argument("--camera", type=Path, required=True, metavar="FILE")
-    spun.add_argument("--pen", type=Path, required=True, metavar="FILE")
+    spun.add_argument(
+        "images",
+        type=Path,
+        nargs="+",
+        metavar="IMAGES",
+        help="images of the pen turned about its stylus in a cone",
+    )
+    spun.add_argument(
+        "--camera",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="camera file: intrinsics of the camera",
+    )
+    spun.add_argument(
+        "--pen", type=Path, required=True, metavar="FILE", help="LED file of the pen"
+    )
     add_pen_options(spun)
     for action in (added, changed, retired, returned, spun):
         _add_author(action)

@@ -55,7 +55,12 @@ from lightpen.verification.tasks.task import Conditions
 
 def add_touch_inputs(parser: argparse.ArgumentParser, tip_help: str) -> None:
     """Add the options for camera, pen, tip and images of a touch."""
-    parser.add_argument("--camera", type=Path, metavar="FILE")
+    parser.add_argument(
+        "--camera",
+        type=Path,
+        metavar="FILE",
+        help="camera file: intrinsics of the camera",
+    )
     parser.add_argument(
         "--rig",
         type=Path,
@@ -66,7 +71,7 @@ def add_touch_inputs(parser: argparse.ArgumentParser, tip_help: str) -> None:
             "file"
         ),
     )
-    parser.add_argument("--pen", type=Path, metavar="FILE")
+    parser.add_argument("--pen", type=Path, metavar="FILE", help="LED file of the pen")
     add_pen_options(parser)
     parser.add_argument(
         "--tip", type=Path, required=True, metavar="RESULT.json", help=tip_help

@@ -71,10 +71,16 @@ def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
                     dest=option.name,
                     choices=tuple(option.words),
                     default=next(iter(option.words)),
+                    help="what was touched; only with --ball-diameter "
+                    f"({next(iter(option.words))})",
                 )
     if task.compares_nominal_tip:
         parser.add_argument(
-            "--nominal-tip", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
+            "--nominal-tip",
+            type=finite,
+            nargs=3,
+            metavar=("X", "Y", "Z"),
+            help="nominal tip centre, pen frame, mm",
         )
     if task.counts_drift:
         parser.add_argument(
