@@ -13,6 +13,7 @@ from lightpen.messages import Message, message
 from lightpen.record.folder.data_folder import sweep_leftovers
 from lightpen.record.library.supervision import Supervision, read_supervision
 from lightpen.record.results.result_folder import SIMULATED
+from lightpen.streaming.points import points_of
 from lightpen.verification.tasks.part import PART
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import Tone
@@ -122,6 +123,7 @@ class Workbench(QObject):
         self.run.changed.connect(self._keep_heading)
         self.run.result_changed.connect(self.library.refresh)
         self.run.result_changed.connect(self.streaming.read_tip)
+        self.measuring.changed.connect(self._stream_points)
         for each in probing:
             each.files_changed.connect(self.archive_writer.enter_owed)
         settings.troubled.connect(self._on_settings_troubled)
@@ -214,6 +216,11 @@ class Workbench(QObject):
 
     def _on_supervision_unread(self, why: str) -> None:
         self.notifications.tell("supervision", why)
+
+    def _stream_points(self) -> None:
+        status, stream = self.measuring.status, self.streaming.stream
+        if stream.is_heard and status.setup is not None and status.state is not None:
+            stream.set_points(points_of(status.setup, status.state))
 
     def _on_settings_troubled(self, why: Message) -> None:
         self.notifications.tell(SETTINGS, worded(why))

@@ -26,6 +26,7 @@ from lightpen.formats.files import printable
 from lightpen.formats.system_reasons import strerror
 from lightpen.messages import Message, message
 from lightpen.streaming.messages import StreamedTip, pose_messages
+from lightpen.streaming.points import NamedPoint, points_message
 
 LOOPBACK = "127.0.0.1"  # for programs of this computer only
 PORT = 18944  # the default port of OpenIGTLink
@@ -95,6 +96,7 @@ class _Client:
     connection: socket.socket
     rest: bytes = b""
     newest: bytes = b""
+    points: tuple[NamedPoint, ...] = ()  # that it was sent last
     active_s: float = field(default_factory=time.monotonic)  # it took or sent data
     waiting_s: float = field(default_factory=time.monotonic)  # since when data waits
     misses: deque[bool] = field(default_factory=lambda: deque(maxlen=RECENT))
@@ -105,6 +107,12 @@ class _Client:
         if not self.is_waiting:
             self.waiting_s = time.monotonic()
         self.newest = data
+
+    def add_points(self, points: tuple[NamedPoint, ...], at: float) -> None:
+        """Send named points if they are others; none is missed."""
+        if points and points != self.points:
+            self.rest += points_message(points, at)
+        self.points = points
 
     @property
     def is_slow(self) -> bool:
@@ -158,6 +166,7 @@ class PoseStream:
         self._status = StreamStatus()
         self._tip: StreamedTip | None = None
         self._newest: _Seen | None = None
+        self._points: tuple[NamedPoint, ...] = ()
         self._lock = Lock()
         self._waker: socket.socket | None = None
         self._thread: Thread | None = None
@@ -212,6 +221,10 @@ class PoseStream:
         """Stream the position of another tip from the next image on."""
         self._tip = tip
 
+    def set_points(self, points: tuple[NamedPoint, ...]) -> None:
+        """Stream the points of a part with the next image that shows the pen."""
+        self._points = points
+
     def take(self, frame: Frame, detection: PenDetection | None) -> None:
         """Stream a detection if it shows the pen; returns at once."""
         waker = self._waker
@@ -264,6 +277,7 @@ class PoseStream:
         sent = pose_messages(seen.detection, self._tip, seen.number, seen.at)
         for client in clients:
             client.offer(sent)
+            client.add_points(self._points, seen.at)
 
     def _tell(self, status: StreamStatus) -> None:
         self._status = status

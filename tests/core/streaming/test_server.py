@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from benchmarks.small_records import SMALL
-from pyigtl import OpenIGTLinkClient, TransformMessage
+from pyigtl import OpenIGTLinkClient, PointMessage, TransformMessage
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import Frame, sealed
@@ -34,6 +34,7 @@ from lightpen.simulator.swings import (
     simulate_centers,
 )
 from lightpen.streaming.messages import StreamedTip, pose_messages, tip_metadata
+from lightpen.streaming.points import NamedPoint
 from lightpen.streaming.server import (
     LOOPBACK,
     MOST_CLIENTS,
@@ -235,6 +236,24 @@ def test_a_message_tells_when_its_image_was_taken(
 
     taken = received(client, "PenToCamera").timestamp
     assert before - 100.1 < taken < after - 99.9
+
+
+def test_named_points_are_sent_once_to_every_client(
+    stream: PoseStream, client: OpenIGTLinkClient, detection: PenDetection
+) -> None:
+    hole = NamedPoint("hole 1", 1, (1.0, 2.0, 3.0))
+    stream.set_points((hole, NamedPoint("h\u00f6he", 1, (4.0, 5.0, 6.0))))
+    for number in range(3):
+        stream.take(frame(number), detection)
+        received(client, "PenToCamera")
+
+    message = client.wait_for_message("Points", timeout=LONGEST)
+    assert isinstance(message, PointMessage)
+    assert message.names == ["hole 1 1", "h\\xf6he 1"]
+    assert message.groups == ["hole 1", "h\\xf6he"]
+    np.testing.assert_allclose(message.positions, [[1, 2, 3], [4, 5, 6]])
+    later = client.get_latest_messages()
+    assert "Points" not in {each.device_name for each in later}
 
 
 def test_an_image_without_the_pen_sends_nothing(
