@@ -181,7 +181,7 @@ def _row(kind: str, counters: FrameCounters | None) -> Row:
         print(f"{kind}: {fault}", file=sys.stderr)
     return Row(
         f"{what}lost of {counters.n_told} acknowledged entries and files; times "
-        "that it was whole",
+        "that the archive was intact",
         f"{counters.n_lost}; {counters.n_whole}",
         f"0; {N_CUTS}",
         met=(counters.n_lost, counters.n_whole) == (0, N_CUTS)

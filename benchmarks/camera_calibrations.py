@@ -107,8 +107,8 @@ def _covered(what: str, deviations: FloatArray) -> Row:
     return Row(
         f"{what}: in their 95 % intervals",
         f"{numbers(shares, 1)} %",
-        f"{COVERED[0]:.0f} to {COVERED[1]:.0f} %; of {n_trials} a true 95 % makes "
-        f"{least:.1f} to {most:.1f} % in 99 of 100",
+        f"{COVERED[0]:.0f} to {COVERED[1]:.0f} % (with {n_trials}, true 95 % give "
+        f"{least:.1f} to {most:.1f} % in 99 of 100 cases)",
         met=bool(np.all((shares >= low) & (shares <= high))),
     )
 

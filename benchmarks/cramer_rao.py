@@ -70,8 +70,8 @@ def cramer_rao_rows(workers: Workers) -> list[Row]:
             bool(np.all(joint <= RATIO_LIMIT)),
         ),
         Row(
-            "95 % intervals by the share of noise, all that these draw, cover the "
-            "truth, x y z",
+            "95 % intervals by the contribution of noise, the only error drawn here: "
+            "cover the truth, x y z",
             f"{numbers(covered, 1)} %",
             f"{low:.0f} to {high:.0f} % each",
             "two-stage (paper) "

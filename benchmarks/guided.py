@@ -88,7 +88,7 @@ def guided_rows(workers: Workers) -> list[Row]:
             f"going round {np.mean([o.seconds for o in round_about]):.0f}",
         ),
         Row(
-            "Tip errors in stated standard deviations, rms of x y z (1 is honest)",
+            "Tip errors in stated standard deviations, rms of x y z (1 is ideal)",
             f"{np.sqrt(np.mean([outcome.errors**2 for outcome in guided])):.2f}",
         ),
         Row(

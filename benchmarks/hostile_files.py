@@ -235,7 +235,7 @@ def hostile_file_rows() -> list[Row]:
     n_right = counters["read"] + counters["refused"]
     return [
         Row(
-            "spoiled files of every kind that are images loaded, or refused in words",
+            "damaged files of every kind: loaded, or rejected with a message",
             f"{n_right} of {N_FILES}",
             "all",
             met=n_right == N_FILES,

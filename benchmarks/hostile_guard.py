@@ -237,7 +237,7 @@ def hostile_guard_rows(
     return [
         Row(
             f"{n_mutations} damaged files of limits, keys, verifications and imports: "
-            "others in force, forged entries or tracebacks",
+            "wrong limits in force, forged entries or tracebacks",
             str(outcomes["wrong"]),
             "0",
             met=not outcomes["wrong"],

@@ -76,7 +76,7 @@ def hostile_kill_rows() -> list[Row]:
     return [
         Row(
             f"killed {N_KILLS} times while it writes ({kind}), {outcome.n_told} writes "
-            "acknowledged: kills that lost and mixed nothing, files left behind",
+            "acknowledged: kills without lost or mixed data, files left behind",
             f"{outcome.n_sound}, {outcome.n_left}",
             f"{N_KILLS}, 0",
             met=outcome.n_sound == N_KILLS and outcome.n_left == 0,

@@ -155,20 +155,20 @@ def hostile_record_rows(n_mutations: int = N_MUTATIONS, seed: int = SEED) -> lis
         print(error, file=sys.stderr)
     return [
         Row(
-            f"{N_FLIPS} bits flipped in an accepted result, one at a time: named",
+            f"{N_FLIPS} bits flipped in an accepted result, one at a time: detected",
             f"{N_FLIPS - n_result}",
             "all",
             met=n_result == 0,
         ),
         Row(
-            "- in header, journal, images and files of its swing: named",
+            "- in header, journal, images and files of its swing: detected",
             f"{N_FLIPS - n_record}",
             "all",
             met=n_record == 0,
         ),
         Row(
-            f"{n_mutations} damaged results, records and settings: errors that are "
-            "not the program's own",
+            f"{n_mutations} damaged results, records and settings: errors without "
+            "a message of the program",
             f"{len(errors)}",
             "0",
             met=not errors,

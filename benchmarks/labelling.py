@@ -62,7 +62,7 @@ def labelling_rows(workers: Workers) -> list[Row]:
         found = sum(workers.map(_outcomes, jobs), Counter[str]())
         rows.append(
             Row(
-                f"{N_VIEWS} random views, {name}: labelled rightly, refused, wrongly",
+                f"{N_VIEWS} random views, {name}: correctly, not, wrongly labelled",
                 f"{found['right']}, {found['refused']}, {found['wrong']}",
                 "0 wrongly",
                 met=found["wrong"] == 0,

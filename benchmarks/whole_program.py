@@ -21,7 +21,7 @@ COUNTS = (60, 300, 900)
 def program_rows(data: Path | None) -> list[Row]:
     """Return time and memory of the whole program on `swing-full`."""
     names = (
-        "`lightpen calibrate` on `swing-full` over only decoding its images",
+        "`lightpen calibrate` on `swing-full`: time over that of decoding its images",
         f"peak memory of it with {', '.join(map(str, COUNTS))} images",
     )
     if data is None:
@@ -60,7 +60,7 @@ def _memory_row(what: str, folder: Path) -> Row:
     return Row(
         what,
         ", ".join(f"{peak:.0f}" for peak in peaks) + " MB",
-        f"<= {MEMORY_LIMIT:.0f} MB, the same but for {MAX_GROWTH:.0f} MB (ten images)",
+        f"<= {MEMORY_LIMIT:.0f} MB, equal within {MAX_GROWTH:.0f} MB (ten images)",
         met=met,
     )
 

@@ -99,14 +99,14 @@ def link_rows(seconds: float = LINK_SECONDS) -> list[Row]:
     rate = (found["delivered"] - found["skipped"]) / found["seconds"]
     return [
         Row(
-            f"{what}: images looked at",
+            f"{what}: images processed",
             f"{rate:.1f} a second; {found['incomplete']} incomplete, "
             f"{found['missed']} missed, {found['skipped']} skipped, all counted",
             f">= {LEAST_LINK_RATE:.0f} a second",
             met=rate >= LEAST_LINK_RATE,
         ),
         Row(
-            "- cut off: until it is told; there again: until images come",
+            "- link cut: time until reported; link restored: time until images arrive",
             f"{found['told']:.1f} s; {found['back']:.1f} s",
             f"<= {MOST_TOLD:.0f} s; <= {MOST_BACK:.0f} s",
             met=found["told"] <= MOST_TOLD and found["back"] <= MOST_BACK,
@@ -136,7 +136,7 @@ def soak_rows(seconds: float = SOAK_SECONDS) -> list[Row]:
     minutes_mb = ", ".join(f"{size:.0f}" for size in sizes)
     return [
         Row(
-            f"{name}: images looked at",
+            f"{name}: images processed",
             f"{rate:.1f} a second, {found['lost']} lost, {found['swings']} swings "
             "solved meanwhile",
             f">= {LEAST_RATE:.0f} a second",

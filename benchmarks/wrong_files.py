@@ -85,7 +85,7 @@ TRIALS = {
     "camera file drawn from its covariance, 300 images": Flaws(
         n_images=300, camera_is_poor=True
     ),
-    "LED file off by 10 \u00b5m, its scale by 1e-4": Flaws(
+    "LED file in error by 10 \u00b5m, its scale by 1e-4": Flaws(
         led_sigma=0.01, scale_sigma=1e-4
     ),
     **{
@@ -123,7 +123,7 @@ def _row(name: str, trial: Flaws, workers: Workers) -> Row:
     limit = MEDIAN_LIMITS[trial.n_images] if trial.camera_is_poor else None
     shakes = trial.jitter > 0 or trial.out_of_round > 0
     n = N_OF_FEW if shakes and trial.n_images <= FEW else N_CALIBRATIONS
-    return _told(f"Tip with a {name}", partial(_errors, trial), n, limit, workers)
+    return _told(f"Tip with {name}", partial(_errors, trial), n, limit, workers)
 
 
 def _rig_row(n_images: int, workers: Workers) -> Row:
@@ -193,7 +193,7 @@ def _told(
         f"{n_calibrations} calibrations",
         f"{1000 * median:.1f} \u00b5m; {numbers(covered, 1)} %",
         asked,
-        f"with the files held fast {1000 * median_held:.1f} \u00b5m",
+        f"with the files held fixed {1000 * median_held:.1f} \u00b5m",
         passed,
     )
 
