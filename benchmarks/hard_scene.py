@@ -88,7 +88,7 @@ def _outcome(seed: int) -> _Outcome:
     scene = Scene(n_images=N_IMAGES, seed=seed, disturbances=HARD)
     plan = plan_scene(scene)
     pen = plan.measured_pen
-    seen = observe_images(_rendered(plan), scene.camera, pen, n_threads=1)
+    seen = observe_images(rendered(plan), scene.camera, pen, n_threads=1)
     calibration = calibrate(scene.camera, pen, seen)
     labelled = np.isfinite(seen.seen_pixels[..., 0])
     true_tip = np.array(scene_truth(plan)["pen"]["tip_in_leds_csv_frame_bestfit"])
@@ -112,7 +112,7 @@ def _outcome(seed: int) -> _Outcome:
     )
 
 
-def _rendered(plan: ScenePlan) -> ImageSource:
+def rendered(plan: ScenePlan) -> ImageSource:
     """Return the images of a scene, each rendered when it is asked for."""
 
     def loaders() -> Iterator[Callable[[], Image]]:

@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.discovery.discover import Request, discover
+from lightpen.discovery.discover import discover
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.numbering import number_by_sketch
+from lightpen.discovery.request import Request
 from lightpen.discovery.scale import MeasuredLength
 from lightpen.discovery.sightings import Sightings, sightings_of_centers
 from lightpen.model.camera import Camera
@@ -37,6 +38,8 @@ class Station:
         Measured centres, px; NaN where an LED is not seen.
     order : (N, L) array of int
         In which the LEDs of each image are given.
+    diameter : float
+        Of the discs as it is stated, mm.
     """
 
     camera: Camera
@@ -44,6 +47,7 @@ class Station:
     swing: Swing
     pixels: FloatArray
     order: np.ndarray
+    diameter: float
 
     @property
     def longest(self) -> float:
@@ -65,7 +69,7 @@ class Station:
     def request(self) -> Request:
         """What its user knows: the largest distance, and the discs."""
         length = MeasuredLength(None, self.longest, EXACT)
-        return Request((length,), self.pen.diameter)
+        return Request((length,), self.diameter)
 
     def discovered(self) -> Discovery:
         """Return what is found."""
@@ -78,6 +82,7 @@ def random_station(
     sigma: float = 0.03,
     missing: float = 0.02,
     rate: float = FRAME_RATE,
+    diameter_error: float = 0.0,
 ) -> Station:
     """Return a station with a pen, a camera and a swing of its own.
 
@@ -89,6 +94,8 @@ def random_station(
         Share of the LEDs that are not seen.
     rate : float
         Images a second.
+    diameter_error : float
+        Standard deviation of the stated diameter of the discs, relative.
     """
     rng = np.random.default_rng([29, seed])
     camera, pen = _camera(rng), _pen(rng)
@@ -104,7 +111,9 @@ def random_station(
     )
     postures = operator_postures(np.arange(n_images) / rate, int(rng.integers(2**31)))
     swing = swing_from_postures(postures, tip, np.append(across, distance))
-    return seen_station(camera, pen, swing, sigma, missing, rng)
+    station = seen_station(camera, pen, swing, sigma, missing, rng)
+    stated = pen.diameter * (1 + diameter_error * float(rng.standard_normal()))
+    return replace(station, diameter=stated)
 
 
 def seen_station(
@@ -121,7 +130,18 @@ def seen_station(
     )
     pixels[rng.uniform(size=pixels.shape[:2]) < missing] = np.nan
     order = rng.permuted(np.tile(np.arange(pen.n_leds), (len(pixels), 1)), axis=1)
-    return Station(camera, pen, swing, pixels, order)
+    return Station(camera, pen, swing, pixels, order, pen.diameter)
+
+
+def seen_again(
+    station: Station, n_images: int, sigma: float, rng: np.random.Generator
+) -> Station:
+    """Return another swing in the same cone."""
+    swing = station.swing
+    seed = int(rng.integers(2**31))
+    postures = operator_postures(np.arange(n_images) / FRAME_RATE, seed)
+    other = swing_from_postures(postures, swing.tip_pen, swing.cone_cam)
+    return seen_station(station.camera, station.pen, other, sigma, 0.02, rng)
 
 
 def leaning(postures: Postures, share: float) -> Postures:

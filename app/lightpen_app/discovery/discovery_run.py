@@ -11,9 +11,10 @@ from PySide6.QtCore import QObject, Signal
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.detection.spots import Spots
-from lightpen.discovery.discover import Request, discover
+from lightpen.discovery.discover import discover
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.guiding import Guide, guide_of
+from lightpen.discovery.request import Request
 from lightpen.discovery.sightings import sightings_of_spots
 from lightpen.errors import FileError
 from lightpen.formats.camera_file_writing import write_camera

@@ -5,10 +5,10 @@ from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.discovery.discover import Request
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.guiding import TURNS_NEEDED
 from lightpen.discovery.report import remarks_of
+from lightpen.discovery.request import Request
 from lightpen.discovery.scale import MeasuredLength
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.model.pen import DISC_DIAMETER

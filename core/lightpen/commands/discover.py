@@ -10,7 +10,7 @@ from pathlib import Path
 from lightpen.commands.arguments import above_zero, finite
 from lightpen.commands.calibrate_options import separation_of
 from lightpen.commands.console import are_same, printing, progress, shown, write_record
-from lightpen.discovery.discover import Request, SecondSightings, discover
+from lightpen.discovery.discover import discover
 from lightpen.discovery.picture import picture_of_pen
 from lightpen.discovery.report import (
     discovery_record,
@@ -18,6 +18,7 @@ from lightpen.discovery.report import (
     swings_record,
     swings_text,
 )
+from lightpen.discovery.request import Request, SecondSightings
 from lightpen.discovery.scale import MeasuredLength
 from lightpen.discovery.sightings import (
     Report,

@@ -14,6 +14,7 @@ from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.disc_normals import effect_of_normals
 from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mixing
+from lightpen.intrinsics.distortion import Choice
 from lightpen.model.camera import Camera
 from lightpen.model.information import inverse
 from lightpen.model.pen import Pen
@@ -34,6 +35,8 @@ class Discovery:
     covariance : (q, q) array
         Of tip, camera, diameter and LEDs, as `parameters` has them, in the frame in
         which the LEDs fit the true ones best.
+    beyond_fit : (3, 3) array
+        Share of lens and mechanics in the covariance of the tip, mm^2.
     calibration : Calibration
         By which they were adjusted.
     lengths : tuple of KnownLength
@@ -42,17 +45,21 @@ class Discovery:
     hypotheses : tuple of Hypothesis
     n_lamps : int
         Lights that did not move with the pen.
+    lens_choice : Choice or None
+        Why this lens model; None where the camera is known.
     """
 
     pen: Pen
     camera: Camera
     tip_pen: FloatArray
     covariance: FloatArray
+    beyond_fit: FloatArray
     calibration: Calibration
     lengths: tuple[KnownLength, ...]
     is_relative: bool
     hypotheses: tuple[Hypothesis, ...]
     n_lamps: int
+    lens_choice: Choice | None = None
 
     @property
     def parameters(self) -> Parameters:
@@ -102,12 +109,13 @@ def discovery_of(
     at = instrument.parameters
     budget = calibration.budget.covariance[:3, :3] - instrument.covariance[:3, :3]
     values, vectors = np.linalg.eigh(budget)
-    covariance[:3, :3] += (vectors * np.maximum(values, 0.0)) @ vectors.T
     pen, R, t = framed(state.pen, tip, sketch)
+    beyond_fit = R @ (vectors * np.maximum(values, 0.0)) @ vectors.T @ R.T
     turn = np.eye(len(covariance))
     turn[at.tip, at.tip] = R
     turn[at.leds, at.leds] = np.kron(np.eye(pen.n_leds), R)
     covariance = turn @ covariance @ turn.T
+    covariance[at.tip, at.tip] += beyond_fit
     camera = replace(
         state.rig.cameras[0], covariance=covariance[at.cameras[0], at.cameras[0]]
     )
@@ -126,6 +134,7 @@ def discovery_of(
         camera=camera,
         tip_pen=R @ tip + t,
         covariance=covariance,
+        beyond_fit=beyond_fit,
         calibration=calibration,
         lengths=lengths,
         is_relative=is_relative,

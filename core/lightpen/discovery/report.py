@@ -8,6 +8,7 @@ from lightpen.discovery.found import Discovery
 from lightpen.discovery.together import Together
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.formats.json_records import plain, record_heading
+from lightpen.intrinsics.distortion import choice_record
 from lightpen.local_time import local_now
 from lightpen.messages import Message, message
 
@@ -54,6 +55,11 @@ def discovery_record(discovery: Discovery) -> dict[str, Any]:
                 names, values, discovery.intrinsics_sigma, strict=True
             )
         },
+        "distortion_choice": (
+            None
+            if discovery.lens_choice is None
+            else choice_record(discovery.lens_choice)
+        ),
         "covariance": {
             "parameters": [
                 *(f"tip_{axis}" for axis in "xyz"),

@@ -31,8 +31,9 @@ from lightpen.model.rigid import rotation_from_vector
 HELD = 1e-6  # relative, of a number that is not free
 UNKNOWN = 3.0  # relative, of a focal length
 # Standard deviations of any camera: of fy / fx, of the principal point from the middle
-# in widths of the image, of k1, k2 and k3, and of p1 and p2.
-ASPECT, CENTER, RADIAL, TANGENTIAL = 1e-3, 0.03, (0.5, 1.0, 1.0), 1e-3
+# in widths of the image, and of distortion coefficients.
+ASPECT, CENTER, RADIAL = 1e-3, 0.03, 1.0
+DISTORTION = {"k1": 0.5, "p1": 1e-3, "p2": 1e-3}
 MAX_TURN = 0.3  # rad, of one step
 SETTLED = 1e-7  # relative gain of a step
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e8
@@ -75,13 +76,9 @@ def free_focal_length(camera: Camera) -> CameraPrior:
 
 
 def any_covariance(camera: Camera) -> FloatArray:
-    """Return the covariance (9, 9) of the intrinsics of cameras about ideal ones."""
-    variances = np.zeros(9)
-    variances[2:4] = (CENTER * camera.width) ** 2
-    variances[4:9] = np.square(
-        [RADIAL[0], RADIAL[1], TANGENTIAL, TANGENTIAL, RADIAL[2]]
-    )
-    covariance = np.diag(variances)
+    """Return the covariance (k, k) of the intrinsics of cameras about ideal ones."""
+    distortion = [DISTORTION.get(name, RADIAL) for name in camera.distortion_names]
+    covariance = np.diag([0.0, 0.0, *(CENTER * camera.width,) * 2, *distortion]) ** 2
     covariance[:2, :2] = (UNKNOWN * camera.fx) ** 2
     covariance[1, 1] += (ASPECT * camera.fx) ** 2
     return covariance
@@ -90,6 +87,9 @@ def any_covariance(camera: Camera) -> FloatArray:
 def any_camera(camera: Camera) -> CameraPrior:
     """Return what is known of any camera with images of this size."""
     ideal = ideal_camera(camera.width, camera.height, camera.fx)
+    ideal = replace(
+        ideal, distortion=np.zeros_like(camera.distortion), lens=camera.lens
+    )
     return CameraPrior.of(ideal, any_covariance(camera))
 
 

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.discovery.discover import Report, Request, discover
+from lightpen.discovery.discover import discover
 from lightpen.discovery.found import Discovery
-from lightpen.discovery.sightings import Sightings
+from lightpen.discovery.request import Request
+from lightpen.discovery.sightings import Report, Sightings
 from lightpen.discovery.starts import gradient_of
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.unknowns import whole_moves
@@ -179,10 +180,7 @@ class _Parts(NamedTuple):
 def _parted(each: Discovery) -> _Parts:
     at, lengths = each.parameters, _length_rows(each)
     beyond = np.zeros_like(each.covariance)
-    own = each.calibration.budget.covariance[:3, :3]
-    own = own - each.calibration.instrument.covariance[:3, :3]
-    values, vectors = np.linalg.eigh(own)
-    beyond[at.tip, at.tip] = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    beyond[at.tip, at.tip] = each.beyond_fit
     fit = each.covariance - beyond
     gain = fit @ lengths
     by_lengths = gain @ np.linalg.pinv(lengths.T @ gain) @ gain.T

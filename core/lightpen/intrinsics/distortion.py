@@ -74,6 +74,17 @@ class Choice:
         )
 
 
+def choice_record(choice: Choice) -> dict[str, object]:
+    """Return the record of a choice; without an error where nothing was held out."""
+    return {
+        "coefficients": choice.n_coefficients,
+        "held_out_rms_px_5": choice.held_out.get(FEW),
+        "held_out_rms_px_8": choice.held_out.get(MANY),
+        "held_out_rms_px_fisheye": choice.held_out.get(FISHEYE),
+        "reason": choice.message if choice.held_out else None,
+    }
+
+
 def _model(n_coefficients: int, own: float, others: tuple[Message, ...]) -> Message:
     """Return the message on the chosen model."""
     match n_coefficients, bool(others):
@@ -136,16 +147,30 @@ def choose_distortion(
             trial_errors = _held_out(views, tolerances, trial)
             rms = rms_together(trial_errors, views)
             held_out[trial.n_coefficients] = rms
-            # By how many times, so that no one view decides alone.
-            gains = np.log(
-                np.maximum(errors, FINEST) / np.maximum(trial_errors, FINEST)
-            )
-            chance = float(gains.std(ddof=1)) / len(gains) ** 0.5
-            is_better = rms < (1 - WORTH) * held_out[best.n_coefficients]
-            if is_better and gains.mean() > SIGMAS * chance:
+            before = held_out[best.n_coefficients]
+            if is_significantly_less(rms, before, trial_errors, errors):
                 best, errors = trial, trial_errors
     report(0.8)
     return Choice(best.n_coefficients, held_out, best.pull), best.fitted, errors
+
+
+def is_significantly_less(
+    rms: float, rms_before: float, errors: FloatArray, errors_before: FloatArray
+) -> bool:
+    """Return whether a lens model predicts images better than the one before.
+
+    Parameters
+    ----------
+    rms, rms_before : float
+        Cross-validated error of all points, px.
+    errors, errors_before : (V,) array
+        That of each image, px.
+    """
+    # By how many times, so that no one image decides alone.
+    gains = np.log(np.maximum(errors_before, FINEST) / np.maximum(errors, FINEST))
+    chance = float(gains.std(ddof=1)) / len(gains) ** 0.5
+    is_less = rms < (1 - WORTH) * rms_before
+    return bool(is_less and gains.mean() > SIGMAS * chance)
 
 
 def _is_wide(camera: Camera, views: Views) -> bool:

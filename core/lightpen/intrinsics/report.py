@@ -10,6 +10,7 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.calibration import CameraCalibration
 from lightpen.intrinsics.coverage import cover
+from lightpen.intrinsics.distortion import choice_record
 from lightpen.intrinsics.next_view import choose_next_view
 from lightpen.intrinsics.observing import ObservedBoard
 from lightpen.intrinsics.pair import PairCalibration
@@ -152,13 +153,7 @@ def intrinsics_record(
         "rms_px": fitted.rms,
         "noise_px": fitted.sigma,
         "held_out_rms_px": calibration.held_out_rms,
-        "distortion_choice": {
-            "coefficients": calibration.choice.n_coefficients,
-            "held_out_rms_px_5": calibration.choice.held_out.get(5),
-            "held_out_rms_px_8": calibration.choice.held_out.get(8),
-            "held_out_rms_px_fisheye": calibration.choice.held_out.get(4),
-            "reason": calibration.choice.message,
-        },
+        "distortion_choice": choice_record(calibration.choice),
         "effects": _effects_record(calibration.effects),
         "projection_uncertainty": {
             "middle_px": uncertain.center,

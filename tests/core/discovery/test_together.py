@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from tests.simulated_stations import Station, errors_of, random_station, seen_station
 
-from lightpen.discovery.discover import Request, SecondSightings, discover
+from lightpen.discovery.discover import discover
 from lightpen.discovery.picture import picture_of_pen
+from lightpen.discovery.request import Request, SecondSightings
 from lightpen.discovery.together import Together, discover_together
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.priors import ConeSeparation

@@ -1,0 +1,54 @@
+"""What is known of pen and camera before the images are looked at."""
+
+from dataclasses import dataclass
+
+from lightpen.arrays import FloatArray
+from lightpen.discovery.scale import MeasuredLength
+from lightpen.discovery.sightings import Sightings
+from lightpen.estimation.bundle.priors import ConeSeparation
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What is known, and how results are to be given.
+
+    Attributes
+    ----------
+    lengths : tuple of MeasuredLength
+        Without any the result is relative: the largest distance is `RELATIVE`.
+    diameter : float
+        Of the LED discs, mm.
+    camera : Camera or None
+        Of a camera file, with its covariance.
+    sketch : Pen or None
+        Rough LEDs, which give numbers and frame.
+    second : SecondSightings or None
+        A swing in a second cone, before the same camera, not moved. The distance of
+        the cones gives the scale where there is no length.
+    """
+
+    lengths: tuple[MeasuredLength, ...]
+    diameter: float
+    camera: Camera | None = None
+    sketch: Pen | None = None
+    second: "SecondSightings | None" = None
+
+    @property
+    def is_relative(self) -> bool:
+        """Whether nothing gives the scale."""
+        return not self.lengths and self.second is None
+
+    @property
+    def rough_leds(self) -> FloatArray | None:
+        """LEDs of the sketch, (L, 3), mm."""
+        return None if self.sketch is None else self.sketch.leds
+
+
+@dataclass(frozen=True, eq=False)
+class SecondSightings:
+    """A swing of the pen in a second cone, at a certified distance from the first."""
+
+    sightings: Sightings
+    separation: ConeSeparation

@@ -1,0 +1,115 @@
+"""Start of the adjustment of a labelled swing: numbers, scale, lens and frame."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.discovery.hypotheses import camera_prior
+from lightpen.discovery.labelling import Labelled
+from lightpen.discovery.lens_choice import choose_lens
+from lightpen.discovery.normals import towards_camera
+from lightpen.discovery.numbering import framed, number_by_place, number_by_sketch
+from lightpen.discovery.request import Request
+from lightpen.discovery.requirements import MIN_LEDS
+from lightpen.discovery.scale import MeasuredLength, known_lengths, scale_by
+from lightpen.discovery.starts import KnownLength, Start, adjust_start, scaled_to
+from lightpen.errors import CalibrationError
+from lightpen.estimation.bundle.linearised import BundleState
+from lightpen.intrinsics.distortion import Choice
+from lightpen.model.pen import Pen
+from lightpen.model.rigid import fit_rigid
+
+N_ADJUSTED = 100  # images that the start is adjusted to
+MIN_SHARE, MIN_SEEN = 0.05, 10  # of the images, and images, in which an LED is seen
+USUAL_DISC = 0.05  # of the largest distance of two LEDs
+RELATIVE = 100.0  # the largest distance of two LEDs, where no length is known
+LEAST_LENGTH_SIGMA = 1e-4  # mm
+
+
+class ScaledStart(NamedTuple):
+    """Start of the adjustment of all images.
+
+    Attributes
+    ----------
+    lengths : tuple of KnownLength
+        One at least; relative where none is known.
+    choice : Choice or None
+        Why this lens model; None where the camera is known.
+    """
+
+    state: BundleState
+    lengths: tuple[KnownLength, ...]
+    choice: Choice | None
+
+
+def numbered(found: Labelled, request: Request) -> Labelled:
+    """Return the labelling by LED numbers, without LEDs that hardly any image shows."""
+    n_seen = (found.spots >= 0).sum(axis=0)
+    good = np.flatnonzero(n_seen >= max(MIN_SHARE * len(found.spots), MIN_SEEN))
+    if len(good) < MIN_LEDS:
+        raise CalibrationError(
+            "discover.too-few-leds", n_leds=len(good), needed=MIN_LEDS
+        )
+    state = _of_leds(found.state, good)
+    order = (
+        number_by_place(state)
+        if request.sketch is None
+        else number_by_sketch(state.pen.leds, request.sketch.leds)
+    )
+    return replace(
+        found, state=_of_leds(state, order), spots=found.spots[:, good[order]]
+    )
+
+
+def _of_leds(state: BundleState, order: IntArray) -> BundleState:
+    pen = state.pen
+    pen = replace(pen, leds=pen.leds[order], normals=pen.normals[order])
+    return replace(state, pen=pen)
+
+
+def scaled_start(request: Request, found: Labelled, pixels: FloatArray) -> ScaledStart:
+    """Return the start of the adjustment, to scale and in the pen's frame.
+
+    Parameters
+    ----------
+    pixels : (N, L, 2) array
+        px.
+    """
+    state, leds = found.state, found.state.pen.leds
+    measured = request.lengths or (MeasuredLength(None, RELATIVE, 0.0),)
+    lengths = tuple(
+        replace(each, sigma=max(each.sigma, LEAST_LENGTH_SIGMA))
+        for each in known_lengths(measured, leds)
+    )
+    state = scaled_to(state, scale_by(lengths, leds))
+    normals = np.tile(towards_camera(state), (len(leds), 1))
+    pen, known = _with_discs(state.pen, request), request.camera
+    pen = replace(pen, normals=normals)
+    state = replace(state, pen=pen)
+    some = np.unique(np.linspace(0, len(found.images) - 1, N_ADJUSTED).astype(int))
+    part = replace(state, rotations=state.rotations[some])
+    pixels = pixels[found.images]
+    start, choice = Start(part, np.inf), None
+    for n_steps in (40, 40):  # the second time about the focal length found
+        prior = camera_prior(start.state.rig.cameras[0], known)
+        start = adjust_start(start.state, pixels[some], prior, n_steps, lengths)
+    part = start.state
+    if known is None:
+        part, choice = choose_lens(start, pixels[some], lengths)
+    turned, _ = fit_rigid(state.pen.leds, part.pen.leds)
+    every = replace(part, rotations=state.rotations @ turned.T)
+    prior = camera_prior(part.rig.cameras[0], known)
+    every = adjust_start(every, pixels, prior, 8, lengths).state
+    pen, R, t = framed(every.pen, every.tip_pen, request.rough_leds)
+    tip, rotations = R @ every.tip_pen + t, every.rotations @ R.T
+    every = replace(every, pen=pen, tip_pen=tip, rotations=rotations)
+    return ScaledStart(every, lengths, choice)
+
+
+def _with_discs(pen: Pen, request: Request) -> Pen:
+    if request.lengths:
+        return replace(pen, diameter=request.diameter)
+    usual = USUAL_DISC * RELATIVE  # nothing shows how large they are
+    return replace(pen, diameter=usual, diameter_sigma=usual)
