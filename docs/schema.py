@@ -32,8 +32,8 @@ def described(docstring: str) -> tuple[str, dict[str, str]]:
     found = {}
     for part in re.split(r"\n(?=\S)", section):
         names, _, meaning = part.partition("\n")
-        for name in names.split(", "):
-            found[name] = " ".join(meaning.split())
+        for name in names.partition(" : ")[0].split(", "):
+            found[name] = re.sub(r"\bNone\b", "null", " ".join(meaning.split()))
     return text, found
 
 

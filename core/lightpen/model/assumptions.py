@@ -10,25 +10,25 @@ COLDEST, WARMEST = -50.0, 100.0  # degrees C, of a pen
 class Assumptions:
     """Default standard uncertainties for what files do not state.
 
-    Those of the camera are what a lens that was calibrated once, and mounted and
-    focused again since, was seen to be off by. Beside them stands what no file states
-    of a station: how warm the pen is, and how true its ball and cone are.
+    Those of the camera are typical errors of the file of a lens that was mounted and
+    focused again after its calibration. The others concern the station: temperature of
+    the pen, form of ball and cone, compliance.
 
     Attributes
     ----------
     focal_length : float
-        Relative.
+        Relative standard uncertainty of the focal length.
     aspect : float
         Relative standard uncertainty of fy / fx.
     principal_point : float
-        Of cx and of cy, px.
+        Standard uncertainty of cx and of cy, px.
     k1, k2, tangential : float
         Standard uncertainty of the distortion coefficients; ``tangential`` applies to
         p1 and p2.
     scale : float
         Relative standard uncertainty of the scale of all LED coordinates.
     expansion : float
-        Thermal, of the pen, 1/K: 2e-6 of carbon fibre to 23e-6 of aluminium.
+        Thermal expansion of the pen, 1/K: 2e-6 (carbon fibre) to 23e-6 (aluminium).
     expansion_share : float
         Relative standard uncertainty of a stated expansion coefficient.
     temperature_c : float or None
@@ -41,15 +41,17 @@ class Assumptions:
     diameter : float
         Relative standard uncertainty of the LED disc diameter.
     form_error : float
-        Of where the ball sits, as ball and cone are not round, along each axis in each
-        form in which it may follow the lean, mm.
+        Standard uncertainty of the seat of the ball by the form error of ball and cone,
+        along each axis in each form of dependence on the tilt, mm.
     center_bias : float
-        Of the centre of an LED's image, px, by what does not average out: another in
-        each posture, the same whenever it returns.
+        Standard uncertainty of the centre of an LED's image, px, by errors that do not
+        average out: different in each posture, equal whenever the posture returns.
     compliance : float
-        Of how far stylus, seat or stand give way, mm by the sine of the lean.
+        Standard uncertainty of the deflection of stylus, seat and stand, mm, divided by
+        the sine of the tilt.
     rotation, translation : float
-        Of a camera in its rig about and along each axis, rad and mm.
+        Standard uncertainty of the pose of a camera in its rig about and along each
+        axis, rad and mm.
     """
 
     focal_length: float = 0.005

@@ -42,7 +42,7 @@ class FoundEffect:
     sigma : float or None
         Standard uncertainty of the one value.
     gain : float
-        Twice the logarithm of its likelihood ratio to none.
+        Twice the logarithm of the likelihood ratio of this effect to no effect.
     """
 
     name: EffectName

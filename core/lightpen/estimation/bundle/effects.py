@@ -116,7 +116,7 @@ class EffectComponent(NamedTuple):
     sigma : float
         Standard deviation of maximum likelihood, mm or px.
     gain : float
-        Twice the logarithm of its likelihood ratio to none.
+        Twice the logarithm of the likelihood ratio of this effect to no effect.
     covariance : (k, k) array
         Of the unknowns with that.
     expected : (k, k) array

@@ -97,19 +97,22 @@ class UncertaintyRecord(Struct, frozen=True):
     Attributes
     ----------
     shares
-        The contributions; their squares add up. Those not listed add nothing.
+        The contributions; the sum of their squares is that of the combined standard
+        uncertainty. A contribution that is not listed is zero.
     independent_noise_mm
-        If no two images were correlated, k = 1.
+        Contribution of noise if no two images were correlated, k = 1.
     correlation_factor
         Ratio of the noise variance to that of independent images.
     lag1_autocorrelation
         Correlation of neighbouring images.
-    blocks_mm, block_ratio
-        By the scatter of blocks of consecutive images.
+    blocks_mm
+        Contribution of noise from the scatter of blocks of consecutive images, k = 1.
+    block_ratio
+        Variance between these blocks over that of independent noise and seat jitter.
     led_sigma_mm
-        Errors of the LED file that the images show.
+        Standard deviation of the errors of the LED file, estimated from the images.
     halves_difference_mm
-        Of the odd and the even images, solved apart.
+        Difference of the tips from the odd and from the even images.
     """
 
     shares: tuple[ContributionRecord, ...]
@@ -176,12 +179,12 @@ class EffectRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     Attributes
     ----------
     size
-        Standard deviation, of one unknown its value: mm, of lens and tilt px, of time
-        image intervals.
+        Standard deviation of the effect, or its value if it has one unknown: in mm, of
+        lens and camera tilt in px, of timing in image intervals.
     standard_uncertainty
-        Of one unknown.
+        Of the value, if it has one unknown.
     gain
-        Twice the logarithm of its likelihood ratio to none.
+        Twice the logarithm of the likelihood ratio of this effect to no effect.
     """
 
     name: EffectName
@@ -207,14 +210,14 @@ class AdjustmentRecord(Struct, frozen=True):
 
 
 class TipFramesRecord(Struct, frozen=True):
-    """The tip where LEDs are displaced, so that the pen frame is ambiguous.
+    """The tip in both pen frames, if displaced LEDs make the pen frame ambiguous.
 
     Attributes
     ----------
     of_file_mm
-        In the frame of the LED file by the LEDs that are not displaced.
+        In the frame of the LED file, defined by the LEDs that are not displaced.
     of_all_leds_mm
-        In the frame of all LEDs as they are.
+        In the frame that fits all LEDs as measured.
     result_is_of_file
         Whether the result and its U refer to the former.
     """
@@ -225,14 +228,15 @@ class TipFramesRecord(Struct, frozen=True):
 
 
 class SelfCheckRecord(Struct, frozen=True):
-    """Errors that half of the LEDs predict the others with, where they follow posture.
+    """Errors with which half of the LEDs predict the others.
 
     Attributes
     ----------
     value
-        Over those that differ from image to image: 1 by chance.
+        Ratio (rms) of the errors that depend on the posture to the rest: about 1 if
+        pen, LEDs and lens agree with the model.
     limit
-        Which chance exceeds in one of a hundred swings.
+        Exceeded by chance in one of a hundred swings.
     """
 
     value: float
@@ -293,7 +297,7 @@ class InstrumentRecord(Struct, frozen=True, omit_defaults=True):
 
 
 class DirectionRecord(Struct, frozen=True):
-    """The direction in the pen frame along which the tip is known least."""
+    """The direction in the pen frame along which U of the tip is largest."""
 
     vector_pen: Vector
     expanded_uncertainty_mm: float
@@ -328,7 +332,7 @@ class LedRecord(Struct, frozen=True):
 
 
 class CameraPlace(Struct, frozen=True, omit_defaults=True):
-    """Where a camera of a rig is; of the first the frame, so nothing more."""
+    """Pose of a camera in its rig; for the first camera, the reference, no more."""
 
     rotation: Matrix3
     translation_mm: Vector
@@ -359,7 +363,7 @@ class RigRecord(Struct, frozen=True):
 
 
 class InputsRecord(Struct, frozen=True, omit_defaults=True):
-    """The files that were read; of a single camera its own and the pen's, whole."""
+    """The files that were read; with one camera, camera and pen file with content."""
 
     camera: FileRecord
     pen: FileRecord
@@ -371,7 +375,7 @@ class InputsRecord(Struct, frozen=True, omit_defaults=True):
 
 
 class SpotRecord(Struct, frozen=True):
-    """The image of an LED: its centre, and whether it was fit for use and used."""
+    """The image of an LED: its centre, and whether it was usable and used."""
 
     led: Place
     x_px: Length
@@ -387,9 +391,9 @@ class FrameRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     Attributes
     ----------
     tip_cam_mm
-        The tip by this image alone.
+        The tip from this image alone.
     edge_width_px
-        Of the LEDs, from dark to bright.
+        Width of the edges of the LEDs, from dark to bright.
     """
 
     camera: str = ""
@@ -427,17 +431,17 @@ class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     rms_px
         Residual of the LED centres, rms.
     rms_mm
-        Distance of the tip of single images from the cone, rms.
+        Distance of the tips from single images to the cone, rms.
     warnings
         Findings to check; their codes stay when the wording changes.
     assumptions
-        Values in place of what the files do not state.
+        Default values for what the files do not state.
     fixed_lamps
-        Of each camera with fixed lamps in view.
+        One entry for each camera with fixed lamps in view.
     tip_frames
-        Where LEDs are displaced.
+        Only if LEDs are displaced.
     self_check
-        Parts of the LEDs against the others.
+        Comparison of one half of the LEDs with the other.
     instrument
         Input of verification and measuring.
     inputs
