@@ -104,6 +104,8 @@ def test_a_measured_part_is_put_on_paper(
     characteristic = {
         "name": "diameter hole",
         "nominal": 20.0,
+        "lower_limit": 19.95,
+        "upper_limit": 20.05,
         "actual": 20.01,
         "deviation": 0.01,
         "expanded_uncertainty": 0.004,

@@ -4,18 +4,18 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from hashlib import sha256
 from pathlib import Path
 
-from lightpen.archive.result_entry import entry_of_file
 from lightpen.formats.files import A_FILE, MEGABYTE, read_bytes, write_whole
-from lightpen.formats.hashes import InputFile
 from lightpen.record.exports.exports import save_new
-from lightpen.record.folder.verifications import is_verification, read_verification
+from lightpen.record.folder.verifications import is_verification
 from lightpen_app.application import has_display, make_application
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import load_fonts
-from lightpen_app.print_report.control import read_calibration_file
+from lightpen_app.print_report.control import (
+    read_calibration_file,
+    read_kept_verification,
+)
 from lightpen_app.print_report.printing import paper_of, paper_stem, pdf_of
 
 LIMIT = 64 * MEGABYTE
@@ -48,28 +48,24 @@ def write_paper(result: Path, out: Path | None, language: str) -> Path:
     """
     content = read_bytes(result, A_FILE, LIMIT)
     if is_verification(content):
-        return _write_verification(result, content, out, language)
+        return _write_verification(result, out, language)
     found = read_calibration_file(result)
     with _speaking(language):
         pdf = pdf_of(paper_of(found.calibration_file, found.reestimated, found.entered))
     return _written(pdf, paper_stem(found.calibration_file), out)
 
 
-def _write_verification(
-    file: Path, content: bytes, out: Path | None, language: str
-) -> Path:
+def _write_verification(file: Path, out: Path | None, language: str) -> Path:
     # Few reports are of one.
     from lightpen_app.print_report.verification import (
         verification_paper,
         verification_stem,
     )
 
-    done = read_verification(content, file)
-    kept = InputFile(file, sha256(content).hexdigest(), content)
-    entered = entry_of_file(file, kept.sha256)
+    found = read_kept_verification(file)
     with _speaking(language):
-        pdf = pdf_of(verification_paper(kept, done, entered))
-    return _written(pdf, verification_stem(file, done), out)
+        pdf = pdf_of(verification_paper(*found))
+    return _written(pdf, verification_stem(file, found.done), out)
 
 
 @contextmanager

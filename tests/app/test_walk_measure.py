@@ -14,6 +14,7 @@ from lightpen.record.swings.names import Names
 from lightpen.simulator.plate import plate_plan
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.part import PART, PartOptions
+from lightpen_app.print_report.preview import PrintReportWindow
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station
 
@@ -65,6 +66,9 @@ def test_a_part_is_measured_without_a_key_between_first_and_last_point(
     assert diameter["actual"] == pytest.approx(20, abs=0.1)
     assert diameter["decision"] == "accepted"
     assert len(records[0]["inputs"]["touches"]) == 1
+
+    walker.click("Report...")
+    walker.until(lambda: walker.window.findChild(PrintReportWindow) is not None)
 
 
 def test_without_a_plan_the_step_says_what_to_do(

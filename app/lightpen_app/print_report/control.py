@@ -3,11 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.result_entry import ArchivePlace, entry_of_file
+from lightpen.formats.hashes import InputFile, with_content
 from lightpen.local_time import local_now
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.record.calibrations.reestimated_poses import (
@@ -15,8 +17,12 @@ from lightpen.record.calibrations.reestimated_poses import (
     reestimate_poses,
 )
 from lightpen.record.exports.export_status import with_status
+from lightpen.record.folder.verifications import StoredVerification, read_verification
 from lightpen_app.work.job import Job
 from lightpen_app.work.save_place import SavePlace
+
+if TYPE_CHECKING:
+    from lightpen_app.print_report.pages import PrintReport
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,29 @@ def read_calibration_file(file: Path) -> ReportContent:
     return ReportContent(
         calibration_file, reestimated, entry_of_file(file, calibration_file.sha256)
     )
+
+
+class KeptVerification(NamedTuple):
+    """A verification on the disk: its file with the content, and its archive entry."""
+
+    file: InputFile
+    done: StoredVerification
+    entered: ArchivePlace | None
+
+
+def read_kept_verification(path: Path) -> KeptVerification:
+    """Read what the report of a verification contains.
+
+    Raises
+    ------
+    ArchiveError
+        The archive beside it cannot be read.
+    FileError
+        It cannot be read, or is not the one that was entered.
+    """
+    file = with_content(path)
+    done = read_verification(file.content or b"", path)
+    return KeptVerification(file, done, entry_of_file(path, file.sha256))
 
 
 class PrintReportControl(QObject):
@@ -92,6 +121,16 @@ class PrintReportControl(QObject):
         job.failed.connect(self.failed)
         job.start()
 
+    def show_verification(self, path: Path) -> None:
+        """Show the report of a verification."""
+        self.shut_down()
+        self._reading = job = Job(lambda _: read_kept_verification(path), self)
+
+        # Connections
+        job.succeeded.connect(self._show_verification)
+        job.failed.connect(self.failed)
+        job.start()
+
     def shut_down(self) -> None:
         """Show nothing any more that is not shown yet."""
         if self._reading is not None:
@@ -99,11 +138,23 @@ class PrintReportControl(QObject):
 
     def _show(self, found: ReportContent) -> None:
         # Printing takes long to be imported, and few swings are printed.
-        from lightpen_app.print_report.preview import PrintReportWindow
         from lightpen_app.print_report.printing import paper_of, paper_stem
 
         paper = paper_of(found.calibration_file, found.reestimated, found.entered)
-        stem = paper_stem(found.calibration_file)
+        self._open(paper, paper_stem(found.calibration_file))
+
+    def _show_verification(self, found: KeptVerification) -> None:
+        from lightpen_app.print_report.verification import (
+            verification_paper,
+            verification_stem,
+        )
+
+        stem = verification_stem(found.file.path, found.done)
+        self._open(verification_paper(*found), stem)
+
+    def _open(self, paper: "PrintReport", stem: str) -> None:
+        from lightpen_app.print_report.preview import PrintReportWindow
+
         window = PrintReportWindow(paper, self._place, stem, self._page)
         window.saved.connect(self.saved)
         window.failed.connect(self.failed)

@@ -37,7 +37,7 @@ def part_blocks(record: Mapping[str, Any]) -> Iterator[Block]:
     yield heading(translate("paper", "Characteristics / mm, degrees"))
     yield from _characteristics(record["characteristics"])
     yield from _budget(record["characteristics"])
-    yield heading(translate("paper", "Features / mm"))
+    yield heading(translate("paper", "Features / mm, degrees"))
     yield from _features(record["features"])
     yield from _alignment(record["alignment"])
     yield heading(translate("paper", "Points"))
@@ -58,6 +58,8 @@ def _characteristics(entries: list[dict[str, Any]]) -> Iterator[Block]:
     columns = [Column(translate("paper", "Characteristic"), 2.2)]
     columns += _numbers(
         translate("paper", "Nominal"),
+        translate("paper", "Lower limit"),
+        translate("paper", "Upper limit"),
         translate("paper", "Actual"),
         translate("paper", "Deviation"),
         translate("paper", "U (k = 2)"),
@@ -73,7 +75,8 @@ def _characteristics(entries: list[dict[str, Any]]) -> Iterator[Block]:
                 *(
                     _text(each[name])
                     for name in (
-                        *("nominal", "actual", "deviation", "expanded_uncertainty"),
+                        *("nominal", "lower_limit", "upper_limit", "actual"),
+                        *("deviation", "expanded_uncertainty"),
                         *("independent_expanded_uncertainty",),
                         *("probability_of_conformity",),
                     )
@@ -116,7 +119,7 @@ def _features(entries: list[dict[str, Any]]) -> Iterator[Block]:
     ]
     rows = []
     for each in entries:
-        sizes = ", ".join(f"{k} {_text(v)}" for k, v in each["sizes"].items())
+        sizes = ", ".join(f"{k} {_text(v)}" for k, v in _sizes(each["sizes"]))
         rows.append(
             [
                 *(each["name"], each["kind"]),
@@ -126,6 +129,17 @@ def _features(entries: list[dict[str, Any]]) -> Iterator[Block]:
             ]
         )
     yield from table(columns, rows, size=PrintSize.SMALL)
+
+
+def _sizes(sizes: Mapping[str, float]) -> Iterator[tuple[str, float]]:
+    """Yield the sizes of a feature as a plan states them, mm and degrees."""
+    if "length" in sizes:
+        yield "width", 2 * sizes["radius"]
+        yield "length", sizes["length"] + 2 * sizes["radius"]
+    elif "radius" in sizes:
+        yield "diameter", 2 * sizes["radius"]
+    if "half_angle" in sizes:
+        yield "angle", 2 * float(np.rad2deg(sizes["half_angle"]))
 
 
 def _alignment(alignment: dict[str, Any] | None) -> Iterator[Block]:

@@ -195,6 +195,8 @@ def _inputs(inputs: Any) -> Iterable[Block]:
     others = inputs.get("files", ())
     rows = [(name, each["file"], each["sha256"]) for name, each in files.items()]
     rows += [("", each["file"], each["sha256"]) for each in others]
+    for each in inputs.get("touches", ()):  # of live ones, whose images it lists
+        rows.append(("touches", each["folder"], each["journal_sha256"]))
     yield heading(translate("paper", "Input files"))
     yield from table(
         [

@@ -25,6 +25,7 @@ from lightpen.verification.tasks.part import PART, planned_at
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
@@ -52,12 +53,14 @@ class PlanPanel(Translated, QWidget):
         self._kind_label.setBuddy(self._kind)
         for kind in (None, *FeatureKind):
             self._kind.addItem("", None if kind is None else kind.value)
-        self._save_plan, self._export = PushButton(), PushButton()
+        self._save_plan, self._export, self._report = (PushButton() for _ in range(3))
+        self._paper = PrintReportControl(workbench.save_place, self)
 
         # Layout
         cells = (self._open, self._free, self._plate, (self._name, 1))
-        of_feature = (self._kind_label, self._kind, self._save_plan, self._export)
-        horizontal_layout(self, *cells, *of_feature, spacing=GRID)
+        of_feature = self._kind_label, self._kind
+        of_part = self._save_plan, self._export, self._report
+        horizontal_layout(self, *cells, *of_feature, *of_part, spacing=GRID)
 
         # Connections
         self._open.clicked.connect(self._on_open_clicked)
@@ -66,6 +69,9 @@ class PlanPanel(Translated, QWidget):
         self._kind.activated.connect(self._on_kind_chosen)
         self._save_plan.clicked.connect(self._on_save_plan_clicked)
         self._export.clicked.connect(self._on_export_clicked)
+        self._report.clicked.connect(self._on_report_clicked)
+        self._paper.failed.connect(partial(self._notices.tell, self))
+        self._paper.saved.connect(self._on_saved)
 
         self._retranslate()
 
@@ -75,12 +81,14 @@ class PlanPanel(Translated, QWidget):
         plan = self._plan()
         self._name.setText("" if plan is None else plan.name)
         planned = self._planned()
-        self._kind.setEnabled(planned is not None)
+        for each in (self._kind_label, self._kind):
+            each.setVisible(planned is not None)
         kind = None if planned is None else planned.kind
         self._kind.setCurrentIndex(self._kind.findData(kind and kind.value))
         self._plate.setVisible(self._live.operator is not None)
         for button in (self._save_plan, self._export):
-            button.setEnabled(self._part() is not None)
+            button.setVisible(self._part() is not None)
+        self._report.setVisible(self._part() is not None and bool(status.files))
 
     def choose(self, plan: Plan) -> None:
         """Measure by a plan, from its first feature."""
@@ -127,6 +135,7 @@ class PlanPanel(Translated, QWidget):
             self.tr("Save a plan with the measured features as nominals.")
         )
         self._export.setText(self.tr("Export..."))
+        self._report.setText(self.tr("Report..."))
 
     def _on_open_clicked(self) -> None:
         name, _ = QFileDialog.getOpenFileName(
@@ -204,7 +213,11 @@ class PlanPanel(Translated, QWidget):
 
         # Connections
         job.failed.connect(partial(self._notices.tell, self))
-        job.succeeded.connect(
-            lambda _: self._notices.show_status(self.tr("Saved: {0}").format(path))
-        )
+        job.succeeded.connect(lambda _: self._on_saved(path))
         job.start()
+
+    def _on_saved(self, path: Path) -> None:
+        self._notices.show_status(self.tr("Saved: {0}").format(path))
+
+    def _on_report_clicked(self) -> None:
+        self._paper.show_verification(self._status.files[0])
