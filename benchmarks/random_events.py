@@ -279,8 +279,8 @@ def _percentiles(values: "array[float]") -> list[float]:
 
 
 def _by_minute(memory: list[tuple[float, float]]) -> list[float]:
-    """Return the median of each begun minute, MB."""
-    minutes = range(int(memory[-1][0] // 60) + 1)
+    """Return the median of each whole minute, MB; of a shorter trial that of all."""
+    minutes = range(max(int(memory[-1][0] // 60), 1))
     sizes = ([size for at, size in memory if at // 60 == m] for m in minutes)
     return [round(float(np.median(found)), 1) for found in sizes if found]
 
