@@ -15,7 +15,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import chdir, contextmanager
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
@@ -58,6 +58,7 @@ from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.motion import lean_vectors, postures_of
+from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers
 from lightpen.swing.preparation import Preparation
@@ -70,6 +71,8 @@ from lightpen.verification.session.session_state import SessionSetup, SessionSta
 from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleOptions
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
+from lightpen.verification.tasks.part import PART, PartOptions
+from lightpen.verification.tasks.task import HandGoal
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.theme import GRID, Appearance
@@ -77,15 +80,17 @@ from lightpen_app.steps.history.history_table import HistoryTable
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.settings import Preferences, Settings
+from lightpen_app.work.verification_run import VerificationRun
 from lightpen_resources import languages
 
 Seen = TypeVar("Seen")
 
 FOLDER = Path(__file__).resolve().parent / "screens"
 DATA = Path("lightpen")  # below the present folder
-STEPS = ("start", "camera", "leds", "swing", "review", "verify", "history")
+STEPS = ("start", "camera", "leds", "swing", "review", "verify", "measure", "history")
 SIZES = (QSize(1280, 800), QSize(1920, 1080))
-NAMES = Names("Hall 2", "A. Weber", "LP-04", "T-10-80", "C-1", 10.0)
+BALL = 10.0  # mm
+NAMES = Names("Hall 2", "A. Weber", "LP-04", "T-10-80", "C-1", BALL)
 NOW = datetime.fromisoformat("2026-09-30T10:00:00+02:00")
 SIGMA = 0.05  # px, of the centres in the swing
 PERIOD = 0.05  # s
@@ -99,6 +104,9 @@ CHOICES = VerificationChoices(
         CircleOptions(SIMULATED_RADIUS, 0.001),
         LengthOptions(SIMULATED_LENGTH, 0.001),
     ),
+)
+PART_CHOICES = VerificationChoices(
+    options=(PartOptions(plate_plan().limited_to({"top", "hole 1", "dome"})),)
 )
 N_ON_RING = 7  # touches when the verification is drawn
 N_HELD = 10  # images through which the pen is held still
@@ -316,18 +324,29 @@ class Stage:
         _await_jobs()
 
     def _fill_verify(self) -> None:
-        run, verification = self._workbench.run, self._workbench.verification
+        run = self._workbench.run
         run.runner.accept("The station is being set up.")
         self._wait_until(lambda: run.status.result is not None)
-        self._workbench.selection.set_choices(CHOICES)
-        verification.runner.ask(lambda workflow: workflow.start_over())
-        self._wait_until(lambda: verification.status.is_touching)
-        verification.runner.ask(lambda workflow: workflow.leave())
-        self._wait_until(lambda: not verification.status.is_here)
-        status = verification.status
+        self._fill_probing(self._workbench.verification, CHOICES, _touched)
+
+    def _fill_measure(self) -> None:
+        self._fill_probing(self._workbench.measuring, PART_CHOICES, _measured)
+
+    def _fill_probing(
+        self,
+        probing: VerificationRun,
+        choices: VerificationChoices,
+        probed: Callable[[SessionSetup, Scene], SessionState],
+    ) -> None:
+        self._workbench.selection.set_choices(choices)
+        probing.runner.ask(lambda workflow: workflow.start_over())
+        self._wait_until(lambda: probing.status.is_touching)
+        probing.runner.ask(lambda workflow: workflow.leave())
+        self._wait_until(lambda: not probing.status.is_here)
+        status = probing.status
         assert status.setup is not None
-        touched = _touched(status.setup, self._scene)
-        verification.on_verification(replace(status, state=touched), ())
+        state = probed(status.setup, self._scene)
+        probing.on_verification(replace(status, state=state), ())
         for index in range(N_SHOWN):
             self._show_image(index)
         shown = QDeadlineTimer(REFRESH_MS)
@@ -470,17 +489,44 @@ def _swing(setup: SwingSetup, scene: Scene) -> SwingState:
 
 def _touched(setup: SessionSetup, scene: Scene) -> SessionState:
     """Return a verification in the middle of its ring."""
-    rng = np.random.default_rng(scene.seed)
     n_touches = setup.choices.options_of(FIXED_POINT).n_touches
-    leans = [(0.2 + 0.2 * (i % 2), 2 * np.pi * i / n_touches) for i in range(n_touches)]
-    points = [np.zeros(3)] * n_touches
+    goals = [
+        HandGoal(np.zeros(3), 0.2 + 0.2 * (i % 2), 2 * np.pi * i / n_touches)
+        for i in range(n_touches)
+    ]
     ring = setup.choices.options_of(CIRCLE)
-    goals = [CIRCLE.hand(ring, 0, i).point for i in range(N_ON_RING)]
-    points += [goal for goal in goals if goal is not None]
-    leans += [(0.1, 0.0)] * N_ON_RING
+    goals += [CIRCLE.hand(ring, 0, i) for i in range(N_ON_RING)]
+    return _probed(setup, scene, goals)
+
+
+def _measured(setup: SessionSetup, scene: Scene) -> SessionState:
+    """Return a part with all its features."""
+    options = setup.choices.options_of(PART)
+    assert options.plan is not None
+    return _probed(
+        setup,
+        scene,
+        [
+            PART.hand(options, run, i)
+            for run, feature in enumerate(options.plan.features)
+            for i in range(feature.n_touches)
+        ],
+    )
+
+
+def _probed(
+    setup: SessionSetup, scene: Scene, goals: Sequence[HandGoal]
+) -> SessionState:
+    """Return a session after points, at which the pen is held in the air."""
+    rng = np.random.default_rng(scene.seed)
     state = SessionState()
-    for point, (tilt, direction) in zip(points, leans, strict=True):
-        R = postures_of(lean_vectors(tilt, direction, 0.0)[None]).rotations
+    for goal in goals:
+        assert goal.point is not None
+        point = goal.point
+        if goal.outwards is not None:
+            point = point + BALL / 2 * goal.outwards
+        tilt = 0.1 if goal.tilt == 0 else goal.tilt
+        R = postures_of(lean_vectors(tilt, goal.direction, 0.0)[None]).rotations
         t = scene.cone_cam + point - R @ scene.tip_pen
         for _ in range(N_HELD):
             (pixels,) = simulate_centers(scene.camera, scene.pen, R, t, SIGMA, rng)

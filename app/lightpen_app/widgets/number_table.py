@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -90,6 +90,7 @@ class NumberTable(QTableWidget):
                 item = QTableWidgetItem(text)
                 item.setTextAlignment(_RIGHT)
                 self.setItem(i, j, item)
+        self._share_width()
         self.updateGeometry()
 
     @override
@@ -99,13 +100,32 @@ class NumberTable(QTableWidget):
 
     @override
     def minimumSizeHint(self) -> QSize:
-        columns, heads = range(self.columnCount()), self.horizontalHeader()
-        needed = (
-            max(self.sizeHintForColumn(i), heads.sectionSizeHint(i)) for i in columns
-        )
-        width = len(columns) * max(needed, default=0)
-        width += self.verticalHeader().sizeHint().width()
+        width = sum(self._needed()) + self.verticalHeader().sizeHint().width()
         return QSize(max(width, 20 * GRID), self.sizeHint().height())
+
+    def _needed(self) -> list[int]:
+        """Return how wide each column must be, px."""
+        heads = self.horizontalHeader()
+        return [
+            max(self.sizeHintForColumn(i), heads.sectionSizeHint(i))
+            for i in range(self.columnCount())
+        ]
+
+    def _share_width(self) -> None:
+        """Make the columns equally wide, where there is little room as they need."""
+        heads, needed = self.horizontalHeader(), self._needed()
+        spare = self.viewport().width() - sum(needed)
+        is_short = self.viewport().width() < len(needed) * max(needed, default=0)
+        mode = QHeaderView.ResizeMode
+        heads.setSectionResizeMode(mode.Fixed if is_short else mode.Stretch)
+        if is_short:
+            for i, width in enumerate(needed):
+                heads.resizeSection(i, width + max(spare, 0) // len(needed))
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._share_width()
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -240,7 +240,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
             date += self.tr(", no uncertainty in the file")
         pair = self.tr("{0} and {1} px")
         if u is not None:
-            pair = self.tr("{0} and {1} px (k = 2)")
+            pair = self.tr("{0} and {1} px (k = 2)").replace(" = ", "\u00a0=\u00a0")
         return [
             self._file.path.name if self._problem.value().text else "",
             pair.format(fx, fy),

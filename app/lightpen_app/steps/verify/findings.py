@@ -31,7 +31,7 @@ from lightpen_app.widgets.translated import Translated
 MOST_TABLES = 2  # of a task; others are only printed
 NOWHERE = Qt.AlignmentFlag(0)  # but all over
 DIAL_SIZE = 22 * GRID  # px
-PICTURE_SHARE, LARGE_PICTURE_SHARE, TABLES_SHARE = 3, 9, 13  # of the width
+PICTURE_SHARE, LARGE_PICTURE_SHARE, TABLES_SHARE = 5, 9, 13  # of the width
 
 
 @dataclass(frozen=True)
@@ -144,6 +144,8 @@ class TaskFinding(ResponsiveLayout, QWidget):
     def __init__(self, task: AnyTask, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._task = task
+        if task is PART:
+            self.narrow_below = 125 * GRID
         self._room = NO_ROOM  # so that its least size at first widens no window
 
         # Widgets
@@ -186,10 +188,15 @@ class TaskFinding(ResponsiveLayout, QWidget):
     @override
     def _use_room(self) -> None:
         direction = QBoxLayout.Direction
+        is_narrow, is_part = self._room.is_narrow, self._task is PART
+        is_stacked = is_narrow or is_part  # its tables are wide
         self._side.setDirection(
-            direction.TopToBottom if self._room.is_narrow else direction.LeftToRight
+            direction.TopToBottom if is_stacked else direction.LeftToRight
         )
-        self._side.setStretch(0, 0 if self._room.is_narrow else 1)
+        self._columns.setDirection(
+            direction.BottomToTop if is_narrow and is_part else direction.LeftToRight
+        )
+        self._side.setStretch(0, 0 if is_stacked else 1)
         self._side.setStretch(1, 1)
         is_large = self._room.is_large
         for table in self._tables:
@@ -197,7 +204,8 @@ class TaskFinding(ResponsiveLayout, QWidget):
         if self._pictured is not None:
             share = LARGE_PICTURE_SHARE if is_large else PICTURE_SHARE
             self._columns.setStretch(0, share)
-            side = Qt.AlignmentFlag.AlignTop if self._room.is_narrow else NOWHERE
+            is_short = is_narrow and not is_part
+            side = Qt.AlignmentFlag.AlignTop if is_short else NOWHERE
             self._columns.setAlignment(self._pictured, side)
 
 

@@ -1,29 +1,55 @@
 """Pages with a list beside or a field above them."""
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, Qt
+from PySide6.QtGui import QPainter
 from PySide6.QtWidgets import (
     QBoxLayout,
     QFrame,
     QListWidget,
     QSizePolicy,
     QStackedWidget,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
     QWidget,
 )
 from typing_extensions import override
 
 from lightpen_app.look.layouts import horizontal_layout
-from lightpen_app.look.theme import GRID
+from lightpen_app.look.signs import Sign, draw_sign
+from lightpen_app.look.theme import GRID, Tone, colors_of
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
 
-ROOM = 2 * GRID  # px, beside the longest title
-STATE_ROOM = 6 * GRID  # px, of the state that a title gets later
+ROOM = GRID  # px, beside the longest title
+STATE_ROOM = 3 * GRID  # px, of the state that a title gets later
+MARK = Qt.ItemDataRole.UserRole  # sign and tone of a title
+
+
+class _Cards(QStyledItemDelegate):
+    """Draws the sign of a title at the left of it."""
+
+    def __init__(self, place: QWidget) -> None:
+        super().__init__(place)
+        self._place = place
+
+    @override
+    def paint(
+        self,
+        painter: QPainter,
+        option: QStyleOptionViewItem,
+        index: QModelIndex | QPersistentModelIndex,
+    ) -> None:
+        super().paint(painter, option, index)
+        sign, tone = index.data(MARK) or (Sign.NONE, Tone.PLAIN)
+        box = QRectF(option.rect)
+        box.setRect(box.left() + GRID, box.top(), 2 * GRID, box.height())
+        draw_sign(painter, box, sign, colors_of(self._place.palette()).tone(tone))
 
 
 class ListedPages(ResponsiveLayout, QWidget):
     """Shows the page of the selected title."""
 
-    narrow_below = 116 * GRID  # px; then the titles are in a field above the page
+    narrow_below = 119 * GRID  # px; then the titles are in a field above the page
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -32,6 +58,8 @@ class ListedPages(ResponsiveLayout, QWidget):
         # Widgets
         self._list = QListWidget()
         self._list.setObjectName("task_list")
+        self._list.setItemDelegate(_Cards(self))
+        self._list.setSpacing(GRID // 4)
         self._list.setFrameShape(QFrame.Shape.NoFrame)
         never = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
         self._list.setHorizontalScrollBarPolicy(never)
@@ -51,7 +79,9 @@ class ListedPages(ResponsiveLayout, QWidget):
         self._field.activated.connect(self._list.setCurrentRow)
 
     def add(self, page: QWidget) -> None:
-        """Add a page as the last one; the first is shown."""
+        """Add a page as the last one, if it is not there; the first is shown."""
+        if self._stack.indexOf(page) >= 0:
+            return
         self._stack.addWidget(page)
         self._field.addItem("")
         self._list.addItem("")
@@ -66,9 +96,12 @@ class ListedPages(ResponsiveLayout, QWidget):
             self._field.removeItem(index)
             self._list.takeItem(index)
 
-    def set_title(self, page: QWidget, title: str) -> None:
-        """Name a page."""
+    def set_title(
+        self, page: QWidget, title: str, sign: Sign = Sign.NONE, tone: Tone = Tone.PLAIN
+    ) -> None:
+        """Name a page, and mark its state."""
         index = self._stack.indexOf(page)
+        self._list.item(index).setData(MARK, (sign, tone))
         if self._list.item(index).text() != title:
             self._list.item(index).setText(title)
             width = self._list.sizeHintForColumn(0) + ROOM

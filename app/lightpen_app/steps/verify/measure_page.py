@@ -28,7 +28,7 @@ class MeasurePage(ProbingPage):
         self._plan = PlanPanel(workbench)
 
         # Layout
-        self._layout.insertWidget(1, self._plan)
+        self._scrolled.insertWidget(0, self._plan)
 
         self._on_workbench_changed()
         self._retranslate()

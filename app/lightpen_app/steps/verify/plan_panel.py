@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from msgspec import structs
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFileDialog, QWidget
 from typing_extensions import override
 
 from lightpen.measuring.exports import EXPORTS, PartExport
@@ -28,6 +28,7 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
@@ -35,8 +36,10 @@ from lightpen_app.work.workbench import Workbench
 SUFFIXES = "*.yaml *.yml"
 
 
-class PlanPanel(Translated, QWidget):
+class PlanPanel(ResponsiveLayout, Translated, QWidget):
     """Chooses a plan, changes the kind of the feature at hand, and saves results."""
+
+    narrow_below = 119 * GRID  # px; then all is in two rows
 
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -44,6 +47,7 @@ class PlanPanel(Translated, QWidget):
         self._selection, self._live = workbench.selection, workbench.live
         self._notices = workbench.notifications
         self._status = VerificationStatus()
+        self._room = NO_ROOM
 
         # Widgets
         self._name = text_label(TextSize.BODY, Tone.QUIET)
@@ -60,7 +64,10 @@ class PlanPanel(Translated, QWidget):
         cells = (self._open, self._free, self._plate, (self._name, 1))
         of_feature = self._kind_label, self._kind
         of_part = self._save_plan, self._export, self._report
-        horizontal_layout(self, *cells, *of_feature, *of_part, spacing=GRID)
+        self._rows = horizontal_layout(self)
+        horizontal_layout(self._rows, *cells, stretch=1)
+        horizontal_layout(self._rows, *of_feature, *of_part)
+        self._use_room()
 
         # Connections
         self._open.clicked.connect(self._on_open_clicked)
@@ -112,6 +119,13 @@ class PlanPanel(Translated, QWidget):
         state = self._status.state
         found = None if state is None else state.found_by(PART)
         return None if found is None else found.part
+
+    @override
+    def _use_room(self) -> None:
+        direction = QBoxLayout.Direction
+        self._rows.setDirection(
+            direction.TopToBottom if self._room.is_narrow else direction.LeftToRight
+        )
 
     @override
     def _retranslate(self) -> None:

@@ -32,6 +32,7 @@ from lightpen_app.steps.verify.view_state import (
     lamps_message,
 )
 from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.state_banner import State
 from lightpen_app.widgets.status_mark import status_text
 from lightpen_app.work.verification_run import VerificationRun
@@ -158,19 +159,20 @@ class VerifyPresenter(QObject):
         why_not = "" if has_points else self.tr("No point is recorded yet.")
         return MainAction(self.tr("Finish early"), why_not)
 
-    def _title(self, task: AnyTask) -> str:
+    def _title(self, task: AnyTask) -> StatusMessage:
         """Return the name of a task, with its progress if selected."""
         status, name = self._status, worded(task.title)
         found = None if status.state is None else status.state.found.get(task.kind)
         if found is not None:
-            far = self._grade_text(found.assessment.grade)
+            grade = found.assessment.grade
+            far, mark = self._grade_text(grade), GRADE_MARKS[grade]
         elif status.setup is not None and task.kind not in status.setup.choices.kinds:
-            return name
+            return StatusMessage(name)
         elif task is status.task:
-            far = self.tr("now")
+            far, mark = self.tr("now"), (Sign.PLAY, Tone.ACTIVE)
         else:
-            far = self.tr("to do")
-        return self.tr("{0}: {1}").format(name, far)
+            far, mark = self.tr("to do"), (Sign.RING, Tone.QUIET)
+        return StatusMessage(self.tr("{0}: {1}").format(name, far), *mark)
 
     def _grade_text(self, grade: Grade) -> str:
         """Return a grade; REPEAT refers to the verification, not to a swing."""

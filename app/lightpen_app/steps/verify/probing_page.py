@@ -1,10 +1,13 @@
 """What the steps Verify and Measure share: probing from the tip to a verdict."""
 
+from functools import partial
+
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.verification.session.status import SessionEventKind
+from lightpen.verification.tasks.registry import AnyTask
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import missing_input_text
 from lightpen_app.look.sounds import Sound, Sounds
@@ -17,6 +20,7 @@ from lightpen_app.steps.verify.simulator_controls import ProbingSimulatorControl
 from lightpen_app.steps.verify.task_panel import TaskPanel
 from lightpen_app.steps.verify.view_state import VerifyView
 from lightpen_app.widgets.image_view import ImageView
+from lightpen_app.widgets.lazy import LazyWidget
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
@@ -69,10 +73,12 @@ class ProbingPage(ResponsiveLayout, Page):
 
         # Widgets
         self._progress = ProgressPanel(workbench, run)
-        tasks = presenter.tasks
-        self._panels = tuple(TaskPanel(task, self._runner) for task in tasks)
+        self._panels = {  # made as they are seen, which halves the page's start
+            task: LazyWidget(partial(self._make_panel, task))
+            for task in presenter.tasks
+        }
         self._pages = ListedPages()
-        for panel in self._panels:
+        for panel in self._panels.values():
             self._pages.add(panel)
         self._image = ImageView()
         self._hand = ProbingSimulatorControls(self._live)
@@ -81,9 +87,11 @@ class ProbingPage(ResponsiveLayout, Page):
         self._showing.setInterval(SHOWING_MS)
 
         # Layout
-        self._layout = layout = vertical_layout(self, self._progress)
+        layout = vertical_layout(self, self._progress)
         scroll = PageScroll()
-        scroll.setWidget(ShrinkingScrollContent(self._pages))
+        scrolled = ShrinkingScrollContent()
+        self._scrolled = vertical_layout(scrolled, (self._pages, 1))
+        scroll.setWidget(scrolled)
         self._body = horizontal_layout(layout, (scroll, 3), spacing=2 * GRID, stretch=1)
         fill(layout, self._hand)
         self._use_room()
@@ -97,8 +105,6 @@ class ProbingPage(ResponsiveLayout, Page):
         workbench.selection.changed.connect(self._on_workbench_changed)
         workbench.library.changed.connect(self.changed)
         self._showing.timeout.connect(self._show)
-        for panel in self._panels:
-            panel.value_changed.connect(workbench.selection.set_choices)
 
     @override
     def lead(self) -> str:
@@ -201,19 +207,30 @@ class ProbingPage(ResponsiveLayout, Page):
         before, self._view = self._view, self._presenter.view()
         view, status = self._view, self._run.status
         self._progress.set_value(view)
-        for panel, title in zip(self._panels, view.titles, strict=True):
-            panel.set_status(status, view.reading)
-            self._pages.set_title(panel, title)
-            if panel.task is view.task and view.task is not before.task:
-                self._pages.show_page(panel)
+        for (task, place), title in zip(self._panels.items(), view.titles, strict=True):
+            panel = place.content_so_far()
+            if panel is not None:
+                panel.set_status(status, view.reading)
+            self._pages.set_title(place, title.text, title.sign, title.tone)
+            if task is view.task and view.task is not before.task:
+                self._pages.show_page(place)
         if self.isVisible():
             self.operator_value_changed.emit(view.operator)
         if view.headline != before.headline:
             self.changed.emit()
 
+    def _make_panel(self, task: AnyTask) -> TaskPanel:
+        panel = TaskPanel(task, self._runner)
+        panel.set_choices(self._selection.choices)
+        panel.set_status(self._run.status, self._view.reading)
+        panel.value_changed.connect(self._selection.set_choices)
+        return panel
+
     def _on_workbench_changed(self) -> None:
-        for panel in self._panels:
-            panel.set_choices(self._selection.choices)
+        for place in self._panels.values():
+            panel = place.content_so_far()
+            if panel is not None:
+                panel.set_choices(self._selection.choices)
         self._show_soon()
         self.changed.emit()
 

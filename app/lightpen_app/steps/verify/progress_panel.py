@@ -6,13 +6,19 @@ from typing_extensions import override
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.library.supervision import Signature
-from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import (
+    fill,
+    grid_layout,
+    horizontal_layout,
+    vertical_layout,
+)
 from lightpen_app.look.theme import GRID, TextSize
 from lightpen_app.steps.verify.view_state import VerifyView
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.reason_bar import ReasonBar, usual_reasons
+from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.translated import Translated
@@ -20,11 +26,27 @@ from lightpen_app.work.verification_run import VerificationRun
 from lightpen_app.work.workbench import Workbench
 
 PROGRESS_STEPS = 1000
-STATE_HEIGHT, VERDICT_HEIGHT = 9 * GRID, 13 * GRID  # px; a verdict has its reason
+STATE_HEIGHT = 9 * GRID  # px, at least
+# Row, column, and how many of these each takes; the state is beside the instruction, or
+# below it where there is little width.
+PLACES = {
+    "_instruction": (0, 0),
+    "_hint": (1, 0),
+    "_state": (0, 1, 2, 1),
+    "_buttons": (2, 0, 1, 2),
+}
+NARROW_PLACES = {
+    "_instruction": (0, 0),
+    "_buttons": (0, 1),
+    "_hint": (1, 0, 1, 2),
+    "_state": (2, 0, 1, 2),
+}
 
 
-class ProgressPanel(Translated, QWidget):
-    """Shows the instruction, the state and the verdict of a verification."""
+class ProgressPanel(ResponsiveLayout, Translated, QWidget):
+    """Shows instruction, state and progress of a verification in one row."""
+
+    narrow_below = 100 * GRID  # px; then the instruction stands above
 
     def __init__(
         self, workbench: Workbench, run: VerificationRun, parent: QWidget | None = None
@@ -32,20 +54,22 @@ class ProgressPanel(Translated, QWidget):
         super().__init__(parent)
         self._workbench, self._run = workbench, run
         self._runner = self._run.runner
+        self._room = NO_ROOM
 
         # Widgets
         self._question = QuestionBar()
         self._question.set_words(self._starting_over)
         self._reason = ReasonBar()
-        self._instruction = FittedText(TextSize.HUGE)
-        self._instruction.setMinimumHeight(6 * GRID)
+        self._instruction = FittedText(TextSize.TITLE)
+        self._instruction.setMinimumHeight(4 * GRID)
         self._act, self._start_over, self._accept = (PushButton() for _ in range(3))
         self._undo = PushButton()
         self._undo.setShortcut(QKeySequence.StandardKey.Undo)
         self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
         self._banner = StateBanner(TextSize.TITLE)
+        self._banner.setMinimumHeight(STATE_HEIGHT)
         self._lamps = SignLabel()
-        self._numbers = QWidget()
+        self._state, self._numbers, self._buttons = (QWidget() for _ in range(3))
         self._count = FittedText(TextSize.DISPLAY)
         self._progress = QProgressBar()
         self._progress.setRange(0, PROGRESS_STEPS)
@@ -53,13 +77,15 @@ class ProgressPanel(Translated, QWidget):
 
         # Layout
         layout = vertical_layout(self, self._question, self._reason)
-        head = horizontal_layout(layout, (self._instruction, 1))
-        fill(head, self._accept, self._act, self._undo, self._start_over)
-        fill(layout, self._hint)
-        state = horizontal_layout(layout, (self._banner, 3), spacing=2 * GRID)
-        fill(state, (self._numbers, 2))
+        self._rows = grid_layout(layout, spacing=(2 * GRID, GRID // 2))
+        horizontal_layout(
+            self._state, (self._banner, 3), (self._numbers, 2), spacing=2 * GRID
+        )
         vertical_layout(self._numbers, self._count, self._progress, spacing=GRID // 2)
+        buttons = self._accept, self._act, self._undo, self._start_over
+        horizontal_layout(self._buttons, 1, *buttons)
         fill(layout, self._lamps)
+        self._use_room()
 
         # Connections
         self._run.refused.connect(self._on_refused)
@@ -75,11 +101,10 @@ class ProgressPanel(Translated, QWidget):
 
     def set_value(self, view: VerifyView) -> None:
         """Show another moment of the verification."""
-        operator, is_done = view.operator, view.headline.is_complete
+        operator = view.operator
         self._instruction.set_text(operator.instruction)
         self._hint.set_text(operator.hint, bold=False)
         self._banner.set_value(operator.state)
-        self._banner.setFixedHeight(VERDICT_HEIGHT if is_done else STATE_HEIGHT)
         self._count.set_text(operator.count)
         self._lamps.set_value(view.lamps)
         self._numbers.setVisible(operator.fraction is not None)
@@ -98,6 +123,16 @@ class ProgressPanel(Translated, QWidget):
     def hide_question(self) -> None:
         """Ask nothing any more."""
         self._question.hide()
+
+    @override
+    def _use_room(self) -> None:
+        is_narrow = self._room.is_narrow
+        for widget, place in (NARROW_PLACES if is_narrow else PLACES).items():
+            child = getattr(self, widget)
+            self._rows.removeWidget(child)
+            self._rows.addWidget(child, *place)
+        self._rows.setColumnStretch(0, 1)
+        self._rows.setColumnStretch(1, 0 if is_narrow else 1)
 
     @override
     def _retranslate(self) -> None:

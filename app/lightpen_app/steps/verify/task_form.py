@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QCheckBox, QWidget
 from typing_extensions import override
 
 from lightpen.verification.session.choices import VerificationChoices
-from lightpen.verification.tasks.registry import AnyTask
+from lightpen.verification.tasks.registry import TASKS, AnyTask
 from lightpen.verification.tasks.task import (
     NumberOption,
     Option,
@@ -74,6 +74,11 @@ class SurfaceField(ChoiceField):
 class TaskForm(Translated, QWidget):
     """Shows whether a task is chosen, and its options.
 
+    Parameters
+    ----------
+    beside : QWidget
+        What stands at the right of the choice.
+
     Signals
     -------
     value_changed()
@@ -82,7 +87,9 @@ class TaskForm(Translated, QWidget):
 
     value_changed = Signal()
 
-    def __init__(self, task: AnyTask, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, task: AnyTask, *beside: QWidget, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
         self._task = task
         self._value = VerificationChoices()
@@ -95,7 +102,8 @@ class TaskForm(Translated, QWidget):
         )
 
         # Layout
-        rows = vertical_layout(self, self._is_chosen)
+        rows = vertical_layout(self)
+        horizontal_layout(rows, self._is_chosen, 1, *beside)
         layout = horizontal_layout(rows, spacing=2 * GRID)
         for label, field in zip(self._labels, self._fields.values(), strict=True):
             label.setWordWrap(False)
@@ -111,6 +119,7 @@ class TaskForm(Translated, QWidget):
             else:
                 field.activated.connect(self._on_changed)
 
+        self._is_chosen.setVisible(task in TASKS)  # that of a part is not chosen
         self._retranslate()
 
     def value(self) -> VerificationChoices:

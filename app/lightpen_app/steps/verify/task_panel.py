@@ -1,15 +1,15 @@
 """One task of a verification: its options, its results, and recorded images."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.verification.runner import VerificationRunner
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.status import VerificationStatus
-from lightpen.verification.tasks.registry import TASKS, AnyTask
+from lightpen.verification.tasks.registry import AnyTask
 from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.verify.findings import TaskFinding
@@ -46,11 +46,11 @@ class TaskPanel(Translated, QWidget):
         self._task, self._runner = task, runner
 
         # Widgets
-        self._form = TaskForm(task)
         self._finding = TaskFinding(task)
         self._anew = PushButton()
         self._recorded = PushButton()
         self._recorded.setCheckable(True)
+        self._form = TaskForm(task, self._recorded, self._anew)
         self._verdict = SignLabel()
         self._images = ImagesRow()
         scroll = PageScroll()
@@ -58,11 +58,7 @@ class TaskPanel(Translated, QWidget):
         scroll.setMinimumHeight(LEAST_HEIGHT)
 
         # Layout
-        layout = vertical_layout(self, self._form)
-        top = Qt.AlignmentFlag.AlignTop
-        below = horizontal_layout(layout, (self._verdict, 1, top), 0)
-        fill(below, (self._recorded, 0, top), (self._anew, 0, top))
-        fill(layout, self._images, (scroll, 1))
+        vertical_layout(self, self._form, self._images, self._verdict, (scroll, 1))
 
         # Connections
         self._form.value_changed.connect(self._on_form_changed)
@@ -72,13 +68,7 @@ class TaskPanel(Translated, QWidget):
         self._images.cancel_requested.connect(self._on_cancel_requested)
 
         self._images.hide()
-        self._form.setVisible(task in TASKS)  # that of a part is not chosen
         self._retranslate()
-
-    @property
-    def task(self) -> AnyTask:
-        """Which task it is."""
-        return self._task
 
     def set_choices(self, choices: VerificationChoices) -> None:
         """Show other choices."""

@@ -41,7 +41,7 @@ class VerifyView:
         Content of the operator view.
     lamps : StatusMessage
         The drift of fixed lamps, unless it is the verdict.
-    titles : tuple of str
+    titles : tuple of StatusMessage
         Titles of the tasks with their progress.
     task : VerificationTask or None
         Current task.
@@ -52,7 +52,7 @@ class VerifyView:
     headline: Headline = field(default_factory=Headline)
     operator: OperatorValue = field(default_factory=OperatorValue)
     lamps: StatusMessage = field(default_factory=StatusMessage)
-    titles: tuple[str, ...] = ()
+    titles: tuple[StatusMessage, ...] = ()
     task: AnyTask | None = None
     reading: float | None = None
     pause: str = ""

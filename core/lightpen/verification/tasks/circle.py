@@ -504,12 +504,7 @@ def _count(options: CircleOptions, progress: TaskProgress) -> Message:
 
 
 def _instruction(options: CircleOptions, progress: TaskProgress) -> Message:
-    return message(
-        "session.touch-ring",
-        covered=covered(progress.points),
-        needed=MIN_ANGLE,
-        n_touches=len(progress.points),
-    )
+    return message("session.touch-ring", n_touches=len(progress.points))
 
 
 def _hand(options: CircleOptions, run: int, step: int) -> HandGoal:
