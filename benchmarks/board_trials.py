@@ -16,7 +16,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from tests.simulated_boards import expose_board, render_board, simulate_board_poses
 
 from lightpen.arrays import FloatArray
 from lightpen.intrinsics.board_fit import BoardFit
@@ -29,6 +28,7 @@ from lightpen.intrinsics.variance_components import MixedFit, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
+from lightpen.simulator.boards import expose_board, render_board, simulate_board_poses
 from lightpen.simulator.sensor import Sensor
 
 STREAM = 27  # of the seeds

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from benchmarks.rows import Row, numbers, without_data
 from benchmarks.workers import Workers
-from tests.simulated_boards import expose_board, render_board, simulate_board_poses
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -24,6 +23,7 @@ from lightpen.intrinsics.sightings import find_points
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
+from lightpen.simulator.boards import expose_board, render_board, simulate_board_poses
 from lightpen.simulator.sensor import Sensor
 from lightpen.simulator.swings import (
     paper_camera,

@@ -7,7 +7,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from tests.simulated_boards import expose_board, render_board, simulate_board_poses
 
 from lightpen.cli import main
 from lightpen.formats.camera_files import read_camera
@@ -16,6 +15,7 @@ from lightpen.intrinsics.boards import parse_board
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.boards import expose_board, render_board, simulate_board_poses
 from lightpen.simulator.sensor import Sensor
 
 BOARD = "chessboard:7x5:20"

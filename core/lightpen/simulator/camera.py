@@ -24,6 +24,7 @@ from lightpen.cameras.protocol import (
     sealed,
 )
 from lightpen.model.rig import Rig
+from lightpen.simulator.boards import HELD_S, expose_board, held_light
 from lightpen.simulator.hand import HandPose, Operator
 from lightpen.simulator.image_plans import (
     ImagePlan,
@@ -264,7 +265,13 @@ class SimulatedCamera:
         pixel_format = settings.pixel_format or "Mono8"
         times = end - self._exposure * np.array([1.0, 0.5, 0.0])
         scene = _with_gain(self.scene, settings)
-        image = render_plan(scene, self._image_plan(scene, seq, times))
+        board = self.operator.board
+        if board is None:
+            image = render_plan(scene, self._image_plan(scene, seq, times))
+        else:
+            light = held_light(scene.camera, board, int(times[1] / HELD_S))
+            rng = np.random.default_rng([scene.seed, seq])
+            image = expose_board(light, scene.sensor, rng)
         return Frame(
             image=sealed(image),
             seq=seq,

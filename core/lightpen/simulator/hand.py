@@ -16,6 +16,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import Clock
+from lightpen.intrinsics.boards import Board
 from lightpen.simulator.motion import (
     STEP,
     TrackingMotion,
@@ -117,6 +118,11 @@ class Operator:
         Chooses the swing, the tremor and where slips go.
     seated : bool
         Whether the tip is in the cone at first; else the pen is out of the image.
+
+    Attributes
+    ----------
+    board : Board or None
+        Calibration board that is held in view instead of the pen.
     """
 
     def __init__(
@@ -129,6 +135,7 @@ class Operator:
         self._turn_tremor = Tremor(self._rng)
         self._tip_tremor = Tremor(self._rng)
         self._lock = Lock()
+        self.board: Board | None = None
         self._wishes: list[_Wish] = []
         self._n_steps = int(clock.now_ns() * 1e-9 / STEP)
         self._lean, self._lean_rate = UPRIGHT.copy(), np.zeros(3)

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from tests.simulated_boards import simulate_board_poses
 
 from lightpen.arrays import FloatArray
 from lightpen.intrinsics.board_fit import board_points
@@ -12,6 +11,7 @@ from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
+from lightpen.simulator.boards import simulate_board_poses
 
 NOISE = 0.03  # px
 

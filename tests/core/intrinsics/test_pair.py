@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_boards import simulate_board_poses
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
@@ -14,6 +13,7 @@ from lightpen.intrinsics.pair import PairCalibration, calibrate_pair
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.boards import simulate_board_poses
 
 MakeViews = Callable[..., Views]
 TURN = rotation_from_vector(np.array([0.02, -0.2, 0.01]))

@@ -6,7 +6,6 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-from tests.simulated_boards import expose_board, render_board
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import CalibrationError, FileError
@@ -18,6 +17,7 @@ from lightpen.intrinsics.squares import CornerCount, count_from, goes_on
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.boards import expose_board, render_board
 from lightpen.simulator.sensor import Sensor
 
 SMALL = Camera(

@@ -1,5 +1,6 @@
 from collections.abc import Callable
 
+import cv2
 import numpy as np
 import pytest
 from tests.faulty_camera import FaultyCamera
@@ -18,7 +19,10 @@ from lightpen.detection.observations import Observations, observe_images
 from lightpen.detection.pose import fit_poses
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.images import ImageSource
+from lightpen.intrinsics.boards import parse_board
+from lightpen.intrinsics.sightings import find_points
 from lightpen.model.camera import Camera
+from lightpen.simulator.boards import HELD_S
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
@@ -314,3 +318,26 @@ def test_a_camera_in_use_is_busy_until_it_is_free() -> None:
 def test_settings_cannot_change_while_images_come() -> None:
     with pytest.raises(ValueError, match="stopped"):
         streaming_camera().configure(CameraSettings())
+
+
+def test_a_board_is_held_in_view_in_many_poses_until_the_pen_is_again() -> None:
+    clock = SkippingClock()
+    board = parse_board("chessboard:7x5:20")
+    camera = streaming_camera(clock=clock)
+    camera.operator.board = board
+    K = np.array([[SMALL.fx, 0, SMALL.cx], [0, SMALL.fy, SMALL.cy], [0, 0, 1]])
+    seen = []
+    for _ in range(3):
+        frame = read(camera, 10)[-1]  # some were waiting
+        corners = find_points(frame.image, board)
+        assert corners is not None
+        _, turn, shift = cv2.solvePnP(board.points, corners, K, None)
+        projected = cv2.projectPoints(board.points, turn, shift, K, None)[0][:, 0]
+        assert np.sqrt(np.mean((projected - corners) ** 2)) < 0.1  # px
+        seen.append(corners)
+        clock.wait(HELD_S)
+
+    assert min(np.ptp(each) for each in np.diff(seen, axis=0)) > 10  # px
+    camera.operator.board = None
+    (frame,) = read(camera, 1)
+    assert find_points(frame.image, board) is None

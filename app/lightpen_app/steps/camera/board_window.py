@@ -122,6 +122,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     def closeEvent(self, event: QCloseEvent) -> None:
         self._calibration.conclude()
         self._capture.start(None)
+        self._hold_simulated(None)
         self._calibration.tell(StatusMessage)
         super().closeEvent(event)
 
@@ -143,9 +144,17 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     def _on_begin_clicked(self) -> None:
         if self._capture.state.sought is not None:
             self._capture.stop()
+            self._hold_simulated(None)
         else:
             self._calibration.conclude()
-            self._capture.start(self._named_board())
+            board = self._named_board()
+            self._capture.start(board)
+            self._hold_simulated(board)
+
+    def _hold_simulated(self, board: Board | None) -> None:
+        """Let a simulated operator hold the board in view, or the pen again."""
+        if self._live.operator is not None:
+            self._live.operator.board = board
 
     def _named_board(self, *, measured: bool = True) -> Board | None:
         """Return the board of the fields, or report why there is none.

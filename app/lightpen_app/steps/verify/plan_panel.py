@@ -155,7 +155,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         name, _ = QFileDialog.getOpenFileName(
             self,
             self.tr("Open a measuring plan"),
-            "",
+            self._folder(),
             self.tr("Measuring plans ({0})").format(SUFFIXES),
         )
         if name:
@@ -170,6 +170,10 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         job.succeeded.connect(lambda _: self._notices.withdraw(self))
         job.failed.connect(partial(self._notices.tell, self))
         job.start()
+
+    def _folder(self) -> str:
+        """Return where files were saved last."""
+        return str(self._workbench.save_place.folder())
 
     def _on_free_clicked(self) -> None:
         self.choose(free_plan(self.tr("Part")))
@@ -198,7 +202,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         name, _ = QFileDialog.getSaveFileName(
             self,
             self.tr("Save the measuring plan"),
-            "plan.yaml",
+            str(Path(self._folder()) / "plan.yaml"),
             self.tr("Measuring plans ({0})").format(SUFFIXES),
         )
         if part is None or not name:
@@ -210,7 +214,10 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         part = self._part()
         filters = {f"{worded(each.label)} (*{each.suffix})": each for each in EXPORTS}
         name, chosen = QFileDialog.getSaveFileName(
-            self, self.tr("Export the measured part"), "", ";;".join(filters)
+            self,
+            self.tr("Export the measured part"),
+            self._folder(),
+            ";;".join(filters),
         )
         if part is not None and name:
             self.export(part, filters[chosen], Path(name))
@@ -223,6 +230,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         )
 
     def _save(self, work: Callable[[Report], object], path: Path) -> None:
+        self._workbench.save_place.remember(path.parent)
         job = Job(work, self)
 
         # Connections

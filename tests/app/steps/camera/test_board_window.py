@@ -13,7 +13,6 @@ import pytest
 from PySide6.QtCore import QSize, QThreadPool
 from PySide6.QtWidgets import QApplication, QLabel, QListWidget, QPushButton
 from pytestqt.qtbot import QtBot
-from tests.simulated_boards import expose_board, render_board, simulate_board_poses
 
 from lightpen.arrays import Image
 from lightpen.cameras.protocol import Frame, sealed
@@ -25,6 +24,7 @@ from lightpen.live.pipeline import LiveImage
 from lightpen.model.camera import Camera
 from lightpen.record.folder.camera_calibrations import CAMERA_CALIBRATIONS, CameraTrial
 from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.simulator.boards import expose_board, render_board, simulate_board_poses
 from lightpen.simulator.sensor import Sensor
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.pooling import pooled
@@ -385,3 +385,20 @@ def test_a_scale_check_by_caliper_is_asked_for_and_its_form_is_told(
         qtbot.waitUntil(lambda: views_listed(window) == 7)
         window.close()
     assert "40.08" in concluded.args[0].board
+
+
+def test_a_simulated_operator_holds_the_board_while_views_are_captured(
+    window: BoardWindow, workbench: Workbench, qtbot: QtBot
+) -> None:
+    workbench.camera.open()
+    qtbot.waitUntil(lambda: workbench.live.operator is not None)
+    operator = workbench.live.operator
+    assert operator is not None
+    press(window, "Start")
+    assert operator.board == parse_board(BOARD)
+
+    press(window, "Stop")
+    assert operator.board is None
+    press(window, "Start")
+    window.close()
+    assert operator.board is None

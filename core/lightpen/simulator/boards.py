@@ -13,7 +13,9 @@ from lightpen.model.lens_field import LensField
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.sensor import Sensor
 
-SAMPLES = 3  # per pixel and axis; blurred before they are taken together
+SAMPLES = (
+    3  # for measurements, per pixel and axis; blurred before they are taken together
+)
 RIM = 1.0  # of a square, white round the board
 WHITE, BLACK, BEHIND = 0.72, 0.05, 0.01  # of full scale
 MAX_TILT = np.radians(35.0)
@@ -21,6 +23,7 @@ FILLED = (0.5, 0.8)  # of the image's shorter side, by the longer side of the bo
 ROLLS = np.radians([-90.0, -15.0, 0.0, 10.0, 90.0])
 OUTER_RIM = 2.0  # squares or distances beyond the points, which stay in the image, too
 MAX_TRIES = 100
+N_HELD, HELD_S = 40, 2.0  # poses in which a board is held live; s of each
 
 
 def render_board(
@@ -32,6 +35,7 @@ def render_board(
     bend: tuple[float, float, float] = (0.0, 0.0, 0.0),
     field: LensField | None = None,
     uneven: FloatArray | None = None,
+    samples: int = SAMPLES,
 ) -> FloatArray:
     """Return the light of a board on the sensor, (H, W), fraction of full scale.
 
@@ -47,16 +51,38 @@ def render_board(
         What the lens does beside the camera's distortion.
     uneven : (N, 2) array, optional
         By how much the corners of a chessboard are off in its plane, mm.
+    samples : int
+        Per pixel and axis.
     """
-    directions = _directions(camera, field)
+    directions = _directions(camera, field, samples)
     places = _on_board(board, directions, rotation, translation, bend)
     if uneven is not None:
         places = places - _moved(board, places, uneven)
     light = _light(board, places)
-    sigma = blur * SAMPLES
+    sigma = blur * samples
     blurred = cv2.GaussianBlur(light, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)
     size = (camera.width, camera.height)
     return np.asarray(cv2.resize(blurred, size, interpolation=cv2.INTER_AREA))
+
+
+@lru_cache(maxsize=1)
+def held_light(camera: Camera, board: Board, number: int) -> FloatArray:
+    """Return the light of a board that an operator holds, as `render_board`.
+
+    Parameters
+    ----------
+    number : int
+        Of the pose; all differ, until they are repeated.
+    """
+    poses = _held_poses(camera, board)
+    at = number % len(poses.rotations)
+    pose = poses.rotations[at], poses.translations[at]
+    return render_board(camera, board, *pose, samples=1)
+
+
+@lru_cache(maxsize=1)
+def _held_poses(camera: Camera, board: Board) -> BoardPoses:
+    return simulate_board_poses(camera, board, N_HELD, np.random.default_rng(1))
 
 
 def expose_board(light: FloatArray, sensor: Sensor, rng: np.random.Generator) -> Image:
@@ -69,10 +95,10 @@ def expose_board(light: FloatArray, sensor: Sensor, rng: np.random.Generator) ->
 
 
 @lru_cache(maxsize=2)
-def _directions(camera: Camera, field: LensField | None = None) -> FloatArray:
+def _directions(camera: Camera, field: LensField | None, samples: int) -> FloatArray:
     """Return where each sample looks, (S H, S W, 3); a camera is asked many times."""
     x, y = (
-        (np.arange(SAMPLES * side) + 0.5) / SAMPLES - 0.5
+        (np.arange(samples * side) + 0.5) / samples - 0.5
         for side in (camera.width, camera.height)
     )
     pixels = np.stack(np.meshgrid(x, y), axis=-1)
