@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
+from lightpen.local_time import local_now
 from lightpen.record.library.calibration_status import StationStatus, TipStatus
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.tip_library import AnyItem, ItemKind, ListedTip
@@ -378,7 +379,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         elif is_typed and not self._form.has_day():
             missing_inputs = self.tr(
                 "Enter a date such as 2026-08-14, or leave it empty."
-            )
+            ).replace("2026", str(local_now().year + 1))  # what is due is to come
         if not missing_inputs and self._is_guarded and not self._supervisor.is_filled():
             missing_inputs = self.tr("Changes need a supervisor's signature.")
         is_asked = self.tr("Saving") if self._asked is not None else ""

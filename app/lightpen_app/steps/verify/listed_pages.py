@@ -79,14 +79,16 @@ class ListedPages(ResponsiveLayout, QWidget):
         self._field.activated.connect(self._list.setCurrentRow)
 
     def add(self, page: QWidget) -> None:
-        """Add a page as the last one, if it is not there; the first is shown."""
-        if self._stack.indexOf(page) >= 0:
-            return
+        """Add a page as the last one, or move it there; the first is shown."""
+        is_shown = self._stack.currentWidget() is page
+        self.remove(page)
         self._stack.addWidget(page)
         self._field.addItem("")
         self._list.addItem("")
         if self._list.currentRow() < 0:
             self._list.setCurrentRow(0)
+        if is_shown:
+            self.show_page(page)
 
     def remove(self, page: QWidget) -> None:
         """Leave a page to another parent."""
