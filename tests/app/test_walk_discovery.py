@@ -1,0 +1,67 @@
+"""From "I have no such file" to the accepted tip, with the simulated pen."""
+
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from tests.app.walks import NAMES, read_out, result_on_disk, told
+
+from lightpen.record.swings.recordings import files_beside
+from lightpen_app.discovery.discovery_run import DISCOVERIES
+from lightpen_app.discovery.discovery_window import DiscoveryWindow
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.pen_view import PenView
+
+if TYPE_CHECKING:
+    from tests.app.conftest import Walker
+
+FRAME_RATE = 20.0  # a hand that moves farther from image to image cannot be followed
+U_LENGTH = 0.002  # mm
+SAVE = "Save both files and calibrate the tip"
+
+
+@pytest.mark.qt_log_ignore("^This plugin does not support ")
+def test_a_pen_without_any_file_becomes_an_accepted_tip(
+    walker: "Walker", monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", FRAME_RATE)
+    for name, text in NAMES.items():
+        walker.click_into(name, text)
+    walker.click("Continue to the camera")
+    walker.until_says("Live")
+    walker.click("I have no such file...")
+    window = walker.window.findChild(DiscoveryWindow)
+    assert window is not None
+    walker.click_on(walker.control("Start", window))
+    (pen,) = window.findChildren(PenView)
+    walker.until(lambda: len(pen.value().marked) == 2)  # by the images so far
+    walker.click_on(walker.control("Stop", window))
+
+    leds = walker.workbench.around.scene.pen.leds
+    length, u, *_ = window.findChildren(NumberField)
+    length.setValue(float(np.linalg.norm(leds[:, None] - leds, axis=2).max()))
+    u.setValue(U_LENGTH)
+    walker.click_on(walker.control("Find pen and camera", window))
+    walker.until(walker.control(SAVE, window).isEnabled)
+    found = "\n".join(walker.texts(window))
+    assert re.search(r"LEDs: 10, U \(k = 2\) up to \S+ µm", found)
+    assert re.search(r"Focal length: \S+ ± \S+ px", found)
+    walker.click_on(walker.control(SAVE, window))
+    walker.until(lambda: not window.isVisible())
+
+    walker.take_window()
+    walker.until_says("Review")
+    walker.until(walker.main_button().isEnabled)
+    walker.click("Review")
+    walker.until(walker.main_button().isEnabled)
+    assert walker.says("PASS: Within limits"), told(walker)
+    shown, true = read_out(walker), walker.workbench.around.scene.tip_pen
+    assert (np.abs(shown.tip - true) < 1.5 * shown.u).all()
+    walker.click("Accept")
+    walker.until(lambda: walker.workbench.run.status.result is not None)
+
+    assert result_on_disk(walker).names.pen == NAMES["Pen serial number"]
+    images = walker.workbench.selection.preparation.source.place
+    assert DISCOVERIES in images
+    assert files_beside(images).pen is not None
