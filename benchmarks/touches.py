@@ -29,6 +29,7 @@ from lightpen.simulator.swings import (
     swing_poses,
 )
 from lightpen.verification.tasks.probed_point import (
+    SEATING,
     ProbingFrame,
     StillFrames,
     measure_touches,
@@ -81,7 +82,11 @@ class Station:
     def touched(
         self, places: FloatArray, rng: np.random.Generator
     ) -> list[StillFrames]:
-        """Return images of a pen held still with its tip on places (N, 3)."""
+        """Return images of a pen held still with its tip on places (N, 3).
+
+        As a touch is modelled, the tip comes to rest a little off its place.
+        """
+        places = places + SEATING * rng.standard_normal(places.shape)
         swing = swing_poses(len(places), rng, pen=self.pen, camera=paper_camera())
         R = np.repeat(self.rotation @ swing.rotations, N_FRAMES, axis=0)
         t = np.repeat(places, N_FRAMES, axis=0) - R @ PAPER_TIP

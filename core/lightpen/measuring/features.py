@@ -34,6 +34,9 @@ LARGEST_DAMPING = 1e8
 ROUNDING = 1e-12  # relative, of a sum of squares: within it, no step is worse
 UNDETERMINED = 1e-7  # of the largest singular value, columns scaled
 FRAMED = {FeatureKind.POINT, FeatureKind.SPHERE}  # their axes mean nothing
+FOLLOWING = {
+    *(FeatureKind.LINE, FeatureKind.PLANE, FeatureKind.CYLINDER, FeatureKind.CONE)
+}
 PLACE, AXIS = slice(0, 3), slice(3, 6)
 
 
@@ -193,14 +196,22 @@ def _feature(kind: FeatureKind, points: FloatArray, at: Start) -> Feature:
     G[np.arange(n), :, np.arange(n)] = by_point
     direct = G.reshape(n * k, 3 * n)
     unknowns = -np.linalg.pinv(J) @ direct
+    by_distances = direct + J @ unknowns
     n_free = len(surface.free)
     motion = np.zeros((6, 3 * n))
     motion[list(surface.free)] = unknowns[:n_free]
+    if kind in FOLLOWING:  # the mean of the points, where the feature is free
+        along = [i for i in range(3) if i not in surface.free]
+        a, b, _ = (points.mean(axis=0) - origin) @ axes
+        of_mean = axes.T @ np.tile(np.eye(3), n) / n
+        of_mean[2] += a * motion[4] - b * motion[3]
+        motion[along] = of_mean[along]
+        if kind is FeatureKind.CONE:
+            unknowns[n_free] += np.tan(sizes[1]) * motion[2]
     by_points = np.concatenate(
         [axes @ motion[:3], -skew(axes[:, 2]) @ axes @ motion[3:], unknowns[n_free:]]
     )
     distances = values.reshape(n, k)
-    by_distances = direct + J @ unknowns
     offsets = np.einsum("nk,nkd->nd", distances, by_point)
     return Feature(
         *(kind, origin, axes, sizes, distances, by_points, by_distances, offsets)
@@ -217,7 +228,7 @@ def _standard(kind: FeatureKind, points: FloatArray, at: Start) -> Start:
     origin, axes, sizes = at
     middle = points.mean(axis=0)
     z = axes[:, 2]
-    if kind in {FeatureKind.LINE, FeatureKind.CYLINDER, FeatureKind.CONE}:
+    if kind in FOLLOWING - {FeatureKind.PLANE}:
         shift = float((middle - origin) @ z)
         origin = origin + shift * z
         if kind is FeatureKind.CONE:

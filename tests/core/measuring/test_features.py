@@ -136,3 +136,20 @@ def test_the_feature_of_least_squares_is_found_exactly(
         np.testing.assert_allclose(25 * across, 0, atol=EXACT)
     if size == 0:
         assert feature.form_error < EXACT
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_feature_follows_its_points_as_its_derivative_says(name: str) -> None:
+    kind, q, _ = CASES[name]
+    R = rotation_from_vector(np.array([0.5, -1.1, 0.8]))
+    points = q @ R.T + FAR / 10
+    feature = fit_feature(kind, points)
+    change = RNG.standard_normal(points.shape)
+
+    ends = [fit_feature(kind, points + h * change).values for h in (1e-4, -1e-4)]
+
+    found = (ends[0] - ends[1]) / 2e-4
+    predicted = feature.by_points @ change.ravel()
+    if kind in {FeatureKind.POINT, FeatureKind.SPHERE}:  # have no axis
+        found[3:6] = predicted[3:6] = 0.0
+    np.testing.assert_allclose(found, predicted, rtol=1e-4, atol=1e-4)
