@@ -23,7 +23,7 @@ from lightpen.discovery.requirements import (
     require_certain,
     require_enough,
     require_length,
-    require_one_pen,
+    require_no_second_pen,
 )
 from lightpen.discovery.scale import with_lengths_known
 from lightpen.discovery.scaled_start import LEAST_LENGTH_SIGMA, numbered, scaled_start
@@ -122,7 +122,7 @@ def _labelled_swing(sightings: Sightings, request: Request, report: Report) -> _
     seed = solve_seed(joined, sightings.size, request.camera)
     report(0.4)
     found = label(seed, joined, certain, centers, width)
-    require_one_pen(found)
+    require_no_second_pen(found)
     return _Swing(sightings, centers, kept, found, seed.hypotheses, len(lamps))
 
 

@@ -35,7 +35,7 @@ def require_enough(sightings: Sightings) -> None:
         raise CalibrationError("discover.too-few-leds", n_leds=n_leds, needed=MIN_LEDS)
 
 
-def require_one_pen(found: Labelled) -> None:
+def require_no_second_pen(found: Labelled) -> None:
     """Refuse images in which more moves than one pen."""
     n_others = int(np.median(found.unexplained.sum(axis=1)))
     if n_others >= SECOND_PEN:
