@@ -4,7 +4,8 @@ Each alternative is fitted to the views: the camera changed at some image, some 
 are turned by 180 degrees, the images are of two cameras, the rows of pixels are not
 perpendicular to the columns. The one that describes the points in the fewest digits is
 chosen [1]_: residuals, numbers of the further parameters, and which view belongs to
-which group are counted together.
+which group are counted together. The points of the board are estimated with each of
+them, as uneven squares are with any camera.
 
 References
 ----------
@@ -18,8 +19,13 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import FINEST, fit_board_poses
-from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit
+from lightpen.intrinsics.adjustment import (
+    FINEST,
+    adjust_board,
+    fit_board_poses,
+    linearise,
+)
+from lightpen.intrinsics.board_fit import N_POSE, N_SHAPE, BoardFit
 from lightpen.intrinsics.distortion import fit_camera, rough_poses
 from lightpen.intrinsics.uncertainty_map import error_fields
 from lightpen.intrinsics.variance_components import MixedFit
@@ -30,6 +36,10 @@ from lightpen.model.quantiles import chi_square_quantile
 
 FEWEST = 3  # views of a group
 MAX_ROUNDS = 8
+CORRELATED = 4.0  # points of a view that tell as much as an independent one
+MAX_PASSES = 8  # of turning one view
+ENOUGH = 0.998  # of the rms before, or one turned view more is not worth it
+RIDGE, HELD = 1e-8, 1e4  # of the information of a point: of nothing, of what is known
 LESSENED = 0.97  # of the rms without it, or an alternative is no explanation
 HALVED = 0.5  # the same, of views that no single camera fits
 CHANCE = 1e-3  # of a change, by chance
@@ -116,21 +126,12 @@ def _fitted_change(
     return way @ found, float(score @ way @ found)
 
 
-@dataclass(frozen=True, eq=False)
-class _BoardKnown:
-    """What is known of the board."""
-
-    tolerances: BoardTolerances
-    offsets: FloatArray
-
-
 def explain(
     views: Views,
     tolerances: BoardTolerances,
     fitted: BoardFit,
     change: CameraChange | None,
-    released: BoardFit | None = None,
-    offsets: FloatArray | None = None,
+    released: BoardTolerances | None = None,
     lessened: float = LESSENED,
 ) -> CalibrationError | None:
     """Return why views do not fit one camera, if an alternative does explain it.
@@ -141,19 +142,14 @@ def explain(
         Of some or all of the views by one camera.
     change : CameraChange or None
         The most significant change in time.
-    released : BoardFit, optional
-        With another board than it is said to be; that explains the views, too.
-    offsets : (N, 3) array, optional
-        Of the points of the board as one camera has them, mm.
+    released : BoardTolerances, optional
+        Of another board than it is said to be; that explains the views, too.
     lessened : float
         Share of the residuals by one camera, below which an alternative explains them.
     """
-    board = _BoardKnown(
-        tolerances, fitted.state.offsets if offsets is None else offsets
-    )
     near = fitted.state.cameras[0]
-    n = 2 * int(views.seen.sum())
-    nothing = _rms(_residuals_by(views, board, near))
+    n = 2 * int(views.seen.sum()) / CORRELATED
+    nothing = _rms_by(views, tolerances, near)
     cost_of_groups = 2 * np.log(2) * views.n_views
     cost_of_camera = len(near.intrinsics) * np.log(n)
     found: list[tuple[float, float, CalibrationError | None]] = []
@@ -162,7 +158,7 @@ def explain(
         found.append((n * np.log(max(rms, FINEST) ** 2) + cost, rms, error))
 
     useless: CalibrationError | None = None
-    turned = _turned(views, board, near)
+    turned = _turned(views, tolerances, near)
     if turned is not None:
         which, rms = turned
         names, n_named = _fewer(views, which)
@@ -172,7 +168,7 @@ def explain(
         consider(rms, cost_of_groups, turned_error)
     if change is not None and change.name:
         after = np.arange(views.n_views) >= views.names.index(change.name)
-        parted = _two_cameras(views, board, near, after, rounds=0)
+        parted = _two_cameras(views, tolerances, near, after, rounds=0)
         if parted is not None and _differ(parted[2]):
             which, rms, cameras = parted
             consider(
@@ -182,7 +178,7 @@ def explain(
             )
             if change.in_image > USELESS * max(views.image_sizes[0]):
                 useless = _change_error(views, which, cameras)
-    groups = _best_groups(views, board, near)
+    groups = _best_groups(views, tolerances, near)
     if groups is not None and _differ(groups[2]):
         which, rms, cameras = groups
         names, n_named = _fewer(views, which)
@@ -195,7 +191,7 @@ def explain(
             other_fx=cameras[1].fx,
         )
         consider(rms, cost_of_camera + cost_of_groups, error)
-    skewed = _skewed(views, board, near)
+    skewed = _skewed(views, tolerances, near)
     if skewed is not None:
         skew, rms = skewed
         consider(
@@ -204,7 +200,8 @@ def explain(
             CalibrationError("intrinsics.skewed", degrees=float(np.degrees(skew))),
         )
     if released is not None:
-        consider(_rms(released.residuals), N_SHAPE * np.log(n), None)
+        rms = _rms_by(views, released, near)
+        consider(rms, N_SHAPE * np.log(n), None)
     n_digits = n * np.log(max(nothing, FINEST) ** 2)
     best = min(found, key=lambda each: each[0], default=(np.inf, np.inf, None))
     is_better = best[0] < n_digits and best[1] < lessened * nothing
@@ -269,23 +266,85 @@ def _fewer(views: Views, which: BoolArray) -> tuple[str, int]:
     return shown, len(names)
 
 
-def _rms(residuals: FloatArray | None) -> float:
-    """Return the size of residuals, px rms; endless without a fit."""
-    if residuals is None:
-        return float("inf")
-    return float(np.sqrt(np.nanmean(np.square(residuals))))
+def _fitted(views: Views, tolerances: BoardTolerances, near: Camera) -> BoardFit | None:
+    fits = _fitted_groups((views,), tolerances, near)
+    return None if fits is None else fits[0]
 
 
-def _fitted(views: Views, board: _BoardKnown, near: Camera) -> BoardFit | None:
+def _fitted_groups(
+    groups: tuple[Views, ...], tolerances: BoardTolerances, near: Camera
+) -> list[BoardFit] | None:
+    """Return the fits of a camera to each group, with one uneven board for all."""
     try:
-        return fit_camera(views, board.tolerances, near, offsets=board.offsets)
+        fits = [fit_camera(views, tolerances, near) for views in groups]
+        offsets, _ = _unevenness(groups, fits)
+        fits = [
+            adjust_board(
+                views,
+                replace(fit.state, shape=np.zeros(N_SHAPE), offsets=offsets),
+                tolerances,
+            )
+            for views, fit in zip(groups, fits, strict=True)
+        ]
     except CalibrationError:
         return None
+    return fits
 
 
-def _residuals_by(views: Views, board: _BoardKnown, near: Camera) -> FloatArray | None:
-    found = _fitted(views, board, near)
-    return None if found is None else found.residuals
+def _unevenness(
+    groups: tuple[Views, ...], fits: list[BoardFit]
+) -> tuple[FloatArray, float]:
+    """Return by how much points are off in their plane beyond an affine board.
+
+    A step of Gauss and Newton of all unknowns together.
+
+    Returns
+    -------
+    (N, 3) array, float
+        mm; the residuals that it leaves, px rms.
+    """
+    board = groups[0].board
+    n_points, n_own = board.n_points, len(fits[0].prior)
+    n = 2 * n_points + n_own * len(fits)
+    known, right, squares, n_seen = np.zeros((n, n)), np.zeros(n), 0.0, 0
+    at = np.arange(n_points)
+    for g, (views, fit) in enumerate(zip(groups, fits, strict=True)):
+        own = slice(2 * n_points + g * n_own, 2 * n_points + (g + 1) * n_own)
+        known[own, own] += fit.sigma**2 * fit.prior
+        for sight in linearise(views, fit.state, fit.residuals):
+            columns = np.zeros((views.n_views, n_points, 2, n))
+            columns[..., own] = sight.shared
+            for axis in range(2):
+                columns[:, at, :, 2 * at + axis] = np.moveaxis(
+                    sight.by_board[..., axis], 1, 0
+                )
+            by_view = columns.reshape(views.n_views, -1, n)
+            own_poses = sight.own.reshape(views.n_views, -1, N_POSE)
+            Q = np.linalg.qr(own_poses)[0]
+            M = (by_view - Q @ (np.swapaxes(Q, 1, 2) @ by_view)).reshape(-1, n)
+            left = sight.residuals.reshape(views.n_views, -1, 1)
+            r = (left - Q @ (np.swapaxes(Q, 1, 2) @ left)).ravel()
+            known += M.T @ M
+            right += M.T @ r
+            squares += float(r @ r)
+        n_seen += int(views.seen.sum())
+    of_points = slice(0, 2 * n_points)
+    most = known[of_points, of_points].diagonal().max()
+    affine = np.linalg.qr(np.c_[board.points[:, :2], np.ones(n_points)])[0]
+    known[of_points, of_points] += HELD * most * np.kron(affine @ affine.T, np.eye(2))
+    known[np.arange(n), np.arange(n)] += RIDGE * most
+    found = np.linalg.solve(known, right)
+    left_over = max(squares - float(right @ found), 0.0) / (2 * n_seen)
+    off = found[of_points].reshape(-1, 2)
+    return np.c_[off, np.zeros(n_points)], float(np.sqrt(left_over))
+
+
+def _rms_by(views: Views, tolerances: BoardTolerances, near: Camera) -> float:
+    """Return the residuals of a camera and an uneven board, px rms."""
+    try:
+        return _unevenness((views,), [fit_camera(views, tolerances, near)])[1]
+    except CalibrationError:
+        return np.inf
 
 
 def _sizes(views: Views, fitted: BoardFit) -> FloatArray:
@@ -299,18 +358,18 @@ def _sizes(views: Views, fitted: BoardFit) -> FloatArray:
 
 
 def _turned(
-    views: Views, board: _BoardKnown, near: Camera
+    views: Views, tolerances: BoardTolerances, near: Camera
 ) -> tuple[BoolArray, float] | None:
     """Return which images are turned by 180 degrees, and the rms with them so."""
     size = np.array(views.image_sizes[0]) - 1.0
     other = replace(views, pixels=size - views.pixels)
 
-    def fitted(which: BoolArray) -> BoardFit | None:
+    def turned(which: BoolArray) -> Views:
         pixels = np.where(which[:, None, None, None], other.pixels, views.pixels)
-        return _fitted(replace(views, pixels=pixels), board, near)
+        return replace(views, pixels=pixels)
 
     which = np.zeros(views.n_views, dtype=np.bool_)
-    found = fitted(which)
+    found = _fitted(views, tolerances, near)
     for _ in range(MAX_ROUNDS):
         if found is None:
             return None
@@ -318,25 +377,29 @@ def _turned(
         if np.array_equal(now, which):
             break
         which = now
-        found = fitted(which)
+        found = _fitted(turned(which), tolerances, near)
     # Views that the others pulled along are found one by one.
-    least = np.inf if found is None else _rms(found.residuals)
-    for v in range(min(views.n_views, MOST_SINGLE)):
-        trial = which.copy()
-        trial[v] = not trial[v]
-        beside = fitted(trial)
-        if beside is not None and _rms(beside.residuals) < least:
-            which, least = trial, _rms(beside.residuals)
+    least = _rms_by(turned(which), tolerances, near)
+    tried = np.arange(min(views.n_views, MOST_SINGLE))
+    for turn in range(MAX_PASSES):
+        trials = [which ^ (np.arange(views.n_views) == v) for v in tried]
+        sizes = [_rms_by(turned(trial), tolerances, near) for trial in trials]
+        best = int(np.argmin(sizes))
+        if sizes[best] >= ENOUGH * least:
+            break
+        which, least = trials[best], sizes[best]
+        order = np.argsort(sizes)[1:]
+        tried = tried[order[: len(order) // 2] if turn == 0 else order]
     if which.sum() > views.n_views / 2:
         which = ~which
     return (which, least) if which.any() else None
 
 
 def _best_groups(
-    views: Views, board: _BoardKnown, near: Camera
+    views: Views, tolerances: BoardTolerances, near: Camera
 ) -> tuple[BoolArray, float, tuple[Camera, Camera]] | None:
     """Return the best of some ways of taking the views for those of two cameras."""
-    alone = _fitted(views, board, near)
+    alone = _fitted(views, tolerances, near)
     order = np.arange(views.n_views)
     starts = [order >= views.n_views // 2, order % 2 == 0]
     if alone is not None:
@@ -347,7 +410,7 @@ def _best_groups(
     tried = [
         found
         for start in starts
-        if (found := _two_cameras(views, board, near, start)) is not None
+        if (found := _two_cameras(views, tolerances, near, start)) is not None
     ]
     return min(tried, key=lambda each: each[1], default=None)
 
@@ -360,7 +423,7 @@ def _outwards(views: Views) -> FloatArray:
 
 def _two_cameras(
     views: Views,
-    board: _BoardKnown,
+    tolerances: BoardTolerances,
     near: Camera,
     which: BoolArray,
     rounds: int = MAX_ROUNDS,
@@ -369,10 +432,11 @@ def _two_cameras(
     for left in range(rounds, -1, -1):
         if min(which.sum(), (~which).sum()) < FEWEST:
             return None
-        fits = [_fitted(views.chosen(own), board, near) for own in (~which, which)]
-        one, other = fits
-        if one is None or other is None:
+        parts = (views.chosen(~which), views.chosen(which))
+        fits = _fitted_groups(parts, tolerances, near)
+        if fits is None:
             return None
+        one, other = fits
         if left > 0:
             now = _sizes(views, other) < _sizes(views, one)
             if not np.array_equal(now, which):
@@ -385,24 +449,21 @@ def _two_cameras(
 
 
 def _skewed(
-    views: Views, board: _BoardKnown, near: Camera
+    views: Views, tolerances: BoardTolerances, near: Camera
 ) -> tuple[float, float] | None:
     """Return the slope of the columns of pixels that fits best, rad, and the rms."""
+
+    def rms_of(slope: float) -> float:
+        pixels = views.pixels.copy()
+        pixels[..., 0] -= slope * (pixels[..., 1] - near.cy)
+        return _rms_by(replace(views, pixels=pixels), tolerances, near)
+
     slopes = np.array([-SHEARED, 0.0, SHEARED])
-    squares = [_rms(_sheared(views, board, near, s)) ** 2 for s in slopes.tolist()]
+    squares = [rms_of(slope) ** 2 for slope in slopes.tolist()]
     if not np.isfinite(squares).all():
         return None
     curve = np.polyfit(slopes, squares, 2)
     if curve[0] <= 0:
         return None
     slope = float(np.clip(-0.5 * curve[1] / curve[0], -10 * SHEARED, 10 * SHEARED))
-    return slope, _rms(_sheared(views, board, near, slope))
-
-
-def _sheared(
-    views: Views, board: _BoardKnown, near: Camera, slope: float
-) -> FloatArray | None:
-    """Return the residuals if the columns of pixels slope."""
-    pixels = views.pixels.copy()
-    pixels[..., 0] -= slope * (pixels[..., 1] - near.cy)
-    return _residuals_by(replace(views, pixels=pixels), board, near)
+    return slope, rms_of(slope)

@@ -167,9 +167,8 @@ def calibrate_camera(
         ) from error
     change = find_change(found.effects, found.views.names)
     if change is not None or found.is_suspicious:
-        released = found.adjustment if found.denied.any() else None
-        offsets = found.adjustment.state.offsets
-        better = explain(views, tolerances, found.adjustment, change, released, offsets)
+        released = released_tolerances(tolerances) if found.denied.any() else None
+        better = explain(views, tolerances, found.adjustment, change, released)
         if better is not None:
             raise better
     require_plausible_bend(found.adjustment)

@@ -25,7 +25,13 @@ import numpy.typing as npt
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.edge_fit import fit_edge
 from lightpen.intrinsics.boards import CORNERS, Board, BoardKind, marker_dictionary
-from lightpen.intrinsics.squares import CornerCount, count_from, goes_on, is_chequered
+from lightpen.intrinsics.squares import (
+    CornerCount,
+    count_from,
+    goes_on,
+    is_chequered,
+    is_first_dark,
+)
 
 PARTS = (5, 4), (3, 3)  # of a chessboard, that grow
 SEARCHED = 1280  # px, of the longer side of the image that is searched first
@@ -76,7 +82,8 @@ def find_points(
         points = _marked(grey, board, quick=quick)
     else:
         points = _chessboard(grey, (board.columns, board.rows), quick=quick)
-        points = None if points is None else _from_front(points, board)
+        if points is not None:
+            points = _numbered(grey, _from_front(points, board), board)
         if points is not None and goes_on(grey, _grid_of(points, board)):
             return None  # it is a part of a larger board
     if points is None or not _is_spread(points, board):
@@ -108,6 +115,20 @@ def _from_front(points: FloatArray, board: Board) -> FloatArray:
         return points
     is_set_off = board.kind is BoardKind.ASYMMETRIC_CIRCLES
     return points[(rows[::-1] if is_set_off else rows[:, ::-1]).ravel()]
+
+
+def _numbered(
+    grey: npt.NDArray[np.uint8], points: FloatArray, board: Board
+) -> FloatArray:
+    """Return corners from that end of the board where the first square is dark.
+
+    The ways of searching begin at either end; where both ends look the same, as one
+    of them had it.
+    """
+    if (board.columns + board.rows) % 2 == 0:
+        return points
+    is_first = is_first_dark(grey, _grid_of(points, board))
+    return points if is_first else points[::-1]
 
 
 def count_corners(image: Image) -> CornerCount | None:

@@ -86,6 +86,16 @@ def is_chequered(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
     return bool(clear[telling].mean() >= NEARLY_ALL)
 
 
+def is_first_dark(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
+    """Return whether the square beside the first corner is a dark one.
+
+    The parameters are as of `is_chequered`.
+    """
+    shade = np.stack([_shades(grey, *rows) for rows in pairwise(grid)])
+    turns = np.where(np.indices(shade.shape).sum(axis=0) % 2 == 0, 1.0, -1.0)
+    return bool(np.sum(turns * (shade - shade.mean())) < 0)
+
+
 def goes_on(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
     """Return whether a chessboard extends beyond the corners found.
 

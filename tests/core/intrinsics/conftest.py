@@ -37,11 +37,14 @@ def make_views(camera: Camera) -> MakeViews:
         seed: int = 1,
         shape: FloatArray | None = None,
         of: Camera = camera,
+        uneven: float = 0.0,
     ) -> Views:
         board = parse_board(word)
         rng = np.random.default_rng(seed)
         poses = simulate_board_poses(of, board, n_views, rng)
         true = board_points(board, np.zeros(5) if shape is None else shape)
+        off = np.random.default_rng(27).normal(0, uneven, (board.n_points, 2))
+        true = true + np.pad(off, ((0, 0), (0, 1)))
         points = true @ np.swapaxes(poses.rotations, 1, 2)
         points += poses.translations[:, None]
         pixels = seen_points(of, board, points, poses.rotations)

@@ -115,8 +115,12 @@ def test_two_cameras_in_one_set_are_named_as_such(make_views: MakeViews) -> None
     assert caught.value.message.values["n_named"] == odd.sum()
 
 
-def test_rotated_images_are_named(make_views: MakeViews) -> None:
-    views = make_views(n_views=14)
+@pytest.mark.parametrize("uneven", [0.0, 0.2])
+def test_rotated_images_are_named_also_with_uneven_squares(
+    make_views: MakeViews, camera: Camera, uneven: float
+) -> None:
+    off_centre = replace(camera, cx=332.0, cy=230.0)
+    views = make_views(n_views=14, of=off_centre, uneven=uneven)
     pixels = views.pixels.copy()
     pixels[[2, 5, 9]] = np.array([639, 479]) - pixels[[2, 5, 9]]
 

@@ -276,3 +276,22 @@ def test_images_in_which_it_is_not_seen_are_named() -> None:
     assert observed.views.names == ("0.png",)
     assert observed.unseen == ("1.png",)
     assert observed.views.image_sizes == ((400, 320),)
+
+
+@pytest.mark.parametrize("is_found_quickly", [True, False])
+@pytest.mark.parametrize("quarters", [0, 1, 2, 3])
+def test_a_board_of_unlike_ends_is_numbered_from_the_same_one_however_it_is_found(
+    monkeypatch: pytest.MonkeyPatch, quarters: int, is_found_quickly: bool
+) -> None:
+    board = parse_board("chessboard:8x5:20")
+    if not is_found_quickly:
+        missed = (False, None)
+        monkeypatch.setattr(cv2, "findChessboardCorners", lambda *_, **__: missed)
+    points = find_points(np.rot90(image_of(board), quarters).copy(), board)
+
+    assert points is not None
+    there = truth(board)
+    for _ in range(quarters):  # as np.rot90: a column becomes a row from below
+        sides = SMALL.image_size if _ % 2 == 0 else SMALL.image_size[::-1]
+        there = np.stack([there[:, 1], sides[0] - 1 - there[:, 0]], axis=1)
+    assert np.abs(points - there).max() < 0.2
