@@ -266,7 +266,7 @@ def main(arguments: Sequence[str]) -> int:
             os.chdir(ROOT)
             # A debugger, the output as it comes and an end at the first failure need
             # one process; and for a few tests others are not worth their start.
-            words = options or PARALLEL
+            words = options if set(options) - {"--slow"} else [*PARALLEL, *options]
             become([environment.program("python"), "-m", "pytest", *words])
         case _:
             run = r".\run.ps1" if os.name == "nt" else "./run"

@@ -53,7 +53,7 @@ PRELOADED = ("numpy", "scipy.special", "scipy.linalg", "scipy.optimize", "cv2", 
              "msgspec", "sqlalchemy")  # fmt: skip
 # The tests of the core need no Qt, which crashes where functions are watched.
 OPTIONS = (
-    *("-q", "-p", "no:cacheprovider", "-p", "no:pytest-qt"),
+    *("-q", "--slow", "-p", "no:cacheprovider", "-p", "no:pytest-qt"),
     *("-o", "addopts=--import-mode=importlib"),
     *("-W", "ignore::pytest.PytestConfigWarning"),  # of the options of pytest-qt
 )

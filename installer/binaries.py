@@ -18,7 +18,16 @@ OF_WINDOWS = {
     *("iphlpapi", "kernel32", "mf", "mfplat", "mfreadwrite", "mpr", "mscms", "msvcrt"),
     *("ncrypt", "netapi32", "ntdll", "ole32", "oleaut32", "propsys", "rpcrt4"),
     *("secur32", "setupapi", "shell32", "shlwapi", "uiautomationcore", "user32"),
-    *("userenv", "uxtheme", "version", "winhttp", "winmm", "ws2_32", "wtsapi32"),
+    *(
+        "userenv",
+        "uxtheme",
+        "version",
+        "winhttp",
+        "winmm",
+        "ws2_32",
+        "wsock32",
+        "wtsapi32",
+    ),
     *("cfgmgr32", "dbghelp", "psapi", "winspool.drv", "avicap32", "gdiplus", "d2d1"),
 }
 

@@ -27,7 +27,18 @@ DROPPED = (
     "*/concrt140.dll", "*/vcamp140.dll", "*/vccorlib140.dll",
     "*/vcomp140.dll",
     "harvesters/test/*", "numpy/f2py/src/*", "numpy/_pyinstaller/*",
-    "pyqtgraph/examples/*",
+    "*/_test_*.pyd", "numpy/*_tests.*.pyd", "numpy/_core/_simd.*",
+    "sqlalchemy/testing/*", "alembic/testing/*",
+    # Parts of libraries that nothing here imports.
+    "pyqtgraph/console/*", "pyqtgraph/dockarea/*", "pyqtgraph/examples/*",
+    "pyqtgraph/flowchart/*",
+    "sqlalchemy/dialects/mssql/*", "sqlalchemy/dialects/mysql/*",
+    "sqlalchemy/dialects/oracle/*", "sqlalchemy/orm/*",
+    "scipy/optimize/cython_optimize*", "scipy/special/cython_special*",
+    "cffi/*", "pycparser/*",  # compile bindings; those here are compiled
+    "PySide6/plugins/imageformats/qgif.dll", "PySide6/plugins/imageformats/qicns.dll",
+    "PySide6/plugins/imageformats/qtga.dll", "PySide6/plugins/imageformats/qwbmp.dll",
+    "PySide6/plugins/imageformats/qwebp.dll",
     # Without FFmpeg OpenCV reads videos of Motion JPEG; see lightpen.formats.videos.
     "cv2/opencv_videoio_ffmpeg*.dll",
     "cv2/LICENSE*",  # a copy of that beside the metadata

@@ -74,13 +74,16 @@ def unpack(distribution: Path, folder: Path) -> None:
 
 
 def without_unproven(library: bytes) -> bytes:
-    """Return the library of Python without the modules that could not be proven."""
+    """Return the library of Python without the modules that could not be proven.
+
+    They are stored as they are: the installer packs them better.
+    """
     packed = io.BytesIO()
     with (
         zipfile.ZipFile(io.BytesIO(library)) as before,
-        zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as after,
+        zipfile.ZipFile(packed, "w") as after,
     ):
         for entry in before.infolist():
             if not entry.filename.startswith(UNPROVEN):
-                after.writestr(entry, before.read(entry))
+                after.writestr(entry, before.read(entry), zipfile.ZIP_STORED)
     return packed.getvalue()

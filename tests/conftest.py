@@ -60,6 +60,11 @@ sys.exit(status)
 """
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add ``--slow``."""
+    parser.addoption("--slow", action="store_true", help="also run the slow tests")
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """Let two more processes work than there are cores: tests wait for cameras."""
@@ -78,8 +83,18 @@ def pytest_make_collect_report(
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with what takes longest, so that no process is left with it at the end."""
+def pytest_collection_modifyitems(
+    config: pytest.Config, items: list[pytest.Item]
+) -> None:
+    """Leave out slow tests unless they are asked for; begin with what takes longest.
+
+    So no process is left with that at the end.
+    """
+    is_named = config.option.markexpr or any("::" in each for each in config.args)
+    if not (config.getoption("--slow") or is_named):
+        slow = [item for item in items if item.get_closest_marker("slow")]
+        config.hook.pytest_deselected(items=slow)
+        items[:] = [item for item in items if not item.get_closest_marker("slow")]
     items.sort(key=lambda item: (_how_small(item.path), item.path))
 
 

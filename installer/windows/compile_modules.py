@@ -1,19 +1,23 @@
 """Compile the modules of all packages into one file, with the Python that runs this.
 
 Run in the folder that is installed. What is not compiled here says so and is left out.
+Of libraries neither docstrings nor sources are installed.
 """
 
-import py_compile
+import ast
+import importlib.util
+import marshal
 import sys
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import compiled_modules
 
-UNCHECKED = py_compile.PycInvalidationMode.UNCHECKED_HASH
-# It takes itself out of the modules and imports its library by the same name, which is
-# found because it puts a folder first on the path.
-FOUND_BY_PATH = {"cv2/__init__.py"}
+UNCHECKED_HASH = (1).to_bytes(4, "little") + bytes(8)
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+# It reads its files by path, takes itself out of the modules and imports its library by
+# the same name, which is found because it puts a folder first on the path.
+FOUND_BY_PATH = "cv2/"
+OURS = "lightpen"
 
 
 def main() -> int:
@@ -21,25 +25,33 @@ def main() -> int:
     packages = Path("runtime") / compiled_modules.PACKAGES
     n_failed = 0
     compiled: list[tuple[str, bytes]] = []
-    with TemporaryDirectory() as name:
-        target = Path(name) / "module.pyc"
-        for path in sorted(packages.rglob("*.py")):
-            source = path.relative_to(packages).as_posix()
-            if source in FOUND_BY_PATH:
-                continue
-            try:
-                py_compile.compile(
-                    *(str(path), str(target), f"site-packages/{source}"),
-                    doraise=True,
-                    invalidation_mode=UNCHECKED,
-                )
-            except py_compile.PyCompileError as error:
-                n_failed += 1
-                print(error, file=sys.stderr)
-            else:
-                compiled.append((source, target.read_bytes()))
+    for path in sorted(packages.rglob("*.py")):
+        source = path.relative_to(packages).as_posix()
+        if source.startswith(FOUND_BY_PATH):
+            continue
+        try:
+            code = compiled_form(path, source)
+        except (SyntaxError, ValueError) as error:
+            n_failed += 1
+            print(path, error, file=sys.stderr)
+            continue
+        compiled.append((source, code))
+        if not source.startswith(OURS):
+            path.unlink()
     compiled_modules.write(compiled_modules.FILE, compiled)
     return n_failed
+
+
+def compiled_form(path: Path, source: str) -> bytes:
+    """Return what Python would write as the compiled form of a module."""
+    tree = ast.parse(path.read_bytes())
+    if not source.startswith(OURS):
+        for node in ast.walk(tree):
+            if isinstance(node, DOCUMENTED) and ast.get_docstring(node) is not None:
+                nothing = ast.copy_location(ast.Pass(), node.body.pop(0))
+                node.body = node.body or [nothing]
+    code = compile(tree, f"site-packages/{source}", "exec", dont_inherit=True)
+    return importlib.util.MAGIC_NUMBER + UNCHECKED_HASH + marshal.dumps(code)
 
 
 if __name__ == "__main__":

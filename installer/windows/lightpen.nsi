@@ -47,7 +47,7 @@ RequestExecutionLevel user
   !endif
 !else
   SetCompressor /SOLID /FINAL lzma
-  SetCompressorDictSize 64
+  SetCompressorDictSize 256 ; both libraries of OpenBLAS hold much of the same
 !endif
 CRCCheck force
 ManifestDPIAware true
