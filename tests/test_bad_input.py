@@ -185,6 +185,7 @@ def run_with(run: Run, swing: Swing, role: str, file: Path) -> CompletedProcess[
     return swing.calibrate(run, **{role: file})
 
 
+@pytest.mark.slow
 def test_the_unspoiled_files_give_the_tip(swing: Swing, lightpen: Run) -> None:
     assert_tip(swing.calibrate(lightpen), swing)
 
@@ -425,6 +426,7 @@ MATLAB_OLD = """\
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "text"),
     [
@@ -902,6 +904,7 @@ def write(path: Path, image: Any) -> None:
     path.write_bytes(cv2.imencode(path.suffix, image)[1].tobytes())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "spoil"),
     [
@@ -988,6 +991,7 @@ def test_a_turned_image_is_refused_or_dropped(
     assert_refused(swing.calibrate(lightpen, images=images), "1024", "1224")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".png", ".tiff", ".bmp"])
 def test_colour_images_give_the_tip_or_are_refused(
     suffix: str, swing: Swing, few: Path, lightpen: Run
@@ -1015,6 +1019,7 @@ def test_colour_images_with_transparency_give_the_tip_or_are_refused(
         assert_tip(outcome, swing)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [16, 257])
 def test_16_bit_images_give_the_tip(
     factor: int, swing: Swing, few: Path, lightpen: Run
@@ -1100,6 +1105,7 @@ def test_a_file_that_is_no_video_is_refused_by_name(
     assert_refused(swing.calibrate(lightpen, images=video), r"swing\.avi")
 
 
+@pytest.mark.slow
 def test_a_cut_video_is_refused_or_its_whole_images_are_used(
     swing: Swing, lightpen: Run, tmp_path: Path
 ) -> None:
@@ -1158,6 +1164,7 @@ def peak_megabytes(arguments: list[str | Path]) -> tuple[CompletedProcess[str], 
     return outcome, int(peak) // 1000
 
 
+@pytest.mark.slow
 @needs_linux
 @pytest.mark.parametrize("role", [*ROLES, "images"])
 def test_a_huge_file_is_refused_before_it_fills_the_memory(
@@ -1180,6 +1187,7 @@ def test_a_huge_file_is_refused_before_it_fills_the_memory(
         assert outcome.returncode == 2
 
 
+@pytest.mark.slow
 @needs_linux
 def test_a_huge_image_in_a_small_file_does_not_fill_the_memory(
     swing: Swing, images: Path
@@ -1192,6 +1200,7 @@ def test_a_huge_image_in_a_small_file_does_not_fill_the_memory(
     assert peak < 500
 
 
+@pytest.mark.slow
 @needs_linux
 @pytest.mark.parametrize("role", ROLES)
 def test_an_endless_file_is_refused(role: str, swing: Swing, script: Run) -> None:
@@ -1216,6 +1225,7 @@ def with_disk_of(size: int, script: Run) -> Run:
     return lambda *arguments: script(*arguments, before=limit)
 
 
+@pytest.mark.slow
 @needs_posix
 @pytest.mark.parametrize("size", [0, 1000, 8192])
 def test_a_full_disk_leaves_the_old_record_whole(
@@ -1234,6 +1244,7 @@ def test_a_full_disk_leaves_the_old_record_whole(
     assert list(folder.iterdir()) == [file], "a torso is left behind"
 
 
+@pytest.mark.slow
 @needs_posix
 def test_a_full_disk_leaves_the_old_pivot_record_whole(
     poses_text: str, script: Run, tmp_path: Path
@@ -1248,6 +1259,7 @@ def test_a_full_disk_leaves_the_old_pivot_record_whole(
     assert file.read_text(encoding="utf-8") == "the old record"
 
 
+@pytest.mark.slow
 @needs_posix
 def test_a_full_disk_stops_a_simulation_with_a_sentence(
     script: Run, tmp_path: Path
@@ -1258,6 +1270,7 @@ def test_a_full_disk_stops_a_simulation_with_a_sentence(
     assert outcome.returncode == 2
 
 
+@pytest.mark.slow
 @needs_linux
 @pytest.mark.parametrize("command", ["calibrate", "pivot", "simulate"])
 def test_output_that_cannot_be_written_ends_with_a_sentence(
@@ -1332,6 +1345,7 @@ def test_no_record_is_written_where_there_is_no_tip(
     assert file.read_text(encoding="utf-8") == "the old record"
 
 
+@pytest.mark.slow
 @needs_linux
 def test_a_name_that_is_no_utf_8_is_written_and_shown(
     swing: Swing, images: Path, script: Run, tmp_path: Path

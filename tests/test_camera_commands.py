@@ -46,6 +46,7 @@ def run(*words: str | Path) -> int:
     return main([str(word) for word in words])
 
 
+@pytest.mark.slow
 def test_a_camera_file_is_made_of_a_folder_of_images(
     pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -68,6 +69,7 @@ def test_a_camera_file_is_made_of_a_folder_of_images(
     assert "U (k = 2)" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_named_images_take_no_part(pairs: Path, tmp_path: Path) -> None:
     record_file = tmp_path / "record.json"
     run(
@@ -92,6 +94,7 @@ def test_an_unknown_name_to_leave_out_is_refused(
     assert not (tmp_path / "camera.yaml").exists()
 
 
+@pytest.mark.slow
 def test_the_rig_file_of_two_cameras_is_read_back(
     pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -137,6 +140,7 @@ def test_a_swing_says_whether_file_and_camera_agree(
     assert json.loads(record_file.read_text())["agrees"] is True
 
 
+@pytest.mark.slow
 def test_a_file_of_another_focus_is_contradicted_by_a_swing(
     shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -87,12 +87,14 @@ def full(swing_full: Path) -> dict[str, Any]:
     return fields
 
 
+@pytest.mark.slow
 def test_swing_clean_gives_the_tip_to_4_um(
     clean: Path, record: Record, truth: Truth
 ) -> None:
     assert tip_error_um(record(clean), truth(clean)) <= 4.0
 
 
+@pytest.mark.slow
 def test_swing_full_gives_the_tip_to_3_5_um(
     shared_data: Path, full: dict[str, Any], truth: Truth
 ) -> None:
@@ -114,6 +116,7 @@ def repeated(shared_data: Path, record: Record) -> list[dict[str, Any]]:
     return [record(folder, "--centers", file) for file in files]
 
 
+@pytest.mark.slow
 def test_ten_calibrations_scatter_no_more_than_by_their_noise(
     repeated: list[dict[str, Any]],
 ) -> None:
@@ -287,6 +290,7 @@ def test_the_text_shows_images_residuals_and_the_weakest_direction(
     assert_printed([fields["rms_px"]], text)
 
 
+@pytest.mark.slow
 def test_the_text_counts_dropped_images_by_reason(record: Record, scene: Scene) -> None:
     fields = record(
         scene("--scene", "hard", "--images", "60", "--seed", "1", "--binning", "2")
@@ -332,6 +336,7 @@ def test_two_stage_can_be_the_method(
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "tip", ["-1.3182 -90.4095 -23.8548", "-1 -90. -23", "-1.3182e0 -9.04095e1 -2e1"]
 )
@@ -380,6 +385,7 @@ def test_a_folder_with_pattern_characters_is_a_folder(
     assert outcome.returncode == 0, outcome.stderr
 
 
+@pytest.mark.slow
 def test_a_video_gives_the_tip_of_its_images(
     simulated: Path, record: Record, lightpen: Run, tmp_path: Path
 ) -> None:
@@ -418,6 +424,7 @@ def test_the_centers_of_a_record_give_its_tip_again(
     assert digest in json.dumps(again)
 
 
+@pytest.mark.slow
 def test_centers_in_any_order_give_the_same_tip(
     shared_data: Path, record: Record, tmp_path: Path
 ) -> None:
@@ -433,6 +440,7 @@ def test_centers_in_any_order_give_the_same_tip(
     )
 
 
+@pytest.mark.slow
 def test_swapped_leds_in_some_frames_leave_the_tip(
     shared_data: Path, record: Record, tmp_path: Path
 ) -> None:
@@ -454,6 +462,7 @@ def test_swapped_leds_in_some_frames_leave_the_tip(
         assert not any(led["used"] for led in frame["leds"] if led["led"] in (2, 8))
 
 
+@pytest.mark.slow
 def test_names_in_any_script_are_read_and_written(
     script: Run, shared_data: Path, tmp_path: Path
 ) -> None:
@@ -475,6 +484,7 @@ def test_names_in_any_script_are_read_and_written(
     assert Path(frames[0]["file"]).name == "Aufnahme_写真_0001.png"
 
 
+@pytest.mark.slow
 def test_a_console_that_cannot_show_a_name_still_gets_the_tip(
     script: Run, shared_data: Path, tmp_path: Path
 ) -> None:
@@ -491,6 +501,7 @@ def test_a_console_that_cannot_show_a_name_still_gets_the_tip(
     assert "Images       10 of 11 used" in outcome.stdout
 
 
+@pytest.mark.slow
 def test_nothing_but_the_result_is_written_when_piped(
     script: Run, shared_data: Path
 ) -> None:
@@ -502,6 +513,7 @@ def test_nothing_but_the_result_is_written_when_piped(
     assert "%|" not in outcome.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo terminal")
 def test_a_terminal_shows_progress(script: Run, shared_data: Path) -> None:
     import pty
@@ -531,6 +543,7 @@ def read_terminal(controller: FileIO) -> str:
         return ""
 
 
+@pytest.mark.slow
 def test_calibrating_twice_writes_the_same_record(
     shared_data: Path, lightpen: Run, tmp_path: Path
 ) -> None:
@@ -639,6 +652,7 @@ def write_poses_with_outliers(source: Path, target: Path, share: float) -> None:
     target.write_text(text + "\n", encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_30_percent_gross_outliers_leave_the_tip_where_the_rest_puts_it(
     lightpen: Run, poses: Path, tmp_path: Path
 ) -> None:

@@ -35,6 +35,7 @@ def arguments(centers: Path, *more: str) -> list[str]:
     return [*given, *more, "--out-pen", pen, "--out-camera", camera, "--json", record]
 
 
+@pytest.mark.slow
 def test_a_swing_of_centres_and_a_length_give_pen_camera_and_record(
     centers: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -67,6 +68,7 @@ def test_a_swing_of_centres_and_a_length_give_pen_camera_and_record(
     assert "tip x" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("more", "told"),
     [
@@ -85,6 +87,7 @@ def test_what_cannot_be_done_is_told_and_nothing_is_written(
     assert not any((centers.parent / name).exists() for name in OUTPUTS)
 
 
+@pytest.mark.slow
 def test_a_length_between_the_wrong_leds_is_told(
     centers: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

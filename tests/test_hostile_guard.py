@@ -8,6 +8,7 @@ from benchmarks.hostile_guard import CHANGES, damage, guarded_folder, killed_cha
 N_MUTATIONS, N_KILLS = 150, 2
 
 
+@pytest.mark.slow
 def test_damaged_limits_and_imports_are_refused_or_as_they_were_set() -> None:
     with guarded_folder() as guarded:
         outcomes = damage(guarded, N_MUTATIONS)
@@ -15,6 +16,7 @@ def test_damaged_limits_and_imports_are_refused_or_as_they_were_set() -> None:
     assert outcomes["refused"] > N_MUTATIONS // 2
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
 def test_a_killed_change_of_limits_keys_or_entries_loses_nothing() -> None:
     with guarded_folder() as guarded:

@@ -18,10 +18,12 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Data:
     return make_data(tmp_path_factory.mktemp("hostile"))
 
 
+@pytest.mark.slow
 def test_every_flipped_bit_is_named_by_the_file_that_it_is_in(data: Data) -> None:
     assert unnamed_flips(data, N_FLIPS) == (0, 0)
 
 
+@pytest.mark.slow
 def test_damaged_files_end_in_the_errors_of_the_program_alone(data: Data) -> None:
     assert foreign_errors(data, N_MUTATIONS) == []
 
@@ -32,6 +34,7 @@ def victim() -> Iterator[Victim]:
         yield process
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
 @pytest.mark.parametrize("kind", CHECKS)
 def test_a_killed_write_loses_nothing_and_leaves_nothing(

@@ -179,6 +179,7 @@ def assert_whole(record: Record) -> None:
         assert sha256(image.file.read_bytes()).hexdigest() == image.sha256
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
 def test_killed_at_any_moment_the_swing_keeps_what_it_acknowledged_and_goes_on(
     tmp_path: Path,

@@ -57,6 +57,7 @@ def contracts() -> list[dict[str, Any]]:
     return found
 
 
+@pytest.mark.slow
 def test_a_class_and_a_function_are_found_by_their_name_alone() -> None:
     assert names_given_twice(PACKAGES.values()) == {}
 

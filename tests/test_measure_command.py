@@ -36,6 +36,7 @@ def files(shared_data: Path, swing_full: Path) -> list[str | Path]:
     ]
 
 
+@pytest.mark.slow
 def test_recorded_touches_are_measured_by_a_plan(
     shared_data: Path,
     lightpen: Run,

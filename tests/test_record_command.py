@@ -165,6 +165,7 @@ def test_taking_out_and_putting_back_gives_the_tip_of_before(
     assert calibrated(folder)[0]["tip_pen_mm"] == before != without
 
 
+@pytest.mark.slow
 def test_the_mask_of_the_record_is_in_force(
     calibrated: Calibrated, folder: Path, rewrite_header: Callable[..., None]
 ) -> None:

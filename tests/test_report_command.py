@@ -25,6 +25,7 @@ from lightpen_app.reporting import write_paper
 UNSEEN = {"QT_QPA_PLATFORM": "", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
 
 
+@pytest.mark.slow
 def test_a_record_is_put_on_paper_without_a_display(
     script: Callable[..., CompletedProcess[str]], stated: dict[str, Any], tmp_path: Path
 ) -> None:

@@ -58,6 +58,7 @@ def fields(
     return found | {"text": outcome.stdout, "path": file}
 
 
+@pytest.mark.slow
 def test_a_tip_is_verified_by_both_cameras(
     station: Path, fields: dict[str, Any], lightpen: Run, tmp_path: Path
 ) -> None:

@@ -73,6 +73,7 @@ def hard(request: pytest.FixtureRequest, scene: Scene) -> Path:
     return scene(*request.param)
 
 
+@pytest.mark.slow
 def test_a_hard_scene_holds_what_it_must(scene: Scene, truth: Truth) -> None:
     flags = {
         flag
@@ -83,6 +84,7 @@ def test_a_hard_scene_holds_what_it_must(scene: Scene, truth: Truth) -> None:
     assert flags >= USELESS | {"clutter", "fingers", "missing", "saturated"}
 
 
+@pytest.mark.slow
 def test_no_led_of_a_hard_scene_is_mislabelled(
     hard: Path, record: Record, truth: Truth
 ) -> None:
@@ -110,6 +112,7 @@ def test_a_hard_scene_gives_an_uncertainty_that_covers_the_error(
     assert np.all(np.abs(error) <= 2 * np.array(fields["expanded_uncertainty_mm"]))
 
 
+@pytest.mark.slow
 def test_noise_hardly_changes_the_covariance_of_a_hard_scene(
     scene: Scene, record: Record, tmp_path: Path
 ) -> None:
@@ -190,6 +193,7 @@ def test_two_leds_exchanged_in_one_image_would_be_noticed(
     assert len(wrong_leds(fields, truth(hard))) == 2
 
 
+@pytest.mark.slow
 def test_hard_images_in_any_order_give_the_same_labels(
     scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
 ) -> None:
@@ -214,6 +218,7 @@ def test_hard_images_in_any_order_give_the_same_labels(
     assert tip_error_um(fields, answer) <= 8.0
 
 
+@pytest.mark.slow
 def test_images_with_three_whole_leds_are_dropped_with_their_reason(
     scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
 ) -> None:
@@ -259,6 +264,7 @@ def test_images_without_any_pen_are_refused(
     assert_refused(outcome, "image")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bits", ["8", "12", "16"])
 def test_images_of_any_depth_give_the_tip_to_8_um(
     bits: str, scene: Scene, record: Record, truth: Truth
@@ -273,6 +279,7 @@ def test_images_of_any_depth_give_the_tip_to_8_um(
     assert wrong_leds(record(folder), truth(folder)) == []
 
 
+@pytest.mark.slow
 def test_a_swing_about_one_axis_is_refused_and_the_axis_named(
     scene: Scene, lightpen: Run
 ) -> None:
@@ -283,6 +290,7 @@ def test_a_swing_about_one_axis_is_refused_and_the_axis_named(
         assert_refused(outcome, "tilt|lean|turn")
 
 
+@pytest.mark.slow
 def test_a_swing_of_too_little_tilt_is_refused_and_tilt_asked_for(
     scene: Scene, lightpen: Run
 ) -> None:
@@ -334,6 +342,7 @@ def test_one_image_again_and_again_is_refused(
     assert_refused(outcome, "tilt|lean|alike|same")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", ["1", "2"])
 @pytest.mark.parametrize("pen", OTHER_PENS)
 def test_another_layout_gives_its_tip_or_is_refused(
@@ -352,6 +361,7 @@ def test_another_layout_gives_its_tip_or_is_refused(
     assert tip_error_um(fields, truth(folder)) <= 15.0  # fewer LEDs tell less
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pen", OTHER_PENS)
 def test_clutter_and_missing_leds_never_mislabel_another_layout(
     pen: str, scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
@@ -380,6 +390,7 @@ def assert_pen_refused(lightpen: Run, folder: Path, pen: Path, some: Path) -> No
 
 
 # The fanned pen has its LEDs where the common one has them.
+@pytest.mark.slow
 @pytest.mark.parametrize("pen", ["six", "eight", "near-symmetric"])
 def test_the_file_of_another_pen_is_refused(
     pen: str, scene: Scene, lightpen: Run, tmp_path: Path
@@ -389,6 +400,7 @@ def test_the_file_of_another_pen_is_refused(
     assert_pen_refused(lightpen, images, other / "leds.csv", tmp_path / "some")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pen", ["six", "eight", "near-symmetric"])
 def test_the_file_of_another_pen_is_refused_for_independent_images(
     pen: str, scene: Scene, lightpen: Run, shared_data: Path, tmp_path: Path

@@ -41,6 +41,7 @@ def test_a_record_that_is_otherwise_is_refused(
     assert not validator.is_valid(fields | change)
 
 
+@pytest.mark.slow
 def test_an_entry_cannot_be_left_out(
     validator: Draft202012Validator, fields: dict[str, Any]
 ) -> None:

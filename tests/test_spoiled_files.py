@@ -22,6 +22,7 @@ def test_good_files_are_read(good: list[Sample], tmp_path: Path) -> None:
         sample.read(path)
 
 
+@pytest.mark.slow
 def test_a_spoiled_file_is_read_or_refused_in_words_and_soon(
     good: list[Sample], tmp_path: Path
 ) -> None:

@@ -23,6 +23,7 @@ def record(swung: Callable[..., Path], calibration_of: Callable[..., Path]) -> P
     return calibration_of(swung()) / "calibration.json"
 
 
+@pytest.mark.slow
 def test_a_recorded_swing_is_streamed_with_its_tip(
     swung: Callable[..., Path], record: Path
 ) -> None:

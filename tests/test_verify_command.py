@@ -58,6 +58,7 @@ def test_the_fixed_point_of_the_paper_is_steady(
     assert np.linalg.eigvalsh(record["touches"][0]["covariance"])[0] > 0
 
 
+@pytest.mark.slow
 def test_the_circle_of_the_paper_has_its_radius(
     shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
 ) -> None:
@@ -78,6 +79,7 @@ def test_the_circle_of_the_paper_has_its_radius(
     assert abs(record["mean_error_mm"]) <= record["expanded_uncertainty_mm"]
 
 
+@pytest.mark.slow
 def test_the_points_of_a_ring_lie_on_a_plane(
     shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
 ) -> None:
@@ -104,6 +106,7 @@ def test_the_points_of_a_ring_lie_on_a_plane(
     assert "not the tip" in plane.stdout
 
 
+@pytest.mark.slow
 def test_table_1_is_reproduced_from_led_centres_by_one_command(
     shared_data: Path, lightpen: Run, tmp_path: Path
 ) -> None:
@@ -146,6 +149,7 @@ def write_touches(path: Path, files: list[str | Path], moved: float) -> None:
     path.write_text("\n".join(lines), encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("moved", "status"), [(0.0, 0), (0.02, 4), (0.3, 3)])
 def test_led_centres_are_verified_and_the_exit_status_tells_the_verdict(
     *, lightpen: Run, files: list[str | Path], tmp_path: Path, moved: float, status: int
@@ -326,6 +330,7 @@ def test_results_and_led_centres_are_not_mixed(
     assert "Give either results or files of LED centres" in outcome.stderr
 
 
+@pytest.mark.slow
 def test_a_pen_is_examined_and_its_file_improved_only_where_it_helps(
     shared_data: Path,
     calibration_of: Callable[..., Path],
@@ -357,6 +362,7 @@ def test_a_pen_is_examined_and_its_file_improved_only_where_it_helps(
     assert "would replace the input file" in over_old.stderr
 
 
+@pytest.mark.slow
 def test_calibrations_are_solved_again_and_their_uncertainty_checked(
     shared_data: Path,
     calibration_of: Callable[..., Path],

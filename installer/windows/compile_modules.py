@@ -18,6 +18,7 @@ DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 # the same name, which is found because it puts a folder first on the path.
 FOUND_BY_PATH = "cv2/"
 OURS = "lightpen"
+CONFIGURATION = "__config__.py"  # states the version of OpenBLAS
 
 
 def main() -> int:
@@ -36,7 +37,7 @@ def main() -> int:
             print(path, error, file=sys.stderr)
             continue
         compiled.append((source, code))
-        if not source.startswith(OURS):
+        if not source.startswith(OURS) and path.name != CONFIGURATION:
             path.unlink()
     compiled_modules.write(compiled_modules.FILE, compiled)
     return n_failed

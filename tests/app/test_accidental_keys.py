@@ -43,6 +43,7 @@ def done(
     return walker
 
 
+@pytest.mark.slow
 def test_a_second_enter_accepts_no_tip_that_was_not_shown(done: "Walker") -> None:
     walker = done
     walker.until(lambda: pressed(walker, Key.Key_Return))
@@ -60,6 +61,7 @@ def test_a_second_enter_accepts_no_tip_that_was_not_shown(done: "Walker") -> Non
     assert walker.title() == "Review"
 
 
+@pytest.mark.slow
 def test_after_a_while_enter_accepts(
     done: "Walker", monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -149,6 +149,7 @@ def test_a_first_start_needs_no_folder(
     wizard.setParent(None)
 
 
+@pytest.mark.slow
 def test_on_a_screen_of_twice_the_scale_the_main_button_can_be_seen(
     tmp_path: Path,
 ) -> None:

@@ -211,6 +211,7 @@ def assert_whole(folder: Path, n_images: int) -> None:
     assert read_resumable(folder).state.n_kept == len(record.used_images)
 
 
+@pytest.mark.slow
 def test_closing_waits_for_all_that_is_under_way_together(
     workbench: Workbench,
     stuck: Stuck,
@@ -233,6 +234,7 @@ def test_closing_waits_for_all_that_is_under_way_together(
     assert_whole(interrupted, N_IMAGES + 2)
 
 
+@pytest.mark.slow
 def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
     workbench: Workbench,
     stuck: Stuck,
@@ -264,6 +266,7 @@ def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
     assert_whole(interrupted, n_acknowledged)
 
 
+@pytest.mark.slow
 def test_a_solution_that_ends_in_time_is_waited_for(
     workbench: Workbench,
     interrupted: Path,
@@ -290,6 +293,7 @@ def test_a_solution_that_ends_in_time_is_waited_for(
     assert_whole(interrupted, N_IMAGES)
 
 
+@pytest.mark.slow
 def test_the_window_closes_in_time_and_the_swing_is_offered_again(
     open_wizard: "OpenWizard",
     swung: Callable[..., Path],
@@ -328,6 +332,7 @@ def test_the_window_closes_in_time_and_the_swing_is_offered_again(
     assert n_kept(again.workbench) == N_IMAGES
 
 
+@pytest.mark.slow
 def test_the_process_ends_though_a_job_does_not(tmp_path: Path) -> None:
     folders = ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "HOME", "APPDATA", "LOCALAPPDATA")
     environment = dict.fromkeys(folders, str(tmp_path))
@@ -346,6 +351,7 @@ def test_the_process_ends_though_a_job_does_not(tmp_path: Path) -> None:
     assert status == 0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signals")
 def test_a_signal_ends_the_demo_with_nothing_left_behind(tmp_path: Path) -> None:
     number = signal.SIGTERM
@@ -360,6 +366,7 @@ def test_a_signal_ends_the_demo_with_nothing_left_behind(tmp_path: Path) -> None
     assert list(tmp_path.glob("lightpen-demo-*")) == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signals")
 @pytest.mark.parametrize(
     ("number", "asks"), [(signal.SIGINT, ""), (signal.SIGTERM, "asks")]

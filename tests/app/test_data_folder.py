@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 SHARED = "The program is open in other windows using the same data folder, "
 
 
+@pytest.mark.slow
 def test_two_windows_on_one_data_folder_both_say_so_until_one_closes(
     open_wizard: "OpenWizard", monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -33,6 +34,7 @@ def test_two_windows_on_one_data_folder_both_say_so_until_one_closes(
     first.until(lambda: not first.tells(SHARED))
 
 
+@pytest.mark.slow
 @pytest.mark.qt_log_ignore(
     "^This plugin does not support (raise|grabbing)", extend=True
 )

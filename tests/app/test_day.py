@@ -29,6 +29,7 @@ def known(settings: Settings, open_wizard: "OpenWizard") -> "Walker":
     return open_wizard()
 
 
+@pytest.mark.slow
 def test_a_tip_takes_three_keys_from_the_launch_and_the_next_one_two(
     known: "Walker",
 ) -> None:
@@ -64,6 +65,7 @@ def swing_and_accept(walker: "Walker") -> None:
     walker.until(lambda: run.status.result is not None)
 
 
+@pytest.mark.slow
 def test_what_is_not_ready_is_amber_and_the_main_button_leads_there(
     known: "Walker",
 ) -> None:
@@ -79,6 +81,7 @@ def test_what_is_not_ready_is_amber_and_the_main_button_leads_there(
     walker.until_shows("LEDs")
 
 
+@pytest.mark.slow
 def test_a_tip_is_found_by_a_part_of_its_name(known: "Walker") -> None:
     walker = known
     walker.until(lambda: walker.main_button().text() == "Start swing")
@@ -104,6 +107,7 @@ def test_what_is_set_up_once_is_a_click_away(known: "Walker") -> None:
     assert walker.main_button().text() == "Start swing"
 
 
+@pytest.mark.slow
 def test_a_first_start_opens_the_setup(walker: "Walker") -> None:
     assert walker.says("Set up station")
     assert walker.offers("Try it with a simulated pen")

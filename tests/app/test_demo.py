@@ -53,6 +53,7 @@ def keep_within_memory() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
 
 
+@pytest.mark.slow
 def test_the_demo_plays_without_a_screen_in_1_5_gb_and_prints_the_tip(
     newcomer: Run, tmp_path: Path
 ) -> None:
@@ -79,6 +80,7 @@ sys.exit(main())
 """
 
 
+@pytest.mark.slow
 def test_an_unseen_demo_that_fails_asks_nobody_before_it_closes(tmp_path: Path) -> None:
     homes = {name: str(tmp_path) for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME")}
     outcome = subprocess.run(
@@ -94,6 +96,7 @@ def test_an_unseen_demo_that_fails_asks_nobody_before_it_closes(tmp_path: Path) 
     assert "Demo ended:" in outcome.stdout
 
 
+@pytest.mark.slow
 def test_the_window_is_refused_in_a_sentence_without_a_screen(newcomer: Run) -> None:
     outcome = newcomer()
 
@@ -103,6 +106,7 @@ def test_the_window_is_refused_in_a_sentence_without_a_screen(newcomer: Run) -> 
     assert "Traceback" not in outcome.stderr
 
 
+@pytest.mark.slow
 def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
     open_wizard: "OpenWizard", settings: Settings, qtbot: QtBot
 ) -> None:
@@ -119,6 +123,7 @@ def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
     assert "Demo ended: no tip to accept." in walker.window.words()
 
 
+@pytest.mark.slow
 def test_a_demo_goes_on_after_somebody_looked_at_another_step(
     open_wizard: "OpenWizard",
 ) -> None:

@@ -29,6 +29,7 @@ def test_nothing_is_streamed_unless_chosen() -> None:
     assert Preferences().stream_address == LOOPBACK
 
 
+@pytest.mark.slow
 @pytest.mark.qt_log_ignore(
     "^This plugin does not support (raise|grabbing)", extend=True
 )

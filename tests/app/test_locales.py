@@ -155,6 +155,7 @@ def test_a_calibration_gives_the_same_tip_in_unusual_locales(
     assert all(tip == tips["usual"] for tip in tips.values())
 
 
+@pytest.mark.slow
 def test_no_property_of_qt_is_set_by_keyword() -> None:
     root = Path(lightpen_app.__file__).parent
     found = {

@@ -24,6 +24,7 @@ def record(tmp_path: Path, swung: Callable[..., Path]) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_swing_with_a_verdict_is_shown_at_the_step_review(
     open_wizard: "OpenWizard", record: Path
 ) -> None:
@@ -38,6 +39,7 @@ def test_a_swing_with_a_verdict_is_shown_at_the_step_review(
     assert len(open_record(record).images) == 20
 
 
+@pytest.mark.slow
 def test_an_interrupted_swing_goes_on_at_the_step_swing(
     open_wizard: "OpenWizard", record: Path
 ) -> None:
@@ -70,6 +72,7 @@ print(application.arguments()[-1])
 """
 
 
+@pytest.mark.slow
 def test_a_path_that_is_no_utf_8_does_not_end_the_program() -> None:
     outcome = subprocess.run(
         [sys.executable, "-c", APPLICATION], capture_output=True, text=True, check=True

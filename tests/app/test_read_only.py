@@ -14,6 +14,7 @@ LONGEST_S = 200  # on a machine that does other things besides
 UNSHARED = ("unshare", "--map-root-user", "--mount")
 
 
+@pytest.mark.slow
 def test_on_a_read_only_folder() -> None:
     if shutil.which("unshare") is None:
         pytest.skip("unshare is not installed, without which nothing can be mounted")

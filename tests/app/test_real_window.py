@@ -68,6 +68,7 @@ def passed(test: str, environment: dict[str, str]) -> str:
     return outcome.stdout
 
 
+@pytest.mark.slow
 def test_on_a_real_screen() -> None:
     lack = why_no_screen()
     if lack:
@@ -79,6 +80,7 @@ def test_on_a_real_screen() -> None:
         assert "2 passed" in passed(FILE, on_screen)
 
 
+@pytest.mark.slow
 def test_the_entry_in_the_menu_opens_the_window(tmp_path: Path) -> None:
     lack = why_no_screen() or ("" if shutil.which("xwininfo") else "no xwininfo")
     if lack:

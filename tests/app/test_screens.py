@@ -120,6 +120,7 @@ def pictures(seen: Seen) -> dict[str, QImage]:
     return seen.pictures
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_step_looks_as_it_did(pictures: dict[str, QImage], name: str) -> None:
     expected = QImage(str(SCREENS.FOLDER / name))

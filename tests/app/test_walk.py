@@ -152,6 +152,7 @@ def test_a_recorded_swing_gives_its_tip(
     assert len(names) == 60
 
 
+@pytest.mark.slow
 def test_in_chinese_no_english_word_is_left(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:

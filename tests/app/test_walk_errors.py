@@ -174,6 +174,7 @@ def picture_in(folder: Path) -> Path:
 # Wrong files
 
 
+@pytest.mark.slow
 def test_a_picture_is_refused_as_intrinsics(prepared: "Walker", tmp_path: Path) -> None:
     go_to(prepared, "Camera")
     workbench = prepared.workbench
@@ -186,6 +187,7 @@ def test_a_picture_is_refused_as_intrinsics(prepared: "Walker", tmp_path: Path) 
     assert workbench.selection.preparation.camera_file is before
 
 
+@pytest.mark.slow
 def test_intrinsics_of_another_size_are_told_and_close_the_next_steps(
     prepared: "Walker", tmp_path: Path
 ) -> None:
@@ -208,6 +210,7 @@ def test_intrinsics_of_another_size_are_told_and_close_the_next_steps(
     prepared.until(prepared.main_button().isEnabled)
 
 
+@pytest.mark.slow
 def test_a_letter_in_the_led_file_is_told_with_its_line(
     prepared: "Walker", tmp_path: Path
 ) -> None:
@@ -222,6 +225,7 @@ def test_a_letter_in_the_led_file_is_told_with_its_line(
     assert prepared.tells("(letter O)")
 
 
+@pytest.mark.slow
 def test_exchanged_leds_are_named(prepared: "Walker", tmp_path: Path) -> None:
     leds = paper_pen().leds.copy()
     leds[[5, 8]] = leds[[8, 5]]
@@ -234,6 +238,7 @@ def test_exchanged_leds_are_named(prepared: "Walker", tmp_path: Path) -> None:
     assert prepared.steps()["Swing"] == "closed"
 
 
+@pytest.mark.slow
 def test_a_displaced_led_is_named(prepared: "Walker", tmp_path: Path) -> None:
     leds = paper_pen().leds.copy()
     leds[5] += (0.0, 0.8, 0.0)
@@ -252,6 +257,7 @@ def pen_in(folder: Path, leds: FloatArray) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_file_of_another_pen_is_told(prepared: "Walker", tmp_path: Path) -> None:
     path = tmp_path / "another.json"
     write_pen(eight_led_pen(), path)
@@ -262,6 +268,7 @@ def test_the_file_of_another_pen_is_told(prepared: "Walker", tmp_path: Path) -> 
     prepared.until_says("Pen not found")
 
 
+@pytest.mark.slow
 def test_a_folder_without_images_can_be_tried_again(
     prepared: "Walker", tmp_path: Path
 ) -> None:
@@ -287,6 +294,7 @@ def test_a_folder_without_images_can_be_tried_again(
 # The camera
 
 
+@pytest.mark.slow
 def test_a_camera_that_is_gone_is_told_and_comes_back(
     cameras: list[FaultyCamera], prepared: "Walker"
 ) -> None:
@@ -316,6 +324,7 @@ def test_a_camera_that_is_gone_is_told_and_comes_back(
 # The pen
 
 
+@pytest.mark.slow
 def test_what_befalls_the_pen_is_told_and_the_swing_goes_on(
     capturing: "Walker",
 ) -> None:
@@ -342,6 +351,7 @@ def test_what_befalls_the_pen_is_told_and_the_swing_goes_on(
     assert capturing.n_inputs == n_inputs
 
 
+@pytest.mark.slow
 def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
     capturing: "Walker",
 ) -> None:
@@ -395,6 +405,7 @@ def finish_now(walker: "Walker") -> None:
     walker.click("Finish now")
 
 
+@pytest.mark.slow
 def test_computing_is_cancelled_and_begun_again(
     capturing: "Walker", solving_on: "SolvingOn"
 ) -> None:
@@ -423,6 +434,7 @@ def test_computing_is_cancelled_and_begun_again(
 # The disk
 
 
+@pytest.mark.slow
 def test_a_full_disk_pauses_the_swing_until_there_is_room(
     small_disk: Callable[[int], None], prepared: "Walker"
 ) -> None:
@@ -447,6 +459,7 @@ def test_a_full_disk_pauses_the_swing_until_there_is_room(
 # Back and forth
 
 
+@pytest.mark.slow
 def test_going_back_and_forth_pauses_the_swing_and_goes_on(capturing: "Walker") -> None:
     folder = record_folder(capturing)
     for title in ("LEDs", "Camera", "Start"):
@@ -475,6 +488,7 @@ def test_going_back_and_forth_pauses_the_swing_and_goes_on(capturing: "Walker") 
     assert n_kept(capturing) >= n_before
 
 
+@pytest.mark.slow
 def test_space_pauses_and_starting_over_asks(capturing: "Walker") -> None:
     first = record_folder(capturing)
     capturing.press(Key.Key_Space)
@@ -494,6 +508,7 @@ def test_space_pauses_and_starting_over_asks(capturing: "Walker") -> None:
     keep_on(capturing)
 
 
+@pytest.mark.slow
 def test_a_swing_closed_in_the_middle_is_resumed_at_the_next_start(
     capturing: "Walker", open_wizard: "OpenWizard"
 ) -> None:
@@ -530,6 +545,7 @@ def test_a_swing_closed_in_the_middle_is_resumed_at_the_next_start(
 # The window
 
 
+@pytest.mark.slow
 def test_language_theme_size_and_windows_change_in_a_step_and_during_capture(
     prepared: "Walker",
 ) -> None:
@@ -583,6 +599,7 @@ def _use_all_windows(walker: "Walker", title: str) -> None:
     walker.take_window()
 
 
+@pytest.mark.slow
 def test_about_tells_the_versions(prepared: "Walker") -> None:
     told: list[str] = []
 
@@ -602,6 +619,7 @@ def test_about_tells_the_versions(prepared: "Walker") -> None:
     assert any("PySide6" in text for text in told)
 
 
+@pytest.mark.slow
 def test_the_operator_view_leads_the_swing_by_its_keys(capturing: "Walker") -> None:
     view = capturing.window.operator_view()
     capturing.press(Key.Key_F11)
@@ -626,6 +644,7 @@ def test_the_operator_view_leads_the_swing_by_its_keys(capturing: "Walker") -> N
 # Anything else
 
 
+@pytest.mark.slow
 def test_pressing_enter_again_and_again_accepts_once(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
@@ -659,6 +678,7 @@ def test_pressing_enter_again_and_again_accepts_once(
     assert len(list(results.glob("*.json"))) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", ["Start", "Camera", "LEDs", "Swing"])
 def test_any_keys_and_clicks_leave_a_window_that_answers(
     prepared: "Walker", tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str

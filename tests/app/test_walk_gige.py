@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
 from tests.gige_simulator import ADDRESS, GigeSimulator
 from typing_extensions import override
 
@@ -42,6 +43,7 @@ class QuickClock(MachineClock):
         return SPEED * time.monotonic_ns()
 
 
+@pytest.mark.slow
 def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
     gige: GigeSimulator,
     small_scene: Scene,

@@ -58,6 +58,7 @@ def lay_down_limits(walker: "Walker", password: str, limit: str) -> None:
     sign(walker, "Eve", password)
 
 
+@pytest.mark.slow
 def test_a_wrong_password_lays_down_nothing_and_is_asked_for_again(
     known: "Walker",
 ) -> None:
@@ -74,6 +75,7 @@ def test_a_wrong_password_lays_down_nothing_and_is_asked_for_again(
     walker.until(lambda: walker.workbench.selection.choices.limits.across == 1.0)
 
 
+@pytest.mark.slow
 def test_beyond_the_limits_a_supervisor_accepts_after_a_wrong_password(
     known: "Walker",
 ) -> None:

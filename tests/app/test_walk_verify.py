@@ -51,6 +51,7 @@ def records(walker: "Walker") -> list[dict[str, Any]]:
     return [json.loads(file.read_bytes()) for file in sorted(folder.glob("*.json"))]
 
 
+@pytest.mark.slow
 def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
     known: "Walker",
 ) -> None:
@@ -94,6 +95,7 @@ def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
     assert walker.steps()["Verify"] == "now"
 
 
+@pytest.mark.slow
 def test_a_tip_that_was_accepted_with_doubts_is_verified_under_that_word(
     known: "Walker",
 ) -> None:
@@ -110,6 +112,7 @@ def test_a_tip_that_was_accepted_with_doubts_is_verified_under_that_word(
     assert lead.endswith("CHECK")
 
 
+@pytest.mark.slow
 def test_without_a_tip_in_force_the_step_says_so(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
@@ -126,6 +129,7 @@ def test_without_a_tip_in_force_the_step_says_so(
     assert not walker.main_button().isEnabled()
 
 
+@pytest.mark.slow
 def test_the_pen_is_shown_over_its_swings_and_no_file_is_made_that_is_no_better(
     known: "Walker",
 ) -> None:
@@ -178,6 +182,7 @@ def interrupted(known: "Walker", tmp_path: Path) -> "Walker":
     return known
 
 
+@pytest.mark.slow
 def test_a_verification_that_was_interrupted_is_gone_on_with(
     interrupted: "Walker",
 ) -> None:
@@ -195,6 +200,7 @@ def test_a_verification_that_was_interrupted_is_gone_on_with(
     walker.until(lambda: not walker.says("Interrupted verification"))
 
 
+@pytest.mark.slow
 def test_a_verification_that_was_interrupted_is_closed_after_a_question(
     interrupted: "Walker",
 ) -> None:

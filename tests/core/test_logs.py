@@ -182,6 +182,7 @@ def test_a_file_that_cannot_be_put_aside_is_gone_on_with(
     assert len(log.read_text().splitlines()) == 100
 
 
+@pytest.mark.slow
 def test_several_processes_share_a_log(tmp_path: Path) -> None:
     names = ("one", "two", "three")
     processes = [

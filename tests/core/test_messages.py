@@ -175,6 +175,7 @@ def test_an_error_carries_its_message() -> None:
     assert FileError(said).message == said
 
 
+@pytest.mark.slow
 def test_every_code_is_written_where_tools_find_it() -> None:
     for path, source in SOURCES.items():
         if path.name != "messages.py":

@@ -103,6 +103,7 @@ def import_scipy_as_installed(without: str = "") -> int:
     return subprocess.run(arguments, cwd=SOURCES, check=False).returncode
 
 
+@pytest.mark.slow
 def test_what_is_installed_of_scipy_is_all_that_its_imports_need() -> None:
     assert import_scipy_as_installed() == 0
     assert import_scipy_as_installed(without="scipy.special._basic") != 0

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 WINDOWS = Path(__file__).parents[2] / "installer" / "windows"
 DRAWN = """
 import sys
@@ -24,6 +26,7 @@ assert any(colour.red() > colour.blue() + 100 for colour in colours)
 """
 
 
+@pytest.mark.slow
 def test_a_curve_is_drawn_without_opengl() -> None:
     words = [sys.executable, "-c", DRAWN, str(WINDOWS)]
     surroundings = os.environ | {"QT_QPA_PLATFORM": "offscreen"}

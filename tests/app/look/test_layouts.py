@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import pytest
 from PySide6.QtWidgets import (
     QApplication,
     QHBoxLayout,
@@ -60,6 +61,7 @@ print("alive")
 """
 
 
+@pytest.mark.slow
 def test_what_comes_to_the_place_of_a_layouts_item_can_be_deleted() -> None:
     command = [sys.executable, "-c", PROGRAM]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -93,6 +95,7 @@ def test_a_layout_that_is_filled_first_keeps_its_items(dressed: QApplication) ->
     window.deleteLater()
 
 
+@pytest.mark.slow
 def test_no_page_keeps_items_of_its_layouts(open_wizard: "OpenWizard") -> None:
     before = kept()
     window = open_wizard().window

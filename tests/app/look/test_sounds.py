@@ -128,6 +128,7 @@ def test_a_machine_without_a_player_says_why_it_is_silent(
     sounds.play(Sound.DONE)
 
 
+@pytest.mark.slow
 def test_the_program_never_imports_qt_multimedia() -> None:
     code = (
         "import sys, lightpen_app.application;"

@@ -173,6 +173,7 @@ def test_a_text_that_is_not_translated_is_noticed(tmp_path: Path) -> None:
     assert sorted(untranslated(fresh)) == ["Page: New text", "core: New {what}"]
 
 
+@pytest.mark.slow
 def test_no_text_reaches_the_screen_untranslatable() -> None:
     for path in APPLICATION.rglob("*.py"):
         source = path.read_text("utf-8")

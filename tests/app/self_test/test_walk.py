@@ -6,11 +6,13 @@ from pathlib import Path
 from subprocess import CompletedProcess
 
 import numpy as np
+import pytest
 
 Run = Callable[..., CompletedProcess[str]]
 SEEN_NOWHERE = {"QT_QPA_PLATFORM": "offscreen"}
 
 
+@pytest.mark.slow
 def test_the_program_finds_itself_whole_and_the_tip_of_a_rendered_swing(
     script: Run, tmp_path: Path
 ) -> None:

@@ -158,6 +158,7 @@ def test_a_chain_that_the_archive_does_not_know_is_named(archive: Path) -> None:
     assert any("not the chain itself" in each for each in findings(archive))
 
 
+@pytest.mark.slow
 def test_a_byte_changed_anywhere_in_the_file_is_found(
     archive: Path, tmp_path: Path
 ) -> None:

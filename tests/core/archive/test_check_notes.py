@@ -37,6 +37,7 @@ def notes(data: Path) -> set[str]:
     return {each.code for each in checked.notes}
 
 
+@pytest.mark.slow
 def test_of_an_honest_history_nothing_is_noted(data: Path) -> None:
     assert notes(data) == set()
 

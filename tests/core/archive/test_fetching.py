@@ -65,6 +65,7 @@ def findings(data: Path) -> list[str]:
     return list(map(str, checked.findings))
 
 
+@pytest.mark.slow
 def test_an_empty_folder_gets_entries_and_files_byte_by_byte(
     data: Path, address: str, tmp_path: Path
 ) -> None:
@@ -101,6 +102,7 @@ def test_a_rolled_back_folder_is_as_before_and_goes_on(
     assert len(FolderArchive(data).all_files()) == 5
 
 
+@pytest.mark.slow
 def test_the_number_of_a_file_that_is_lost_is_not_given_again(
     data: Path, address: str, tmp_path: Path
 ) -> None:

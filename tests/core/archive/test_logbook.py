@@ -225,6 +225,7 @@ def data_of_two(tmp_path: Path, swung: Callable[..., Path]) -> Path:
     return data
 
 
+@pytest.mark.slow
 def test_an_untouched_swing_of_two_cameras_is_checked_without_a_finding(
     data_of_two: Path,
 ) -> None:

@@ -59,6 +59,7 @@ def test_no_more_tips_are_recomputed_than_asked_for(
     assert entered_and_recomputed(tmp_path, 0).n_tips == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["tip", "uncertainty"])
 def test_a_forged_tip_or_u_that_is_entered_and_signed_is_found(
     what: str, tmp_path: Path, result: Result, shifted: Callable[..., Result]

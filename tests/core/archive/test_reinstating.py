@@ -170,6 +170,7 @@ def test_a_note_is_an_entry_on_another(data: Path, logbook: Logbook) -> None:
 EVE = Signature("Eve", "correct horse")
 
 
+@pytest.mark.slow
 def test_where_there_is_a_password_a_supervisor_reinstates_a_tip(
     data: Path, logbook: Logbook
 ) -> None:
@@ -190,6 +191,7 @@ def test_where_there_is_a_password_a_supervisor_reinstates_a_tip(
     assert checked(data).findings == ()
 
 
+@pytest.mark.slow
 def test_where_there_is_a_password_a_supervisor_takes_a_tip_back(
     data: Path, logbook: Logbook
 ) -> None:

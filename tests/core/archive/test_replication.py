@@ -31,6 +31,7 @@ def await_all(station: Station, address: str) -> None:
             time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_two_stations_deliver_at_once_while_the_server_restarts(
     postgres: Postgres,
     make_station: Callable[[str], Station],

@@ -120,6 +120,7 @@ def test_of_two_changes_the_later_one_counts_at_both_stations(
     assert taken.replaced.item.note == "other, changed"
 
 
+@pytest.mark.slow
 def test_a_password_needs_a_supervisor_to_take_over(
     site: Callable[[str], Site],
 ) -> None:

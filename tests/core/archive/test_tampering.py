@@ -277,10 +277,12 @@ KINDS: dict[str, Callable[[Plant], None]] = {
 }
 
 
+@pytest.mark.slow
 def test_a_plant_as_it_was_left_has_no_finding(plant: Plant) -> None:
     assert plant.findings() == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_it_is_found_that(kind: str, plant: Plant) -> None:
     KINDS[kind](plant)
@@ -300,6 +302,7 @@ def test_a_rolled_back_folder_delivers_nothing_and_says_what_to_do(
         deliver(logbook.database, logbook.chain, server)
 
 
+@pytest.mark.slow
 def test_a_rolled_back_folder_that_went_on_is_told_from_its_first_new_entry(
     plant: Plant,
 ) -> None:

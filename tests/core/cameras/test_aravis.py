@@ -90,6 +90,7 @@ def test_images_come_as_they_were_sent(
     assert seen.serial == "LP01"  # though it was looked for by its address
 
 
+@pytest.mark.slow
 def test_packets_of_others_are_not_taken_for_images_of_the_camera(
     gige: GigeSimulator,
 ) -> None:
@@ -342,6 +343,7 @@ def test_a_camera_that_hangs_for_long_is_lost_and_found_again(
     assert watched.connections.count(Connection.LOST) == 1
 
 
+@pytest.mark.slow
 def test_a_camera_whose_power_fails_is_back_when_it_has_power_again(
     server: Server, watched: Watched
 ) -> None:

@@ -118,6 +118,7 @@ def test_a_camera_held_up_for_long_is_told_and_paired_rightly_afterwards(
     assert "75 ms apart" in str(held_up(moved_ms))
 
 
+@pytest.mark.slow
 def test_clocks_that_drift_apart_are_not_told_as_held_up() -> None:
     pairs = FramePairs()
     for seq in range(2000):

@@ -211,6 +211,7 @@ def test_a_folder_that_is_gone_is_a_lost_camera_until_it_is_back(
     np.testing.assert_array_equal(camera.read(1.0).image, images[0])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="an open file stays where it is there")
 def test_a_video_that_is_gone_is_a_lost_camera(tmp_path: Path) -> None:
     path = tmp_path / "swing.avi"

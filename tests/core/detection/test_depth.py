@@ -44,6 +44,7 @@ def rms(off: FloatArray) -> float:
     return float(np.sqrt(np.nanmean(np.square(off))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exposure", [USUAL, DIM])
 def test_centres_are_no_worse_with_12_bits_than_with_8(exposure: float) -> None:
     deep, flat = errors(12, exposure), errors(8, exposure)

@@ -246,6 +246,7 @@ def test_every_reason_that_one_image_can_have_is_among_the_scenes() -> None:
     assert reasons == set(Reason) - of_many_images - elsewhere
 
 
+@pytest.mark.slow
 def test_hard_images_show_the_same_live_and_on_files() -> None:
     """Tracking refuses no image that a start labels, and for no other reason.
 

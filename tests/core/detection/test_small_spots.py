@@ -87,6 +87,7 @@ def test_clipped_leds_that_bloom_have_centers(width: float) -> None:
     assert found.rms < 0.06
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("panel", [EASY, HARD, replace(HARD, width=8.0)])
 def test_the_stated_standard_deviation_is_about_the_error(panel: Panel) -> None:
     found = found_on(panel, 6)

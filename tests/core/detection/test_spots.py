@@ -529,6 +529,7 @@ def test_the_number_of_spots_is_limited() -> None:
     assert len(detect_spots(image)) == MAX_SPOTS
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(
     arrays(

@@ -107,6 +107,7 @@ def observed(*images: Image) -> Observations:
     return observe_images(ImageSource(names, (), partial(iter, loaders)), CAMERA, PEN)
 
 
+@pytest.mark.slow
 def test_no_ugly_image_is_beyond_the_live_way() -> None:
     before = None
     reasons = []
@@ -124,6 +125,7 @@ def test_no_ugly_image_is_beyond_the_live_way() -> None:
     }
 
 
+@pytest.mark.slow
 def test_no_ugly_image_is_beyond_the_way_of_files() -> None:
     rngs = [np.random.default_rng([10, seed]) for seed in range(N_FILES)]
 

@@ -42,6 +42,7 @@ def refused(sightings: Sightings, station: Station = STATION) -> str:
     return caught.value.message.code
 
 
+@pytest.mark.slow
 def test_tip_pen_and_camera_are_found_within_their_uncertainties(
     found: Discovery,
 ) -> None:
@@ -79,6 +80,7 @@ def test_leds_are_numbered_from_the_tip_upwards(found: Discovery) -> None:
     np.testing.assert_allclose(found.pen.leds[-1, [0, 2]], 0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_sketch_gives_numbers_and_frame() -> None:
     rng = np.random.default_rng(1)
     order = rng.permutation(STATION.pen.n_leds)
@@ -94,6 +96,7 @@ def test_a_sketch_gives_numbers_and_frame() -> None:
     assert np.linalg.norm(found.tip_pen - tip) < 8
 
 
+@pytest.mark.slow
 def test_a_known_camera_makes_the_tip_more_certain(found: Discovery) -> None:
     sigmas = np.array([1.0, 1.0, 0.5, 0.5, 1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
     camera = replace(STATION.camera, covariance=np.diag(sigmas**2))
@@ -107,6 +110,7 @@ def test_a_known_camera_makes_the_tip_more_certain(found: Discovery) -> None:
     assert (np.abs(errors.tip) < 1.75 * known.expanded_uncertainty).all()
 
 
+@pytest.mark.slow
 def test_an_uncertain_length_makes_the_tip_uncertain_in_proportion() -> None:
     length = MeasuredLength(None, STATION.longest, 0.02)
     found = discover(STATION.sightings, replace(STATION.request, lengths=(length,)))
@@ -117,6 +121,7 @@ def test_an_uncertain_length_makes_the_tip_uncertain_in_proportion() -> None:
     assert found.expanded_uncertainty[1] < 1.5 * by_length[1]
 
 
+@pytest.mark.slow
 def test_without_a_length_the_result_is_relative() -> None:
     found = discover(STATION.sightings, replace(STATION.request, lengths=()))
 
@@ -136,6 +141,7 @@ def test_without_a_length_the_result_is_relative() -> None:
     assert np.abs(errors.tip).max() < 0.15
 
 
+@pytest.mark.slow
 def test_a_tip_that_slips_and_lights_that_are_none_are_left_out() -> None:
     rng = np.random.default_rng(7)
     swing = STATION.swing
@@ -161,6 +167,7 @@ def test_a_tip_that_slips_and_lights_that_are_none_are_left_out() -> None:
     assert found.expanded_uncertainty.max() < 0.1
 
 
+@pytest.mark.slow
 def test_images_out_of_order_are_refused() -> None:
     def shuffled(centers: list[np.ndarray]) -> list[np.ndarray]:
         order = np.random.default_rng(2).permutation(len(centers))
@@ -181,6 +188,7 @@ def test_a_pen_of_four_leds_is_refused() -> None:
     assert refused(few.sightings, few) == "discover.too-few-leds"
 
 
+@pytest.mark.slow
 def test_a_second_pen_is_refused() -> None:
     other = random_station(8, n_images=N)
 
@@ -191,6 +199,7 @@ def test_a_second_pen_is_refused() -> None:
     assert refused(with_centers(STATION, both)) == "discover.two-pens"
 
 
+@pytest.mark.slow
 def test_a_camera_that_zooms_midway_is_refused() -> None:
     camera = STATION.camera
     longer = replace(camera, fx=1.03 * camera.fx, fy=1.03 * camera.fy)
@@ -201,6 +210,7 @@ def test_a_camera_that_zooms_midway_is_refused() -> None:
     assert refused(zoomed.sightings, zoomed) == "discover.camera-changed"
 
 
+@pytest.mark.slow
 def test_a_swing_that_hardly_tilts_is_refused() -> None:
     swing = STATION.swing
     rng = np.random.default_rng(5)
@@ -216,6 +226,7 @@ def test_a_swing_that_hardly_tilts_is_refused() -> None:
     }
 
 
+@pytest.mark.slow
 def test_two_lengths_that_contradict_each_other_are_refused(found: Discovery) -> None:
     leds = found.pen.leds
     right = float(np.linalg.norm(leds[0] - leds[-1]))
@@ -227,6 +238,7 @@ def test_two_lengths_that_contradict_each_other_are_refused(found: Discovery) ->
     assert caught.value.message.code == "discover.lengths-contradict"
 
 
+@pytest.mark.slow
 def test_a_length_to_an_led_that_is_none_is_refused() -> None:
     lengths = (MeasuredLength((1, 40), 100.0, 0.01),)
     with pytest.raises(CalibrationError, match="no LED 40"):

@@ -32,6 +32,7 @@ def together() -> Together:
     return discover_together((FIRST.sightings, again(1).sightings), FIRST.request)
 
 
+@pytest.mark.slow
 def test_two_swings_know_more_than_each_and_are_true(together: Together) -> None:
     found = together.found
     for each in together.swings:
@@ -61,6 +62,7 @@ def test_swings_with_images_of_two_sizes_are_refused() -> None:
         discover_together((FIRST.sightings, smaller), FIRST.request)
 
 
+@pytest.mark.slow
 def test_a_second_cone_at_a_known_distance_gives_the_scale() -> None:
     separation = ConeSeparation(float(np.linalg.norm(APART)), 1e-3)
     second = SecondSightings(again(2, APART).sightings, separation)

@@ -42,6 +42,7 @@ def calibration() -> Calibration:
     return calibrate(camera, pen, observe_centers(centers, camera, pen))
 
 
+@pytest.mark.slow
 def test_the_linear_budget_agrees_with_trials(calibration: Calibration) -> None:
     found = run_monte_carlo(calibration, N_TRIALS, in_this_process)
 

@@ -151,6 +151,7 @@ def test_a_rig_whose_file_states_nothing_adds_nothing_to_what_the_images_say() -
     assert (error < 1.5 * result.budget.expanded_uncertainty[:3]).all()
 
 
+@pytest.mark.slow
 def test_a_focal_length_that_is_off_moves_the_tip_by_micrometres() -> None:
     """The limit is that of 0.1 % in one of two cameras; held, it moves 0.2 mm."""
     errors = []
@@ -292,6 +293,7 @@ def test_a_single_image_of_another_moment_is_left_out_and_told() -> None:
     assert (error < 1.5 * result.budget.expanded_uncertainty[:3]).all()
 
 
+@pytest.mark.slow
 def test_a_camera_that_lags_is_named_with_its_lag_and_corrected() -> None:
     times = np.arange(60) / 20
     now, later = (
@@ -377,6 +379,7 @@ def test_text_and_record_tell_of_each_camera(good: Calibration) -> None:
     assert "U from rig" in text
 
 
+@pytest.mark.slow
 def test_the_covariance_agrees_with_the_scatter_over_drawn_rigs() -> None:
     """Camera and rig files are off by what they state."""
     normalised = []

@@ -718,6 +718,7 @@ def cameras(draw: st.DrawFn) -> Camera:
     )
 
 
+@pytest.mark.slow
 @given(cameras())
 def test_any_camera_is_read_back_to_the_last_digit(
     tmp_path_factory: pytest.TempPathFactory, expected: Camera
@@ -827,6 +828,7 @@ def test_the_shared_camera_is_read(shared_data: Path) -> None:
     assert_same(found, expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     [

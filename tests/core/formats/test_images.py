@@ -193,6 +193,7 @@ def test_a_png_of_noise_is_read_however_little_it_is_compressed(
     assert np.array_equal(decode_image(data, "noise.png"), noise)
 
 
+@pytest.mark.slow
 def test_large_images_are_decoded_in_turn(tmp_path: Path) -> None:
     large = np.zeros((7000, 9000), dtype=np.uint8)  # half of the memory and more
     path = tmp_path / "large.png"

@@ -467,6 +467,7 @@ def pens(draw: st.DrawFn) -> Pen:
     )
 
 
+@pytest.mark.slow
 @given(pens(), st.sampled_from(["csv", "json"]))
 def test_any_pen_is_read_back_to_the_last_digit(
     tmp_path_factory: pytest.TempPathFactory, pen: Pen, suffix: str
@@ -476,6 +477,7 @@ def test_any_pen_is_read_back_to_the_last_digit(
     assert_same(read_pen(path), pen)
 
 
+@pytest.mark.slow
 @given(
     pens(),
     st.lists(st.floats(-1e5, 1e5), min_size=3, max_size=3),

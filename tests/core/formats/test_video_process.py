@@ -61,6 +61,7 @@ def frame_of_h264(side: int) -> bytes:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit is one of Linux")
 @pytest.mark.parametrize("n_small", [0, 40], ids=["at once", "later"])
 def test_frames_larger_than_those_of_cameras_do_not_fill_the_memory(

@@ -61,6 +61,7 @@ def test_the_jacobian_agrees_with_differences(make_views: MakeViews) -> None:
         assert grown == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_covariance_agrees_with_the_scatter_of_fits(
     make_views: MakeViews, camera: Camera
 ) -> None:

@@ -44,6 +44,7 @@ def ten(make_views: MakeViews) -> CameraCalibration:
     return calibrated(make_views(n_views=10))
 
 
+@pytest.mark.slow
 def test_views_copied_six_times_count_once(
     make_views: MakeViews, ten: CameraCalibration
 ) -> None:
@@ -57,6 +58,7 @@ def test_views_copied_six_times_count_once(
     assert "50 views repeat the board position" in str(found.remarks[0])
 
 
+@pytest.mark.slow
 def test_images_of_a_board_at_rest_count_once(
     make_views: MakeViews, ten: CameraCalibration
 ) -> None:
@@ -80,6 +82,7 @@ def test_one_pose_alone_is_refused_as_such(make_views: MakeViews) -> None:
         calibrated(replace(views, pixels=rest))
 
 
+@pytest.mark.slow
 def test_zoom_in_the_middle_of_a_set_is_refused_with_the_first_view_after_it(
     make_views: MakeViews, camera: Camera
 ) -> None:
@@ -90,6 +93,7 @@ def test_zoom_in_the_middle_of_a_set_is_refused_with_the_first_view_after_it(
         calibrated(merged(before, after, np.arange(28) >= 14))
 
 
+@pytest.mark.slow
 def test_a_small_change_is_a_finding(make_views: MakeViews, camera: Camera) -> None:
     before = make_views(n_views=24)
     after = make_views(n_views=24, of=replace(camera, cx=camera.cx + 3.0))
@@ -101,11 +105,13 @@ def test_a_small_change_is_a_finding(make_views: MakeViews, camera: Camera) -> N
     }
 
 
+@pytest.mark.slow
 def test_an_unchanged_camera_is_not_said_to_have_changed(make_views: MakeViews) -> None:
     for seed in range(3):
         assert not calibrated(make_views(seed=seed)).remarks
 
 
+@pytest.mark.slow
 def test_two_cameras_in_one_set_are_named_as_such(make_views: MakeViews) -> None:
     odd = np.arange(20) % 3 == 1
     mixed = merged(make_views(n_views=20), make_views(n_views=20, of=OTHER), odd)
@@ -130,6 +136,7 @@ def test_rotated_images_are_named_also_with_uneven_squares(
     assert names == "view_03.png, view_06.png, view_10.png"
 
 
+@pytest.mark.slow
 def test_sheared_images_are_not_taken_for_a_sheared_board(
     make_views: MakeViews,
 ) -> None:
@@ -144,12 +151,14 @@ def test_sheared_images_are_not_taken_for_a_sheared_board(
     assert np.radians(degrees) == pytest.approx(0.003, abs=BoardTolerances().squareness)
 
 
+@pytest.mark.slow
 def test_a_board_in_another_unit_is_questioned(make_views: MakeViews) -> None:
     found = calibrated(make_views("chessboard:9x6:2423"))
 
     assert "makes a board of 19.4 m" in str(found.remarks[-1])
 
 
+@pytest.mark.slow
 def test_a_board_bent_as_none_is_refused(make_views: MakeViews) -> None:
     with pytest.raises(CalibrationError, match="bent by"):
         calibrated(make_views(shape=np.array([0, 0, 12.0, 0, 8.0])))

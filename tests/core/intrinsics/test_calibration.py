@@ -36,6 +36,7 @@ def few(make_views: MakeViews) -> CameraCalibration:
     return calibrate_camera(make_views(n_views=6), BoardTolerances())
 
 
+@pytest.mark.slow
 def test_the_truth_lies_within_the_intervals(
     found: CameraCalibration, camera: Camera
 ) -> None:
@@ -54,6 +55,7 @@ def test_five_coefficients_are_kept_where_eight_gain_nothing(
     assert "5 distortion coefficients:" in str(found.choice.message)
 
 
+@pytest.mark.slow
 def test_eight_coefficients_are_taken_where_the_lens_needs_them(
     make_views: MakeViews,
 ) -> None:
@@ -69,6 +71,7 @@ def test_eight_coefficients_are_taken_where_the_lens_needs_them(
     assert "they reduce the cross-validated error" in str(choice.message)
 
 
+@pytest.mark.slow
 def test_a_lens_that_the_views_leave_open_is_refused(make_views: MakeViews) -> None:
     """The corners, which no view reaches, are extrapolated by a rational function."""
     lens = Camera(
@@ -94,6 +97,7 @@ def test_views_left_out_are_met_nearly_as_well_as_those_fitted(
     assert found.adjustment.rms < found.held_out_rms < 1.2 * found.adjustment.rms
 
 
+@pytest.mark.slow
 def test_views_left_out_are_met_by_the_board_as_it_is_bent(
     make_views: MakeViews,
 ) -> None:
@@ -103,6 +107,7 @@ def test_views_left_out_are_met_by_the_board_as_it_is_bent(
     assert found.held_out_rms < 1.2 * found.adjustment.rms
 
 
+@pytest.mark.slow
 def test_a_view_that_fits_no_other_is_left_out(make_views: MakeViews) -> None:
     views = make_views()
     pixels = views.pixels.copy()
@@ -121,6 +126,7 @@ def test_a_view_that_shows_one_row_is_left_out(make_views: MakeViews) -> None:
     assert found.left_out == (views.names[3],)
 
 
+@pytest.mark.slow
 def test_a_misplaced_point_is_left_out(make_views: MakeViews) -> None:
     views = make_views()
     pixels = views.pixels.copy()
@@ -153,6 +159,7 @@ def test_views_that_are_alike_are_refused(make_views: MakeViews) -> None:
         calibrate_camera(alike, BoardTolerances())
 
 
+@pytest.mark.slow
 def test_a_board_printed_to_fit_the_page_is_remarked(make_views: MakeViews) -> None:
     stretched = np.array([0.03, 0, 0, 0, 0])
     found = calibrate_camera(make_views(shape=stretched), BoardTolerances())
@@ -162,6 +169,7 @@ def test_a_board_printed_to_fit_the_page_is_remarked(make_views: MakeViews) -> N
     assert remark.values["stretch"] == pytest.approx(0.03, abs=5e-4)
 
 
+@pytest.mark.slow
 def test_a_bent_board_is_remarked(make_views: MakeViews) -> None:
     bent = np.array([0, 0, 1.5, 0, 0])
     found = calibrate_camera(make_views(shape=bent), BoardTolerances())
@@ -177,6 +185,7 @@ def test_points_of_another_board_are_refused(make_views: MakeViews) -> None:
         calibrate_camera(replace(views, pixels=shuffled), BoardTolerances())
 
 
+@pytest.mark.slow
 def test_what_the_views_do_not_reach_is_said(make_views: MakeViews) -> None:
     views = make_views()
     left = views.pixels[:, 0, :, 0].max(axis=1) < 520
@@ -188,6 +197,7 @@ def test_what_the_views_do_not_reach_is_said(make_views: MakeViews) -> None:
     assert "bottom right" in str(missing[0])
 
 
+@pytest.mark.slow
 def test_the_next_view_takes_more_of_the_uncertainty_where_little_is_known(
     few: CameraCalibration, found: CameraCalibration
 ) -> None:
@@ -222,6 +232,7 @@ def test_residuals_are_told_by_region(found: CameraCalibration) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_wide_lens_is_fitted_though_no_view_reaches_the_corners(
     make_views: MakeViews,
 ) -> None:

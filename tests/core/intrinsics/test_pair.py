@@ -64,12 +64,14 @@ def errors(found: PairCalibration) -> FloatArray:
     return np.asarray(off / np.sqrt(np.diag(found.rig.covariance)))
 
 
+@pytest.mark.slow
 def test_the_second_camera_stands_where_it_does(found: PairCalibration) -> None:
     assert np.abs(errors(found)).max() < 3.5  # of six
     assert found.baseline == pytest.approx(np.linalg.norm(SHIFT), abs=0.3)
     assert not found.remarks
 
 
+@pytest.mark.slow
 def test_the_scale_of_the_board_is_part_of_the_baseline(camera: Camera) -> None:
     vague = BoardTolerances(scale=0.01)
     found = calibrate_pair(both_see(camera), vague, NAMES)
@@ -77,6 +79,7 @@ def test_the_scale_of_the_board_is_part_of_the_baseline(camera: Camera) -> None:
     assert found.baseline_sigma == pytest.approx(0.01 * found.baseline, rel=0.05)
 
 
+@pytest.mark.slow
 def test_views_of_the_second_camera_alone_are_used(camera: Camera) -> None:
     turn = rotation_from_vector(np.array([0.0, -1.0, 0.0]))
     middle = np.array([20.0, 0.0, 400.0])
@@ -93,6 +96,7 @@ def test_views_of_the_second_camera_alone_are_used(camera: Camera) -> None:
     assert np.sqrt(np.nanmean(found.adjustment.view_rms**2)) < 2 * NOISE
 
 
+@pytest.mark.slow
 def test_a_board_numbered_from_its_other_end_is_turned_round(camera: Camera) -> None:
     views = both_see(camera)
     pixels = views.pixels.copy()
@@ -103,6 +107,7 @@ def test_a_board_numbered_from_its_other_end_is_turned_round(camera: Camera) -> 
     assert np.abs(errors(found)).max() < 3.5
 
 
+@pytest.mark.slow
 def test_a_pair_of_images_of_two_moments_is_left_out(camera: Camera) -> None:
     views = both_see(camera)
     pixels = views.pixels.copy()
@@ -112,6 +117,7 @@ def test_a_pair_of_images_of_two_moments_is_left_out(camera: Camera) -> None:
     assert found.left_out == ("5.png",)
 
 
+@pytest.mark.slow
 def test_cameras_whose_files_are_given_keep_to_them(camera: Camera) -> None:
     known = replace(camera, covariance=np.diag(np.full(9, 1e-12)))
     found = calibrate_pair(both_see(camera), BoardTolerances(), NAMES, (known, known))
@@ -121,6 +127,7 @@ def test_cameras_whose_files_are_given_keep_to_them(camera: Camera) -> None:
         np.testing.assert_allclose(own.intrinsics, camera.intrinsics, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_cameras_out_of_step_are_told_with_what_that_costs(camera: Camera) -> None:
     found = calibrate_pair(
         both_see(camera, late=0.04), BoardTolerances(), NAMES, (), 500.0
@@ -131,6 +138,7 @@ def test_cameras_out_of_step_are_told_with_what_that_costs(camera: Camera) -> No
     assert "pair.late-by" in [remark.code for remark in found.remarks]
 
 
+@pytest.mark.slow
 def test_the_board_is_judged_by_both_cameras_together(camera: Camera) -> None:
     found = calibrate_pair(both_see(camera, stretch=0.01), BoardTolerances(), NAMES)
 

@@ -75,6 +75,7 @@ def error_of(points: FloatArray | None, board: Board) -> float:
     return float(np.sqrt(min(errors)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", LIMITS)
 def test_the_points_of_a_board_are_found(word: str) -> None:
     board = parse_board(word)
@@ -85,6 +86,7 @@ def test_the_points_of_a_board_are_found(word: str) -> None:
     assert np.isfinite(points[:, 0]).mean() > 0.9  # a ChArUco board may lack some
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", ["circles:7x5:20:14", "asymmetric-circles:4x9:15:14"])
 def test_no_circle_of_a_grid_is_seen_off_its_place(word: str) -> None:
     board = parse_board(word)
@@ -216,6 +218,7 @@ def test_corners_are_counted_from_any_part_of_a_board_that_was_found(
     assert not goes_on(image, grid)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("said", ["5x4", "6x5", "8x6"])
 def test_a_part_of_a_far_larger_board_is_not_taken_for_the_board(said: str) -> None:
     """OpenCV finds one, of every second corner or of corners that are none."""

@@ -56,6 +56,7 @@ def found() -> CameraCalibration:
     return calibrate_camera(held_before(WIDE, 24, 1), BoardTolerances())
 
 
+@pytest.mark.slow
 def test_a_fisheye_is_taken_for_one(found: CameraCalibration) -> None:
     assert found.camera.lens is LensModel.KANNALA_BRANDT
     assert found.held_out_rms < 1.1 * NOISE * 2**0.5
@@ -73,6 +74,7 @@ def test_the_truth_of_a_fisheye_lies_within_the_intervals(
     assert map_uncertainty(found.camera, found.camera.covariance).worst < 0.5
 
 
+@pytest.mark.slow
 def test_a_round_image_is_uncertain_only_where_it_shows_something() -> None:
     found = calibrate_camera(held_before(ROUND, 24, 2), BoardTolerances())
     assert found.camera.covariance is not None

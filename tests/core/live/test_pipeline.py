@@ -189,6 +189,7 @@ def test_masked_light_is_left_out_with_and_without_a_camera(
     assert screen.n_spots == 0
 
 
+@pytest.mark.slow
 def test_a_swing_keeps_its_pen_and_mask_when_others_are_looked_for(
     station: "Station", make_live: MakeLive, screen: Screen, interrupted: Path
 ) -> None:
@@ -288,6 +289,7 @@ def gap_s(screen: Screen) -> float:
     return (now.frame.host_ts_ns - before.frame.host_ts_ns) * 1e-9
 
 
+@pytest.mark.slow
 def test_in_a_swing_what_rests_for_long_is_looked_at_less_often_until_it_moves(
     station: "Station",
     make_live: MakeLive,
@@ -310,6 +312,7 @@ def test_in_a_swing_what_rests_for_long_is_looked_at_less_often_until_it_moves(
     screen.wait_until(lambda: gap_s(screen) < 2 / FRAME_RATE)
 
 
+@pytest.mark.slow
 def test_a_swing_begins_with_a_pen_that_has_rested_for_long(
     station: "Station",
     make_live: MakeLive,
@@ -571,6 +574,7 @@ def test_a_bug_while_looking_counts_as_a_camera_that_failed(
     crashed.stop()
 
 
+@pytest.mark.slow
 def test_a_bug_while_looking_leaves_the_swing_to_the_next_camera(
     crashed: Live, station: "Station", make_live: MakeLive
 ) -> None:

@@ -293,6 +293,7 @@ def gige_pair(
     second.unplug()
 
 
+@pytest.mark.slow
 def test_two_cameras_are_still_paired_when_nothing_has_moved_for_long(
     gige_pair: tuple[GigeSimulator, GigeSimulator], make_live: MakeLive, screen: Screen
 ) -> None:

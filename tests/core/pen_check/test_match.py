@@ -112,6 +112,7 @@ def test_a_true_file_fits() -> None:
     np.testing.assert_allclose(match.rms, NOISE * np.sqrt(2), rtol=0.5)
 
 
+@pytest.mark.slow
 def test_twenty_clean_swings_raise_no_alarm() -> None:
     for seed in range(20):
         rng = np.random.default_rng(seed)
@@ -120,6 +121,7 @@ def test_twenty_clean_swings_raise_no_alarm() -> None:
         assert match_pen(CAMERA, pen, views).findings == ()
 
 
+@pytest.mark.slow
 def test_an_led_half_a_millimetre_off_is_named_within_two_seconds() -> None:
     n_named, n_trials = 0, 30
     for seed in range(n_trials):
@@ -163,6 +165,7 @@ def test_two_leds_off_are_both_named() -> None:
     assert [finding.leds for finding in findings] == [(8,), (3,)]
 
 
+@pytest.mark.slow
 def test_an_exchanged_coordinate_is_named() -> None:
     views = SWUNG[::5]
     wrong = []

@@ -80,6 +80,7 @@ def test_images_taken_out_give_the_same_tip_at_once_and_from_the_disk(
     assert at_once.calibration.used.sum() == N_IMAGES - 2
 
 
+@pytest.mark.slow
 def test_images_put_back_give_the_tip_of_before(folder: Path) -> None:
     before = solve_record(open_record(folder))
     note_taken_out(folder, {1: "taken out", 2: "taken out"})

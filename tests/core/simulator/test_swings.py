@@ -52,6 +52,7 @@ def test_every_led_is_whole_and_clear_in_a_careful_swing(name: str, kind: str) -
     assert gaps.min() >= MIN_GAP
 
 
+@pytest.mark.slow
 def test_cone_out_of_sight_is_refused() -> None:
     far_aside = PAPER_CONE + np.array([500.0, 0, 0])
     with pytest.raises(ValueError, match="cone_cam"):

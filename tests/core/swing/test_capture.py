@@ -136,6 +136,7 @@ def calibrated(folder: Path) -> Calibration:
     return calibrate(found.camera, found.pen, seen)
 
 
+@pytest.mark.slow
 def test_every_kept_image_is_on_disk_with_what_was_seen_in_it(wizard: Wizard) -> None:
     wizard.run(12)
     record = open_record(wizard.folder)
@@ -180,6 +181,7 @@ def test_centres_found_live_are_those_found_in_the_record(wizard: Wizard) -> Non
     np.testing.assert_array_equal(seen.pixels, wizard.state.kept.pixels[:, 0])
 
 
+@pytest.mark.slow
 def test_an_interrupted_swing_goes_on_with_all_its_images(wizard: Wizard) -> None:
     wizard.run(20)
     before = wizard.state
@@ -211,6 +213,7 @@ def test_a_record_without_images_is_resumed_as_a_new_swing(wizard: Wizard) -> No
     assert (state.n_kept, state.next_number, state.phase) == (0, 1, Phase.WAIT)
 
 
+@pytest.mark.slow
 def test_slipped_images_are_taken_out_of_the_record(tmp_path: Path) -> None:
     swung = Swung()
     wizard = Wizard(tmp_path, swung)

@@ -128,6 +128,7 @@ def test_nothing_is_certain_before_the_postures_allow_a_joint_fit() -> None:
     assert upright.joint is None
 
 
+@pytest.mark.slow
 def test_slipped_images_are_left_out_and_no_others() -> None:
     out = [5, 6, 31]
     kept, numbers = without_slipped(RIG, PEN, grown(slipping(out, 0.5)))
@@ -175,6 +176,7 @@ def test_an_image_that_the_fit_leaves_out_has_the_misfit_of_all_its_leds() -> No
     np.testing.assert_allclose(without.misfits[5], np.sqrt(squares.mean()))
 
 
+@pytest.mark.slow
 def test_a_tip_that_wobbles_throughout_costs_no_images() -> None:
     swing = swing_poses(60, np.random.default_rng(0))
     wobble = 0.15 * np.random.default_rng(2).standard_normal((60, 3))

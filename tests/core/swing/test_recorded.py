@@ -71,6 +71,7 @@ def recording(station: "Station", swung: Callable[..., Path]) -> Recording:
     return recording
 
 
+@pytest.mark.slow
 def test_all_images_are_read_once_and_in_order_and_then_the_tip_is_computed(
     recording: Recording, station: "Station", swung: Callable[..., Path]
 ) -> None:
@@ -107,6 +108,7 @@ def test_it_begins_with_the_first_image_whichever_is_shown(
     assert station.state.progress.n_read == station.n_recorded == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoiled", [7, N_IMAGES - 1])
 def test_an_image_that_cannot_be_read_is_passed_over(
     station: "Station", swung: Callable[..., Path], tmp_path: Path, spoiled: int
@@ -124,6 +126,7 @@ def test_an_image_that_cannot_be_read_is_passed_over(
     assert station.state.n_dropped == {Reason.UNREADABLE: 1}
 
 
+@pytest.mark.slow
 def test_the_verdict_is_that_on_the_same_files(
     station: "Station", swung: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -152,6 +155,7 @@ def test_the_verdict_is_that_on_the_same_files(
     assert told.grade is Grade.PASS
 
 
+@pytest.mark.slow
 def test_an_image_takes_part_that_would_on_files_with_few_leds_whole(
     station: "Station", swung: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -179,6 +183,7 @@ def test_an_image_takes_part_that_would_on_files_with_few_leds_whole(
     assert not station.state.n_dropped
 
 
+@pytest.mark.slow
 def test_the_postures_that_are_missing_are_named_at_the_end(
     station: "Station", swung: Callable[..., Path]
 ) -> None:
@@ -194,6 +199,7 @@ def test_the_postures_that_are_missing_are_named_at_the_end(
     assert "camera" in str(tilt)  # which side, the hand of the operator decides
 
 
+@pytest.mark.slow
 def test_an_interrupted_reading_goes_on_and_takes_no_image_twice(
     recording: Recording, station: "Station"
 ) -> None:
@@ -210,6 +216,7 @@ def test_an_interrupted_reading_goes_on_and_takes_no_image_twice(
     assert len(sums) == len(set(sums)) == N_IMAGES
 
 
+@pytest.mark.slow
 def test_a_pause_waits_and_goes_on_with_the_next_image(
     recording: Recording, station: "Station"
 ) -> None:
@@ -224,6 +231,7 @@ def test_a_pause_waits_and_goes_on_with_the_next_image(
     assert station.n_recorded == N_IMAGES
 
 
+@pytest.mark.slow
 def test_after_the_verdict_nothing_more_can_be_captured_or_confirmed(
     recording: Recording, station: "Station"
 ) -> None:

@@ -245,6 +245,7 @@ def whole() -> Station:
     return station.run(120.0, until=Phase.SOLVING)
 
 
+@pytest.mark.slow
 def test_a_guided_swing_goes_through_its_phases_without_a_key(whole: Station) -> None:
     assert whole.phases == [
         Phase.WAIT,
@@ -380,6 +381,7 @@ def test_lifting_in_the_countdown_starts_over() -> None:
     assert station.event_kinds()[-1] is SwingEventKind.LOST
 
 
+@pytest.mark.slow
 def test_a_slip_drops_its_own_images_only() -> None:
     station = capturing()
     before = station.state.kept.numbers
@@ -416,6 +418,7 @@ def test_a_slip_says_so_once_with_the_number_of_images() -> None:
     assert station.state.message == FOLLOW_ARROW
 
 
+@pytest.mark.slow
 def test_images_that_slipped_are_found_when_more_is_known() -> None:
     # 0.3 mm in the first images hides in what the tip may still be.
     station = Station(period=0.1)
@@ -576,6 +579,7 @@ def test_finishing_early_says_what_is_missing() -> None:
     assert transition.events == (SwingEvent(SwingEventKind.CAPTURED),)
 
 
+@pytest.mark.slow
 def test_the_ceiling_ends_a_swing_that_is_not_good_enough() -> None:
     limits = SwingLimits(max_uncertainty=4e-3, min_images=30, max_images=40)
     station = Station(limits=limits, pen=EXACT_PEN)
@@ -585,6 +589,7 @@ def test_the_ceiling_ends_a_swing_that_is_not_good_enough() -> None:
     assert missing(station.setup, station.state)[-1].code == Code.UNCERTAIN
 
 
+@pytest.mark.slow
 def test_fields_the_camera_cannot_see_are_not_asked_for() -> None:
     station = Station(limits=SwingLimits(max_uncertainty=0.02), sigma=0.01)
     station.cone = PAPER_CONE + np.array([200.0, 0.0, 0.0])
@@ -635,6 +640,7 @@ def test_three_seconds_upright_and_still_say_yes_and_no_more_than_that() -> None
     assert stillness(replace(still, time=9.0)) == 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "drops"), [(1, False), (2, False), (5, True)])
 def test_whatever_happens_the_events_tell_what_is_kept(seed: int, drops: bool) -> None:
     station = Station(seed=seed)

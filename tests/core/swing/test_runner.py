@@ -52,6 +52,7 @@ class Screen:
 # From the first image to the accepted tip
 
 
+@pytest.mark.slow
 def test_a_swing_goes_from_the_first_image_to_the_accepted_tip_without_a_key(
     present: "Station", command: Command
 ) -> None:
@@ -100,6 +101,7 @@ def test_a_swing_goes_from_the_first_image_to_the_accepted_tip_without_a_key(
     assert open_record(station.record_folder).verdict == result.grade
 
 
+@pytest.mark.slow
 def test_without_a_nominal_tip_the_swing_finds_the_seat_and_goes_to_the_verdict(
     station: "Station",
 ) -> None:
@@ -222,6 +224,7 @@ def test_commands_without_a_swing_do_nothing(station: "Station") -> None:
 # Capture
 
 
+@pytest.mark.slow
 def test_a_paused_swing_keeps_nothing_until_it_is_resumed(
     station: "Station", interrupted: Path
 ) -> None:

@@ -5,6 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import pytest
+
 from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.reading import DISCARDED, IMAGES, open_record
 from lightpen.swing.preparation import (
@@ -93,6 +95,7 @@ def test_whoever_comes_again_tries_again(present: "Station") -> None:
     assert present.status.refusal is None
 
 
+@pytest.mark.slow
 def test_leaving_pauses_and_coming_back_goes_on(
     present: "Station", interrupted: Path
 ) -> None:
@@ -218,6 +221,7 @@ def test_other_choices_are_settled_when_they_are_kept_or_taken_back(
     assert present.status.names.operator == "Ann"
 
 
+@pytest.mark.slow
 def test_other_choices_are_not_settled_by_capturing_more(
     solved: "Station", interrupted: Path
 ) -> None:

@@ -44,6 +44,7 @@ def is_reported_once(crashes: Crashes) -> bool:
     return crashes.get(timeout=TIMEOUT) is MistakeError and crashes.empty()
 
 
+@pytest.mark.slow
 def test_a_bug_while_an_image_is_taken_pauses_the_swing_and_costs_nothing_else(
     station: "Station",
     interrupted: Path,

@@ -57,6 +57,7 @@ def test_both_images_of_a_moment_are_recorded_with_what_they_show(by_two: Path) 
     assert decode_image(data, "it").shape == (1024, 1224)
 
 
+@pytest.mark.slow
 def test_running_fit_and_solution_are_of_both_cameras(
     station: "Station", by_two: Path, command: Command
 ) -> None:
@@ -124,6 +125,7 @@ def capture_more(
         )
 
 
+@pytest.mark.slow
 def test_moments_that_only_the_second_camera_shows_count_live_and_on_files(
     station: "Station", by_two: Path
 ) -> None:
@@ -144,6 +146,7 @@ def test_moments_that_only_the_second_camera_shows_count_live_and_on_files(
     assert second.used[-3:].all()
 
 
+@pytest.mark.slow
 def test_an_interrupted_swing_goes_on_with_both_cameras(
     station: "Station", by_two: Path
 ) -> None:

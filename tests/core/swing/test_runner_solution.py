@@ -40,6 +40,7 @@ Command = Callable[[Path], dict[str, Any]]
 # The solution
 
 
+@pytest.mark.slow
 def test_the_tip_is_that_of_the_command_line_to_the_last_digit(
     solved: "Station", command: Command
 ) -> None:
@@ -53,6 +54,7 @@ def test_the_tip_is_that_of_the_command_line_to_the_last_digit(
     assert fields == command(solved.record_folder)
 
 
+@pytest.mark.slow
 def test_so_it_is_after_taking_images_out_and_putting_some_back(
     solved: "Station", command: Command
 ) -> None:
@@ -79,6 +81,7 @@ def test_how_far_the_tip_is_computed_is_told_from_0_to_1(solved: "Station") -> N
     assert (fractions[0] < 0.1, fractions[-1]) == (True, 1.0)
 
 
+@pytest.mark.slow
 def test_images_taken_out_in_quick_succession_all_count(
     solved: "Station", command: Command
 ) -> None:
@@ -95,6 +98,7 @@ def test_images_taken_out_in_quick_succession_all_count(
     assert event_kinds.count(event_kinds[-1]) == 1  # the verdict is told once
 
 
+@pytest.mark.slow
 def test_too_few_images_left_keep_the_solution_and_the_record(
     solved: "Station",
 ) -> None:
@@ -201,6 +205,7 @@ def test_nothing_comes_of_a_solution_after_its_swing_was_abandoned(
     assert station.witness.faults == []
 
 
+@pytest.mark.slow
 def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
     solved: "Station",
 ) -> None:
@@ -221,6 +226,7 @@ def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
 # After the verdict
 
 
+@pytest.mark.slow
 def test_holding_the_pen_upright_and_still_after_the_verdict_is_told_once(
     solved: "Station",
 ) -> None:
@@ -236,6 +242,7 @@ def test_holding_the_pen_upright_and_still_after_the_verdict_is_told_once(
     assert solved.state.phase is Phase.VERDICT
 
 
+@pytest.mark.slow
 def test_more_images_can_be_captured_after_the_verdict(
     solved: "Station", command: Command
 ) -> None:
@@ -254,6 +261,7 @@ def test_more_images_can_be_captured_after_the_verdict(
     assert solved.tip == command(solved.record_folder)["tip_pen_mm"]
 
 
+@pytest.mark.slow
 def test_the_operators_side_is_that_of_the_station_and_kept_for_more_images(
     station: "Station", interrupted: Path, rewrite_header: Callable[..., None]
 ) -> None:
@@ -269,6 +277,7 @@ def test_the_operators_side_is_that_of_the_station_and_kept_for_more_images(
     assert station.state.heading == np.pi
 
 
+@pytest.mark.slow
 def test_more_images_than_needed_are_not_needed_because_they_were_asked_for(
     solved: "Station",
 ) -> None:
@@ -283,6 +292,7 @@ def test_more_images_than_needed_are_not_needed_because_they_were_asked_for(
     assert solved.status.verdict.reason.code != Code.TOO_FEW_IMAGES
 
 
+@pytest.mark.slow
 def test_more_images_can_be_captured_while_a_wish_is_computed(
     solved: "Station",
 ) -> None:
@@ -354,6 +364,7 @@ def other(
     return folder
 
 
+@pytest.mark.slow
 def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
     in_force: "Station", other: Path
 ) -> None:

@@ -34,6 +34,7 @@ def second(rng: np.random.Generator, swing_degrees: float, n: int = 20) -> Poses
     return fit_poses(CAMERA, PEN, pixels, swing.rotations, swing.translations)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("swing_degrees", [0.2, 5.0, 40.0])
 def test_the_truth_lies_within_the_stated_covariance(swing_degrees: float) -> None:
     squares = []

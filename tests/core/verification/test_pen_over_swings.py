@@ -164,6 +164,7 @@ def test_a_length_gives_the_new_file_its_scale(swing: Swing) -> None:
     assert extents - 1 == pytest.approx(3e-4, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_swing_of_another_state_of_the_pen_does_not_confirm(swing: Swing) -> None:
     pen = true_pen()
     swings = [swing(with_moved_led(pen), number) for number in (1, 2, 3)]
@@ -205,6 +206,7 @@ def test_the_figures_of_a_pen_over_its_swings_are_as_before(swing: Swing) -> Non
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [None, Scale(1.0001, 2e-5, 1e-4)])
 def test_the_figures_of_an_improved_pen_are_as_before(
     swing: Swing, scale: Scale | None

@@ -116,6 +116,7 @@ def moved(rig: Rig, k: int, step: float) -> Rig:
     )
 
 
+@pytest.mark.slow
 def test_ellipsoids_hold_the_point_as_often_as_they_say(by_two: Instrument) -> None:
     """Of rigs as a swing leaves them; 400 trials have a deviation of 1.1 %."""
     rng = np.random.default_rng(3)

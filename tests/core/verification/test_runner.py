@@ -72,6 +72,7 @@ def test_a_tip_is_verified_from_the_first_touch_to_the_verdict(at_it: Verifier) 
     assert abs(length["runs"][0]["error_mm"]) < 0.02
 
 
+@pytest.mark.slow
 def test_two_cameras_verify_a_tip_together(
     verifier: Verifier, prepared_by_two: Preparation
 ) -> None:
@@ -98,6 +99,7 @@ def test_two_cameras_verify_a_tip_together(
     assert names == ["camera.yaml", "camera-2.yaml"]
 
 
+@pytest.mark.slow
 def test_what_is_kept_can_be_given_to_other_commands(at_it: Verifier) -> None:
     at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
     point, _, length, _ = at_it.status.files
@@ -462,6 +464,7 @@ def lit_by(verifier: Verifier) -> Iterator[Callable[[float], SimulatedCamera]]:
         yield camera_turning
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", [0.0, 3.0])
 def test_a_rendered_lamp_tells_whether_the_camera_turns_slowly(
     verifier: Verifier, lit_by: Callable[[float], SimulatedCamera], turn: float
@@ -499,6 +502,7 @@ def test_a_rendered_lamp_tells_whether_the_camera_turns_slowly(
         assert witness.moved < 0.006
 
 
+@pytest.mark.slow
 def test_a_lamp_is_watched_on_after_an_interruption(
     verifier: Verifier,
     lit_by: Callable[[float], SimulatedCamera],

@@ -37,6 +37,7 @@ def stations() -> Stations:
     return tuple(calibrated_station(rng) for _ in range(N_STATIONS))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SESSIONS)
 def test_a_correct_tip_passes(stations: Stations, name: str) -> None:
     grades = Counter(
@@ -48,6 +49,7 @@ def test_a_correct_tip_passes(stations: Stations, name: str) -> None:
     assert grades[Grade.PASS] >= wanted, grades
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHOWING_TIP)
 def test_a_tip_that_is_wrong_by_20_um_is_found_where_its_postures_show_it(
     stations: Stations, name: str

@@ -93,6 +93,7 @@ def written(folder: Path, images: list[Image]) -> str:
     return str(folder)
 
 
+@pytest.mark.slow
 def test_a_folder_of_images_becomes_a_camera_file_in_use(
     window: BoardWindow, images: list[Image], tmp_path: Path, qtbot: QtBot
 ) -> None:
@@ -126,6 +127,7 @@ def test_a_folder_of_images_becomes_a_camera_file_in_use(
     assert reds[0] < reds[1]
 
 
+@pytest.mark.slow
 def test_a_view_that_is_left_out_takes_no_part(
     window: BoardWindow, images: list[Image], tmp_path: Path, qtbot: QtBot
 ) -> None:
@@ -160,6 +162,7 @@ def test_the_fields_tell_the_board_and_print_it(
     assert path.read_bytes() == board_page(board)
 
 
+@pytest.mark.slow
 def test_the_views_of_a_folder_are_counted_and_judged(
     window: BoardWindow, images: list[Image], tmp_path: Path, qtbot: QtBot
 ) -> None:
@@ -181,6 +184,7 @@ def test_images_without_a_board_are_refused_with_the_reason(
     qtbot.waitUntil(lambda: "None of the 1 images" in remark(window))
 
 
+@pytest.mark.slow
 def test_a_board_held_still_is_kept_by_itself(
     window: BoardWindow, images: list[Image], workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -202,6 +206,7 @@ def test_a_board_held_still_is_kept_by_itself(
     press(window, "Stop")
 
 
+@pytest.mark.slow
 def test_another_board_held_before_the_camera_is_named(
     window: BoardWindow, images: list[Image], workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -218,6 +223,7 @@ def test_another_board_held_before_the_camera_is_named(
     press(window, "Stop")
 
 
+@pytest.mark.slow
 def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
     window: BoardWindow,
     images: list[Image],
@@ -259,6 +265,7 @@ def slow_disk(hold_back: "HoldBack") -> Event:
     return hold_back("lightpen_app.steps.camera.board_calibration.save_camera")
 
 
+@pytest.mark.slow
 def test_a_camera_file_that_is_still_being_saved_is_that_of_its_attempt(
     window: BoardWindow,
     images: list[Image],
@@ -324,6 +331,7 @@ def test_what_the_live_image_shows_is_said_no_more_once_it_is_stopped(
     assert remark(window) == ""
 
 
+@pytest.mark.slow
 def test_a_window_opened_again_tells_nothing_of_the_calibration_before(
     window: BoardWindow, images: list[Image], tmp_path: Path, qtbot: QtBot
 ) -> None:
@@ -353,6 +361,7 @@ def test_a_calibration_under_way_ends_where_other_views_are_begun(
     press(window, "Stop")
 
 
+@pytest.mark.slow
 def test_what_was_calibrated_is_told_in_the_language_that_is_chosen(
     window: BoardWindow,
     images: list[Image],
@@ -371,6 +380,7 @@ def test_what_was_calibrated_is_told_in_the_language_that_is_chosen(
     assert not remark(window).isascii()
 
 
+@pytest.mark.slow
 def test_a_scale_check_by_caliper_is_asked_for_and_its_form_is_told(
     window: BoardWindow, tmp_path: Path, images: list[Image], qtbot: QtBot
 ) -> None:

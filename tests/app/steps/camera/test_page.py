@@ -171,6 +171,7 @@ def ask_for_second(seen: "Seen") -> None:
     box.click()
 
 
+@pytest.mark.slow
 def test_a_second_camera_is_shown_set_and_masked_by_itself(
     live: "Seen", workbench: Workbench
 ) -> None:
@@ -573,6 +574,7 @@ def test_a_recording_asks_where_it_is(live: "Seen", workbench: Workbench) -> Non
     live.wait("Search for the camera and choose it.")
 
 
+@pytest.mark.slow
 def test_a_recorded_swing_is_played(
     live: "Seen", small_scene: Scene, tmp_path: Path
 ) -> None:
@@ -774,6 +776,7 @@ def test_a_camera_that_is_unplugged_is_told_and_comes_back(
     assert "Live" in seen.words
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["folder", "images"])
 def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
     live: "Seen", small_scene: Scene, tmp_path: Path, kind: str
@@ -847,6 +850,7 @@ def test_a_search_ends_with_the_images(
 # Stray light
 
 
+@pytest.mark.slow
 def test_what_shines_beside_the_covered_pen_is_found_and_masked(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
@@ -951,6 +955,7 @@ def test_a_mask_adds_to_the_one_before(
     assert len(workbench.selection.preparation.mask) == 2
 
 
+@pytest.mark.slow
 def test_a_pen_that_is_still_seen_is_not_masked(live: "Seen") -> None:
     live.click("Search")
 
@@ -1074,6 +1079,7 @@ def window(
     return window
 
 
+@pytest.mark.slow
 def test_the_notice_of_a_lost_camera_goes_when_it_is_back(
     window: MainWindow, seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
@@ -1089,6 +1095,7 @@ def test_the_notice_of_a_lost_camera_goes_when_it_is_back(
     assert not any("). Check cable and power." in each for each in window.words())
 
 
+@pytest.mark.slow
 def test_the_fault_of_a_swing_is_not_taken_for_one_of_the_camera(
     window: MainWindow, live: "Seen", workbench: Workbench
 ) -> None:
@@ -1112,6 +1119,7 @@ def test_the_step_leads_on_to_the_leds(window: MainWindow, live: "Seen") -> None
     assert window.page().title() == "LEDs"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("field", "text"),
     [("Intrinsics file", "/nowhere.yaml"), ("Exposure", "2"), ("Gain", "1")],
@@ -1173,6 +1181,7 @@ def test_every_control_is_named_and_reached_by_tab(
     }
 
 
+@pytest.mark.slow
 def test_another_language_keeps_what_is_shown(live: "Seen") -> None:
     live.click("Search")
     live.wait("The pen is still visible;")

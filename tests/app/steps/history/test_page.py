@@ -251,6 +251,7 @@ def test_what_is_not_of_a_live_camera_is_marked_and_no_practice_is_in_force(
     ]
 
 
+@pytest.mark.slow
 def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
     desk: Desk,
 ) -> None:
@@ -290,6 +291,7 @@ def test_a_server_that_cannot_be_reached_is_told_without_the_password(
     desk.workbench.run.logbook.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", languages())
 def test_at_the_usual_width_every_column_is_seen_and_told_whole(
     desk: Desk, qapp: QApplication, language: str
@@ -316,6 +318,7 @@ def test_at_the_usual_width_every_column_is_seen_and_told_whole(
     assert not desk.table.isColumnHidden(STATION)
 
 
+@pytest.mark.slow
 def test_a_block_that_is_read_computes_nothing_anew_of_what_is_selected(
     desk: Desk,
 ) -> None:
@@ -346,6 +349,7 @@ def test_what_is_no_day_is_marked_and_chooses_nothing(desk: Desk) -> None:
     assert len(desk.column(TIP)) == 2
 
 
+@pytest.mark.slow
 def test_lines_are_read_when_they_are_seen(desk: Desk) -> None:
     desk.enter(MANY)
     desk.open()
@@ -357,6 +361,7 @@ def test_lines_are_read_when_they_are_seen(desk: Desk) -> None:
     desk.until(lambda: last.data() == "0.0000")
 
 
+@pytest.mark.slow
 def test_the_trend_is_of_the_tip_that_is_chosen(desk: Desk) -> None:
     desk.enter(4)
     desk.enter(1, tip="T-11", first=4)
@@ -447,6 +452,7 @@ def test_the_capability_is_studied_with_a_tolerance_and_a_reference(desk: Desk) 
     assert "A study needs 30 to 50 repeats; 3 are available." in row.words()
 
 
+@pytest.mark.slow
 def test_a_note_is_entered_and_shown_with_its_entry(desk: Desk) -> None:
     desk.enter(2)
     desk.open()
@@ -530,6 +536,7 @@ def store(folder: Path, n: int) -> Result:
     return result
 
 
+@pytest.mark.slow
 def test_an_older_tip_is_put_in_force_again_for_a_reason(desk: Desk) -> None:
     folder = desk.workbench.folder
     for n in range(2):
@@ -551,6 +558,7 @@ def test_an_older_tip_is_put_in_force_again_for_a_reason(desk: Desk) -> None:
     assert desk.notices == []
 
 
+@pytest.mark.slow
 def test_what_was_accepted_here_is_put_on_paper_as_its_file_has_it(
     desk: Desk, stated: dict[str, Any]
 ) -> None:
@@ -638,6 +646,7 @@ def test_a_rule_that_is_being_typed_stays_while_something_else_changes(
         assert field.text() == "7"
 
 
+@pytest.mark.slow
 def test_what_a_supervisor_laid_down_is_not_changed_by_anybody(desk: Desk) -> None:
     desk.enter(3)
     folder, eve = desk.workbench.folder, Signature("Eve", "correct horse")
@@ -677,6 +686,7 @@ def test_what_was_changed_is_said_in_the_list_and_by_a_check(desk: Desk) -> None
     assert any("Entry 2 of chain" in text for text in told)
 
 
+@pytest.mark.slow
 def test_entries_are_saved_and_taken_up_at_another_station(
     desk: Desk, tmp_path: Path
 ) -> None:
@@ -713,6 +723,7 @@ def test_a_file_that_is_no_archive_is_refused_in_words(
     assert "is not an exported archive, or was modified (line 2)." in desk.notices[0]
 
 
+@pytest.mark.slow
 def test_no_trend_is_left_of_what_is_no_longer_looked_for(desk: Desk) -> None:
     desk.enter(3)
     desk.open()

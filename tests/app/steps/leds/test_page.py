@@ -754,6 +754,7 @@ def test_a_pen_that_fits_is_said_to(live: "Seen") -> None:
     assert labels <= {str(led) for led in range(1, 11)} | {""}
 
 
+@pytest.mark.slow
 def test_a_bug_in_the_comparison_leaves_no_old_finding_and_the_next_views_are_compared(
     live: "Seen", monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -773,6 +774,7 @@ def test_a_bug_in_the_comparison_leaves_no_old_finding_and_the_next_views_are_co
     assert all(isinstance(error, ZeroDivisionError) for error in caught)
 
 
+@pytest.mark.slow
 def test_a_displaced_led_is_named_and_marked_everywhere(live: "Seen") -> None:
     live.wait("10 of 10 LEDs")
 
@@ -795,6 +797,7 @@ def test_a_displaced_led_is_named_and_marked_everywhere(live: "Seen") -> None:
     assert not live.shows("Use measured position")
 
 
+@pytest.mark.slow
 def test_an_exchanged_coordinate_is_put_back_by_a_click(live: "Seen") -> None:
     live.wait("10 of 10 LEDs")
     second, fourth = (cell(live, led, Y) for led in (2, 4))
@@ -869,6 +872,7 @@ def test_another_file_has_nothing_to_undo(seen: "Seen", tmp_path: Path) -> None:
     assert not seen.named("Redo").isEnabled()
 
 
+@pytest.mark.slow
 def test_the_match_follows_the_table_before_it_is_saved(
     live: "Seen", workbench: Workbench
 ) -> None:
@@ -881,6 +885,7 @@ def test_the_match_follows_the_table_before_it_is_saved(
     assert in_use(workbench).pen.n_leds == 10
 
 
+@pytest.mark.slow
 def test_another_page_sees_the_pen_in_use_again(
     live: "Seen", workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -898,6 +903,7 @@ def test_another_page_sees_the_pen_in_use_again(
         pass
 
 
+@pytest.mark.slow
 def test_raw_coordinates_are_matched_too(live: "Seen", tmp_path: Path) -> None:
     open_file(live, write_table(tmp_path / "raw.csv", raw()))
 
@@ -916,6 +922,7 @@ def test_a_covered_led_is_told(
     assert "9 of 10 LEDs" in seen.words
 
 
+@pytest.mark.slow
 def test_the_simulated_pen_is_leaned_and_covered_at_a_click(
     seen: "Seen",
     workbench: Workbench,
@@ -941,6 +948,7 @@ def test_the_simulated_pen_is_leaned_and_covered_at_a_click(
     seen.until(lambda: camera.operator.doing is HandActivity.SEATED)
 
 
+@pytest.mark.slow
 def test_another_pens_file_is_told(live: "Seen", tmp_path: Path) -> None:
     leds = np.random.default_rng(3).uniform(-60, 60, (10, 3))
     open_file(live, write_table(tmp_path / "other.csv", leds))

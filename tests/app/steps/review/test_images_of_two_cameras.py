@@ -54,6 +54,7 @@ def are_ringed(view: ResidualView, points: FloatArray) -> bool:
     return np.array_equal([(ring.x, ring.y) for ring in view.markers()], points)
 
 
+@pytest.mark.slow
 def test_the_residuals_are_of_both_cameras(solution: Solution) -> None:
     for c, images in enumerate(solution.calibration.cameras):
         squares = np.square(solution.residuals[:, c]).sum(axis=-1)

@@ -431,6 +431,7 @@ def test_the_step_is_closed_until_the_pen_was_swung(
     assert not page.is_complete()
 
 
+@pytest.mark.slow
 def test_a_vast_screen_shows_the_postures_beside_larger_figures(
     page: ReviewPage, qtbot: QtBot
 ) -> None:
@@ -474,6 +475,7 @@ def test_the_tip_is_shown_to_the_digit_of_its_uncertainty(
         assert float(number) == pytest.approx(value, abs=0.5 * u)
 
 
+@pytest.mark.slow
 def test_an_uncertain_tip_is_to_be_checked_and_more_images_are_advised(
     bed: Bed,
 ) -> None:
@@ -488,6 +490,7 @@ def test_an_uncertain_tip_is_to_be_checked_and_more_images_are_advised(
     bed.qtbot.waitUntil(lambda: workbench.run.status.is_capturing)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("assumed", "value"), [("form_error", 0.001), ("warmth", 60.0)]
 )
@@ -580,6 +583,7 @@ def test_the_result_says_which_tip_it_is_of(bed: Bed, workbench: Workbench) -> N
     )
 
 
+@pytest.mark.slow
 def test_a_tip_far_from_its_nominal_place_is_asked_about(bed: Bed) -> None:
     bed.rewrite_header(bed.swing, nominal_tip_mm=[3.0, -90.0, -20.0])
     bed.solve()
@@ -747,6 +751,7 @@ def test_the_tip_as_found_is_told_against_its_limit(bed: Bed) -> None:
     assert found.tone is Tone.WARN
 
 
+@pytest.mark.slow
 def test_of_practice_no_older_tip_is_said_to_stay_in_force(bed: Bed) -> None:
     told = "Until then the previous result remains current."
     bed.solve_after([0.0, 0.0, 0.001])
@@ -810,6 +815,7 @@ def save(bed: Bed, page: ReviewPage, what: str, folder: Path) -> None:
     dialog.close()
 
 
+@pytest.mark.slow
 def test_all_is_saved_at_once_under_pen_tip_and_date_and_nothing_overwritten(
     bed: Bed, tmp_path: Path
 ) -> None:
@@ -868,6 +874,7 @@ def test_all_formats_are_offered_and_a_certificate_asks_for_the_laboratory(
     assert workbench.settings.laboratory() == laboratory
 
 
+@pytest.mark.slow
 def test_plots_that_were_not_looked_at_are_saved_whole_and_with_their_mark(
     bed: Bed, tmp_path: Path
 ) -> None:
@@ -897,6 +904,7 @@ def test_plots_that_were_not_looked_at_are_saved_whole_and_with_their_mark(
         assert colors_in(picture.copy(foot)) >= {colors.panel, colors.warn}, name
 
 
+@pytest.mark.slow
 def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
     bed.rewrite_header(bed.swing, nominal_tip_mm=[-1.0, -90.0, -24.0])
     workbench = bed.solve()
@@ -908,6 +916,7 @@ def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
     assert readout(page).nominal == ("-1", "-90", "-24")
 
 
+@pytest.mark.slow
 def test_the_budget_is_checked_by_monte_carlo_on_request(
     page: ReviewPage, qtbot: QtBot
 ) -> None:
@@ -959,6 +968,7 @@ def test_every_control_has_a_name_for_a_screen_reader(page: ReviewPage) -> None:
 # Images
 
 
+@pytest.mark.slow
 def test_images_are_listed_worst_first_with_their_reasons(bed: Bed) -> None:
     (bed.swing / "images" / f"{DAMAGED:06d}.png").write_bytes(b"no image")
     slip(bed.swing)
@@ -1048,6 +1058,7 @@ def test_of_another_swing_the_worst_image_is_shown_first(
     assert len(table(page).selected()) == 1
 
 
+@pytest.mark.slow
 def test_an_image_that_cannot_be_read_says_why(bed: Bed) -> None:
     (bed.swing / "images" / f"{DAMAGED:06d}.png").write_bytes(b"no image")
     bed.solve()
@@ -1095,6 +1106,7 @@ def test_a_click_on_the_misfit_chooses_the_image(
     assert table(page).number() == 11
 
 
+@pytest.mark.slow
 def test_an_image_is_taken_out_and_put_back_with_the_tip_solved_at_once(
     page: ReviewPage,
     workbench: Workbench,
@@ -1137,6 +1149,7 @@ def test_an_image_is_taken_out_and_put_back_with_the_tip_solved_at_once(
     np.testing.assert_array_equal(tip(workbench), before)
 
 
+@pytest.mark.slow
 def test_keys_take_several_images_out_and_put_them_back(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -1155,6 +1168,7 @@ def test_keys_take_several_images_out_and_put_them_back(
     await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} included")
 
 
+@pytest.mark.slow
 def test_what_was_taken_out_or_put_back_is_undone_and_redone(
     page: ReviewPage, qtbot: QtBot
 ) -> None:
@@ -1178,6 +1192,7 @@ def test_what_was_taken_out_or_put_back_is_undone_and_redone(
     )
 
 
+@pytest.mark.slow
 def test_the_line_over_the_misfits_takes_out_what_it_is_drawn_below(
     page: ReviewPage, qtbot: QtBot
 ) -> None:
@@ -1217,6 +1232,7 @@ def test_the_line_leaves_the_better_half_of_the_images(
     await_count(qtbot, page, f"{half} of {N_IMAGES} included; {half} excluded manually")
 
 
+@pytest.mark.slow
 def test_a_slipped_image_of_the_swing_may_be_put_back(bed: Bed) -> None:
     slip(bed.swing)
     bed.solve()
@@ -1279,6 +1295,7 @@ def test_a_computation_shows_its_progress_and_can_be_cancelled(
 # Plots
 
 
+@pytest.mark.slow
 def test_every_plot_is_saved_as_picture_and_as_numbers(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot, tmp_path: Path
 ) -> None:
@@ -1342,6 +1359,7 @@ def test_a_file_is_chosen_in_a_dialog_that_stops_nothing(
     assert first == "image,misfit_px,used"
 
 
+@pytest.mark.slow
 def test_the_two_stage_method_stands_beside_the_joint_fit(
     page: ReviewPage, workbench: Workbench
 ) -> None:
@@ -1389,6 +1407,7 @@ def test_an_accepted_tip_is_in_force_and_said_to_be(
     assert open_record(workbench.run.records_folder / "swing").verdict == Grade.PASS
 
 
+@pytest.mark.slow
 def test_the_record_on_paper_is_of_the_result_on_the_disk(
     page: ReviewPage, bed: Bed, qtbot: QtBot
 ) -> None:
@@ -1466,6 +1485,7 @@ def test_a_result_that_cannot_be_stored_is_told_and_the_old_one_stays(
     assert open_record(workbench.run.records_folder / "swing").verdict is None
 
 
+@pytest.mark.slow
 def test_more_images_are_captured_into_the_same_swing(
     page: ReviewPage,
     workbench: Workbench,

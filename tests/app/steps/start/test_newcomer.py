@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard
 
 
+@pytest.mark.slow
 def test_a_simulated_pen_is_at_the_swing_after_one_click(
     open_wizard: "OpenWizard", settings: Settings
 ) -> None:
@@ -36,6 +37,7 @@ def test_a_simulated_pen_is_at_the_swing_after_one_click(
     assert not walker.control("Try it with a simulated pen").isEnabled()
 
 
+@pytest.mark.slow
 def test_at_the_first_start_the_trial_is_seen_in_the_smallest_window(
     open_wizard: "OpenWizard",
 ) -> None:
@@ -49,6 +51,7 @@ def test_at_the_first_start_the_trial_is_seen_in_the_smallest_window(
     walker.until(is_seen)
 
 
+@pytest.mark.slow
 def test_enter_goes_to_the_first_field_that_is_missing(
     open_wizard: "OpenWizard",
 ) -> None:
@@ -67,6 +70,7 @@ def test_enter_goes_to_the_first_field_that_is_missing(
     walker.until_shows("Camera")
 
 
+@pytest.mark.slow
 def test_the_introduction_shows_pen_and_cone_and_leads_to_the_trial(
     open_wizard: "OpenWizard",
 ) -> None:
@@ -84,6 +88,7 @@ def test_the_introduction_shows_pen_and_cone_and_leads_to_the_trial(
     walker.until_shows("Swing")
 
 
+@pytest.mark.slow
 def test_the_demo_is_played_in_a_window_of_its_own(
     open_wizard: "OpenWizard", monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -342,6 +342,7 @@ def test_all_of_it_is_remembered_for_the_station(
     again.shut_down()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [ODD, "a" * 200, "General", "../..", "王"])
 def test_any_name_will_do(
     start: Opened, workbench: Workbench, settings: Settings, qtbot: QtBot, name: str
@@ -906,6 +907,7 @@ def test_the_page_is_there_before_the_swings_are_looked_for(
     page.shut_down()
 
 
+@pytest.mark.slow
 def test_a_swing_goes_on_with_its_images_at_the_step_swing(
     show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -935,6 +937,7 @@ def test_a_swing_goes_on_with_its_images_at_the_step_swing(
     assert start.notices == []
 
 
+@pytest.mark.slow
 def test_the_swing_under_way_is_not_offered(
     show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -1004,6 +1007,7 @@ def test_without_a_camera_it_is_told_where_to_choose_one(
     assert workbench.run.status.state is None
 
 
+@pytest.mark.slow
 def test_a_swing_of_another_source_names_the_source_that_it_wants(
     show: Callable[[Workbench], Opened],
     workbench: Workbench,
@@ -1154,6 +1158,7 @@ def test_the_whole_sentence_of_a_damage_is_seen(
     assert label.minimumSizeHint().width() <= label.width()
 
 
+@pytest.mark.slow
 def test_a_swing_that_another_program_captures_is_no_offer_until_it_is_killed(
     show: Callable[[Workbench], Opened],
     workbench: Workbench,
@@ -1183,6 +1188,7 @@ def test_a_swing_that_another_program_captures_is_no_offer_until_it_is_killed(
     assert workbench.run.status.record_folder == folder
 
 
+@pytest.mark.slow
 def test_a_swing_that_another_program_took_meanwhile_is_not_resumed_or_discarded(
     show: Callable[[Workbench], Opened],
     workbench: Workbench,
@@ -1207,6 +1213,7 @@ def test_a_swing_that_another_program_took_meanwhile_is_not_resumed_or_discarded
     assert (folder / "journal.jsonl").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_record_that_cannot_be_written_is_told(
     show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -1284,6 +1291,7 @@ def test_a_discarded_swing_keeps_its_images_and_is_not_offered_again(
     assert start.statuses[-1] == f"Swing discarded. The images remain in {folder}."
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("also_searching", [False, True])
 @pytest.mark.parametrize(
     ("word", "broken_part"),
@@ -1351,6 +1359,7 @@ def test_a_bug_in_the_lookup_leaves_no_result_of_another_pen(
     assert start.last() == before
 
 
+@pytest.mark.slow
 def test_buttons_wait_while_a_swing_is_read(
     show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -1386,6 +1395,7 @@ def test_what_waits_for_an_answer_comes_first(
         assert place(panel).y() + panel.height() < start.page.height()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [810, 850, 1000])
 def test_an_interrupted_swing_is_seen_whole(
     show: Callable[[Workbench], Opened], workbench: Workbench, width: int
@@ -1528,6 +1538,7 @@ def test_whoever_finds_all_as_it_was_goes_on_by_one_key(window: MainWindow) -> N
     assert window.page().key == "camera"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["Operator", "Station", "Ball diameter"])
 def test_the_keys_of_a_remote_lead_on_from_every_field(
     window: MainWindow, workbench: Workbench, name: str

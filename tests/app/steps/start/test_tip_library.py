@@ -261,6 +261,7 @@ def test_a_retired_tip_is_no_choice_and_typed_it_leads_no_further(desk: Desk) ->
     )
 
 
+@pytest.mark.slow
 def test_a_damaged_library_is_told_and_told_off_once_it_is_mended(desk: Desk) -> None:
     told, relieved = list[str](), list[str]()
     desk.workbench.notifications.raised.connect(lambda text, _: told.append(text))
@@ -467,6 +468,7 @@ def test_a_tip_is_retired_and_brought_back_with_a_reason(desk: Desk) -> None:
     desk.click("Close")
 
 
+@pytest.mark.slow
 def test_where_a_password_guards_a_supervisor_signs(desk: Desk) -> None:
     eve = Signature("Eve", "correct horse")
     set_password(desk.data, eve, eve.password, local_now())

@@ -332,6 +332,7 @@ def test_fewer_than_five_leds_are_refused() -> None:
     assert label_spots(view.spots, CAMERA, PEN).reason is LabelStatus.TOO_FEW
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper", "six", "eight", "near-symmetric"])
 def test_five_leds_alone_are_labelled_if_they_fit_one_way_only(name: str) -> None:
     pen = SAMPLE_PENS[name]()
@@ -346,6 +347,7 @@ def test_four_leds_and_a_lamp_are_not_taken_for_five() -> None:
     assert found == {str(LabelStatus.TOO_FEW): 30}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_lamps", [6, 10, 15, 30])
 def test_lamps_without_a_pen_are_refused(n_lamps: int) -> None:
     rng = np.random.default_rng(41 + n_lamps)
@@ -358,6 +360,7 @@ def test_lamps_without_a_pen_are_refused(n_lamps: int) -> None:
         }
 
 
+@pytest.mark.slow
 def test_too_many_hidden_leds_are_not_made_up_for_by_lamps() -> None:
     def make(rng: np.random.Generator) -> View:
         return random_view(rng, PEN, int(rng.integers(5, 7)), int(rng.integers(2, 6)))
@@ -628,6 +631,7 @@ def test_a_camera_file_of_another_lens_is_named() -> None:
     assert "2 times the focal length" in str(diagnose(some_spots(), camera, PEN))
 
 
+@pytest.mark.slow
 def test_the_file_of_another_pen_is_named() -> None:
     assert "LED file belongs to this pen" in str(
         diagnose(some_spots(), CAMERA, TWELVE_LED_PEN)

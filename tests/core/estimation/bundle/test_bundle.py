@@ -263,6 +263,7 @@ def test_centres_that_are_of_no_pen_are_refused() -> None:
         adjusted(rig_of(CAMERA), PEN, swing, pixels)
 
 
+@pytest.mark.slow
 def test_the_tip_and_the_cone_scatter_as_their_covariance_says() -> None:
     """Everything is drawn from its prior: LEDs, camera, scale and diameter."""
     n_runs = 40

@@ -92,6 +92,7 @@ def is_beyond(swing: Swing, result: Calibration) -> bool:
     return along > result.budget.weakest_uncertainty
 
 
+@pytest.mark.slow
 def test_camera_files_as_good_as_they_say_are_put_right_and_covered() -> None:
     n_runs = 24
     covariance = drawn_covariance()
@@ -111,6 +112,7 @@ def test_camera_files_as_good_as_they_say_are_put_right_and_covered() -> None:
     assert (np.mean(inside, axis=0) >= 0.81).all()
 
 
+@pytest.mark.slow
 def test_a_true_camera_file_is_hardly_ever_contradicted() -> None:
     file = replace(CAMERA, covariance=drawn_covariance())
     found = [calibrated(file, seed, 30)[1] for seed in range(10)]
@@ -118,6 +120,7 @@ def test_a_true_camera_file_is_hardly_ever_contradicted() -> None:
     assert not any(result.contradictions for result in found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [{"focal_length": 0.003}, {"focal_length": 0.009}, {"cy": 3.0}, {"cy": 10.0}],
@@ -132,6 +135,7 @@ def test_a_wrong_file_that_states_nothing_never_passes_a_tip_beyond_u(
         assert not (passed and is_beyond(swing, result))
 
 
+@pytest.mark.slow
 def test_a_file_without_distortion_never_passes_and_is_named() -> None:
     straight = CAMERA.intrinsics
     straight[4:] = 0.0
@@ -212,6 +216,7 @@ def test_several_wrong_numbers_are_told_as_the_images_want_them_together(
         assert abs(each.estimated - fitted[name]) <= 0.02 * each.estimated_uncertainty
 
 
+@pytest.mark.slow
 def test_noise_that_lasts_contradicts_no_true_file() -> None:
     contradicted = 0
     for seed in range(8):

@@ -68,6 +68,7 @@ def calibrated(sigmas: FloatArray, seed: int) -> tuple[Calibration, FloatArray]:
     return found, found.joint.tip_pen - swing.tip_pen
 
 
+@pytest.mark.slow
 def test_two_noisy_leds_hardly_worsen_the_tip() -> None:
     noisy = np.full(10, 0.03)
     noisy[[1, 8]] = 0.2

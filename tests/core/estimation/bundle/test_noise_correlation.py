@@ -55,6 +55,7 @@ def of_noise(n_images: int, coefficient: float, seed: int) -> tuple[Swing, Calib
     return swing, calibrated(swing, 0.03 * lasting(n_images, coefficient, seed))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coefficient", [0.5, 0.9])
 def test_the_coefficient_is_found_though_the_fit_takes_most_of_it(
     coefficient: float,
@@ -66,6 +67,7 @@ def test_the_coefficient_is_found_though_the_fit_takes_most_of_it(
     assert np.mean(found) == pytest.approx(coefficient, abs=0.1)
 
 
+@pytest.mark.slow
 def test_independent_noise_is_taken_as_such() -> None:
     results = [of_noise(30, 0.0, seed)[1].budget for seed in range(20)]
 
@@ -73,6 +75,7 @@ def test_independent_noise_is_taken_as_such() -> None:
     assert sum(budget.correlation_factor > 1 for budget in results) <= 2
 
 
+@pytest.mark.slow
 def test_u_covers_the_tip_whose_noise_lasts() -> None:
     inside = []
     for n_images, seed in product((15, 30, 60), range(8)):
@@ -85,6 +88,7 @@ def test_u_covers_the_tip_whose_noise_lasts() -> None:
     assert np.mean(inside) >= 0.87
 
 
+@pytest.mark.slow
 def test_noise_that_lasts_is_not_counted_again_as_errors_of_leds_and_drift() -> None:
     ratios, warned = [], []
     for seed in range(5):

@@ -94,6 +94,7 @@ def test_a_simultaneous_swing_loses_nothing_by_timing() -> None:
     assert (by_timing < 0.3 * shares[ContributionName.NOISE]).all()
 
 
+@pytest.mark.slow
 def test_a_late_camera_is_corrected_and_named() -> None:
     rig = from_first(row_of_cameras(2, 1000.0))
     rng, late = np.random.default_rng(266), 0.06

@@ -65,6 +65,7 @@ def share(result: Calibration, name: ContributionName) -> FloatArray:
     return found[0] if found else np.zeros(3)
 
 
+@pytest.mark.slow
 def test_a_true_geometry_is_left_alone() -> None:
     corrected = [calibrated(PEN, 0.05, seed, FEW).led_sigma > 0 for seed in range(20)]
 
@@ -118,6 +119,7 @@ def test_led_errors_that_hide_in_the_noise_count_all_the_same() -> None:
     assert 0.5 * by_scale < np.sqrt(np.mean(variances)) < 2 * by_scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stated", [None, 0.01])
 def test_the_tip_does_not_take_on_led_errors_and_its_covariance_is_honest(
     stated: float | None,
@@ -211,6 +213,7 @@ N_RUNS = 20
 LOWEST = 0.8
 
 
+@pytest.mark.slow
 def test_a_tip_that_sits_anew_in_each_image_is_covered() -> None:
     rng = np.random.default_rng(7)
     seats = [0.01 * rng.standard_normal((60, 3)) for _ in range(N_RUNS)]
@@ -218,6 +221,7 @@ def test_a_tip_that_sits_anew_in_each_image_is_covered() -> None:
     assert (covered(N_RUNS, seats) >= LOWEST).all()
 
 
+@pytest.mark.slow
 def test_a_seat_out_of_round_is_covered() -> None:
     phases = np.linspace(0, 2 * np.pi, N_RUNS, endpoint=False)
     seats = [forms_of_seat(2 + k % 2, phase) for k, phase in enumerate(phases.tolist())]

@@ -79,6 +79,7 @@ def test_the_derivative_of_the_contact_model_agrees_with_differences() -> None:
         )
 
 
+@pytest.mark.slow
 def test_the_scatter_is_at_the_cramer_rao_bound_and_covered_by_the_intervals() -> None:
     truth = swing(60)
     sigma = 0.05

@@ -79,6 +79,7 @@ def test_known_covariances_weigh_the_poses() -> None:
     assert np.sqrt(fit.covariance[0, 0]) < 0.01
 
 
+@pytest.mark.slow
 def test_the_covariance_agrees_with_the_scatter_of_many_fits() -> None:
     fits = [fit_pivot(*pivoting_poses(noise=0.1, seed=seed)) for seed in range(400)]
     errors = np.array([fit.tip_pen - TIP_PEN for fit in fits])

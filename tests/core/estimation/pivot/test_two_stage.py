@@ -67,6 +67,7 @@ def test_each_step_length_minimises_the_objective() -> None:
         assert objective(fit.iterates[k] + 1.01 * move) > best
 
 
+@pytest.mark.slow
 def test_the_propagated_covariance_agrees_with_the_scatter_of_many_fits() -> None:
     truth = swing(50)
     covariances = np.tile(np.diag([4e-8] * 3 + [1e-4, 1e-4, 1e-2]), (50, 1, 1))

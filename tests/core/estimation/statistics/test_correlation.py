@@ -21,6 +21,7 @@ def solve(noise: FloatArray) -> tuple[FloatArray, FloatArray]:
     return error, DESIGN @ error - noise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("correlation", "most"), [(0.0, 1.8), (0.9, 3.0)])
 def test_the_covariance_agrees_with_the_scatter_of_many_fits(
     correlation: float, most: float

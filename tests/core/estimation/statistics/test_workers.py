@@ -65,6 +65,7 @@ def test_a_dask_cluster_does_the_same(scheduler: str) -> None:
     assert told[-1] == 1.0
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_does_not_answer_is_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

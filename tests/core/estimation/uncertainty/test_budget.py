@@ -133,6 +133,7 @@ def test_blocks_of_independent_noise_scatter_as_that_noise_does() -> None:
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.slow
 def test_independent_noise_is_hardly_ever_raised() -> None:
     factors = [
         calibrated(0.05 * noise(seed, n_images=40)).budget.correlation_factor
@@ -143,6 +144,7 @@ def test_independent_noise_is_hardly_ever_raised() -> None:
 
 
 # The scatter is 11 times the independent one. 10 draws fix a variance to 45 %.
+@pytest.mark.slow
 def test_correlated_noise_raises_the_uncertainty_to_the_scatter_it_has() -> None:
     swing = swing_poses(60, np.random.default_rng(0), "operator")
     errors, independent, raised = [], [], []

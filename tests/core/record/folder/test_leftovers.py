@@ -35,6 +35,7 @@ def leave(part: Path) -> None:
     os.utime(part, (0, 0))
 
 
+@pytest.mark.slow
 def test_parts_of_killed_writes_are_removed(swing: Path, tmp_path: Path) -> None:
     (tmp_path / RESULTS).mkdir()
     parts = [folder / PART for folder in (tmp_path / RESULTS, swing, swing / "images")]

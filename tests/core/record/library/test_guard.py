@@ -74,6 +74,7 @@ TAMPERING: dict[str, Callable[[Path], object]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", TAMPERING)
 def test_a_guard_that_was_tampered_with_is_refused(guarded: Path, how: str) -> None:
     TAMPERING[how](guarded)
@@ -100,6 +101,7 @@ def test_limits_hold_for_every_spelling_of_the_station(guarded: Path) -> None:
     assert supervision.is_unknown("Hall 22")
 
 
+@pytest.mark.slow
 def test_wrong_passwords_are_delayed(guarded: Path) -> None:
     supervision = read_supervision(guarded)
     for _ in range(FREE + 1):
@@ -123,6 +125,7 @@ def without_key(data: Path) -> str:
     return name
 
 
+@pytest.mark.slow
 def test_a_lost_station_key_is_replaced_by_a_supervisor_alone(guarded: Path) -> None:
     chain = without_key(guarded)
     with pytest.raises(FileError, match="not in this user account"):

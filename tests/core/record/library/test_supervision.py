@@ -88,6 +88,7 @@ def test_nobody_else_changes_anything(
     assert read_supervision(guarded) == before
 
 
+@pytest.mark.slow
 def test_the_password_is_changed_by_the_one_before(guarded: Path) -> None:
     set_password(guarded, EVE, "another one", NOON)
     supervision = read_supervision(guarded)

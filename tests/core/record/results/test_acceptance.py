@@ -545,6 +545,7 @@ def test_a_damaged_result_of_a_swing_is_accepted_anew(case: Case) -> None:
     assert case.in_force().record == case.folder
 
 
+@pytest.mark.slow
 @forks
 def test_killed_before_any_line_it_leaves_the_old_tip_or_the_new_and_no_doubt(
     swing: Path, solved: Solution, elsewhere: Elsewhere, tmp_path: Path
@@ -571,6 +572,7 @@ def test_killed_before_any_line_it_leaves_the_old_tip_or_the_new_and_no_doubt(
     assert met == {(False, False), (True, False), (True, True)}
 
 
+@pytest.mark.slow
 @forks
 def test_killed_while_it_is_taken_back_the_tip_is_in_force_or_the_one_before(
     swing: Path, solved: Solution, elsewhere: Elsewhere, tmp_path: Path
@@ -599,6 +601,7 @@ def test_killed_while_it_is_taken_back_the_tip_is_in_force_or_the_one_before(
     assert met == {False, True}
 
 
+@pytest.mark.slow
 @forks
 def test_a_full_disk_keeps_the_old_tip_and_the_next_attempt_succeeds(
     case: Case, elsewhere: Elsewhere
@@ -613,6 +616,7 @@ def test_a_full_disk_keeps_the_old_tip_and_the_next_attempt_succeeds(
     assert case.verdict() == Grade.CHECK
 
 
+@pytest.mark.slow
 @forks
 def test_a_journal_that_cannot_be_written_is_concluded_at_the_next_start(
     case: Case, elsewhere: Elsewhere
@@ -669,6 +673,7 @@ def named(folder: Path, station: str) -> None:
     (folder / HEADER).write_bytes(header_bytes(header))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("station", ["Hall 2", "hall 2 ", "HALL 2"])
 def test_the_limits_in_force_count_and_not_those_of_the_header(
     guarded: tuple[Path, Solution], station: str

@@ -186,6 +186,7 @@ def test_nothing_is_overwritten_even_at_the_same_instant(
     assert x_in_force(archive) == 4.0
 
 
+@pytest.mark.slow
 def test_programs_that_accept_at_once_take_one_number_each(
     archive: FolderArchive, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
@@ -415,6 +416,7 @@ def test_a_result_of_a_later_version_is_refused_and_hides_none(
     assert x_in_force(archive, tip="T-11") == 1.0
 
 
+@pytest.mark.slow
 def test_no_flipped_bit_puts_another_tip_in_force_and_each_is_named(
     archive: FolderArchive,
 ) -> None:
@@ -529,6 +531,7 @@ def test_the_result_of_a_record_is_the_last_one_that_can_be_read(
 # The disk
 
 
+@pytest.mark.slow
 def test_a_thousand_results_of_other_pens_cost_little(archive: FolderArchive) -> None:
     """Only their first entries are read; one of 300 images has 1 MB."""
     seen = SpotRecord(1, 0.5, 0.5, 0.5, True, True)
@@ -592,6 +595,7 @@ def stored_elsewhere(
     return child.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of file sizes")
 def test_a_full_disk_is_told_and_keeps_the_old_tip_in_force(
     archive: FolderArchive,
@@ -606,6 +610,7 @@ def test_a_full_disk_is_told_and_keeps_the_old_tip_in_force(
     assert x_in_force(archive) == 2.0
 
 
+@pytest.mark.slow
 def test_a_write_protected_folder_is_told_and_keeps_the_old_tip_in_force(
     archive: FolderArchive, obedient: Sequence[str]
 ) -> None:

@@ -119,6 +119,7 @@ def test_the_record_brings_its_own_camera_and_pen(
     np.testing.assert_array_equal(found.masks[0], header.masks[0])
 
 
+@pytest.mark.slow
 def test_killed_at_any_moment_it_keeps_every_acknowledged_image(
     tmp_path: Path, header: Header
 ) -> None:

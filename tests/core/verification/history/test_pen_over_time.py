@@ -49,6 +49,7 @@ def test_accepted_swings_with_the_led_file_tell_of_the_pen(
     assert found.health.assessment.grade is Grade.PASS
 
 
+@pytest.mark.slow
 def test_a_better_led_file_is_a_new_one_and_names_its_parent(
     tmp_path: Path, off_file: Preparation
 ) -> None:

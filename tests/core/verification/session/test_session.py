@@ -43,6 +43,7 @@ GIVE_UP = 240.0  # s
 FRAME_RATE = 5.0  # 1/s: a quarter of the usual one, as each image is rendered
 
 
+@pytest.mark.slow
 def test_a_simulated_operator_verifies_a_tip_without_a_key() -> None:
     scene = Scene(camera=paper_camera(binning=4))
     pen = replace(scene.pen, led_sigma=0.002)
@@ -323,6 +324,7 @@ def postures(session: Session) -> Session:
     return session
 
 
+@pytest.mark.slow
 def test_a_posture_ends_with_its_fifth_touch_and_the_last_one_the_task(
     postures: Session,
 ) -> None:

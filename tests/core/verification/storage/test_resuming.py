@@ -139,6 +139,7 @@ def measured(state: SessionState) -> list[object]:
     ]
 
 
+@pytest.mark.slow
 def test_after_any_touch_a_verification_goes_on_as_it_was(
     in_force: Path, tmp_path_factory: pytest.TempPathFactory, verifying: Verifying
 ) -> None:
@@ -174,6 +175,7 @@ def test_after_any_touch_a_verification_goes_on_as_it_was(
             assert verdicts == {CONCLUDED}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_touches", [1, 5])  # the first task ends with the seventh
 def test_killed_it_is_offered_and_keeps_every_touch(
     in_force: Path, prepared: Preparation, verifying: Verifying, n_touches: int

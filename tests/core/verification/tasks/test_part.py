@@ -289,6 +289,7 @@ def test_nothing_is_measured_without_a_plan(instrument: Instrument) -> None:
     assert PART.missing(PartOptions(), BALL) is not None
 
 
+@pytest.mark.slow
 def test_a_moved_part_is_tied_by_datum_points_probed_again(
     instrument: Instrument,
 ) -> None:

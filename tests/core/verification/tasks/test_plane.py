@@ -84,6 +84,7 @@ def test_residuals_follow_moves_of_the_points_as_their_weights_say() -> None:
     np.testing.assert_allclose(moved.residuals, expected, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", [0.0, 0.05])
 def test_u_covers_the_true_flatness_of_ideal_and_of_bent_plates(
     instrument: Instrument, form: float
@@ -107,6 +108,7 @@ def test_u_covers_the_true_flatness_of_ideal_and_of_bent_plates(
         assert share <= least + by_chance
 
 
+@pytest.mark.slow
 def test_u_covers_what_wrong_files_and_the_noise_make_of_an_ideal_plate(
     instrument: Instrument, touching: Touching
 ) -> None:

@@ -180,6 +180,7 @@ def test_another_tip_moves_the_point_with_the_pen(
     np.testing.assert_allclose(moved.point_cam - touch.point_cam, touch.rotation[:, 2])
 
 
+@pytest.mark.slow
 def test_ellipsoids_hold_the_true_point_as_often_as_they_say() -> None:
     # What is wrong of a calibration is wrong of all its touches: eight count, and three
     # standard deviations below 95 % of eight are 72 %. The benchmark has a hundred.
