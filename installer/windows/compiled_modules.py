@@ -2,8 +2,8 @@
 
 Windows is slow at finding files, and for each module Python would look for four. Here
 all are found by their names in one index. The packages keep their folders, for what
-else is in them: sources, libraries and data. A module that is not in the file, or is
-damaged in it, is compiled from its source.
+else is in them: libraries, data and sources of Lightpen. A module of it that is not in
+the file, or is damaged in it, is compiled from its source.
 """
 
 import marshal
