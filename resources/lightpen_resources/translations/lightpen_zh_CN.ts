@@ -3369,6 +3369,10 @@
         <translation>导出...</translation>
     </message>
     <message>
+        <source>Report...</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Open a measuring plan</source>
         <translation>打开测量计划</translation>
     </message>
@@ -4266,6 +4270,10 @@
     <message>
         <source>Live stream at {0}, clients: {1}</source>
         <translation>实时数据流 {0}，客户端：{1}</translation>
+    </message>
+    <message>
+        <source>({0} of them miss images)</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Pen {0}</source>
@@ -6152,10 +6160,6 @@ mm</translation>
         <translation>触测圆环</translation>
     </message>
     <message>
-        <source>Probe the ring all round and hold still on each point. Points: {n_touches}; covered: {covered:.0f} of {needed:.0f} degrees.</source>
-        <translation>沿环规整圈测量，并在每个点保持静止。点数：{n_touches}；已覆盖：{covered:.0f} / {needed:.0f} 度。</translation>
-    </message>
-    <message>
         <source>Probe the sphere</source>
         <translation>探测球</translation>
     </message>
@@ -8012,6 +8016,10 @@ mm</translation>
         <translation>以同一姿态触测锥孔 {needed} 次，每次之间抬起测头：{n_touches} / {needed}。第 {posture} / {n_postures} 个姿态：竖直，以及向四个方向倾斜。</translation>
     </message>
     <message>
+        <source>Probe the ring all round and hold still on each point. Points: {n_touches}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Processing cannot keep up: {n_missed} of {n_offered} images skipped. Close other programs, or the swing takes longer.</source>
         <translation>处理速度不足：{n_offered} 幅图像中有 {n_missed} 幅未处理。请关闭其他程序，否则摆动会更久。</translation>
     </message>
@@ -9320,6 +9328,10 @@ mm</translation>
         <translation>{name} 不是有效的 YAML。请检查是否选对了文件。</translation>
     </message>
     <message>
+        <source>{one} and {other} hold the same tip to the last digit. Give each calibration once.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{path} is the name of a device on Windows, not of a file. Choose another name.</source>
         <translation>{path} 是 Windows 上的设备名，而不是文件名。请选择其他名称。</translation>
     </message>
@@ -10392,8 +10404,8 @@ mm</translation>
         <translation>特性 / mm，度</translation>
     </message>
     <message>
-        <source>Features / mm</source>
-        <translation>要素 / mm</translation>
+        <source>Features / mm, degrees</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Points</source>
@@ -10410,6 +10422,14 @@ mm</translation>
     <message>
         <source>Nominal</source>
         <translation>标称</translation>
+    </message>
+    <message>
+        <source>Lower limit</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Upper limit</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Actual</source>
