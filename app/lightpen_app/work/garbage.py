@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, QTimer
 
 from lightpen.formats.decoding import release_freed_memory
 
-PERIOD_MS, RELEASE_PERIOD_MS = 500, 20_000
+PERIOD_MS, RELEASE_PERIOD_MS = 500, 2_000
 LIMITS = (700, 10, 10)  # of the generations: objects, and collections of the younger
 
 

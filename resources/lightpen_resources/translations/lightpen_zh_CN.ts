@@ -3370,7 +3370,7 @@
     </message>
     <message>
         <source>Report...</source>
-        <translation type="unfinished"></translation>
+        <translation>报告…</translation>
     </message>
     <message>
         <source>Open a measuring plan</source>
@@ -4273,7 +4273,7 @@
     </message>
     <message>
         <source>({0} of them miss images)</source>
-        <translation type="unfinished"></translation>
+        <translation>（其中 {0} 个丢失图像）</translation>
     </message>
     <message>
         <source>Pen {0}</source>
@@ -8017,7 +8017,7 @@ mm</translation>
     </message>
     <message>
         <source>Probe the ring all round and hold still on each point. Points: {n_touches}.</source>
-        <translation type="unfinished"></translation>
+        <translation>沿环规整圈探测，在每个点上保持静止。点数：{n_touches}。</translation>
     </message>
     <message>
         <source>Processing cannot keep up: {n_missed} of {n_offered} images skipped. Close other programs, or the swing takes longer.</source>
@@ -9329,7 +9329,7 @@ mm</translation>
     </message>
     <message>
         <source>{one} and {other} hold the same tip to the last digit. Give each calibration once.</source>
-        <translation type="unfinished"></translation>
+        <translation>{one} 与 {other} 的测头完全相同。每次校准只需给出一次。</translation>
     </message>
     <message>
         <source>{path} is the name of a device on Windows, not of a file. Choose another name.</source>
@@ -10405,7 +10405,7 @@ mm</translation>
     </message>
     <message>
         <source>Features / mm, degrees</source>
-        <translation type="unfinished"></translation>
+        <translation>要素 / mm，度</translation>
     </message>
     <message>
         <source>Points</source>
@@ -10425,11 +10425,11 @@ mm</translation>
     </message>
     <message>
         <source>Lower limit</source>
-        <translation type="unfinished"></translation>
+        <translation>下极限</translation>
     </message>
     <message>
         <source>Upper limit</source>
-        <translation type="unfinished"></translation>
+        <translation>上极限</translation>
     </message>
     <message>
         <source>Actual</source>
