@@ -341,12 +341,12 @@ class Stage:
         self._workbench.selection.set_choices(choices)
         probing.runner.ask(lambda workflow: workflow.start_over())
         self._wait_until(lambda: probing.status.is_touching)
+        setup = probing.status.setup
+        assert setup is not None
         probing.runner.ask(lambda workflow: workflow.leave())
         self._wait_until(lambda: not probing.status.is_here)
-        status = probing.status
-        assert status.setup is not None
-        state = probed(status.setup, self._scene)
-        probing.on_verification(replace(status, state=state), ())
+        status = replace(probing.status, setup=setup, state=probed(setup, self._scene))
+        probing.on_verification(status, ())
         for index in range(N_SHOWN):
             self._show_image(index)
         shown = QDeadlineTimer(REFRESH_MS)
