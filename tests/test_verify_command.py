@@ -98,8 +98,9 @@ def test_the_points_of_a_ring_lie_on_a_plane(
         read(tmp_path / "ring.json")["runs"],
     )
     assert found["verification"] == "plane"
-    assert found["flatness_mm"] == pytest.approx(of_ring["flatness_mm"], abs=1e-9)
-    assert found["normal_cam"] == pytest.approx(of_ring["normal_cam"], abs=1e-9)
+    # The ring's plane is that of the nearest circle, not of the nearest plane.
+    assert found["flatness_mm"] == pytest.approx(of_ring["flatness_mm"], abs=1e-5)
+    assert found["normal_cam"] == pytest.approx(of_ring["normal_cam"], abs=1e-5)
     assert 0 < found["expanded_uncertainty_mm"] < 0.1
     assert set(found["verdict"]["limits_mm"]) == {"form", "tip"}
     assert "Decision rule: simple acceptance" in plane.stdout

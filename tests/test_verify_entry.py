@@ -30,17 +30,20 @@ N_POINTS = 12
 
 
 @pytest.fixture
-def result(tmp_path: Path, shared_data: Path) -> Path:
-    """An accepted tip in a data folder."""
+def preparation(shared_data: Path) -> Preparation:
+    """Names and files of a tip."""
     files = shared_data / "fixed-point"
-    return accept_tip(
-        tmp_path / "data",
-        Preparation(
-            names=Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0),
-            camera_file=CameraFile.read(files / "camera.yaml"),
-            pen_file=PenFile.read(files / "leds.csv"),
-        ),
+    return Preparation(
+        names=Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0),
+        camera_file=CameraFile.read(files / "camera.yaml"),
+        pen_file=PenFile.read(files / "leds.csv"),
     )
+
+
+@pytest.fixture
+def result(tmp_path: Path, preparation: Preparation) -> Path:
+    """An accepted tip in a data folder."""
+    return accept_tip(tmp_path / "data", preparation)
 
 
 @pytest.fixture
@@ -128,10 +131,20 @@ def test_a_tip_from_elsewhere_is_entered_where_it_is_wanted(
     assert entered(tmp_path / "data")[-1].settings["verified"] == "fixed point"
 
 
-def test_repeatability_is_entered_with_the_tips_it_is_of(
-    verify: Verify, lightpen: Run, result: Path, tmp_path: Path
+def test_a_calibration_given_twice_is_refused(
+    lightpen: Run, result: Path, tmp_path: Path
 ) -> None:
-    other = Path(shutil.copy(result, result.with_name("000002.json")))
+    again = Path(shutil.copy(result, tmp_path / "again.json"))
+    outcome = lightpen("repeatability", result, again)
+
+    assert outcome.returncode == 2
+    assert "again.json hold the same tip to the last digit" in outcome.stderr
+
+
+def test_repeatability_is_entered_with_the_tips_it_is_of(
+    lightpen: Run, result: Path, preparation: Preparation, tmp_path: Path
+) -> None:
+    other = accept_tip(tmp_path / "data", preparation, seed=4)
     outcome = lightpen("repeatability", result, other)
 
     assert outcome.returncode == 0, outcome.stderr

@@ -1,6 +1,7 @@
 """``lightpen repeatability``: one tip calibrated several times."""
 
 import argparse
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -109,6 +110,9 @@ def _repeatability(options: argparse.Namespace) -> int:
     require_other_file(options.json, *inputs)
     require_other_file(options.chart, *inputs)
     tips, first = _tips(options)
+    for one, other in combinations(tips, 2):
+        if np.array_equal(one.tip_pen, other.tip_pen):
+            raise UsageError("repeatability.twice", one=one.name, other=other.name)
     limits = VerificationLimits(repeatability=options.limit)
     found = measure_repeatability(
         tips,

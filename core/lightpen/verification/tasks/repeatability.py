@@ -10,7 +10,6 @@ moved under the pen, or was not held.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from itertools import combinations
 
 import numpy as np
 
@@ -176,15 +175,10 @@ def measure_repeatability(
     Raises
     ------
     CalibrationError
-        There are fewer than two, or one is given twice.
+        There are fewer than two.
     """
     if len(tips) < MIN_TIPS:
         raise CalibrationError("repeatability.too-few", n_tips=len(tips))
-    for one, other in combinations(tips, 2):
-        if np.array_equal(one.tip_pen, other.tip_pen):
-            raise CalibrationError(
-                "repeatability.twice", one=one.name, other=other.name
-            )
     scatter = Scatter(np.array([tip.tip_pen for tip in tips]))
     values, deviation = scatter.points, scatter.deviation
     points_to = None if touched is None else _points_to(deviation, len(tips), touched)

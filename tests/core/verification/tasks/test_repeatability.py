@@ -70,11 +70,6 @@ def test_the_table_of_the_paper_is_reproduced() -> None:
     assert "Ave                        -1.3182  -90.4095  -23.8548" in text
 
 
-def test_a_calibration_given_twice_is_refused() -> None:
-    with pytest.raises(CalibrationError, match="test 1 and test 3 hold the same tip"):
-        measure_repeatability(estimates(TABLE_1[[0, 1, 0]]), LIMITS)
-
-
 def test_a_tip_that_scatters_more_than_a_fixed_point_rode_with_the_pen() -> None:
     found = measure_repeatability(
         estimates(TABLE_1), LIMITS, touched=touched(TABLE_2_STD)
