@@ -341,11 +341,14 @@ class Stage:
         self._workbench.selection.set_choices(choices)
         probing.runner.ask(lambda workflow: workflow.start_over())
         self._wait_until(lambda: probing.status.is_touching)
-        setup = probing.status.setup
-        assert setup is not None
+        before = probing.status
+        assert before.setup is not None
         probing.runner.ask(lambda workflow: workflow.leave())
         self._wait_until(lambda: not probing.status.is_here)
-        status = replace(probing.status, setup=setup, state=probed(setup, self._scene))
+        state = probed(before.setup, self._scene)
+        status = replace(
+            probing.status, tip=before.tip, setup=before.setup, state=state
+        )
         probing.on_verification(status, ())
         for index in range(N_SHOWN):
             self._show_image(index)
