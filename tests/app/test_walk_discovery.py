@@ -22,6 +22,7 @@ SAVE = "Save both files and calibrate the tip"
 
 
 @pytest.mark.qt_log_ignore("^This plugin does not support ")
+@pytest.mark.slow
 def test_a_pen_without_any_file_becomes_an_accepted_tip(
     walker: "Walker", monkeypatch: pytest.MonkeyPatch
 ) -> None:
