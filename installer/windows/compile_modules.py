@@ -1,10 +1,9 @@
 """Compile the modules of all packages into one file, with the Python that runs this.
 
 Run in the folder that is installed. What is not compiled here says so and is left out.
-Of libraries neither docstrings nor sources are installed.
+The sources of libraries are not installed.
 """
 
-import ast
 import importlib.util
 import marshal
 import sys
@@ -13,7 +12,6 @@ from pathlib import Path
 import compiled_modules
 
 UNCHECKED_HASH = (1).to_bytes(4, "little") + bytes(8)
-DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 # It reads its files by path, takes itself out of the modules and imports its library by
 # the same name, which is found because it puts a folder first on the path.
 FOUND_BY_PATH = "cv2/"
@@ -45,13 +43,9 @@ def main() -> int:
 
 def compiled_form(path: Path, source: str) -> bytes:
     """Return what Python would write as the compiled form of a module."""
-    tree = ast.parse(path.read_bytes())
-    if not source.startswith(OURS):
-        for node in ast.walk(tree):
-            if isinstance(node, DOCUMENTED) and ast.get_docstring(node) is not None:
-                nothing = ast.copy_location(ast.Pass(), node.body.pop(0))
-                node.body = node.body or [nothing]
-    code = compile(tree, f"site-packages/{source}", "exec", dont_inherit=True)
+    code = compile(
+        path.read_bytes(), f"site-packages/{source}", "exec", dont_inherit=True
+    )
     return importlib.util.MAGIC_NUMBER + UNCHECKED_HASH + marshal.dumps(code)
 
 
