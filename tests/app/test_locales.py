@@ -119,6 +119,7 @@ def properties_by_keyword(source: str) -> list[str]:
     ]
 
 
+@pytest.mark.slow
 def test_the_demo_opens_the_window_and_plays_in_unusual_locales(
     environment_of: EnvironmentOf, tmp_path: Path
 ) -> None:
@@ -129,6 +130,7 @@ def test_the_demo_opens_the_window_and_plays_in_unusual_locales(
     assert outcome.stdout.split() == [LETTERS, "\u06f1\u066b\u06f5", "True", "True"]
 
 
+@pytest.mark.slow
 def test_a_calibration_gives_the_same_tip_in_unusual_locales(
     environment_of: EnvironmentOf,
     scene: Callable[..., Path],
