@@ -74,6 +74,21 @@ def number_from(
     return number_of
 
 
+def add_camera_and_pen(parser: argparse.ArgumentParser) -> None:
+    """Add ``--camera`` and ``--pen``, both required, and the options of the pen."""
+    parser.add_argument(
+        "--camera",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="camera file: intrinsics of the camera",
+    )
+    parser.add_argument(
+        "--pen", type=Path, required=True, metavar="FILE", help="LED file of the pen"
+    )
+    add_pen_options(parser)
+
+
 def add_pen_options(parser: argparse.ArgumentParser) -> None:
     """Add options for what a pen file may omit."""
     parser.add_argument(

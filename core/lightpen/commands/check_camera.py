@@ -1,11 +1,10 @@
 """``lightpen check-camera``: test of a camera file with one swing."""
 
 import argparse
-from pathlib import Path
 
 import numpy as np
 
-from lightpen.commands.arguments import add_json, add_pen_options, number_from
+from lightpen.commands.arguments import add_camera_and_pen, add_json, number_from
 from lightpen.commands.console import (
     printing,
     progress,
@@ -33,17 +32,7 @@ def add_check_camera(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "images", nargs="+", metavar="IMAGES", help="images of one swing of the pen"
     )
-    parser.add_argument(
-        "--camera",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="camera file: intrinsics of the camera",
-    )
-    parser.add_argument(
-        "--pen", type=Path, required=True, metavar="FILE", help="LED file of the pen"
-    )
-    add_pen_options(parser)
+    add_camera_and_pen(parser)
     parser.add_argument(
         "--temperature",
         type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),

@@ -3,7 +3,11 @@
 import argparse
 from pathlib import Path
 
-from lightpen.commands.arguments import add_exit_by_verdict, add_json, add_pen_options
+from lightpen.commands.arguments import (
+    add_camera_and_pen,
+    add_exit_by_verdict,
+    add_json,
+)
 from lightpen.commands.console import (
     are_same,
     printing,
@@ -65,17 +69,7 @@ def _add_swings(parser: argparse.ArgumentParser) -> None:
         metavar="RESULT.json",
         help="calibrations with this pen, in any order",
     )
-    parser.add_argument(
-        "--camera",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="camera file: intrinsics of the camera",
-    )
-    parser.add_argument(
-        "--pen", type=Path, required=True, metavar="FILE", help="LED file of the pen"
-    )
-    add_pen_options(parser)
+    add_camera_and_pen(parser)
 
 
 @printing

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.commands.arguments import add_json, add_pen_options, whole_number
+from lightpen.commands.arguments import add_camera_and_pen, add_json, whole_number
 from lightpen.commands.console import (
     printing,
     progress,
@@ -56,17 +56,7 @@ def add_recalculate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "results", nargs="+", type=Path, metavar="RESULT.json", help="calibrations"
     )
-    parser.add_argument(
-        "--camera",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="camera file: intrinsics of the camera",
-    )
-    parser.add_argument(
-        "--pen", type=Path, required=True, metavar="FILE", help="LED file of the pen"
-    )
-    add_pen_options(parser)
+    add_camera_and_pen(parser)
     parser.add_argument(
         "--monte-carlo",
         type=_n_trials,
