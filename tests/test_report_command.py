@@ -59,6 +59,7 @@ def verification(tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.usefixtures("qapp")  # text is measured by the fonts of an application
 def test_a_verification_is_put_on_paper(
     script: Callable[..., CompletedProcess[str]], verification: Path, tmp_path: Path
 ) -> None:
