@@ -178,11 +178,15 @@ def assumptions_of(options: argparse.Namespace) -> Assumptions:
     return replace(assumed, **{n: x for n, x in given.items() if x is not None})
 
 
-def separation_of(options: argparse.Namespace) -> ConeSeparation | None:
-    """Return the distance of two cones, if there are two."""
+def separation_of(
+    options: argparse.Namespace, *, is_touched: bool = False
+) -> ConeSeparation | None:
+    """Return the distance of two cones, if there are two: swung in, or touched."""
     given = (options.second_cone, options.distance, options.distance_sigma)
-    if all(each is None for each in given):
+    if all(each is None for each in given) and not is_touched:
         return None
-    if any(each is None for each in given):
-        raise UsageError("cli.second-cone")
+    if any(each is None for each in given[is_touched:]):
+        raise UsageError("cli.touched" if is_touched else "cli.second-cone")
+    if is_touched and options.second_cone is not None:
+        raise UsageError("cli.touched-and-cone")
     return ConeSeparation(options.distance, options.distance_sigma)

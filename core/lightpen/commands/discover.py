@@ -10,6 +10,7 @@ from pathlib import Path
 from lightpen.commands.arguments import above_zero, finite
 from lightpen.commands.calibrate_options import separation_of
 from lightpen.commands.console import are_same, printing, progress, shown, write_record
+from lightpen.commands.touched import touches_at
 from lightpen.discovery.discover import discover
 from lightpen.discovery.picture import picture_of_pen
 from lightpen.discovery.report import (
@@ -18,7 +19,7 @@ from lightpen.discovery.report import (
     swings_record,
     swings_text,
 )
-from lightpen.discovery.request import Request, SecondSightings
+from lightpen.discovery.request import Request, SecondSightings, TouchedLength
 from lightpen.discovery.scale import MeasuredLength
 from lightpen.discovery.sightings import (
     Report,
@@ -89,7 +90,19 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         "moved. With --distance it gives the scale",
     )
     parser.add_argument(
-        "--distance", type=above_zero, metavar="MM", help="distance of the two cones"
+        "--touched",
+        nargs="+",
+        default=[],
+        metavar="RUN",
+        help="touches of two cones at a certified distance, as for verify length: "
+        "image folders, videos, records or FILE.csv (frame,led,x_px,y_px). With "
+        "--distance they give the scale",
+    )
+    parser.add_argument(
+        "--distance",
+        type=above_zero,
+        metavar="MM",
+        help="distance of the two cones, or of the touched ends",
     )
     parser.add_argument(
         "--distance-sigma",
@@ -150,16 +163,17 @@ def _size(text: str) -> tuple[int, int]:
 @printing
 def _discover(options: argparse.Namespace) -> None:
     lengths = tuple(_length(words, options.length_sigma) for words in options.length)
-    separation = separation_of(options)
+    separation = separation_of(options, is_touched=bool(options.touched))
     if not lengths and separation is None and options.out_pen is not None:
         raise UsageError("discover.no-length")
     camera = None if options.camera is None else read_camera(options.camera)
     sketch = _sketch(options.pen_sketch or options.pen)
     _check_outputs(options)
     places = _places(options)
-    if len(places) > 1 and separation is not None:
+    has_cone = options.second_cone is not None
+    if has_cone and len(places) > 1:
         raise UsageError("cli.discover-swings-and-cone")
-    n_read = len(places) + (separation is not None)
+    n_read = len(places) + has_cone
     read = partial(_sightings, options, camera)
     with progress("Finding pen and camera") as report:
         share = 0.0 if options.centers else SEARCHING
@@ -169,7 +183,10 @@ def _discover(options: argparse.Namespace) -> None:
             for k, place in enumerate(places)
         ]
         request = Request(lengths, _diameter(options, sketch), camera, sketch)
-        if separation is not None:
+        if separation is not None and options.touched:
+            touches = partial(touches_at, options.touched)
+            request = replace(request, touched=TouchedLength(touches, separation))
+        elif separation is not None:
             last = partial(_report_part, report, each, each)
             other = read([options.second_cone], last)
             request = replace(request, second=SecondSightings(other, separation))

@@ -10,7 +10,7 @@ import numpy as np
 
 from lightpen.commands.arguments import add_pen_options, limits_by
 from lightpen.commands.console import lacking, progress, require_other_file
-from lightpen.detection.observations import Observations, observe_centers
+from lightpen.detection.observations import Observations, Report, observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.hashes import all_hashed, hashed
@@ -162,7 +162,8 @@ def measure_runs(
     files += tuple(centers)
     require_other_file(options.json, *files)
     instrument = instrument_of(calibration, viewers, pen, pen_file)
-    seen = _seen(centers, found, instrument)
+    with progress("Finding LEDs") as report:
+        seen = _seen(centers, found, instrument, report)
     runs = _runs_of(seen, instrument, options.frames)
     nominal = getattr(options, "nominal_tip", None)
     for known in (pen.nominal_tip, calibration.nominal_tip):
@@ -190,6 +191,14 @@ def measure_runs(
     )
 
 
+def touches_at(places: Sequence[str], instrument: Instrument) -> list[ProbedPoint]:
+    """Return the touches of images, or of files of LED centres, at all places."""
+    centers = [Path(each) for each in places if each.lower().endswith(".csv")]
+    others = [touch_place((p,)) for p in places if Path(p) not in centers]
+    runs = _runs_of(_seen(centers, others, instrument), instrument, None)
+    return [touch for run in runs for touch in run.touches]
+
+
 @dataclass(frozen=True, eq=False)
 class _SeenRun:
     """What the images of a run, or its centres, show in each camera."""
@@ -200,7 +209,10 @@ class _SeenRun:
 
 
 def _seen(
-    centers: Sequence[Path], places: Sequence[ImageLocation], instrument: Instrument
+    centers: Sequence[Path],
+    places: Sequence[ImageLocation],
+    instrument: Instrument,
+    report: Report = lambda fraction: None,
 ) -> list[_SeenRun]:
     if centers and instrument.rig.n_cameras > 1:
         raise UsageError("cli.centers-of-rig")
@@ -209,11 +221,10 @@ def _seen(
         own = read_centers(path, instrument.pen.n_leds)
         view = observe_centers(own, instrument.camera, instrument.pen)
         seen.append(_SeenRun(path.name, (view,)))
-    with progress("Finding LEDs") as report:
-        for i, place in enumerate(places, start=1):
-            views = observe_place(place, instrument)
-            seen.append(_SeenRun(place.name, views, place.touches))
-            report(i / len(places))
+    for i, place in enumerate(places, start=1):
+        views = observe_place(place, instrument)
+        seen.append(_SeenRun(place.name, views, place.touches))
+        report(i / len(places))
     return seen
 
 

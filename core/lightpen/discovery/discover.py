@@ -29,6 +29,7 @@ from lightpen.discovery.scale import with_lengths_known
 from lightpen.discovery.scaled_start import LEAST_LENGTH_SIGMA, numbered, scaled_start
 from lightpen.discovery.sightings import Report, Sightings
 from lightpen.discovery.starts import any_covariance, scaled_to
+from lightpen.discovery.touched_length import with_touched_length
 from lightpen.discovery.tracks import find_lamps, follow, without_lamps
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.calibrate import calibrate
@@ -80,6 +81,17 @@ def discover(
     swing = _labelled_swing(sightings, request, report)
     swing = replace(swing, found=numbered(swing.found, request))
     report(0.5)
+    if request.touched is not None:
+        free = replace(request, lengths=(), touched=None)
+        request = with_touched_length(request, _adjusted(swing, free))
+    return _adjusted(swing, request, report)
+
+
+def _adjusted(
+    swing: _Swing, request: Request, report: Report = lambda fraction: None
+) -> Discovery:
+    """Return tip, pen and camera by a swing with numbered LEDs."""
+    sightings = swing.sightings
     pixels = pixels_of(swing.found.spots, swing.centers)
     start, lengths, choice = scaled_start(request, swing.found, pixels)
     report(0.6)

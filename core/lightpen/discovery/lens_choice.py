@@ -54,7 +54,10 @@ class _Trial(NamedTuple):
 
 
 def choose_lens(
-    start: Start, pixels: FloatArray, lengths: tuple[KnownLength, ...]
+    start: Start,
+    pixels: FloatArray,
+    lengths: tuple[KnownLength, ...],
+    needed: int | None = None,
 ) -> tuple[BundleState, Choice]:
     """Return the start with the lens model that predicts images best, and why.
 
@@ -64,7 +67,15 @@ def choose_lens(
         With 5 coefficients.
     pixels : (M, L, 2) array
         Of its images, px; NaN where an LED was not seen.
+    needed : int, optional
+        Coefficients of the model that is taken, where they do not fold the image.
     """
+    if needed is not None and needed != FEW:
+        only = _refitted(start, needed, pixels, lengths, worth=-np.inf)
+        if only is not None:
+            return only.start.state, Choice(needed, {}, only.pull)
+    if needed is not None:
+        return start.state, Choice(FEW, {})
     best = _Trial(start, any_camera(start.state.rig.cameras[0]))
     models = (MANY, FISHEYE) if _is_wide(best.camera, pixels) else (MANY,)
     found = (_refitted(start, n, pixels, lengths) for n in models)
@@ -93,7 +104,11 @@ def _is_wide(camera: Camera, pixels: FloatArray) -> bool:
 
 
 def _refitted(
-    start: Start, n: int, pixels: FloatArray, lengths: tuple[KnownLength, ...]
+    start: Start,
+    n: int,
+    pixels: FloatArray,
+    lengths: tuple[KnownLength, ...],
+    worth: float = WORTH,
 ) -> _Trial | None:
     """Return the adjustment with n coefficients.
 
@@ -108,7 +123,7 @@ def _refitted(
             camera, prior = _pulled(near, pull)
         state = replace(start.state, rig=rig_of(camera))
         found = adjust_start(state, pixels, prior, N_STEPS, lengths)
-        if found.sigma > (1 - WORTH) * start.sigma:
+        if found.sigma > (1 - worth) * start.sigma:
             return None
         if not folds(found.state.rig.cameras[0]):
             return _Trial(found, prior, pull)

@@ -1,13 +1,16 @@
 """What is known of pen and camera before the images are looked at."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from lightpen.arrays import FloatArray
 from lightpen.discovery.scale import MeasuredLength
 from lightpen.discovery.sightings import Sightings
 from lightpen.estimation.bundle.priors import ConeSeparation
+from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
+from lightpen.verification.tasks.probed_point import ProbedPoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +30,10 @@ class Request:
     second : SecondSightings or None
         A swing in a second cone, before the same camera, not moved. The distance of
         the cones gives the scale where there is no length.
+    touched : TouchedLength or None
+        A certified length, of which both ends were touched with the pen.
+    n_coefficients : int or None
+        Lens model that other swings need; None: it is chosen.
     """
 
     lengths: tuple[MeasuredLength, ...]
@@ -34,11 +41,13 @@ class Request:
     camera: Camera | None = None
     sketch: Pen | None = None
     second: "SecondSightings | None" = None
+    touched: "TouchedLength | None" = None
+    n_coefficients: int | None = None
 
     @property
     def is_relative(self) -> bool:
         """Whether nothing gives the scale."""
-        return not self.lengths and self.second is None
+        return not (self.lengths or self.second or self.touched)
 
     @property
     def rough_leds(self) -> FloatArray | None:
@@ -51,4 +60,18 @@ class SecondSightings:
     """A swing of the pen in a second cone, at a certified distance from the first."""
 
     sightings: Sightings
+    separation: ConeSeparation
+
+
+@dataclass(frozen=True, eq=False)
+class TouchedLength:
+    """Touches of both ends of a certified length, after the swing.
+
+    Attributes
+    ----------
+    touches : callable
+        Returns the touches as measured with pen, camera and tip as found.
+    """
+
+    touches: Callable[[Instrument], Sequence[ProbedPoint]]
     separation: ConeSeparation

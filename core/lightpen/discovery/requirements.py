@@ -54,6 +54,13 @@ def require_length(
         ratio = each.stated / each.estimated
         if abs(ratio - 1) < OTHER_SIZE:
             continue
+        if request.touched is not None:
+            raise CalibrationError(
+                "discover.touched-length",
+                length=request.touched.separation.distance,
+                found=each.estimated,
+                stated=each.stated,
+            )
         leds, length = ratio * calibration.bundle.state.pen.leds, lengths[0].length
         first, second, _ = nearest_pair(leds, length)
         raise CalibrationError(

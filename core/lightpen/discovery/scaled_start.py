@@ -97,7 +97,7 @@ def scaled_start(request: Request, found: Labelled, pixels: FloatArray) -> Scale
         start = adjust_start(start.state, pixels[some], prior, n_steps, lengths)
     part = start.state
     if known is None:
-        part, choice = choose_lens(start, pixels[some], lengths)
+        part, choice = choose_lens(start, pixels[some], lengths, request.n_coefficients)
     turned, _ = fit_rigid(state.pen.leds, part.pen.leds)
     every = replace(part, rotations=state.rotations @ turned.T)
     prior = camera_prior(part.rig.cameras[0], known)

@@ -16,11 +16,12 @@ from lightpen.arrays import FloatArray
 from lightpen.discovery.discover import discover
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.request import Request
+from lightpen.discovery.scale import MeasuredLength
 from lightpen.discovery.sightings import Report, Sightings
-from lightpen.discovery.starts import gradient_of
+from lightpen.discovery.starts import any_camera, gradient_of
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.unknowns import whole_moves
-from lightpen.model.information import inverse
+from lightpen.model.information import inverse, known_by
 from lightpen.model.rigid import fit_rigid
 
 CONTRADICTING = 4.0  # standard deviations of a held-out swing
@@ -90,11 +91,18 @@ def discover_together(
             raise CalibrationError("discover.other-size", number=k + 1)
     found: list[Discovery] = []
     for k, sightings in enumerate(swings):
-        own = request if not found else replace(request, sketch=found[0].pen)
+        own = request if not found else _again(request, found[0])
         each = discover(sightings, own, partial(_report_part, report, k, len(swings)))
         if each.pen.n_leds != (found or [each])[0].pen.n_leds:
             raise CalibrationError("discover.other-pen", number=k + 1)
         found.append(each)
+    sizes = [len(each.camera.distortion) for each in found]
+    for k, size in enumerate(sizes):
+        if size != max(sizes):  # a swing shows the lens where the LEDs were
+            own = replace(_again(request, found[0]), n_coefficients=max(sizes))
+            found[k] = discover(swings[k], own)
+            if len(found[k].camera.distortion) != max(sizes):
+                raise CalibrationError("discover.other-lens", number=k + 1)
     held_out = _compared(joined(found[:-1]), found[-1])
     if held_out.worst > CONTRADICTING:
         raise CalibrationError(
@@ -105,24 +113,43 @@ def discover_together(
     return Together(joined(found), tuple(found), held_out)
 
 
+def _again(request: Request, first: Discovery) -> Request:
+    """Return the request of a later swing: numbers, frame and lengths of the first."""
+    if request.touched is not None:
+        lengths = (
+            MeasuredLength((each.first + 1, each.second + 1), each.length, each.sigma)
+            for each in first.lengths
+        )
+        request = replace(request, lengths=tuple(lengths), touched=None)
+    return replace(request, sketch=first.pen)
+
+
 def _report_part(report: Report, k: int, n: int, fraction: float) -> None:
     report((k + fraction) / n)
 
 
 def joined(swings: Sequence[Discovery]) -> Discovery:
-    """Return what swings found together, in the frame of the first."""
+    """Return what swings found together, in the frame of the first.
+
+    What is known of camera and discs without images counts once: each swing brings the
+    information of its images, which is its own less that of these priors.
+    """
     first, at = swings[0], swings[0].parameters
     if len(swings) == 1:
         return first
     basis = _free_of(first)
     parts = [_parted(each) for each in swings]
-    information = [inverse(basis.T @ each.fit @ basis) for each in parts]
-    covariance = inverse(np.sum(information, axis=0))
     start = _values(first, first)
-    right = sum(
-        known @ basis.T @ (_values(each, first) - start)
-        for known, each in zip(information, swings, strict=True)
-    )
+    information = basis.T @ _prior_information(first) @ basis
+    right = information @ basis.T @ (_prior_values(first) - start)
+    for each, part in zip(swings, parts, strict=True):
+        prior = basis.T @ _prior_information(each) @ basis
+        of_images = _not_negative(inverse(basis.T @ part.fit @ basis) - prior)
+        values = _values(each, first)
+        begun = basis.T @ (values - _started_at(each, values))
+        information += of_images
+        right += of_images @ basis.T @ (values - start) + prior @ begun
+    covariance = inverse(information)
     whole = start + basis @ covariance @ right
     shared = np.mean([each.shared for each in parts], axis=0)
     spread = basis @ covariance @ basis.T + shared
@@ -165,6 +192,40 @@ def _values(each: Discovery, frame: Discovery) -> FloatArray:
     values[at.diameter] = each.pen.diameter
     values[at.leds] = (each.pen.leds @ R.T + t).ravel()
     return values
+
+
+def _prior_information(each: Discovery) -> FloatArray:
+    """Return what is known of camera and discs without images, (q, q)."""
+    at, priors = each.parameters, each.calibration.priors
+    information = np.zeros((at.number, at.number))
+    camera = at.cameras[0]
+    information[camera, camera] = known_by(priors.cameras[0].covariance)
+    information[at.diameter, at.diameter] = known_by(priors.diameter.covariance)
+    return information
+
+
+def _prior_values(each: Discovery) -> FloatArray:
+    """Return the parameters, (q,), with camera and discs as the priors have them."""
+    values = _started_at(each, _values(each, each))
+    if each.lens_choice is not None:  # else the camera is that of a file
+        values[each.parameters.cameras[0]] = any_camera(each.camera).intrinsics
+    return values
+
+
+def _started_at(each: Discovery, values: FloatArray) -> FloatArray:
+    """Return parameters with camera and discs as the adjustment began with them."""
+    start, values = each.calibration.bundle.unknowns.start, values.copy()
+    values[each.parameters.cameras[0]] = start.rig.cameras[0].intrinsics
+    values[each.parameters.diameter] = start.pen.diameter
+    return values
+
+
+def _not_negative(information: FloatArray) -> FloatArray:
+    """Return information without directions in which rounding leaves less than none."""
+    units = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(information / np.outer(units, units))
+    scaled = units[:, None] * vectors
+    return np.asarray((scaled * np.maximum(values, 0.0)) @ scaled.T)
 
 
 class _Parts(NamedTuple):

@@ -7,13 +7,13 @@ from tests.simulated_stations import Station, errors_of, random_station, seen_st
 from lightpen.discovery.discover import discover
 from lightpen.discovery.picture import picture_of_pen
 from lightpen.discovery.request import Request, SecondSightings
-from lightpen.discovery.together import Together, discover_together
+from lightpen.discovery.together import Together, discover_together, joined
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.simulator.postures import FRAME_RATE, operator_postures
 from lightpen.simulator.swings import swing_from_postures
 
-N = 100  # images
+N = 60  # images
 FIRST = random_station(6, n_images=N)
 APART = np.array([25.0, 2.0, 30.0])  # mm, from cone to cone
 
@@ -49,6 +49,17 @@ def test_the_length_is_common_to_all_swings(together: Together) -> None:
     leds = together.found.pen.leds
     length = float(np.linalg.norm(leds[known.first] - leds[known.second]))
     assert length == pytest.approx(known.length, abs=2e-4)
+
+
+def test_what_no_image_shows_is_no_better_known_by_two_swings(
+    together: Together,
+) -> None:
+    each = together.swings[0]
+    twice = joined((each, each))
+    # Centres alone hardly show the size of the discs; the focal length they do.
+    assert twice.pen.diameter_sigma == pytest.approx(each.pen.diameter_sigma, rel=0.02)
+    ratio = twice.intrinsics_sigma[0] / each.intrinsics_sigma[0]
+    assert ratio == pytest.approx(0.5**0.5, rel=0.02)
 
 
 def test_the_swing_held_out_agrees_with_the_others(together: Together) -> None:

@@ -1,0 +1,36 @@
+"""Scale of a pen by a certified length whose ends were touched with it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from lightpen.discovery.found import Discovery
+from lightpen.discovery.request import Request
+from lightpen.discovery.scale import MeasuredLength
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.verification.tasks.length import LengthOptions, measure_length
+from lightpen.verification.tasks.task import Conditions
+
+
+def with_touched_length(request: Request, relative: Discovery) -> Request:
+    """Return a request with the distance of two LEDs by the touched length.
+
+    The touches measure that length in the unit of the relative result. The ratio to the
+    certified length is the scale, and so the distance of the LEDs farthest apart.
+
+    Raises
+    ------
+    CalibrationError
+        The touches are not of two ends.
+    """
+    touched = request.touched
+    assert touched is not None
+    instrument = relative.calibration.instrument
+    runs = [("--touched", touched.touches(instrument))]
+    (run,) = measure_length(runs, Conditions(instrument), LengthOptions()).runs
+    known, certified = relative.lengths[0], touched.separation
+    length = known.length * certified.distance / run.measured
+    own = run.uncertainty / COVERAGE_FACTOR / run.measured
+    sigma = length * float(np.hypot(own, certified.sigma / certified.distance))
+    measured = MeasuredLength((known.first + 1, known.second + 1), length, sigma)
+    return replace(request, lengths=(*request.lengths, measured))
