@@ -17,7 +17,7 @@ MESSAGES = {
     "discover.same-led": "The length is between LED {number} and itself. Give the numbers of two LEDs.",
     "discover.lengths-contradict": "The lengths contradict each other: LEDs {first} and {second} are stated {stated:.3f} mm apart; the other lengths give {implied:.3f} mm. Check the numbers of the LEDs, and measure again.",
     "discover.length-of-others": "The length of {length:g} mm does not fit LEDs {first} and {second}: it gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. It may be the length between LEDs {other} and {another}. Check which LEDs were measured, and the diameter of the discs.",
-    "discover.touched-length": "The touched length of {length:g} mm gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. Check which length was touched, and --distance and --led-diameter.",
+    "discover.touched-length": "The touched length of {length:g} mm gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. Check which length was touched, its certified value, and the disc diameter.",
     "discover.no-length": "A pen file needs one known length. Measure the distance between two LEDs and state it, touch both ends of a certified length, or swing in a second cone at a known distance.",
     "discover.other-size": "The images of swing {number} are of another size than those of the first. Give swings of one camera.",
     "discover.other-pen": "Swing {number} shows another number of LEDs than the first. Give swings of one pen.",

@@ -185,8 +185,10 @@ def separation_of(
     given = (options.second_cone, options.distance, options.distance_sigma)
     if all(each is None for each in given) and not is_touched:
         return None
-    if any(each is None for each in given[is_touched:]):
-        raise UsageError("cli.touched" if is_touched else "cli.second-cone")
     if is_touched and options.second_cone is not None:
         raise UsageError("cli.touched-and-cone")
+    if is_touched and None in given[1:]:
+        raise UsageError("cli.touched")
+    if not is_touched and None in given:
+        raise UsageError("cli.second-cone")
     return ConeSeparation(options.distance, options.distance_sigma)
