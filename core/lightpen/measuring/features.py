@@ -117,14 +117,8 @@ def fit_feature(kind: FeatureKind, points: FloatArray) -> Feature:
             needed=surface.min_points,
         )
     solved = [_solve(surface, points, start, ROUGHLY) for start in starts(kind, points)]
-    best = min(solved, key=lambda each: _cost(surface, points, each))
-    return _feature(kind, points, _solve(surface, points, best, CONVERGED))
-
-
-def _cost(surface: FeatureModel, points: FloatArray, at: Start) -> float:
-    origin, axes, sizes = at
-    values = surface.distances((points - origin) @ axes, sizes).values
-    return float(np.sum(values**2))
+    best, _ = min(solved, key=lambda each: each[1])
+    return _feature(kind, points, _solve(surface, points, best, CONVERGED)[0])
 
 
 def _jacobian(
@@ -152,35 +146,37 @@ def _moved(surface: FeatureModel, at: Start, step: FloatArray) -> Start:
 
 def _solve(
     surface: FeatureModel, points: FloatArray, start: Start, converged: float
-) -> Start:
-    """Return the feature of least squares from a start."""
+) -> tuple[Start, float]:
+    """Return the feature of least squares from a start, and its sum of squares."""
     extent = max(float(np.ptp(points, axis=0).max()), np.finfo(float).tiny)
     at, damping, before = start, 1e-6, np.inf
-    cost = _cost(surface, points, at)
+    values, J, _ = _jacobian(surface, points, at)
+    cost = float(values @ values)
     for _ in range(MAX_STEPS):
-        values, J, _by_points = _jacobian(surface, points, at)
-        scale = np.linalg.norm(J, axis=0) + np.finfo(float).tiny
-        J = J / scale
+        scale = np.sqrt(np.einsum("mu,mu->u", J, J)) + np.finfo(float).tiny
+        scaled, damper = J / scale, np.eye(J.shape[1])
         if converged >= ROUGHLY:
-            normal = J.T @ J + damping * np.eye(J.shape[1])
-            step = np.linalg.solve(normal, -J.T @ values) / scale
+            normal = scaled.T @ scaled + damping * damper
+            step = np.linalg.solve(normal, -scaled.T @ values) / scale
         else:
-            damped = np.vstack([J, np.sqrt(damping) * np.eye(J.shape[1])])
+            damped = np.vstack([scaled, np.sqrt(damping) * damper])
             wanted = np.concatenate([-values, np.zeros(J.shape[1])])
             step = np.linalg.lstsq(damped, wanted)[0] / scale
         after = _moved(surface, at, step)
-        cost_after = _cost(surface, points, after)
+        values_after, J_after, _ = _jacobian(surface, points, after)
+        cost_after = float(values_after @ values_after)
         length = float(np.abs(step * scale).max()) / (extent * np.sqrt(len(points)))
         # At the end rounding alone is left: steps are small and shrink no more.
         small = length <= converged or SHRINKS * before < length < ROUGHLY
         before = length
         if cost_after <= cost * (1 + ROUNDING):
-            at, cost, damping = after, cost_after, damping / 10
+            at, values, J = after, values_after, J_after
+            cost, damping = cost_after, damping / 10
         else:
             damping *= 10
         if small or damping > LARGEST_DAMPING:
             break
-    return at
+    return at, cost
 
 
 def _feature(kind: FeatureKind, points: FloatArray, at: Start) -> Feature:

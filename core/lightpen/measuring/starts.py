@@ -17,6 +17,7 @@ N_DIRECTIONS = 200  # over the half sphere: some 10 degrees apart
 N_NEAR = 15  # directions about a principal axis
 RIDGE = 1e-12
 N_STARTS = 4  # fits that begin at the best of them
+N_TRIED = 24  # points, drawn from more, that directions are tried with
 APART = 0.995  # cosine between two starts
 LEAST_ANGLE = 1e-3  # rad, of a cone at its start
 TINY = float(np.finfo(float).tiny)
@@ -59,7 +60,8 @@ def starts(kind: FeatureKind, points: FloatArray) -> Iterator[Start]:
             length = max(2 * (half[0] - half[1]), half[1] / 2)
             yield center, frame, np.array([half[1], length])
         case FeatureKind.CYLINDER | FeatureKind.CONE:
-            found = _by_direction(kind, points - middle, middle, axes)
+            few = np.random.default_rng(0).permutation(len(points))[:N_TRIED]
+            found = _by_direction(kind, points[few] - middle, middle, axes)
             yield from islice(found, N_STARTS)
 
 

@@ -75,7 +75,7 @@ class FeatureModel:
     ) -> tuple[Distances, FloatArray]:
         """Return distances, with derivatives (N, K, U) by free motions and sizes."""
         found = self.distances(q, sizes)
-        (x, y, z), (u, v, w) = q.T[:, :, None], np.moveaxis(found.by_point, 2, 0)
+        (x, y, z), (u, v, w) = q.T[:, :, None], found.by_point.transpose(2, 0, 1)
         columns = [-u, -v, -w, z * v - y * w, x * w - z * u, y * u - x * v]
         J = np.empty((*found.values.shape, self.n_unknowns))
         for column, i in enumerate(self.free):
@@ -122,7 +122,7 @@ def _plane(q: FloatArray, _: FloatArray) -> Distances:
 
 def _radial(across: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the lengths (N,) of vectors (N, D), and their directions."""
-    lengths = np.linalg.norm(across, axis=1)
+    lengths = np.sqrt(np.einsum("nd,nd->n", across, across))
     return lengths, across / np.maximum(lengths, TINY)[:, None]
 
 
