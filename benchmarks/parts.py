@@ -19,9 +19,8 @@ from msgspec import structs
 from skspatial.objects import Cylinder, Line, Plane, Sphere
 
 from lightpen.arrays import FloatArray
-from lightpen.measuring.characteristics import FORMS
 from lightpen.measuring.features import fit_feature
-from lightpen.measuring.part import MeasuredPart, measure_part
+from lightpen.measuring.part import measure_part
 from lightpen.measuring.plan import CharacteristicKind, PlannedCharacteristic
 from lightpen.measuring.plan import Plan as MeasuringPlan
 from lightpen.measuring.starts import frame_about
@@ -29,13 +28,15 @@ from lightpen.measuring.surfaces import SURFACES, FeatureKind
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.swings import PAPER_CONE
-from lightpen.verification.tasks.part import PART, PartOptions
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import PartOptions
 from lightpen.verification.tasks.probed_point import measure_touches
 from lightpen.verification.tasks.task import Conditions
 
 CAMERAS = 1, 2
 N_PARTS, N_CHUNKS = 1000, 50
 BALL = 10.0  # mm
+SHAPE = 0.01  # mm, standard deviation of a part's surface from its features
 SHARE_LIMITS = 0.93, 0.97
 FIXED = 1e-9  # mm, U of what a feature or the alignment fixes
 N_TOUCHES, LONGEST, N_TIMED = 50, 0.020, 9  # a feature, s
@@ -48,15 +49,23 @@ MORE = (
     PlannedCharacteristic(DISTANCE, ("dome", "countersink"), nominal=50.0),
     PlannedCharacteristic(DISTANCE, ("dome", "top"), nominal=2.0),
     PlannedCharacteristic(ANGLE, ("top", "front"), nominal=90.0),
+    PlannedCharacteristic(CharacteristicKind.STRAIGHTNESS, ("front",)),
+    PlannedCharacteristic(CharacteristicKind.ROUNDNESS, ("hole 1",)),
+    PlannedCharacteristic(CharacteristicKind.CYLINDRICITY, ("bore",)),
+    PlannedCharacteristic(CharacteristicKind.FORM, ("dome",)),
+    PlannedCharacteristic(CharacteristicKind.FORM, ("countersink",)),
+    PlannedCharacteristic(CharacteristicKind.PARALLELISM, ("front",), datum="top"),
+    PlannedCharacteristic(
+        CharacteristicKind.CONCENTRICITY, ("countersink",), datum="bore"
+    ),
 )
 
 
 @cache
 def _plan() -> MeasuringPlan:
-    """Return the plan of the plate without form errors, but with more distances."""
+    """Return the plan of the plate with more characteristics."""
     plan = plate_plan()
-    kept = [each for each in plan.characteristics if each.quantity not in FORMS]
-    return structs.replace(plan, characteristics=(*kept, *MORE))
+    return structs.replace(plan, characteristics=(*plan.characteristics, *MORE))
 
 
 @dataclass(frozen=True)
@@ -161,7 +170,8 @@ def _probed() -> tuple[tuple[str, ...], FloatArray, FloatArray]:
 def _covered_part(n_cameras: int, rng: np.random.Generator) -> CoveredPart:
     station = calibrated_station(rng, n_cameras)
     names, places, approaches = _probed()
-    places = station.placed(places)
+    of_form = SHAPE * rng.standard_normal((len(places), 1))
+    places = station.placed(places + of_form * approaches)
     held = station.touched(places, rng)
     points = [
         replace(point, approach_cam=station.rotation @ way)
@@ -172,35 +182,19 @@ def _covered_part(n_cameras: int, rng: np.random.Generator) -> CoveredPart:
     runs = [(name, [point]) for name, point in zip(names, points, strict=True)]
     conditions = Conditions(station.instrument, ball_diameter=BALL)
     part = PART.measure(runs, conditions, PartOptions(_plan(), 0.0)).part
-    true = _true_values(n_cameras, part, places)
+    exact = measure_part(_plan(), replace(part.touches, points_cam=places))
     features, holds, distances = {}, {}, {}
     for name, one in part.features.items():
         u = part.uncertainty(name)
-        is_known = np.abs(one.in_part.values - true[name]) <= u
+        is_known = np.abs(one.in_part.values - exact.features[name].in_part.values) <= u
         features[name] = float(np.mean(is_known[u > FIXED]))
-    for result in part.results:
+    for result, true in zip(part.results, exact.results, strict=True):
         label, u_alone = result.planned.label, result.independent_uncertainty
-        error = result.value.value - (result.planned.nominal or 0.0)
+        error = result.value.value - true.value.value
         holds[label] = abs(error) <= result.value.uncertainty
         if result.planned.quantity is DISTANCE and u_alone is not None:
             distances[label] = result.value.uncertainty, u_alone
     return CoveredPart(features, holds, distances)
-
-
-_TRUE: dict[int, dict[str, FloatArray]] = {}
-
-
-def _true_values(
-    n_cameras: int, part: MeasuredPart, places: FloatArray
-) -> dict[str, FloatArray]:
-    """Return the values of the features by exact touches, frame of the part."""
-    if n_cameras not in _TRUE:
-        plan = structs.replace(_plan(), characteristics=())
-        exact = measure_part(plan, replace(part.touches, points_cam=places))
-        _TRUE[n_cameras] = {
-            name: one.in_part.values for name, one in exact.features.items()
-        }
-    return _TRUE[n_cameras]
 
 
 # Speed, and other programs

@@ -71,7 +71,8 @@ from lightpen.verification.session.session_state import SessionSetup, SessionSta
 from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleOptions
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
-from lightpen.verification.tasks.part import PART, PartOptions
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import PartOptions
 from lightpen.verification.tasks.task import HandGoal
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.look.pooling import pooled

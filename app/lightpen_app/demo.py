@@ -8,7 +8,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.swings.names import Names
 from lightpen.simulator.plate import plate_plan
 from lightpen.swing.state import Phase
-from lightpen.verification.tasks.part import PartOptions
+from lightpen.verification.tasks.part_course import PartOptions
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.work.workbench import Workbench

@@ -13,7 +13,8 @@ from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
 from lightpen.simulator.plate import plate_plan
 from lightpen.verification.session.choices import VerificationChoices
-from lightpen.verification.tasks.part import PART, PartOptions
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import PartOptions
 from lightpen_app.print_report.preview import PrintReportWindow
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station

@@ -8,6 +8,7 @@ from PySide6.QtCore import QCoreApplication, QPointF, QRectF
 from PySide6.QtGui import QColor, QPainter
 
 from lightpen.arrays import FloatArray
+from lightpen.measuring.touches import at_position
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import LIGHT
 from lightpen_app.print_report.blocks import (
@@ -40,8 +41,9 @@ def part_blocks(record: Mapping[str, Any]) -> Iterator[Block]:
     yield heading(translate("paper", "Features / mm, degrees"))
     yield from _features(record["features"])
     yield from _alignment(record["alignment"])
+    yield from _refinement(record["refinement"])
     yield heading(translate("paper", "Points"))
-    yield from _points(record["touches"])
+    yield from _points(record["touches"], record["positions"])
     yield heading(translate("paper", "Measuring plan"))
     yield from _plan(record["plan"])
 
@@ -159,10 +161,43 @@ def _alignment(alignment: dict[str, Any] | None) -> Iterator[Block]:
     yield from table(columns, rows, size=PrintSize.SMALL)
 
 
-def _points(touches: list[dict[str, Any]]) -> Iterator[Block]:
+def _refinement(refinement: dict[str, Any] | None) -> Iterator[Block]:
+    if refinement is None:
+        return
+    before, after = (
+        _text(max(refinement[f"tip_expanded_uncertainty_{when}_mm"]))
+        for when in ("before", "after")
+    )
+    text = translate(
+        "paper",
+        "Features of known form: {0}. Refinement of points and tip: {1}. Shift of the "
+        "tip {2} mm; U (k = 2) {3} mm before, {4} mm after; chi-square {5} with {6} "
+        "degrees of freedom.",
+    )
+    is_used = refinement["is_used"]
+    yield paragraph(
+        text.format(
+            ", ".join(refinement["features"]),
+            translate("paper", "used") if is_used else translate("paper", "not used"),
+            ", ".join(map(_text, refinement["tip_shift_pen_mm"])),
+            *(before, after, number_text(refinement["chi_square"], 1)),
+            refinement["degrees_of_freedom"],
+        )
+    )
+
+
+def _points(
+    touches: list[dict[str, Any]], positions: list[dict[str, Any]]
+) -> Iterator[Block]:
     """Yield a plot of all points with their deviations, from the flattest side."""
     points = np.array([each["point_cam_mm"] for each in touches])
     off = np.array([each["deviation_cam_mm"] or [0, 0, 0] for each in touches])
+    for each in positions:
+        tail = at_position("", each["position"])
+        own = [touch["feature"].endswith(tail) for touch in touches]
+        turn = np.array(each["first_from_here_rotation"]).T
+        points[own] = points[own] @ turn + each["first_from_here_translation_mm"]
+        off[own] = off[own] @ turn
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]
     if len(axes) < 2:

@@ -70,6 +70,11 @@ MESSAGES = {
     "part.qdas": "Q-DAS (AQDEF), for statistics",
     "part.qif": "QIF 3.0 results",
     "part.dxf": "DXF, the measured geometry",
-    "measuring.not-tied": "Position {position} shares {n_shared} features with the first one; at least {needed} datum points have to be probed in both. Probe more of them again.",
+    "measuring.not-tied": "Position {position} shares {n_shared} datum points (points, circles, slots, spheres) with the positions before; at least {needed} are needed. Probe more of them again.",
+    "part.few-datums": "{n_points} points, circles, slots and spheres were probed; {needed} that are not on one line are needed as datum points to connect the new position. Start over.",
+    "part.moved": "Position {position}: datum points agree with the first position within {residual:.4f} mm.",
+    "part.refined": "Points and tip refined by the known form of {names}: tip shifted by {shift:.4f} mm, its U (k = 2) {before:.4f} mm before and {after:.4f} mm after.",
+    "part.not-refined": "The touches of {names} deviate from the known form by more than their U (chi-square {chi_square:.1f} with {n_free} degrees of freedom) and refine nothing.",
+    "part.check-known": "Check nominal diameter, ball diameter and cleanliness; then verify the tip.",
     "measuring.no-format": "{file} has an end of no known format. End its name with one of {suffixes}.",
 }

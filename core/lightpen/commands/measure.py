@@ -26,7 +26,8 @@ from lightpen.verification.probing.drift_reference import (
 )
 from lightpen.verification.reports.records import verification_record
 from lightpen.verification.reports.summaries import found_text
-from lightpen.verification.tasks.part import BALL_UNCERTAINTY, PART, PartOptions
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import BALL_UNCERTAINTY, PartOptions
 from lightpen.verification.tasks.probed_point import rejected_entries
 
 

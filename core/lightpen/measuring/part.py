@@ -1,7 +1,7 @@
 """Measurement of a part: features, alignment and characteristics of a plan."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from msgspec import structs
@@ -16,7 +16,14 @@ from lightpen.measuring.alignment import (
     align_points,
     tie,
 )
-from lightpen.measuring.characteristics import AXIAL, FLAT, Measured, Value, evaluate
+from lightpen.measuring.characteristics import (
+    AXIAL,
+    CENTRED,
+    FLAT,
+    Measured,
+    Value,
+    evaluate,
+)
 from lightpen.measuring.compensation import Evidence, TouchedSurface, surface_of
 from lightpen.measuring.features import AXIS, Feature, fit_feature
 from lightpen.measuring.plan import (
@@ -80,6 +87,8 @@ class MeasuredPart:
         All features and constructed features by name.
     alignment : Alignment or None
         None if results are in the frame of the camera.
+    ties : mapping of int to Alignment
+        Motion of each later position to the first one, by datum points.
     """
 
     plan: Plan
@@ -87,6 +96,7 @@ class MeasuredPart:
     features: Mapping[str, Measured]
     alignment: Alignment | None
     results: tuple[CharacteristicResult, ...]
+    ties: Mapping[int, Alignment] = field(default_factory=dict)
 
     def uncertainty(self, name: str) -> FloatArray:
         """Return U (k = 2) of a feature's values in the frame of the part."""
@@ -103,7 +113,7 @@ def measure_part(plan: Plan, touches: PartTouches) -> MeasuredPart:
         is not defined for its features.
     """
     plan = _with_kinds(plan, touches)
-    fits, surfaces, points = _probed(plan, touches)
+    fits, surfaces, points, ties = _probed(plan, touches)
     for construction in plan.constructions:
         surfaces[construction.name] = _constructed(construction, surfaces)
     alignment = _aligned(plan, surfaces)
@@ -116,17 +126,23 @@ def measure_part(plan: Plan, touches: PartTouches) -> MeasuredPart:
     results = tuple(
         _result(plan, planned, features, touches) for planned in plan.characteristics
     )
-    return MeasuredPart(plan, touches, features, alignment, results)
+    return MeasuredPart(plan, touches, features, alignment, results, ties)
 
 
 def _probed(
     plan: Plan, touches: PartTouches
-) -> tuple[dict[str, Feature], dict[str, TouchedSurface], dict[str, Quantity]]:
+) -> tuple[
+    dict[str, Feature],
+    dict[str, TouchedSurface],
+    dict[str, Quantity],
+    dict[int, Alignment],
+]:
     """Return fits, surfaces and points of the features, all in the first position.
 
-    Features that were probed in the first position and in a later one are the datum
-    points that tie the two together.
+    Features with a centre that were probed in an earlier position and in a later one
+    are the datum points that tie the two together.
     """
+    ties: dict[int, Alignment] = {}
     fits: dict[str, Feature] = {}
     surfaces: dict[str, TouchedSurface] = {}
     points: dict[str, Quantity] = {}
@@ -135,7 +151,7 @@ def _probed(
         for each in plan.features:
             name = at_position(each.name, position)
             at = touches.of(name)
-            if not len(at) and (position > 1 or _is_later(each.name, touches)):
+            if not len(at) and (position > 1 or len(touches.first_of(each.name))):
                 continue
             planned = structs.replace(each, name=name)
             fit = _fitted(planned, touches)
@@ -143,7 +159,7 @@ def _probed(
             places[each.name] = touches.points(at)
             fits.setdefault(each.name, fit)
         if position > 1:
-            shared = [name for name in own if name in surfaces]
+            shared = [n for n in own if n in surfaces and own[n].kind in CENTRED]
             if len(shared) < MIN_POINTS:
                 raise CalibrationError(
                     "measuring.not-tied",
@@ -151,7 +167,7 @@ def _probed(
                     n_shared=len(shared),
                     needed=MIN_POINTS,
                 )
-            motion = tie(
+            ties[position] = motion = tie(
                 [surfaces[name].quantity for name in shared],
                 [own[name].quantity for name in shared],
             )
@@ -163,12 +179,8 @@ def _probed(
         for name, surface in own.items():
             surfaces.setdefault(name, surface)
             points.setdefault(name, places[name])
-    return fits, {each.name: surfaces[each.name] for each in plan.features}, points
-
-
-def _is_later(name: str, touches: PartTouches) -> bool:
-    """Return whether a feature was probed in a later position."""
-    return any(len(touches.of(at_position(name, p))) for p in touches.positions[1:])
+    ordered = {each.name: surfaces[each.name] for each in plan.features}
+    return fits, ordered, points, ties
 
 
 def _with_kinds(plan: Plan, touches: PartTouches) -> Plan:
@@ -212,7 +224,7 @@ def taught_plan(part: MeasuredPart) -> Plan:
             structs.replace(
                 each,
                 nominal=nominal_of(each.name, each.nominal),
-                touches=int((np.array(part.touches.owners) == each.name).sum()),
+                touches=len(part.touches.first_of(each.name)),
             )
             for each in part.plan.features
         ),
@@ -221,8 +233,7 @@ def taught_plan(part: MeasuredPart) -> Plan:
 
 def kind_of(name: str, touches: PartTouches) -> FeatureKind | None:
     """Return the kind that the touches of a feature show, if they do."""
-    positions = (touches.of(at_position(name, p)) for p in touches.positions)
-    at = next((each for each in positions if len(each)), touches.of(name))
+    at = touches.first_of(name)
     if not len(at):
         return None
     return recognise(

@@ -33,6 +33,8 @@ MAX_FREE = 50  # features of a part without a plan
 NEVER = "least squares"
 REDUNDANT = 2  # times as many points as determine a feature
 UNKNOWN_TOUCHES = 8  # of a feature to be recognised
+OF_ONE_SIZE = {FeatureKind.CIRCLE, FeatureKind.SPHERE, FeatureKind.CYLINDER}
+KNOWN_FORMS = "a plane, or a circle, sphere or cylinder with its nominal diameter"
 NEEDS_FRAME = ("x", "y", "z", "position")
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -119,6 +121,9 @@ class PlannedFeature(_Entry, frozen=True):
         Number of points; None for the usual one.
     air : triple of float or None
         Ball centre in air beside the surface, camera frame, mm: decides the side.
+    known : float or None
+        U (k = 2) of the nominal diameter, mm, of a feature of known form, whose touches
+        refine the tip; None to measure the feature.
     """
 
     name: Name
@@ -128,6 +133,7 @@ class PlannedFeature(_Entry, frozen=True):
     criterion: str = NEVER
     nominal: Nominal | None = None
     air: Vector | None = None
+    known: Annotated[float, Meta(ge=0)] | None = None
 
     @property
     def n_touches(self) -> int:
@@ -316,6 +322,10 @@ def _problems(plan: Plan) -> Iterator[str]:
         needed = 1 if each.kind is None else SURFACES[each.kind].min_points
         if each.kind is not None and (each.touches or needed) < needed:
             yield f"a {each.kind.value} needs {needed} touches - at {each.name!r}"
+        if "@" in each.name:
+            yield f"'@' in the name {each.name!r}"
+        if each.known is not None and not _has_known_form(each):
+            yield f"a known form needs {KNOWN_FORMS} - at {each.name!r}"
         if each.criterion not in {NEVER, *(known.value for known in Criterion)}:
             yield f"unknown criterion {each.criterion!r} - at {each.name!r}"
     known = {each.name for each in plan.features}
@@ -348,6 +358,13 @@ def _alignment_problems(
 
 def _has_origin(feature: PlannedFeature) -> bool:
     return feature.nominal is not None and feature.nominal.origin is not None
+
+
+def _has_known_form(feature: PlannedFeature) -> bool:
+    if feature.kind is FeatureKind.PLANE:
+        return True
+    has_size = feature.nominal is not None and feature.nominal.diameter is not None
+    return feature.kind in OF_ONE_SIZE and has_size
 
 
 def _unknown(

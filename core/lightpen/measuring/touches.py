@@ -32,6 +32,8 @@ class PartTouches:
         Feature of each touch, see `at_position`.
     ball_radius, ball_uncertainty : float
         Radius of the ball and its U (k = 2), mm; 0 to measure at the centre of the tip.
+    joint : (P, P) array or None
+        Covariance of all inputs, if the ball is correlated with the touches, mm^2.
     """
 
     points_cam: FloatArray
@@ -41,6 +43,7 @@ class PartTouches:
     owners: tuple[str, ...]
     ball_radius: float = 0.0
     ball_uncertainty: float = 0.0
+    joint: FloatArray | None = None
 
     @property
     def positions(self) -> tuple[int, ...]:
@@ -57,6 +60,8 @@ class PartTouches:
     @property
     def inputs(self) -> FloatArray:
         """Covariance of all inputs, (P, P), mm^2."""
+        if self.joint is not None:
+            return self.joint.copy()
         covariance = np.zeros((self.n_inputs, self.n_inputs))
         covariance[:-1, :-1] = self.covariance
         covariance[-1, -1] = (self.ball_uncertainty / 2) ** 2
@@ -80,6 +85,16 @@ class PartTouches:
     def of(self, name: str) -> IntArray:
         """Return the indices of the touches of a feature."""
         return np.flatnonzero([owner == name for owner in self.owners])
+
+    def in_position(self, position: int) -> IntArray:
+        """Return the indices of the touches in a position of part and camera."""
+        tail = at_position("", position)
+        return np.flatnonzero([owner.endswith(tail) for owner in self.owners])
+
+    def first_of(self, name: str) -> IntArray:
+        """Return the touches of a feature in the first position where it was probed."""
+        each = (self.of(at_position(name, position)) for position in self.positions)
+        return next((at for at in each if len(at)), self.of(name))
 
     def noise(self, touches: IntArray) -> float:
         """Return the standard deviation of a coordinate about the mean of touches, mm.

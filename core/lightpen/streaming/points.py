@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from lightpen.verification.session.session_state import SessionSetup, SessionState
-from lightpen.verification.tasks.part import PART, planned_at
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import planned_at
 
 POINTS = "Points"
 

@@ -35,6 +35,7 @@ from lightpen.verification.session.session import (
     end_task,
     setup_of,
     touched_anew,
+    with_moved_part,
     with_other_choices,
     with_read,
     without_last_touch,
@@ -58,6 +59,7 @@ from lightpen.verification.storage.resuming import (
 )
 from lightpen.verification.storage.session_files import SessionKeeping
 from lightpen.verification.tasks.drift import DRIFT
+from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.registry import AnyTask
 
 ANOTHER = message("verification.another-under-way")
@@ -157,9 +159,11 @@ class VerificationWorkflow:
 
     def touch_anew(self, task: AnyTask) -> None:
         """Do one task again; the result before stays in the archive."""
-        status, state = self._status, self._status.state
-        if state is not None:
-            self._publish(replace(status, accepted_by=""))
+        status, setup, state = self._status, self._status.setup, self._status.state
+        if setup is not None and state is not None:
+            if task is PART:
+                setup = replace(setup, choices=setup.choices.with_moves(()))
+            self._publish(replace(status, setup=setup, accepted_by=""))
             self._touch_again(touched_anew(state, task))
 
     def undo(self) -> None:
@@ -174,6 +178,23 @@ class VerificationWorkflow:
             self._faults.tell(error.message)
             return
         self._publish(replace(self._status, state=after))
+
+    def part_moved(self) -> None:
+        """Probe datum points again, as part or camera was moved, or report why not.
+
+        The points of the current feature are discarded.
+        """
+        self._faults.trying(self._part_moved)
+
+    def _part_moved(self) -> None:
+        setup, state = self._status.setup, self._status.state
+        if setup is None or state is None or self._status.task is not PART:
+            return
+        setup = with_moved_part(setup, state)
+        for _ in state.touches:
+            self.undo()
+        self._faults.end()
+        self._publish(replace(self._status, setup=setup))
 
     def accept(self, reason: str, signature: Signature | None = None) -> None:
         """Accept the tip despite findings, or report why not."""
@@ -479,7 +500,7 @@ class VerificationWorkflow:
     def _note_under_way(self) -> None:
         """Write the checkpoint from which the verification can be resumed."""
         try:
-            self._keeping.note(self._status, self._choices)
+            self._keeping.note(self._status)
         except FileError as error:
             if not self._faults.is_any:  # it may be reported already
                 self._faults.tell(error.message, Cause.NOTE)

@@ -25,6 +25,7 @@ from lightpen.verification.storage.checkpoint import (
     find_interrupted,
 )
 from lightpen.verification.storage.resuming import abandon_interrupted
+from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.part import PART
 from lightpen_app.look.phrases import missing_input_text, origin_text
 from lightpen_app.look.sentences import worded
@@ -286,10 +287,12 @@ class InterruptedControl(QObject):
         self._go_to_station(under_way.names.station)
         selection.set_preparation(replace(selection.preparation, names=under_way.names))
         chosen, is_part = selection.choices, PART.kind in under_way.choices.kinds
-        kinds = chosen.kinds if is_part else under_way.choices.kinds
-        selection.set_choices(
-            replace(under_way.choices, kinds=kinds, limits=chosen.limits)
-        )
+        kinds = under_way.choices.kinds
+        if is_part:
+            is_drift_checked = DRIFT.kind in kinds
+            kinds = chosen.with_task(DRIFT, is_chosen=is_drift_checked).kinds
+        again = replace(under_way.choices, kinds=kinds, limits=chosen.limits)
+        selection.set_choices(again.with_moves(()))  # which the session has
         missing_inputs = selection.preparation.missing_inputs()
         if missing_inputs:
             self._notices.tell(NOTICE, missing_input_text(missing_inputs[0]))

@@ -8,6 +8,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.verification.session.session_state import SessionSetup, SessionState
 from lightpen.verification.tasks.assessment import VerificationAssessment
+from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
 from lightpen_app.look.quantities import number_text
@@ -19,7 +20,7 @@ from lightpen_app.widgets.operator_view import OperatorValue
 class MeasurePresenter(VerifyPresenter):
     """Computes the view from the status of runner, camera and station."""
 
-    tasks = (PART,)
+    tasks = PART, DRIFT
 
     @override
     def view(self) -> VerifyView:

@@ -12,7 +12,8 @@ from lightpen.arrays import FloatArray
 from lightpen.measuring.drawing import outline_of
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.verification.session.session_state import SessionSetup, SessionState
-from lightpen.verification.tasks.part import PART, feature_so_far
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import feature_so_far
 from lightpen.verification.tasks.registry import AnyTask
 from lightpen_app.look.theme import GRID, colors_of
 from lightpen_app.widgets.translated import Translated
@@ -58,12 +59,15 @@ def part_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> PartV
     tip = touching.held[-1].tip_cam if is_seen else None
     if found is not None:
         part = found.part
-        off = np.zeros_like(part.touches.points_cam)
-        for name, one in part.features.items():
-            if one.feature is not None:
-                off[part.touches.of(name)] = one.feature.offsets
+        points, off = part.touches.points_cam.copy(), np.zeros((len(found.points), 3))
+        for i, offset in enumerate(found.deviations()):
+            off[i] = 0.0 if offset is None else offset
+        for position, motion in part.ties.items():
+            moved = part.touches.in_position(position)
+            points[moved] = points[moved] @ motion.rotation.T + motion.translation
+            off[moved] = off[moved] @ motion.rotation.T
         outlines = [line for one in part.features.values() for line in outline_of(one)]
-        return PartValue(part.touches.points_cam, off, tuple(outlines), tip)
+        return PartValue(points, off, tuple(outlines), tip)
     earlier = [point.point_cam for run in progress.runs for point in run]
     now = [point.point_cam for point in progress.points]
     points = np.array([*earlier, *now]).reshape(-1, 3)

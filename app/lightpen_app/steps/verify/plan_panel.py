@@ -21,7 +21,8 @@ from lightpen.measuring.surfaces import NAMES, FeatureKind
 from lightpen.record.exports.exports import save_new
 from lightpen.simulator.plate import plate_plan
 from lightpen.verification.session.status import VerificationStatus
-from lightpen.verification.tasks.part import PART, planned_at
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import PartOptions, base_name, planned_at
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -57,13 +58,15 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._kind_label.setBuddy(self._kind)
         for kind in (None, *FeatureKind):
             self._kind.addItem("", None if kind is None else kind.value)
-        self._save_plan, self._export, self._report = (PushButton() for _ in range(3))
+        self._moved, self._save_plan, self._export, self._report = (
+            PushButton() for _ in range(4)
+        )
         self._paper = PrintReportControl(workbench.save_place, self)
 
         # Layout
         cells = (self._open, self._free, self._plate, (self._name, 1))
         of_feature = self._kind_label, self._kind
-        of_part = self._save_plan, self._export, self._report
+        of_part = self._moved, self._save_plan, self._export, self._report
         self._rows = horizontal_layout(self)
         horizontal_layout(self._rows, *cells, stretch=1)
         horizontal_layout(self._rows, *of_feature, *of_part)
@@ -74,6 +77,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._free.clicked.connect(self._on_free_clicked)
         self._plate.clicked.connect(self._on_plate_clicked)
         self._kind.activated.connect(self._on_kind_chosen)
+        self._moved.clicked.connect(self._on_moved_clicked)
         self._save_plan.clicked.connect(self._on_save_plan_clicked)
         self._export.clicked.connect(self._on_export_clicked)
         self._report.clicked.connect(self._on_report_clicked)
@@ -88,8 +92,9 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         plan = self._plan()
         self._name.setText("" if plan is None else plan.name)
         planned = self._planned()
-        for each in (self._kind_label, self._kind):
+        for each in (self._kind_label, self._kind, self._moved):
             each.setVisible(planned is not None)
+        self._moved.setEnabled(status.state is not None and bool(status.state.runs))
         kind = None if planned is None else planned.kind
         self._kind.setCurrentIndex(self._kind.findData(kind and kind.value))
         self._plate.setVisible(self._live.operator is not None)
@@ -113,7 +118,13 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         state = self._status.state
         if state is None or PART.kind in state.found:
             return None
-        return planned_at(self._selection.choices.options_of(PART), len(state.runs))
+        return planned_at(self._options(), len(state.runs))
+
+    def _options(self) -> PartOptions:
+        """Return the options of the session, or those chosen for the next one."""
+        setup = self._status.setup
+        choices = self._selection.choices if setup is None else setup.choices
+        return choices.options_of(PART)
 
     def _part(self) -> MeasuredPart | None:
         state = self._status.state
@@ -144,6 +155,13 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._kind.setItemText(0, self.tr("Recognise"))
         for index, kind in enumerate(FeatureKind, start=1):
             self._kind.setItemText(index, worded(NAMES[kind]))
+        self._moved.setText(self.tr("Part moved"))
+        self._moved.setToolTip(
+            self.tr(
+                "Part or camera was moved: probe three datum points again, which "
+                "connect the new position with the old."
+            )
+        )
         self._save_plan.setText(self.tr("Save plan..."))
         self._save_plan.setToolTip(
             self.tr("Save a plan with the measured features as nominals.")
@@ -187,8 +205,9 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
             return
         word = self._kind.currentData()
         kind = None if word is None else FeatureKind(word)
+        name = base_name(planned.name)
         features = tuple(
-            structs.replace(each, kind=kind) if each is planned else each
+            structs.replace(each, kind=kind) if each.name == name else each
             for each in plan.features
         )
         choices = self._selection.choices
@@ -196,6 +215,9 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
             choices.options_of(PART), plan=structs.replace(plan, features=features)
         )
         self._selection.set_choices(choices.with_options(options))
+
+    def _on_moved_clicked(self) -> None:
+        self._run.runner.ask(lambda workflow: workflow.part_moved())
 
     def _on_save_plan_clicked(self) -> None:
         part = self._part()

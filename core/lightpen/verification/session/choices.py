@@ -2,10 +2,14 @@
 
 from dataclasses import dataclass, field, replace
 
+from msgspec import structs
+
 from lightpen.messages import Message, message
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.probing.probing import FAST
 from lightpen.verification.tasks.fixed_point import FIXED_POINT
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import Move
 from lightpen.verification.tasks.registry import (
     ALL_TASKS,
     AnyOptions,
@@ -50,6 +54,13 @@ class VerificationChoices:
         ordered = (chosen.get(task.options) for task in ALL_TASKS)
         unusual = (each for each in ordered if each and each != type(each)())
         return replace(self, options=tuple(unusual))
+
+    def with_moves(self, moves: tuple[Move, ...]) -> "VerificationChoices":
+        """Return them with other moves of a part, which belong to one session."""
+        options = self.options_of(PART)
+        if options.moves == moves:
+            return self
+        return self.with_options(structs.replace(options, moves=moves))
 
     def with_task(self, task: AnyTask, *, is_chosen: bool) -> "VerificationChoices":
         """Return them with a task chosen or not."""

@@ -32,6 +32,8 @@ from lightpen.verification.session.session_state import (
     without_touches,
 )
 from lightpen.verification.tasks.drift import DRIFT, MIN_VISITS, Drift, measure_drift
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import with_move
 from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
 from lightpen.verification.tasks.registry import ALL_TASKS, AnyTask
 from lightpen.verification.tasks.task import (
@@ -233,6 +235,19 @@ def without_last_touch(state: SessionState) -> SessionState:
     return replace(state, touching=touching, touches=state.touches[:-1], trouble=None)
 
 
+def with_moved_part(setup: SessionSetup, state: SessionState) -> SessionSetup:
+    """Return the setup of a session in which part or camera was moved just now.
+
+    Raises
+    ------
+    CalibrationError
+        The runs so far have no datum points.
+    """
+    options = setup.choices.options_of(PART)
+    moves = with_move(options, state.runs, setup.conditions).moves
+    return replace(setup, choices=setup.choices.with_moves(moves))
+
+
 def with_other_choices(
     setup: SessionSetup, state: SessionState, choices: VerificationChoices
 ) -> tuple[SessionSetup, SessionState]:
@@ -243,6 +258,7 @@ def with_other_choices(
     the state has another `touching`.
     """
     at_hand = state.task(setup)
+    choices = choices.with_moves(setup.choices.options_of(PART).moves)
     for task in ALL_TASKS:
         one, other = setup.choices.options_of(task), choices.options_of(task)
         if task.kind in state.found and not task.is_same_artefact(one, other):

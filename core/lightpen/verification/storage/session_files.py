@@ -14,7 +14,6 @@ from lightpen.record.folder.verifications import TOUCHES
 from lightpen.record.signing.keys import SigningKey
 from lightpen.verification.probing.current_tip import CurrentTip
 from lightpen.verification.probing.drift_reference import LampDrift
-from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session_state import SessionState
 from lightpen.verification.session.status import VerificationStatus
 from lightpen.verification.storage.checkpoint import (
@@ -277,7 +276,7 @@ class SessionKeeping:
         """
         self._records.write()
 
-    def note(self, status: VerificationStatus, choices: VerificationChoices) -> None:
+    def note(self, status: VerificationStatus) -> None:
         """Write the checkpoint from which the verification can be resumed.
 
         Raises
@@ -285,9 +284,11 @@ class SessionKeeping:
         FileError
             It cannot be written.
         """
-        tip, runs = status.tip, self.images.runs
+        tip, setup, runs = status.tip, status.setup, self.images.runs
         has_some = bool(runs or self._read)
-        if tip is None or status.began is None or status.is_done or not has_some:
+        if tip is None or setup is None or status.began is None:
+            return
+        if status.is_done or not has_some:
             return
         if self._file is None:
             path = under_way_path(self.root(tip), tip.names, status.began)
@@ -302,7 +303,7 @@ class SessionKeeping:
                 tip_sha256=tip.tip_file.sha256,
                 pen_sha256=tip.pen_file.sha256,
                 seen_by=tip.viewers.hashes,
-                choices=choices,
+                choices=setup.choices,
                 runs=runs,
                 read=self._read,
                 files=tuple(file.name for file in self._records.files),

@@ -4,66 +4,59 @@ The geometry is that of `lightpen.measuring`; here are its touches, its course a
 is shown and recorded of it. A plan that is ended early gives what was probed of it.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from msgspec import Meta, structs
+from msgspec import structs
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.measuring.features import fit_feature
-from lightpen.measuring.next_touch import Place, area_of, best_places, nominal_area
-from lightpen.measuring.part import MeasuredPart, kind_of, measure_part
-from lightpen.measuring.plan import Plan, PlannedFeature, Side
+from lightpen.measuring.known_forms import Refinement, refine
+from lightpen.measuring.part import MeasuredPart, measure_part
 from lightpen.measuring.report import (
     PartRow,
     characteristic_rows,
     feature_rows,
     part_entries,
 )
-from lightpen.measuring.surfaces import NAMES, FeatureKind
-from lightpen.measuring.touches import PartTouches
+from lightpen.measuring.surfaces import NAMES
 from lightpen.messages import Message, message
 from lightpen.model.decision_rules import Decision
 from lightpen.model.limits import VerificationLimits, rule_in_words
-from lightpen.model.posture import UPRIGHT_AXIS
 from lightpen.verification.tasks.assessment import (
     VerificationAssessment,
     accepted,
     check,
     refused,
+    worst,
 )
-from lightpen.verification.tasks.probed_point import (
-    ProbedPoint,
-    joint_covariance,
-    point_entries,
+from lightpen.verification.tasks.part_course import (
+    PartOptions,
+    base_name,
+    course,
+    feature_so_far,
+    hand_goal,
+    planned_at,
+    touches_of_part,
 )
+from lightpen.verification.tasks.probed_point import ProbedPoint, point_entries
 from lightpen.verification.tasks.task import (
     ANY,
     Conditions,
     Found,
-    HandGoal,
     ResultRow,
     ResultTable,
     Runs,
-    TaskOptions,
     TaskProgress,
     VerificationTask,
 )
 
 NEW_PLACE = 0.5  # mm
-BALL_UNCERTAINTY = 0.001  # mm, U (k = 2)
 MOST_NAMED = 5  # characteristics in a sentence
-
-# The simulated part: its origin from the bottom of the cone, and its axes x to the
-# right, y away from the camera, z up, as columns in the camera frame.
-SIMULATED_ORIGIN = np.array([0.0, -30.0, 0.0])
-SIMULATED_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,19 +69,22 @@ class Part(Found):
         Feature and ball centre of each touch.
     missing : tuple of str
         Features of the plan that were not probed.
+    refinement : Refinement or None
+        By features of known form, if there are any.
     """
 
     part: MeasuredPart
     points: tuple[tuple[str, ProbedPoint], ...]
     missing: tuple[str, ...]
+    refinement: Refinement | None = None
 
     def deviations(self) -> list[FloatArray | None]:
         """Return the way from its feature to each point, (3,), mm; None if unknown."""
         found: list[FloatArray | None] = [None] * len(self.points)
         for name, one in self.part.features.items():
-            at = self.part.touches.of(name)
-            if one.feature is not None and len(at) == len(one.feature.offsets):
-                for i, offset in zip(at.tolist(), one.feature.offsets, strict=True):
+            if one.feature is not None:
+                at = self.part.touches.first_of(name).tolist()
+                for i, offset in zip(at, one.feature.offsets, strict=True):
                     found[i] = offset
         return found
 
@@ -100,6 +96,9 @@ class Part(Found):
         """
         points = [point for _, point in self.points]
         by_parameters = np.concatenate([point.sensitivity for point in points])
+        covariance = instrument.covariance
+        if self.refinement is not None and self.refinement.is_used:
+            covariance = self.refinement.after
         own = np.zeros((len(by_parameters), len(by_parameters)))
         for i, point in enumerate(points):
             own[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = point.noise
@@ -110,7 +109,7 @@ class Part(Found):
         covariances = {"points": own}
         for name, of in (("tip", np.r_[at.tip]), ("LEDs", leds), ("cameras", cameras)):
             rows = by_parameters[:, of]
-            covariances[name] = rows @ instrument.covariance[np.ix_(of, of)] @ rows.T
+            covariances[name] = rows @ covariance[np.ix_(of, of)] @ rows.T
         ball = self.part.touches.ball_uncertainty
         budgets: list[dict[str, float] | None] = []
         for result in self.part.results:
@@ -125,13 +124,6 @@ class Part(Found):
             budget["ball"] = abs(float(row[-1])) * ball
             budgets.append(budget)
         return budgets
-
-
-class PartOptions(TaskOptions, frozen=True, tag="part"):
-    """A plan, and U (k = 2) of the ball diameter, mm."""
-
-    plan: Plan | None = None
-    ball_uncertainty: Annotated[float, Meta(ge=0)] = BALL_UNCERTAINTY
 
 
 def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) -> Part:
@@ -149,16 +141,27 @@ def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) ->
     """
     if options.plan is None:
         raise CalibrationError("part.no-plan")
-    found = _owned(runs, options.plan)
-    names = {name.partition("@")[0] for name, _ in found}
+    found = _owned(runs, options)
+    names = {base_name(name) for name, _ in found}
     plan = options.plan.limited_to(names)
     if not plan.features:
         raise CalibrationError("part.nothing-probed")
-    part = measure_part(plan, touches_of_part(found, conditions, options))
+    sensitivity = np.concatenate([point.sensitivity for _, point in found])
+    touches, refinement = refine(
+        plan,
+        touches_of_part(found, conditions, options),
+        sensitivity,
+        conditions.instrument.covariance,
+    )
+    part = measure_part(plan, touches)
     missing = tuple(
         each.name for each in options.plan.features if each.name not in names
     )
-    return Part(_assessment(part, missing), part, tuple(found), missing)
+    assessment = _assessment(part, missing)
+    if refinement is not None and not refinement.is_used:
+        said = _refined(refinement, conditions.instrument)
+        assessment = worst((assessment, check(said, message("part.check-known"))))
+    return Part(assessment, part, tuple(found), missing, refinement)
 
 
 def check_feature(runs: Runs, conditions: Conditions, options: PartOptions) -> None:
@@ -171,53 +174,30 @@ def check_feature(runs: Runs, conditions: Conditions, options: PartOptions) -> N
     """
     if options.plan is None:
         return
-    found = _owned(runs, options.plan)
-    last = found[-1][0]  # of a session, which has one position
-    own = [each for each in found if each[0] == last]
+    found = _owned(runs, options)
+    last = found[-1][0]
+    name = base_name(last)
+    own = [(name, point) for owner, point in found if owner == last]
     plan = structs.replace(
-        options.plan.limited_to({last}), constructions=(), characteristics=()
+        options.plan.limited_to({name}), constructions=(), characteristics=()
     )
     measure_part(
         structs.replace(plan, alignment=None), touches_of_part(own, conditions, options)
     )
 
 
-def touches_of_part(
-    found: Sequence[tuple[str, ProbedPoint]],
-    conditions: Conditions,
-    options: PartOptions,
-) -> PartTouches:
-    """Return probed points as the touches of a part, with the motion of the camera."""
-    points = [point for _, point in found]
-    drift = np.diag(np.tile(conditions.drift**2, len(points)))
-    unknown = np.full(3, np.nan)
-    return PartTouches(
-        points_cam=np.array([point.point_cam for point in points]),
-        covariance=joint_covariance(points, conditions.instrument) + drift,
-        approaches_cam=np.array(
-            [
-                unknown if point.approach_cam is None else point.approach_cam
-                for point in points
-            ]
-        ),
-        styli_cam=np.array([point.rotation @ UPRIGHT_AXIS for point in points]),
-        owners=tuple(name for name, _ in found),
-        ball_radius=(conditions.ball_diameter or 0.0) / 2,
-        ball_uncertainty=options.ball_uncertainty / 2,
-    )
-
-
-def _owned(runs: Runs, plan: Plan) -> list[tuple[str, ProbedPoint]]:
+def _owned(runs: Runs, options: PartOptions) -> list[tuple[str, ProbedPoint]]:
     """Return the touches with their features."""
-    names = [each.name for each in plan.features]
+    planned = [each.name for each in course(options)]
+    names = dict.fromkeys(map(base_name, planned))
     found = []
     for i, (run, points) in enumerate(runs):
-        is_named = run.partition("@")[0] in names
-        if not is_named and i >= len(names):
+        is_named = base_name(run) in names
+        if not is_named and i >= len(planned):
             raise CalibrationError(
                 "measuring.unknown-feature", name=run, names=", ".join(names)
             )
-        found += [(run if is_named else names[i], point) for point in points]
+        found += [(run if is_named else planned[i], point) for point in points]
     return found
 
 
@@ -270,6 +250,7 @@ def _entries(found: Part, instrument: Instrument) -> dict[str, Any]:
     return {
         **entries,
         "missing": list(found.missing),
+        "refinement": _refinement_entries(found.refinement, instrument),
         "touches": [
             {
                 "feature": name,
@@ -287,6 +268,46 @@ def _entries(found: Part, instrument: Instrument) -> dict[str, Any]:
     }
 
 
+def _refinement_entries(
+    refinement: Refinement | None, instrument: Instrument
+) -> dict[str, Any] | None:
+    if refinement is None:
+        return None
+    tip = instrument.parameters.tip
+    before, after = (
+        COVERAGE_FACTOR * np.sqrt(np.diag(covariance)[tip])
+        for covariance in (refinement.before, refinement.after)
+    )
+    return {
+        "features": list(refinement.names),
+        "is_used": refinement.is_used,
+        "tip_shift_pen_mm": refinement.shift[tip],
+        "tip_expanded_uncertainty_before_mm": before,
+        "tip_expanded_uncertainty_after_mm": after,
+        "chi_square": refinement.chi_square,
+        "degrees_of_freedom": refinement.n_free,
+    }
+
+
+def _refined(refinement: Refinement, instrument: Instrument) -> Message:
+    """Return what features of known form say of the tip."""
+    names = ", ".join(refinement.names)
+    if not refinement.is_used:
+        return message(
+            "part.not-refined",
+            names=names,
+            chi_square=refinement.chi_square,
+            n_free=refinement.n_free,
+        )
+    tip = instrument.parameters.tip
+    before, after = (
+        COVERAGE_FACTOR * float(np.sqrt(np.diag(covariance)[tip].max()))
+        for covariance in (refinement.before, refinement.after)
+    )
+    shift = float(np.linalg.norm(refinement.shift[tip]))
+    return message("part.refined", names=names, shift=shift, before=before, after=after)
+
+
 def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
     part = found.part
     in_part, in_camera = message("part.in-part"), message("part.in-camera")
@@ -298,7 +319,7 @@ def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
             message("part.kind"),
         ),
         _rows(feature_rows(part)),
-        (in_camera if part.alignment is None else in_part,),
+        (in_camera if part.alignment is None else in_part, *_notes(found, conditions)),
     )
     characteristics = ResultTable(
         message("part.characteristics"),
@@ -317,62 +338,17 @@ def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
     return characteristics, features
 
 
+def _notes(found: Part, conditions: Conditions) -> Iterator[Message]:
+    """Yield how positions are tied and what known forms refine."""
+    for position, motion in found.part.ties.items():
+        residual = float(motion.residuals.max())
+        yield message("part.moved", position=position, residual=residual)
+    if found.refinement is not None:
+        yield _refined(found.refinement, conditions.instrument)
+
+
 def _rows(rows: Iterable[PartRow]) -> tuple[ResultRow, ...]:
     return tuple(ResultRow(each.name, each.values, 4, each.remark) for each in rows)
-
-
-def planned_at(options: PartOptions, run: int) -> PlannedFeature | None:
-    """Return the feature of a run from 0; None after the last, or without a plan."""
-    features = () if options.plan is None else options.plan.features
-    return features[run] if run < len(features) else None
-
-
-@dataclass(frozen=True, eq=False)
-class FeatureSoFar:
-    """The feature at hand.
-
-    Attributes
-    ----------
-    kind : FeatureKind or None
-        As planned, or as recognised so far.
-    deviations : (N,) array
-        Distances of the touches from it, mm; NaN before it is determined.
-    next_touch : Place or None
-        The most informative one, frame of the camera.
-    """
-
-    planned: PlannedFeature
-    kind: FeatureKind | None
-    deviations: FloatArray
-    next_touch: Place | None = None
-
-
-def feature_so_far(
-    options: PartOptions, progress: TaskProgress, conditions: Conditions
-) -> FeatureSoFar | None:
-    """Return the feature that is being probed; None if there is none."""
-    planned = planned_at(options, len(progress.runs))
-    if planned is None:
-        return None
-    points = progress.points
-    unknown = FeatureSoFar(planned, planned.kind, np.full(len(points), np.nan))
-    if not points:
-        return unknown
-    found = [(planned.name, point) for point in points]
-    touches = touches_of_part(found, conditions, options)
-    kind = planned.kind or kind_of(planned.name, touches)
-    if kind is None:
-        return unknown
-    try:
-        fit = fit_feature(kind, touches.points_cam)
-    except CalibrationError:
-        return replace(unknown, kind=kind)
-    area = area_of(fit, touches.points_cam)
-    place = best_places(area, 1, touches.points_cam)[0]
-    off = np.linalg.norm(fit.distances, axis=1)
-    if fit.distances.shape[1] == 1:
-        off = fit.distances[:, 0]
-    return FeatureSoFar(planned, kind, off, place)
 
 
 def _figures_so_far(
@@ -432,39 +408,6 @@ def _rule(options: PartOptions, limits: VerificationLimits) -> Message:
     return rule_in_words(replace(limits, rule=options.plan.rule))
 
 
-@cache
-def planned_places(planned: PlannedFeature) -> tuple[Place, ...]:
-    """Return where to probe a feature by its nominals, frame of the part.
-
-    The normals point out of the material. Empty if the nominals do not tell.
-    """
-    area = None
-    if planned.kind is not None and planned.nominal is not None:
-        area = nominal_area(planned.kind, planned.nominal)
-    if area is None:
-        return ()
-    places = best_places(area, planned.n_touches)
-    if planned.side is Side.INSIDE:
-        places = [replace(each, normal=-each.normal) for each in places]
-    if planned.kind is FeatureKind.LINE:  # at the front of the part
-        normal = np.array([0.0, -1.0, 0.0])
-        places = sorted(
-            (replace(each, normal=normal) for each in places),
-            key=lambda each: float(each.point[0]),
-        )
-    return tuple(places)
-
-
-def _hand(options: PartOptions, run: int, step: int) -> HandGoal:
-    planned = planned_at(options, run)
-    places = () if planned is None else planned_places(planned)
-    if not places:
-        return HandGoal()
-    place = places[step % len(places)]
-    point = SIMULATED_ORIGIN + SIMULATED_AXES @ place.point
-    return HandGoal(point, outwards=SIMULATED_AXES @ place.normal)
-
-
 PART = VerificationTask(
     kind="part",
     summary="a part by a plan",
@@ -482,9 +425,9 @@ PART = VerificationTask(
     entries=_entries,
     tables=_tables,
     figures_so_far=_figures_so_far,
-    hand=_hand,
+    hand=hand_goal,
     n_points=lambda options: 1,
-    n_runs=lambda options: 1 if options.plan is None else len(options.plan.features),
+    n_runs=lambda options: max(len(course(options)), 1),
     fraction=_fraction,
     count=_count,
     instruction=_instruction,

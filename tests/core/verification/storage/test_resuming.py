@@ -32,7 +32,8 @@ from lightpen.verification.tasks.circle import CIRCLE
 from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.fixed_point import FIXED_POINT
 from lightpen.verification.tasks.length import LENGTH
-from lightpen.verification.tasks.part import PART, PartOptions
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import PartOptions
 
 ALL = replace(CHOICES, kinds=(*CHOICES.kinds, DRIFT.kind))
 UPRIGHT = (Hold(tilt=0.0),) * 3

@@ -12,6 +12,7 @@ from ezdxf.filemanagement import read as read_drawing
 from msgspec import structs
 from tests.accepted_tip import Hold, Holder
 
+from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
@@ -28,16 +29,19 @@ from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session import (
     advance_session,
     end_task,
+    with_moved_part,
     without_last_touch,
 )
 from lightpen.verification.session.session_state import SessionSetup, SessionState
-from lightpen.verification.tasks.part import PART, Part, PartOptions, feature_so_far
+from lightpen.verification.tasks.part import PART, Part
+from lightpen.verification.tasks.part_course import PartOptions, course, feature_so_far
 from lightpen.verification.tasks.probed_point import ProbedPoint
 
 BALL = 10.0  # mm
 QIF = Path(os.environ.get("LIGHTPEN_DATA", "no such folder")) / "qif/QIFDocument.xsd"
 NOISE = 0.002  # mm
 RAISED = FACING
+UNMOVED = np.zeros(3)  # mm
 
 
 @dataclass
@@ -48,14 +52,16 @@ class Station:
     holder: Holder
     state: SessionState = field(default_factory=SessionState)
 
-    def probe(self, n: int, plan: Plan | None = None) -> None:
+    def probe(
+        self, n: int, plan: Plan | None = None, moved: FloatArray = UNMOVED
+    ) -> None:
         """Probe the next points, of a plan with nominals or of the one in use."""
         by = self.options if plan is None else PartOptions(plan)
         for _ in range(n):
             goal = PART.hand(by, len(self.state.runs), len(self.state.touches))
             assert goal.point is not None
             assert goal.outwards is not None
-            place = goal.point + BALL / 2 * goal.outwards
+            place = goal.point + BALL / 2 * goal.outwards + moved
             seen = [*self.holder.still(Hold(tuple(place.tolist()), 0.1), 5)]
             for detection in [*seen, *self.holder.away(6)]:
                 transition = advance_session(self.setup, self.state, "image", detection)
@@ -289,6 +295,80 @@ def test_nothing_is_measured_without_a_plan(instrument: Instrument) -> None:
     assert PART.missing(PartOptions(), BALL) is not None
 
 
+def test_a_part_moved_in_between_goes_on_after_three_datum_points(
+    instrument: Instrument,
+) -> None:
+    holes = [structs.replace(each, touches=3) for each in plate_plan().features[2:6]]
+    distance = plate_plan().characteristics[7]  # of holes 1 and 4
+    plan = Plan("Holes", (*holes,), characteristics=(distance,))
+    at_it = station(instrument, plan)
+    at_it.probe(10)  # three holes, and a point of the fourth
+    at_it.state = without_last_touch(at_it.state)
+    at_it.setup = with_moved_part(at_it.setup, at_it.state)
+    away = np.array([4.0, -3.0, 2.0])
+    at_it.probe(9, moved=away)
+    names = [each.name for each in course(at_it.options)]
+    at_it.probe(3, moved=away)
+
+    assert names[3:] == ["hole 1@2", "hole 2@2", "hole 3@2", "hole 4@2"]
+    (result,) = at_it.found.part.results
+    assert result.value.value == pytest.approx(40, abs=result.value.uncertainty)
+    # Without the tie it would be off by the way of the part.
+    assert np.linalg.norm(away) > 10 * result.value.uncertainty
+    (motion,) = at_it.found.part.ties.values()
+    assert motion.residuals.max() < 0.05
+    notes = PART.tables(at_it.found, at_it.setup.conditions)[1].notes
+    assert any(note.code == "part.moved" for note in notes)
+
+
+def test_a_part_is_not_moved_before_three_datum_points_are_probed(
+    instrument: Instrument,
+) -> None:
+    at_it = station(instrument, plate_plan())
+    at_it.probe(6)
+
+    with pytest.raises(CalibrationError, match="3 that are not on one line"):
+        with_moved_part(at_it.setup, at_it.state)
+
+
+@pytest.mark.parametrize("error", [0.03, 3.0])
+def test_a_known_sphere_refines_the_tip_or_says_why_not(
+    instrument: Instrument, error: float
+) -> None:
+    dome = structs.replace(plate_plan().features[7], touches=12, known=0.002)
+    plan = Plan("Dome", (dome,), characteristics=plate_plan().characteristics[3:4])
+    rng, shift = np.random.default_rng(3), error * np.array([0.6, -0.5, 0.6])
+    ((name, points),) = probed_plate(instrument, plan)
+    off = []
+    for point in points:
+        turn = rotation_from_vector(0.5 * rng.standard_normal(3)) @ RAISED
+        sensitivity = point.sensitivity.copy()
+        sensitivity[:, instrument.parameters.tip] = turn
+        place = point.point_cam + turn @ shift
+        off.append(
+            replace(point, point_cam=place, rotation=turn, sensitivity=sensitivity)
+        )
+    loose = instrument.covariance.copy()
+    tip = instrument.parameters.tip
+    loose[tip, tip] += 0.03**2 * np.eye(3)
+    setup = station(replace(instrument, covariance=loose), plan).setup
+
+    found = PART.measure([(name, off)], setup.conditions, PartOptions(plan))
+
+    entries = PART.entries(found, setup.instrument)["refinement"]
+    assert entries["is_used"] is (error < 1)
+    if error > 1:
+        assert found.assessment.grade is not Grade.PASS
+        notes = PART.tables(found, setup.conditions)[1].notes
+        assert notes[-1].code == "part.not-refined"
+        return
+    np.testing.assert_allclose(entries["tip_shift_pen_mm"], -shift, atol=0.01)
+    before = entries["tip_expanded_uncertainty_before_mm"]
+    after = entries["tip_expanded_uncertainty_after_mm"]
+    assert (after < before / 3).all()
+    assert (np.abs(entries["tip_shift_pen_mm"] + shift) < 1.5 * after).all()
+
+
 @pytest.mark.slow
 def test_a_moved_part_is_tied_by_datum_points_probed_again(
     instrument: Instrument,
@@ -319,6 +399,8 @@ def test_a_moved_part_is_tied_by_datum_points_probed_again(
         probed_plate(instrument, plan), at_it.setup.conditions, at_it.options
     )
     assert found.part.uncertainty("slot")[1] > once.part.uncertainty("slot")[1]
+    # A plane is probed elsewhere each time: it is no datum point.
     few = [each for each in runs if not each[0].startswith("hole")]
-    with pytest.raises(CalibrationError, match="Position 2 shares 1 features"):
+    few.append(("top@2", runs[0][1]))
+    with pytest.raises(CalibrationError, match="Position 2 shares 1 datum points"):
         PART.measure(few, at_it.setup.conditions, at_it.options)
