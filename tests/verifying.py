@@ -3,6 +3,7 @@
 import json
 import threading
 from collections.abc import Callable, Iterable
+from copy import deepcopy
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,6 +20,7 @@ from lightpen.model.rig import rig_of
 from lightpen.record.folder.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.swing.preparation import Preparation
+from lightpen.verification.probing.probing import ProbingPhase
 from lightpen.verification.runner import VerificationRunner
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session_state import SessionState
@@ -49,6 +51,7 @@ CHOICES = VerificationChoices(
     n_frames=3,
 )
 FRAME = Frame(sealed(np.zeros((2, 2), np.uint8)), 0, 0)
+TABLE = Hold((0.0, 80.0, 0.0))
 BAR = Hold((-75.0, -20.0, 0.0)), Hold((75.0, -20.0, 0.0))
 
 
@@ -162,8 +165,18 @@ class Verifier:
             self.runner.take(frame, detection, wanted)
 
     def touch(self, *holds: Hold) -> None:
+        self.pick_up()
         for hold in holds:
             self.see(self.holder.still(hold))
+
+    def pick_up(self) -> None:
+        """Take the pen up if it rests, as it must be before the first touch."""
+        done = threading.Event()
+        self.runner.ask(lambda _: done.set())
+        done.wait(TIMEOUT)
+        state = self.status.state
+        if state is not None and state.touching.phase is ProbingPhase.AT_REST:
+            self.see(deepcopy(self.holder).still(TABLE, 1))
 
     def read(self, task: AnyTask, place: Path) -> None:
         """Read recorded images, and wait until that has ended."""

@@ -39,7 +39,7 @@ MADE: dict[str, Made] = {
     "about": lambda _: About({"Python": "3.11", "Qt": "6.11"}),
     "stream": lambda _: StreamDialog(),
     "help": lambda _: HelpWindow(),
-    "board": lambda workbench: BoardWindow(workbench.live),
+    "board": lambda workbench: BoardWindow(workbench.live, workbench.save_place),
     "laboratory": lambda _: LaboratoryDialog(None),
     "assumptions": lambda _: AssumptionsDialog(),
     "limits": lambda _: LimitsDialog(),

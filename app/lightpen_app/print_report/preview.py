@@ -6,7 +6,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtPrintSupport import QPrintDialog, QPrinter, QPrintPreviewWidget
-from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
+from PySide6.QtWidgets import QDialog, QWidget
 from typing_extensions import override
 
 from lightpen.formats.files import write_whole
@@ -16,6 +16,7 @@ from lightpen_app.print_report.pages import PrintReport
 from lightpen_app.print_report.printing import A4, paint_on, pdf_of
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.save_dialog import ask_file
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job
 from lightpen_app.work.save_place import SavePlace
@@ -101,15 +102,8 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         self._print.setText(self.tr("Print..."))
 
     def _ask_file(self) -> None:
-        dialog = QFileDialog(self, self.tr("Save calibration report"))
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.setNameFilter("PDF (*.pdf)")
-        dialog.setDefaultSuffix("pdf")
-        dialog.setDirectory(str(self._place.folder()))
-        dialog.selectFile(f"{self._stem}.pdf")
-        dialog.fileSelected.connect(lambda path: self.write(Path(path)))
-        dialog.open()
+        path = self._place.folder() / f"{self._stem}.pdf"
+        ask_file(self, self.tr("Save calibration report"), path, self.write)
 
     def write(self, path: Path) -> None:
         """Save it as PDF in a file."""

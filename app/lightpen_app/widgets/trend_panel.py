@@ -184,6 +184,11 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
             return self.tr(
                 "Pen {0}, tip {1}: one calibration, {2}. Dashed: the limit of U."
             ).format(*names, first)
+        if trend.control is None:
+            return self.tr(
+                "Pen {0}, tip {1}: {2} calibrations, {3} to {4}. Dashed: the limit of "
+                "U. Ten calibrations give control limits."
+            ).format(*names, len(trend.entries), first, last)
         return self.tr(
             "Pen {0}, tip {1}: {2} calibrations, {3} to {4}. Dashed: mean ± three "
             "standard deviations, and the limit of U."

@@ -7,7 +7,11 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.simulator.hand import HandActivity, Operator
 from lightpen.verification.probing.probing import ProbingPhase
-from lightpen.verification.session.session_state import SessionSetup, SessionState
+from lightpen.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+    is_at_rest,
+)
 from lightpen.verification.tasks.registry import AnyTask
 from lightpen.verification.tasks.task import HandGoal
 
@@ -39,6 +43,9 @@ class ProbingOperator:
         if task is None:
             self._wanted = wanted
             operator.leave()
+            return
+        if is_at_rest(state) and not is_lifted:
+            operator.lift()
             return
         options = setup.choices.options_of(task)
         is_same_again = not any(task.newness(options))

@@ -40,7 +40,11 @@ from lightpen.verification.session.session import (
     with_read,
     without_last_touch,
 )
-from lightpen.verification.session.session_state import SessionState, with_drift
+from lightpen.verification.session.session_state import (
+    SessionState,
+    with_drift,
+    with_pen_at_rest,
+)
 from lightpen.verification.session.status import (
     ReadingState,
     SessionEventKind,
@@ -136,7 +140,7 @@ class VerificationWorkflow:
 
     def come(self) -> None:
         """Operator present: read the current tip, and take images."""
-        self._publish(replace(self._status, is_here=True))
+        self._publish(replace(self._rested(), is_here=True))
         self._write()
         if self._status.reading is not ReadingState.IMAGES:
             self._read_tip()
@@ -147,7 +151,7 @@ class VerificationWorkflow:
 
     def toggle_pause(self) -> None:
         """Take no images until this is called again, or take them again."""
-        self._publish(replace(self._status, is_paused=not self._status.is_paused))
+        self._publish(replace(self._rested(), is_paused=not self._status.is_paused))
 
     def start_over(self) -> None:
         """Discard all touches and read the current tip again; files are kept."""
@@ -295,7 +299,7 @@ class VerificationWorkflow:
             VerificationStatus(
                 tip=before.tip,
                 setup=before.setup,
-                state=before.state,
+                state=with_pen_at_rest(before.state),
                 region=before.tip.region,
                 began=before.under_way.began,
                 files=before.files,
@@ -378,7 +382,14 @@ class VerificationWorkflow:
     def _touch_again(self, state: SessionState) -> None:
         """Continue with another state, in which points have to be probed again."""
         self._keeping.forget_but(state)
-        self._publish(replace(self._status, state=state))
+        self._publish(replace(self._status, state=with_pen_at_rest(state)))
+
+    def _rested(self) -> VerificationStatus:
+        """Return the status for a pen that may have been put down."""
+        state = self._status.state
+        if state is None:
+            return self._status
+        return replace(self._status, state=with_pen_at_rest(state))
 
     # The tip
 
@@ -395,11 +406,15 @@ class VerificationWorkflow:
         setup, state = with_other_choices(setup, state, choices)
         refusal = self._why_not(status.tip)
         self._status = replace(status, setup=setup, state=state, refusal=refusal)
-        if state.touching is before.touching:
-            self._publish(self._status)
-        else:
+        is_measured_again = self._keeping.add_again(before, state)
+        if is_measured_again:
+            self._status = replace(self._status, accepted_by="")
+        if state.touching is not before.touching:
             self._touch_again(state)
         self._keep()
+        if is_measured_again:
+            self._conclude_done()
+        self._publish(self._status)
 
     def _read_tip(self) -> None:
         preparation = self._preparation
@@ -419,7 +434,7 @@ class VerificationWorkflow:
             status = VerificationStatus(
                 tip=tip,
                 setup=setup_of(tip, self._choices),
-                state=SessionState(),
+                state=with_pen_at_rest(SessionState()),
                 region=tip.region,
                 is_here=status.is_here,
             )

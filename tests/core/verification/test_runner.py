@@ -43,7 +43,7 @@ from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.status import SessionEventKind, VerificationStatus
 from lightpen.verification.storage.checkpoint import find_interrupted
 from lightpen.verification.storage.point_images import CONCLUDED
-from lightpen.verification.tasks.circle import CIRCLE, CircleOptions
+from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleOptions
 from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.length import LENGTH
@@ -215,17 +215,27 @@ def test_what_is_not_known_is_asked_for(
     assert verifier.refusal() == code
 
 
-def test_another_artefact_forgets_what_was_found_of_the_one_before(
+def test_a_corrected_certified_value_counts_for_the_points_that_were_probed(
     at_it: Verifier,
 ) -> None:
     at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10])
+    before = found_by(at_it.status.state, CIRCLE)
     assert at_it.status.task is LENGTH
-    other = CHOICES.with_options(CircleOptions(radius=20.0))
+    radius = SIMULATED_RADIUS + 0.5
+    other = CHOICES.with_options(CircleOptions(radius, 0.001))
     at_it.runner.ask(lambda workflow: workflow.choose(at_it.preparation, other))
-    at_it.ear.wait_until(lambda: at_it.status.task is CIRCLE)
+    at_it.ear.wait_until(lambda: len(at_it.records) == 3)
 
-    assert at_it.status.state is not None
-    assert FIXED_POINT.kind in at_it.status.state.found
+    found = found_by(at_it.status.state, CIRCLE)
+    assert found.runs[0].radius == before.runs[0].radius
+    assert found.assessment.grade is Grade.REPEAT
+    assert at_it.status.task is LENGTH
+    first, second = (
+        each for each in at_it.records if each["verification"] == CIRCLE.kind
+    )
+    assert first["runs"][0]["touches"] == second["runs"][0]["touches"]
+    certified = [each["certified_radius_mm"] for each in (first, second)]
+    assert certified == [SIMULATED_RADIUS, radius]
 
 
 def test_a_tip_that_came_into_force_meanwhile_is_verified_anew(at_it: Verifier) -> None:
@@ -381,6 +391,7 @@ def by_touch(record: Record) -> list[list[RecordedImage]]:
 
 
 def test_of_a_touch_that_was_broken_off_no_image_counts(at_it: Verifier) -> None:
+    at_it.pick_up()
     at_it.see(at_it.holder.still(leant(4)[0], 5))
     at_it.see(at_it.holder.away())
     at_it.touch(leant(4)[1])
@@ -390,6 +401,24 @@ def test_of_a_touch_that_was_broken_off_no_image_counts(at_it: Verifier) -> None
     assert len(record.images) == 5
     assert len(record.used_images) == 3
     assert {image.touch for image in record.used_images} == {1}
+
+
+def test_a_pen_that_lies_still_is_no_touch_until_it_was_picked_up(
+    at_it: Verifier,
+) -> None:
+    def n_touches() -> int:
+        assert at_it.status.state is not None
+        return len(at_it.status.state.touches)
+
+    lying, held = leant(4)[:2]
+    at_it.see(at_it.holder.still(lying, 30))
+    assert n_touches() == 0
+    at_it.touch(held)
+    assert n_touches() == 1
+    for _ in range(2):  # it may be put down while the verification is paused
+        at_it.runner.ask(lambda workflow: workflow.toggle_pause())
+    at_it.see(at_it.holder.still(lying, 30))
+    assert n_touches() == 1
 
 
 def test_an_image_that_cannot_be_kept_does_not_count(at_it: Verifier) -> None:

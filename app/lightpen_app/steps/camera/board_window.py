@@ -30,9 +30,11 @@ from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.save_dialog import ask_file
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.live_view import DisplayedImage, LiveView
+from lightpen_app.work.save_place import SavePlace
 
 SIDE_WIDTH = 48 * GRID
 LEAST_LIST = 28 * GRID  # px, of the views
@@ -52,11 +54,13 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     saved = Signal(str)
     concluded = Signal(object)
 
-    def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, live: LiveView, place: SavePlace, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent, Qt.WindowType.Window)
         self.setObjectName("board")
         self.resize(150 * GRID, 90 * GRID)
-        self._live = live
+        self._live, self._place = live, place
         self._capture = BoardCapture(self)
         self._calibration = BoardCalibration(self._capture, live, self)
 
@@ -133,13 +137,15 @@ class BoardWindow(FittedWindow, Translated, QWidget):
 
     def read_folder(self, folder: str) -> None:
         """Calibrate by the images in a folder."""
+        self._place.remember(Path(folder))
         board = self._named_board()
         if board is not None:
             self._calibration.calibrate_by_folder(folder, board)
 
-    def save(self, path: str) -> None:
+    def save(self, path: Path) -> None:
         """Write the camera file and offer it for use."""
-        self._calibration.save(Path(path))
+        self._place.remember(path.parent)
+        self._calibration.save(path)
 
     def _on_begin_clicked(self) -> None:
         if self._capture.state.sought is not None:
@@ -180,22 +186,22 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     def _on_folder_clicked(self) -> None:
         if self._named_board() is None:
             return
-        folder = QFileDialog.getExistingDirectory(self, self.tr("Board images"))
+        folder = QFileDialog.getExistingDirectory(
+            self, self.tr("Board images"), str(self._place.folder())
+        )
         if folder:
             self.read_folder(folder)
 
-    def print_board(self, path: str) -> None:
+    def print_board(self, path: Path) -> None:
         """Write the board as a page at true scale."""
         board = self._named_board(measured=False)
         if board is not None:
-            self._calibration.print_board(board, Path(path))
+            self._place.remember(path.parent)
+            self._calibration.print_board(board, path)
 
     def _on_print_clicked(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(
-            self, self.tr("Save the board"), "board.pdf", "*.pdf"
-        )
-        if path:
-            self.print_board(path)
+        path = self._place.folder() / "board.pdf"
+        ask_file(self, self.tr("Save the board"), path, self.print_board)
 
     def _on_remove_clicked(self) -> None:
         item = self._worst.currentItem()
@@ -203,11 +209,8 @@ class BoardWindow(FittedWindow, Translated, QWidget):
             self._calibration.leave_out(item.data(Qt.ItemDataRole.UserRole))
 
     def _on_save_clicked(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(
-            self, self.tr("Save camera file"), "camera.yaml", "*.yaml"
-        )
-        if path:
-            self.save(path)
+        path = self._place.folder() / "camera.yaml"
+        ask_file(self, self.tr("Save camera file"), path, self.save)
 
     def _on_found_changed(self) -> None:
         found = self._calibration.found

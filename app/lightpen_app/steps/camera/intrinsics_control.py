@@ -32,6 +32,7 @@ class IntrinsicsControl(QObject):
         super().__init__(page)
         self._archive_writer = workbench.archive_writer
         self._selection, self._live = workbench.selection, workbench.live
+        self._place = workbench.save_place
         self._panel = panel
         self._page = page
         self._reading: Job | None = None
@@ -71,7 +72,7 @@ class IntrinsicsControl(QObject):
             # A camera is calibrated once a year; it is not waited for at each start.
             from lightpen_app.steps.camera.board_window import BoardWindow
 
-            self._board = BoardWindow(self._live, self._page)
+            self._board = BoardWindow(self._live, self._place, self._page)
 
             # Connections
             self._board.saved.connect(self._on_path_chosen)

@@ -1,6 +1,7 @@
 """Actions on the whole archive: check, save and import."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -14,6 +15,7 @@ from lightpen.archive.listing import save_entries
 from lightpen.archive.recompute_check import with_recomputed
 from lightpen_app.steps.history.archive_panel import ArchivePanel, SaveFormat
 from lightpen_app.steps.history.filter_bar import FilterBar
+from lightpen_app.widgets.save_dialog import ask_file
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
 
@@ -76,7 +78,11 @@ class ArchiveControl(QObject):
             self._work.cancel()
 
     def _ask_import(self) -> None:
-        dialog = self._dialog(self.tr("Entries of another station"), SaveFormat.WHOLE)
+        dialog = QFileDialog(self._panel, self.tr("Entries of another station"))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        suffix = SaveFormat.WHOLE.suffix
+        dialog.setNameFilter(f"{suffix[1:].upper()} (*{suffix})")
+        dialog.setDirectory(str(self._place.folder()))
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.fileSelected.connect(lambda path: self._import(Path(path)))
         dialog.open()
@@ -94,13 +100,10 @@ class ArchiveControl(QObject):
         self._notices.show_status(told.format(copied.n_new, copied.n_known))
 
     def _ask_save(self, saving: SaveFormat) -> None:
-        dialog = self._dialog(self.tr("Save entries"), saving)
-        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.setDefaultSuffix(saving.suffix[1:])
-        day = self._clock()
-        dialog.selectFile(f"lightpen-{day:%Y-%m-%d}{saving.suffix}")
-        dialog.fileSelected.connect(lambda path: self._save(saving, Path(path)))
-        dialog.open()
+        name = f"lightpen-{self._clock():%Y-%m-%d}{saving.suffix}"
+        path = self._place.folder() / name
+        title = self.tr("Save entries")
+        ask_file(self._panel, title, path, partial(self._save, saving))
 
     def _save(self, saving: SaveFormat, path: Path) -> None:
         logbook, wanted = self._logbook, self._filter.value()
@@ -116,13 +119,6 @@ class ArchiveControl(QObject):
         self._do(
             save, lambda n_saved: self._notices.show_status(told.format(n_saved, path))
         )
-
-    def _dialog(self, title: str, saving: SaveFormat) -> QFileDialog:
-        dialog = QFileDialog(self._panel, title)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.setNameFilter(f"{saving.suffix[1:].upper()} (*{saving.suffix})")
-        dialog.setDirectory(str(self._place.folder()))
-        return dialog
 
     def _do(
         self, function: Callable[[Report], T], on_succeeded: Callable[[T], object]

@@ -6,13 +6,14 @@ from typing import NamedTuple
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QMouseEvent
-from PySide6.QtWidgets import QFileDialog, QFrame, QMenu, QToolButton, QWidget
+from PySide6.QtWidgets import QFrame, QMenu, QToolButton, QWidget
 from typing_extensions import override
 
 from lightpen.formats.files import write_whole
 from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.plots import Plot
+from lightpen_app.widgets.save_dialog import ask_file
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job
 from lightpen_app.work.save_place import SavePlace
@@ -119,23 +120,15 @@ class PlotCard(Translated, QFrame):
         return "" if self._place is None else self._place.mark()
 
     def _ask_place(self, suffix: str) -> None:
-        dialog = QFileDialog(self, self.tr("Save plot"))
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.setNameFilter(f"{suffix[1:].upper()} (*{suffix})")
-        dialog.setDefaultSuffix(suffix[1:])
-        name = self._file_stem + suffix
+        path = Path(self._file_stem + suffix)
         if self._place is not None:
-            name = f"{self._place.stem()}_{name}"
-            dialog.setDirectory(str(self._place.folder()))
-        dialog.selectFile(name)
-        dialog.fileSelected.connect(self._on_place_chosen)
-        dialog.open()
+            path = self._place.folder() / f"{self._place.stem()}_{path}"
+        ask_file(self, self.tr("Save plot"), path, self._on_place_chosen)
 
-    def _on_place_chosen(self, path: str) -> None:
+    def _on_place_chosen(self, path: Path) -> None:
         if self._place is not None:
-            self._place.remember(Path(path).parent)
-        self.save(Path(path))
+            self._place.remember(path.parent)
+        self.save(path)
 
     def _retranslate(self) -> None:
         self._enlarge.setText(self.tr("Enlarge"))

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from lightpen.local_time import local_now
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
 from lightpen.record.library.library_changes import read_kept_picture, read_picture
 from lightpen.record.library.tip_library import (
@@ -282,7 +283,7 @@ class ItemForm(Translated, QWidget):
             named.setAccessibleName(text)
         self._due.setToolTip(
             self.tr("Last day of use, for example {0}; empty for none").format(
-                date(2026, 8, 14)
+                date(local_now().year + 1, 8, 14)
             )
         )
         self._ball.setSpecialValueText(nothing)

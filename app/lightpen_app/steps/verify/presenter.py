@@ -13,6 +13,7 @@ from lightpen.verification.session.session_state import (
     SessionState,
     fraction_done,
     instruction,
+    is_at_rest,
 )
 from lightpen.verification.session.status import ReadingState, VerificationStatus
 from lightpen.verification.tasks.assessment import USE_TIP, VerificationAssessment
@@ -221,6 +222,8 @@ class VerifyPresenter(QObject):
         task, touching = state.task(setup), state.touching
         if is_held(state):
             return self.tr("Hold still")
+        if is_at_rest(state):
+            return self.tr("Pick up the pen")
         if touching.phase is ProbingPhase.KNOWN:
             return self.tr("Probed before")
         if state.trouble is not None:

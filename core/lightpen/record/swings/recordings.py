@@ -12,6 +12,7 @@ from lightpen.record.swings.header import copy_name
 from lightpen.record.swings.reading import is_record, open_record, recorded_origin
 
 CAMERA_FILES = ("camera.yaml", "camera.yml", "camera.json", "camera.xml")
+CAMERA_SUFFIXES = tuple(Path(name).suffix for name in CAMERA_FILES)
 PEN_FILES = ("leds.csv", "pen.json", "leds.json", "pen.csv")
 
 
@@ -35,12 +36,15 @@ def files_beside(place: str) -> FilesBeside:
     Parameters
     ----------
     place : str
-        Folder, pattern or video.
+        Folder, pattern or video; or a camera file, which is offered itself.
     """
     with suppress(OSError, ValueError, FileError):
-        folder = Path(place)
+        chosen = folder = Path(place)
         if not folder.is_dir():
             folder = folder.parent
+        if chosen.suffix.lower() in CAMERA_SUFFIXES and chosen.is_file():
+            camera = None if chosen.name in PEN_FILES else chosen
+            return FilesBeside(camera, _first(folder, PEN_FILES))
         if folder.name == IMAGE_FOLDER:
             folder = folder.parent
         if is_record(folder):

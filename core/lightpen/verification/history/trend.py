@@ -21,6 +21,7 @@ from lightpen.verification.tasks.repeatability import (
     Repeatability,
     RepeatedPoint,
     TipEstimate,
+    control_limits,
     measure_repeatability,
 )
 
@@ -103,7 +104,7 @@ def trend_of(database: Database, wanted: EntryFilter) -> Trend:
         tip=wanted.tip,
         entries=entries,
         tips=tips,
-        control=_control(tips),
+        control=control_limits(np.array([tip.tip_pen for tip in tips])),
         max_uncertainty=_limit(entries[-1]) if entries else None,
         touched=_last_touched(database, wanted),
     )
@@ -177,12 +178,6 @@ def repeatability_of(
 def _subject(entry: StoredEntry) -> tuple[str, str, bool]:
     event = entry.entry.event
     return event.names.pen, event.names.tip, event.is_simulated
-
-
-def _control(tips: tuple[TipEstimate, ...]) -> ControlLimits | None:
-    if len(tips) < MIN_TIPS:
-        return None
-    return measure_repeatability(tips, VerificationLimits()).control
 
 
 def _limit(entry: StoredEntry) -> float | None:

@@ -5,7 +5,8 @@ and what happened. It has no clock and no threads: live images and recorded ones
 through the same steps. The pen is still while its tip stays within the noise of its
 images and its posture hardly turns. One image that disagrees is left out and named; a
 second one means that the pen has moved, and what was held so far counts no more. After
-a touch the pen must move on before the next one begins.
+a touch the pen must move on before the next one begins. Live, a pen that rests
+somewhere when probing begins must leave that place before its first touch.
 """
 
 from collections.abc import Iterable
@@ -37,12 +38,16 @@ STILL_TURN = np.radians(1.0)
 MAX_LOST = 5  # images in a row without the pen; more end a touch
 HELD_ENOUGH = 3  # images, from which on a discarded point is reported
 MAX_PATH = 20  # images
-FAR_ENOUGH = 2.0  # mm, that show the direction of approach
+FAR_ENOUGH = (
+    2.0  # mm, that show the direction of approach, or that the pen was taken up
+)
+TAKEN_UP_TURN = np.radians(3.0)  # likewise
 
 
 class ProbingPhase(StrEnum):
     """Phase of a touch."""
 
+    AT_REST = "at rest"  # not seen to move since probing began
     MOVING = "moving"  # or not seen
     HOLDING = "holding"
     RECORDED = "recorded"  # the pen has to move on
@@ -101,7 +106,7 @@ class ProbingState:
     Attributes
     ----------
     held : tuple of TipObservation
-        Through which the pen is still.
+        Through which the pen is still; at rest the first and the last one.
     doubted : TipObservation or None
         The last one, if it disagrees.
     rejected : tuple of RejectedFrame
@@ -161,6 +166,9 @@ def advance_touch(
         return _without_pose(state, RejectedFrame(name, reason))
     seen = _seen(instrument, name, detection)
     state = replace(state, n_lost=0)
+    if state.phase is ProbingPhase.AT_REST and not _has_left(state.held, seen):
+        rest = (*state.held[:1], seen)
+        return ProbingTransition(replace(state, held=rest, doubted=None))
     if not state.held:
         return _moved_to(rules, state, (seen,))
     if _agrees(state.held, seen):
@@ -175,6 +183,11 @@ def advance_touch(
         return ProbingTransition(replace(state, doubted=seen))
     both_elsewhere = _agrees((state.doubted,), seen)
     return _moved_to(rules, state, (state.doubted, seen) if both_elsewhere else (seen,))
+
+
+def at_rest(state: ProbingState) -> ProbingState:
+    """Return the touches so far; the pen must leave where it is before the next."""
+    return replace(_let_go(state).state, phase=ProbingPhase.AT_REST, path=())
 
 
 def take_all(
@@ -250,8 +263,24 @@ def _agrees(held: tuple[TipObservation, ...], seen: TipObservation) -> bool:
     )
 
 
+def _has_left(rest: tuple[TipObservation, ...], seen: TipObservation) -> bool:
+    """Return whether the pen is clearly elsewhere than where it rested."""
+    return bool(rest) and _differs(seen, rest[0], TAKEN_UP_TURN, FAR_ENOUGH)
+
+
+def _differs(
+    seen: TipObservation, before: TipObservation, turn: float, distance: float
+) -> bool:
+    """Return whether the pen turned or moved by so much: rad, mm."""
+    rotations = seen.frame.rotation[None], before.frame.rotation[None]
+    way = float(np.linalg.norm(seen.tip_cam - before.tip_cam))
+    return bool(angles_between(*rotations)[0, 0] >= turn or way >= distance)
+
+
 def _without_pose(state: ProbingState, rejected: RejectedFrame) -> ProbingTransition:
     state = replace(state, n_lost=state.n_lost + 1)
+    if state.n_lost > MAX_LOST and state.phase is ProbingPhase.AT_REST:
+        return ProbingTransition(replace(state, held=()))
     if state.n_lost > MAX_LOST:
         return _let_go(state)
     if state.phase is ProbingPhase.HOLDING:
@@ -312,14 +341,8 @@ def _held(rules: ProbingRules, state: ProbingState) -> ProbingTransition:
 
 
 def _is_new(rules: ProbingRules, state: ProbingState, seen: TipObservation) -> bool:
-    for before in state.places:
-        turned = angles_between(seen.frame.rotation[None], before.frame.rotation[None])[
-            0, 0
-        ]
-        distance = float(np.linalg.norm(seen.tip_cam - before.tip_cam))
-        if turned < rules.min_turn and distance < rules.min_distance:
-            return False
-    return True
+    least = rules.min_turn, rules.min_distance
+    return all(_differs(seen, before, *least) for before in state.places)
 
 
 def approach_of(state: ProbingState, tip_cam: FloatArray) -> FloatArray | None:

@@ -40,15 +40,18 @@ def _table(found: Repeatability) -> str:
     rows: list[list[object]] = [list(header.split(","))]
     for i, tip in enumerate(found.tips):
         for k, axis in enumerate("xyz"):
-            cells = (
-                tip.tip_pen[k],
-                found.control.lower[k],
-                found.control.center[k],
-                found.control.upper[k],
-            )
             # Rounded numbers, not texts: a minus makes no formula of them.
-            rows.append([i + 1, tip.name, axis, *(_Rounded(cell) for cell in cells)])
+            numbers = map(_Rounded, (tip.tip_pen[k], *_lines(found, k)))
+            rows.append([i + 1, tip.name, axis, *numbers])
     return csv_table(rows)
+
+
+def _lines(found: Repeatability, k: int) -> tuple[float, ...]:
+    """Return lower limit, centre and upper limit, if there are any."""
+    control = found.control
+    if control is None:
+        return ()
+    return tuple(float(e[k]) for e in (control.lower, control.center, control.upper))
 
 
 class _Rounded(float):
@@ -71,11 +74,8 @@ def _picture(found: Repeatability) -> str:
 
 
 def _coordinate(found: Repeatability, k: int, axis: str) -> list[str]:
-    control, values = found.control, found.scatter.points[:, k]
-    lower, center, upper = (
-        float(each[k]) for each in (control.lower, control.center, control.upper)
-    )
-    ends = np.array([values.min(), values.max(), lower, upper])
+    lines, values = _lines(found, k), found.scatter.points[:, k]
+    ends = np.array([values.min(), values.max(), *lines])
     low, high = float(ends.min()), float(ends.max())
     reach = max(high - low, 1e-9)
     top, height = k * HEIGHT + 30, HEIGHT - 50
@@ -87,7 +87,7 @@ def _coordinate(found: Repeatability, k: int, axis: str) -> list[str]:
         return MARGIN + (WIDTH - 2 * MARGIN) * (i + 0.5) / len(values)
 
     parts = [f'<text x="8" y="{k * HEIGHT + 18}">{axis}, mm</text>']
-    for value, kind in ((lower, "limit"), (center, "center"), (upper, "limit")):
+    for value, kind in zip(lines, ("limit", "center", "limit"), strict=False):
         y = place(value)
         parts.append(
             f'<line x1="{MARGIN}" y1="{y:.1f}" x2="{WIDTH - MARGIN}" y2="{y:.1f}" '
@@ -99,7 +99,8 @@ def _coordinate(found: Repeatability, k: int, axis: str) -> list[str]:
         f'<polyline points="{points}" fill="none" stroke="{COLOURS["line"]}"/>'
     )
     for i, value in enumerate(values):
-        kind = "line" if lower <= value <= upper else "limit"
+        is_beyond = bool(lines) and not lines[0] <= value <= lines[-1]
+        kind = "limit" if is_beyond else "line"
         parts.append(
             f'<circle cx="{across(i):.1f}" cy="{place(value):.1f}" r="3.5" '
             f'fill="{COLOURS[kind]}"><title>{escape(found.tips[i].name)}: '

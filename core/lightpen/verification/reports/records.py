@@ -61,17 +61,21 @@ def verification_record(
 
 def repeatability_entries(found: Repeatability) -> dict[str, Any]:
     """Return the entries of a repeatability study."""
-    study = found.capability
+    study, control = found.capability, found.control
     return {
         "mean_mm": found.scatter.mean,
         "std_mm": found.scatter.deviation,
         "range_mm": found.scatter.range,
-        "control": {
-            "lower_mm": found.control.lower,
-            "center_mm": found.control.center,
-            "upper_mm": found.control.upper,
-            "out_of_control": [tip.name for tip in found.out_of_control],
-        },
+        "control": (
+            None
+            if control is None
+            else {
+                "lower_mm": control.lower,
+                "center_mm": control.center,
+                "upper_mm": control.upper,
+                "out_of_control": [tip.name for tip in found.out_of_control],
+            }
+        ),
         "capability": (
             None
             if study is None

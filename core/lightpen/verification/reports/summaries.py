@@ -109,9 +109,12 @@ def repeatability_text(found: Repeatability) -> str:
         row("Ave", found.scatter.mean),
         row("Std", found.scatter.deviation),
         row("Range", found.scatter.range),
-        row("Control limit, lower", found.control.lower),
-        row("Control limit, upper", found.control.upper),
     ]
+    if found.control is not None:
+        lines += [
+            row("Control limit, lower", found.control.lower),
+            row("Control limit, upper", found.control.upper),
+        ]
     out = found.out_of_control
     if out:
         lines.append("Out of control: " + ", ".join(tip.name for tip in out))

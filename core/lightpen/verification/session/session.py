@@ -24,7 +24,7 @@ from lightpen.verification.probing.probing import (
 from lightpen.verification.probing.sources import require_leds_fit
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session_state import (
-    PendingDriftCheck,
+    MeasuredRuns,
     SessionSetup,
     SessionState,
     n_visits,
@@ -35,7 +35,7 @@ from lightpen.verification.tasks.drift import DRIFT, MIN_VISITS, Drift, measure_
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import with_move
 from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
-from lightpen.verification.tasks.registry import ALL_TASKS, AnyTask
+from lightpen.verification.tasks.registry import AnyTask
 from lightpen.verification.tasks.task import (
     Found,
     Points,
@@ -172,9 +172,7 @@ def measure(setup: SessionSetup, task: AnyTask, runs: Runs) -> Found:
     return found
 
 
-def measure_with_drift(
-    setup: SessionSetup, done: PendingDriftCheck, drift: Drift | None = None
-) -> Found:
+def measure_with_drift(setup: SessionSetup, done: MeasuredRuns) -> Found:
     """Return the result of a task, with the motion of the camera.
 
     Raises
@@ -182,13 +180,13 @@ def measure_with_drift(
     CalibrationError
         They do not suffice.
     """
-    by = with_drift(setup if done.setup is None else done.setup, drift)
+    by = with_drift(setup if done.setup is None else done.setup, done.drift)
     found = measure(by, done.task, done.runs)
     return replace(found, assessment=judged_with(found.assessment, done.lamps))
 
 
 def with_read(
-    setup: SessionSetup, state: SessionState, read: PendingDriftCheck, found: Found
+    setup: SessionSetup, state: SessionState, read: MeasuredRuns, found: Found
 ) -> SessionState:
     """Return it with what recorded images have found.
 
@@ -200,14 +198,17 @@ def with_read(
     elif state.awaits_drift(setup):
         others = (each for each in state.pending if each.task is not read.task)
         state = replace(state, pending=(*others, read))
-    return with_found(state, read.task, found)
+    return with_found(state, read, found)
 
 
-def with_found(state: SessionState, task: AnyTask, found: Found) -> SessionState:
+def with_found(state: SessionState, done: MeasuredRuns, found: Found) -> SessionState:
     """Return the session with a task's result; the next begins when the pen moves."""
-    pending = () if task is DRIFT else state.pending
+    kind = done.task.kind
     return replace(
-        without_touches(state), found={**state.found, task.kind: found}, pending=pending
+        without_touches(state),
+        found={**state.found, kind: found},
+        measured={**state.measured, kind: done},
+        pending=() if done.task is DRIFT else state.pending,
     )
 
 
@@ -253,17 +254,15 @@ def with_other_choices(
 ) -> tuple[SessionSetup, SessionState]:
     """Return a verification that continues by other choices.
 
-    What was found of another artefact than is chosen now is found again; all else
-    stays. Where another task is to be probed now, the points at hand are forgotten, and
-    the state has another `touching`.
+    Where the values of an artefact changed, its points are measured again by them; all
+    else stays. Where another task is to be probed now, the points at hand are
+    forgotten, and the state has another `touching`.
     """
     at_hand = state.task(setup)
     choices = choices.with_moves(setup.choices.options_of(PART).moves)
-    for task in ALL_TASKS:
-        one, other = setup.choices.options_of(task), choices.options_of(task)
-        if task.kind in state.found and not task.is_same_artefact(one, other):
-            state = touched_anew(state, task)
     setup = replace(setup, choices=choices)
+    if choices.missing(setup.ball_diameter) is None:
+        state = _measured_by(choices, state)
     now = state.task(setup)
     if now is not at_hand:
         state = without_touches(state)
@@ -273,6 +272,33 @@ def with_other_choices(
     if state.pending and not state.awaits_drift(setup):
         state = replace(state, pending=())
     return setup, state
+
+
+def _measured_by(choices: VerificationChoices, state: SessionState) -> SessionState:
+    """Return the session with tasks measured again whose artefact has other values."""
+    for kind, done in state.measured.items():
+        setup = done.setup
+        if setup is None or kind not in state.found:
+            continue
+        one, other = setup.choices.options_of(done.task), choices.options_of(done.task)
+        if done.task.is_same_artefact(one, other):
+            continue
+        again = replace(done, setup=replace(setup, choices=choices))
+        try:
+            found = measure_with_drift(setup, again)
+        except CalibrationError:  # the points can be none of this artefact
+            state = touched_anew(state, done.task)
+            continue
+        state = replace(
+            state,
+            found={**state.found, kind: found},
+            measured={**state.measured, kind: again},
+            pending=tuple(
+                again if each.task is done.task and each.setup is not None else each
+                for each in state.pending
+            ),
+        )
+    return state
 
 
 def rules_of(setup: SessionSetup, task: AnyTask) -> ProbingRules:
@@ -343,9 +369,9 @@ def _done(
         state = _after_visit(setup, state, runs)
     found = measure(setup, task, runs)
     if task is not DRIFT and state.awaits_drift(setup):
-        done = PendingDriftCheck(task, runs)
+        done = MeasuredRuns(task, runs)
         state = replace(state, pending=(*state.pending, done))
-    return with_found(state, task, found)
+    return with_found(state, MeasuredRuns(task, runs, setup), found)
 
 
 def _with_visit(setup: SessionSetup, state: SessionState) -> SessionState:
@@ -370,8 +396,8 @@ def _after_visit(
 def _counting(setup: SessionSetup, state: SessionState, drift: Drift) -> SessionState:
     """Include a drift in the results since the last visit."""
     for each in state.pending:
-        found = measure_with_drift(setup, each, drift)
-        state = with_found(state, each.task, found)
+        done = replace(each, setup=each.setup or setup, drift=drift)
+        state = with_found(state, done, measure_with_drift(setup, done))
     return replace(state, pending=())
 
 

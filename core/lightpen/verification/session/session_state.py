@@ -9,7 +9,7 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.verification.probing.drift_reference import LampDrift
-from lightpen.verification.probing.probing import ProbingPhase, ProbingState
+from lightpen.verification.probing.probing import ProbingPhase, ProbingState, at_rest
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.assessment import VerificationAssessment, worst
 from lightpen.verification.tasks.drift import DRIFT, MIN_VISITS, Drift
@@ -67,21 +67,24 @@ def with_drift(
 
 
 @dataclass(frozen=True, eq=False)
-class PendingDriftCheck:
-    """Points of a task that is done, until the drift reference is visited again.
+class MeasuredRuns:
+    """Points of a task that is done, to be measured again.
 
     Attributes
     ----------
     setup : SessionSetup or None
-        By which recorded images were measured; None where it is the session's.
+        By which they were measured; None where it is the session's.
     lamps : LampDrift or None
         The drift of fixed lamps in recorded images.
+    drift : Drift or None
+        Between the visits of the drift reference around it.
     """
 
     task: AnyTask
     runs: Runs
     setup: SessionSetup | None = None
     lamps: LampDrift | None = None
+    drift: Drift | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +102,11 @@ class SessionState:
         number does.
     found : mapping of str to Found
         Results of the completed tasks by kind.
+    measured : mapping of str to MeasuredRuns
+        Their points by kind.
     visits : tuple of tuple of ProbedPoint
         Visits of the reference cone so far.
-    pending : tuple of PendingDriftCheck
+    pending : tuple of MeasuredRuns
         Results since the last visit, which do not include the drift yet.
     """
 
@@ -110,8 +115,9 @@ class SessionState:
     runs: tuple[Points, ...] = ()
     trouble: Message | None = None
     found: Mapping[str, Found] = field(default_factory=dict)
+    measured: Mapping[str, MeasuredRuns] = field(default_factory=dict)
     visits: tuple[Points, ...] = ()
-    pending: tuple[PendingDriftCheck, ...] = ()
+    pending: tuple[MeasuredRuns, ...] = ()
 
     def found_by(self, task: VerificationTask[OptionsT, FoundT]) -> FoundT | None:
         """Return the result of a task; None until it is complete."""
@@ -190,11 +196,24 @@ def without_touches(state: SessionState) -> SessionState:
     return replace(state, touching=touching, touches=(), runs=(), trouble=None)
 
 
+def with_pen_at_rest(state: SessionState) -> SessionState:
+    """Return it for a pen that may lie anywhere: before its next touch it must move."""
+    return replace(state, touching=at_rest(state.touching))
+
+
+def is_at_rest(state: SessionState) -> bool:
+    """Return whether the pen is seen where it rests since probing began."""
+    touching = state.touching
+    return touching.phase is ProbingPhase.AT_REST and bool(touching.held)
+
+
 def instruction(setup: SessionSetup, state: SessionState) -> Message:
     """Return the instruction for the operator."""
     task = state.task(setup)
     if task is None:
         return message("session.done")
+    if is_at_rest(state):
+        return message("session.at-rest")
     if state.touching.phase is ProbingPhase.KNOWN:
         return task.known
     if state.trouble is not None:

@@ -181,6 +181,7 @@ class SessionKeeping:
         self._records = SessionRecords(data)
         self._unkept: tuple[CompletedTask, ...] = ()  # whose drift is not known yet
         self._read: tuple[ReadImages, ...] = ()
+        self._done: dict[str, CompletedTask] = {}
         self._file: CheckpointFile | None = None  # of the verification under way
 
     @property
@@ -206,14 +207,35 @@ class SessionKeeping:
         self, task: AnyTask, tip: CurrentTip, lamp_drift: LampDrift | None
     ) -> None:
         """Store the result of live touches once its drift is known."""
+        self._keep(self._live_task(task, tip, lamp_drift))
+
+    def _live_task(
+        self, task: AnyTask, tip: CurrentTip, lamp_drift: LampDrift | None
+    ) -> CompletedTask:
         records = self.images.records(task)
         images = TaskImages(tip.origin, lamp_drift=lamp_drift, records=records)
-        self._unkept = (*self._unkept, CompletedTask(task, tip, images))
+        return CompletedTask(task, tip, images)
 
     def add_read(self, images: ReadImages, done: CompletedTask) -> None:
         """Store the result of recorded images once its drift is known."""
         self._read = (*self._read, images)
-        self._unkept = (*self._unkept, done)
+        self._keep(done)
+
+    def add_again(self, before: SessionState, state: SessionState) -> bool:
+        """Store the results of points that were measured again; return if there are."""
+        again = [
+            kind
+            for kind, found in state.found.items()
+            if before.found.get(kind, found) is not found
+        ]
+        for kind in again:
+            self._keep(self._done[kind])
+        return bool(again)
+
+    def _keep(self, done: CompletedTask) -> None:
+        self._done[done.task.kind] = done
+        others = (each for each in self._unkept if each.task is not done.task)
+        self._unkept = (*others, done)
 
     def settle(self, status: VerificationStatus) -> None:
         """Queue the results, except those whose U depends on a later visit."""
@@ -265,6 +287,7 @@ class SessionKeeping:
         """Begin another session."""
         self._records.begin()
         self._unkept, self._read, self._file = (), (), None
+        self._done = {}
 
     def write(self) -> None:
         """Write what waits for it.
@@ -336,12 +359,13 @@ class SessionKeeping:
         self._file, self._read = file, under_way.read
         self._records.begin(before.files)
         read = {done.task.kind: done for done in before.read}
-        for kind in before.unwritten:
-            if kind in read:
-                done = read[kind]
-                self._unkept = (*self._unkept, done)
-            else:
-                self.add_task(task_of(kind), before.tip, lamp_drift)
+        for kind in before.state.found:
+            done = read.get(kind) or self._live_task(
+                task_of(kind), before.tip, lamp_drift
+            )
+            self._done[kind] = done
+            if kind in before.unwritten:
+                self._keep(done)
 
     def _add(
         self, done: CompletedTask, found: Found, status: VerificationStatus

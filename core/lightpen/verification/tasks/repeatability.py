@@ -29,6 +29,8 @@ from lightpen.verification.tasks.assessment import (
 from lightpen.verification.tasks.fixed_point import Scatter
 
 MIN_TIPS = 2
+ENOUGH_TIPS = 5  # for a verdict, and
+FOR_CONTROL = 10  # for limits of a control chart
 STUDY = 30  # repeats of a type-1 gauge study, at least
 MOVING_RANGE = 1.128  # mean range of two over the standard deviation
 CONTROL = 3.0  # standard deviations
@@ -37,6 +39,7 @@ SHARE_OF_TOLERANCE = 0.2
 CAPABLE = 1.33
 TIGHTEN = message("repeatability.tighten")
 WIDEN = message("repeatability.widen")
+REPEAT_MORE = message("repeatability.repeat-more")
 USE_NEWEST = message("repeatability.use-newest")
 
 
@@ -127,6 +130,8 @@ class Repeatability:
 
     Attributes
     ----------
+    control : ControlLimits or None
+        None for fewer than ten calibrations.
     touched : RepeatedPoint or None
         A fixed point touched with the tip.
     points_to : Message or None
@@ -134,7 +139,7 @@ class Repeatability:
     """
 
     tips: tuple[TipEstimate, ...]
-    control: ControlLimits
+    control: ControlLimits | None
     capability: Capability | None
     touched: RepeatedPoint | None
     points_to: Message | None
@@ -149,6 +154,8 @@ class Repeatability:
     def out_of_control(self) -> tuple[TipEstimate, ...]:
         """The tips beyond the limits of the control chart."""
         values, control = self.scatter.points, self.control
+        if control is None:
+            return ()
         beyond = (values < control.lower) | (values > control.upper)
         return tuple(self.tips[i] for i in np.flatnonzero(beyond.any(axis=1)))
 
@@ -185,7 +192,7 @@ def measure_repeatability(
     study = None if tolerance is None else _capability(values, tolerance, reference)
     return Repeatability(
         tips=tuple(tips),
-        control=_control(values),
+        control=control_limits(values),
         capability=study,
         touched=touched,
         points_to=points_to,
@@ -193,7 +200,10 @@ def measure_repeatability(
     )
 
 
-def _control(values: FloatArray) -> ControlLimits:
+def control_limits(values: FloatArray) -> ControlLimits | None:
+    """Return the limits of a control chart of values (N, 3), if they are enough."""
+    if len(values) < FOR_CONTROL:
+        return None
     sigma = np.abs(np.diff(values, axis=0)).mean(axis=0) / MOVING_RANGE
     center = values.mean(axis=0)
     return ControlLimits(center - CONTROL * sigma, center, center + CONTROL * sigma)
@@ -250,6 +260,9 @@ def _assessment(
     study: Capability | None,
     limits: VerificationLimits,
 ) -> VerificationAssessment:
+    if len(tips) < ENOUGH_TIPS:
+        few = message("repeatability.few", n_tips=len(tips), needed=ENOUGH_TIPS)
+        return check(few, REPEAT_MORE)
     axis = int(np.argmax(deviation))
     stated = np.mean([tip.uncertainty for tip in tips], axis=0) / 2
     ridden = "repeatability.rode-with-pen"

@@ -11,7 +11,13 @@ import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import QSize, QThreadPool
-from PySide6.QtWidgets import QApplication, QLabel, QListWidget, QPushButton
+from PySide6.QtWidgets import (
+    QApplication,
+    QFileDialog,
+    QLabel,
+    QListWidget,
+    QPushButton,
+)
 from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import Image
@@ -56,7 +62,7 @@ def images() -> list[Image]:
 
 @pytest.fixture
 def window(qtbot: QtBot, workbench: Workbench) -> Iterator[BoardWindow]:
-    window = BoardWindow(workbench.live)
+    window = BoardWindow(workbench.live, workbench.save_place)
     qtbot.addWidget(window)
     window.board.set_board(parse_board(BOARD))
     window.show()
@@ -99,12 +105,12 @@ def test_a_folder_of_images_becomes_a_camera_file_in_use(
 ) -> None:
     window.read_folder(written(tmp_path, images))
     qtbot.waitUntil(lambda: views_listed(window) == 7)
-    path = str(tmp_path / "camera.yaml")
+    path = tmp_path / "camera.yaml"
     with qtbot.waitSignal(window.saved) as saved:
         window.save(path)
 
-    assert saved.args == [path]
-    assert read_camera(Path(path)).fx == pytest.approx(CAMERA.fx, abs=5)
+    assert saved.args == [str(path)]
+    assert read_camera(path).fx == pytest.approx(CAMERA.fx, abs=5)
     overlay = window.findChildren(BoardView)[0].overlay()
     assert overlay.arrows is not None
     assert len(overlay.arrows) == 7 * 35
@@ -156,10 +162,24 @@ def test_the_fields_tell_the_board_and_print_it(
     window.board.set_board(board)
     assert window.board.board() == board
 
-    window.print_board(str(path))
+    window.print_board(path)
 
     qtbot.waitUntil(lambda: "board.pdf" in remark(window))
     assert path.read_bytes() == board_page(board)
+
+
+def test_a_file_is_offered_where_files_were_saved_last(
+    window: BoardWindow, tmp_path: Path, qtbot: QtBot
+) -> None:
+    window.print_board(tmp_path / "one.pdf")
+    qtbot.waitUntil(lambda: "one.pdf" in remark(window))
+
+    buttons = {each.text(): each for each in window.findChildren(QPushButton)}
+    buttons["Print (PDF)..."].click()
+
+    (dialog,) = window.findChildren(QFileDialog)
+    assert Path(dialog.directory().absolutePath()) == tmp_path
+    dialog.reject()
 
 
 @pytest.mark.slow
@@ -242,7 +262,7 @@ def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
         window.read_folder(folder)
         qtbot.waitUntil(lambda: views_listed(window) == 7)
     with qtbot.waitSignal(window.saved):
-        window.save(str(tmp_path / "camera.yaml"))
+        window.save(tmp_path / "camera.yaml")
     window.close()
 
     assert [each.outcome for each in told] == [
@@ -284,7 +304,7 @@ def test_a_camera_file_that_is_still_being_saved_is_that_of_its_attempt(
         window.show()
         window.read_folder(folder)
         qtbot.waitUntil(lambda: views_listed(window) == 7)
-        window.save(str(path))
+        window.save(path)
         window.close()
         assert told == []
         slow_disk.set()

@@ -31,6 +31,14 @@ def test_camera_and_pen_file_are_found_beside_the_images(
     assert found == FilesBeside(folder / "camera.yaml", folder / "leds.csv")
 
 
+def test_a_camera_file_in_place_of_images_is_offered_whatever_its_name(
+    folder: Path,
+) -> None:
+    own = folder / "hall 2.yaml"
+    own.touch()
+    assert files_beside(str(own)) == FilesBeside(own, folder / "leds.csv")
+
+
 def test_where_there_are_none_none_are_found(tmp_path: Path) -> None:
     assert files_beside(str(tmp_path)) == FilesBeside()
     assert files_beside(str(tmp_path / "missing")) == FilesBeside()

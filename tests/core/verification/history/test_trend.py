@@ -57,9 +57,11 @@ def enter(
 def test_the_trend_is_of_accepted_tips_in_their_order_with_limits(
     database: Database,
 ) -> None:
-    values = (1.0, 1.1, 1.0, 1.2)
-    for x in values:
+    values = (1.0, 1.1, 1.0, 1.2, *[1.1] * 6)
+    for x in values[:-1]:
         enter(database, x)
+    assert trend_of(database, WANTED).control is None  # of nine
+    enter(database, values[-1])
     enter(database, 9.0, Kind.REFUSED)
     enter(database, 1.0, Kind.RESTORED)
     enter(database, 9.0, tip="T-11")
@@ -69,9 +71,9 @@ def test_the_trend_is_of_accepted_tips_in_their_order_with_limits(
     assert trend.max_uncertainty == 0.012
     assert trend.control is not None
     # Individual values: the mean, and three mean moving ranges over 1.128 about it.
-    assert trend.control.center[0] == pytest.approx(1.075)
-    reach = 3 * np.mean([0.1, 0.1, 0.2]) / 1.128
-    assert trend.control.upper[0] == pytest.approx(1.075 + reach)
+    assert trend.control.center[0] == pytest.approx(1.09)
+    reach = 3 * np.mean([0.1, 0.1, 0.2, 0.1, *[0.0] * 5]) / 1.128
+    assert trend.control.upper[0] == pytest.approx(1.09 + reach)
 
 
 def enter_touches(database: Database, w: float, tip: str = "T-10") -> StoredEntry:

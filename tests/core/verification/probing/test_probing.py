@@ -18,6 +18,7 @@ from lightpen.verification.probing.probing import (
     ProbingRules,
     ProbingState,
     advance_touch,
+    at_rest,
 )
 
 RULES = ProbingRules(n_frames=5, n_settling=2)
@@ -48,9 +49,12 @@ def detections(
 
 
 def run(
-    instrument: Instrument, places: Sequence[Place | None], rules: ProbingRules = RULES
+    instrument: Instrument,
+    places: Sequence[Place | None],
+    rules: ProbingRules = RULES,
+    state: ProbingState | None = None,
 ) -> tuple[ProbingState, list[ProbingEvent]]:
-    state, events = ProbingState(), list[ProbingEvent]()
+    state, events = state or ProbingState(), list[ProbingEvent]()
     for name, detection in detections(instrument, places):
         transition = advance_touch(instrument, rules, state, name, detection)
         state = transition.state
@@ -72,6 +76,36 @@ def test_a_still_pen_is_taken_after_so_many_images(instrument: Instrument) -> No
     assert events[0].names == tuple(f"image {i}" for i in range(8, 13))
     assert state.phase is ProbingPhase.RECORDED
     assert len(state.taken[0].frames) == RULES.n_frames
+
+
+def test_a_pen_that_rests_is_not_touching_until_it_was_taken_up(
+    instrument: Instrument,
+) -> None:
+    resting, none = at_rest(ProbingState()), list[ProbingEvent]()
+    on_the_table = [HELD] * 3 * STILL
+    switched_on = [None] * 2 * STILL + [HELD] * 3 * STILL
+    one_wrong_image = [HELD, moving()[0], *[HELD] * 3 * STILL]
+
+    for places in (on_the_table, switched_on, one_wrong_image):
+        state, events = run(instrument, places, state=resting)
+        assert (state.phase, events) == (ProbingPhase.AT_REST, none)
+
+    taken_up = [HELD] * STILL + moving() + [HELD] * STILL
+    state, events = run(instrument, taken_up, state=resting)
+
+    assert [event.what for event in events] == [ProbingEventKind.RECORDED]
+    assert state.phase is ProbingPhase.RECORDED
+
+
+def test_a_tip_that_waits_in_its_cone_is_taken_once_the_pen_was_tilted(
+    instrument: Instrument,
+) -> None:
+    tilted = [(PAPER_CONE, 0.1 + 0.1 * i) for i in range(5)]
+    resting = at_rest(ProbingState())
+
+    state, _ = run(instrument, [HELD, *tilted, *[tilted[-1]] * STILL], state=resting)
+
+    assert len(state.taken) == 1
 
 
 def test_progress_tells_how_much_of_a_touch_is_taken(instrument: Instrument) -> None:

@@ -12,6 +12,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
 from lightpen.verification.reports.charts import write_chart
+from lightpen.verification.reports.records import repeatability_entries
 from lightpen.verification.reports.summaries import repeatability_text
 from lightpen.verification.tasks.repeatability import (
     RepeatedPoint,
@@ -167,6 +168,25 @@ def test_what_is_not_capable_never_passes() -> None:
 def test_one_calibration_is_refused() -> None:
     with pytest.raises(CalibrationError, match="does not show repeatability"):
         measure_repeatability(estimates(TABLE_1[:1]), LIMITS)
+
+
+def test_fewer_than_five_calibrations_give_no_verdict_and_nine_no_control_limits(
+    tmp_path: Path,
+) -> None:
+    steady = PAPER_TIP + 0.02 * (TABLE_1 - TABLE_1.mean(axis=0))
+    four, five, nine, ten = (
+        measure_repeatability(estimates(steady[:n]), LIMITS) for n in (4, 5, 9, 10)
+    )
+
+    assert four.assessment.grade is Grade.CHECK
+    assert four.assessment.reason.code == "repeatability.few"
+    assert five.assessment.grade is Grade.PASS
+    assert nine.control is None
+    assert ten.control is not None
+    assert "Control limit" not in repeatability_text(nine)
+    assert repeatability_entries(nine)["control"] is None
+    write_chart(nine, tmp_path / "chart.svg")
+    assert "dasharray" not in (tmp_path / "chart.svg").read_text()
 
 
 def test_a_tip_beyond_its_control_limits_is_named() -> None:
