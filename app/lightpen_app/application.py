@@ -31,7 +31,6 @@ from lightpen.record.signing.keys import KEYS
 from lightpen.simulator.camera import SERIAL
 from lightpen.streaming.server import StreamPlace
 from lightpen_app.crash import CrashHook, versions
-from lightpen_app.demo import Demo
 from lightpen_app.end_signals import EndSignals
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.sounds import MutedSounds, Sounds, find_sounds
@@ -265,6 +264,8 @@ def run_demo(make_pages: MakePages) -> int:
         if not is_seen:
             settings.set_camera(SERIAL, CameraSettings(frame_rate=UNSEEN_FRAME_RATE))
         wizard = Wizard(application, make_pages, settings, Path(folder), around)
+        from lightpen_app.demo import Demo
+
         demo = Demo(wizard.window, wizard.workbench, is_watched=is_seen)
         if not is_seen:
             demo.told.connect(partial(print, flush=True))

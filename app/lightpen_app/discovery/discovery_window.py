@@ -232,7 +232,9 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         tip, u = found.tip_pen, found.expanded_uncertainty
         fx, u_fx = found.camera.fx, 2 * float(found.intrinsics_sigma[0])
         rows = [
-            self.tr("Tip {0}: {1:.4f} \u00b1 {2:.4f} mm").format(axis, value, each)
+            self.tr("Tip {0}: {1:.4f} \u00b1 {2:.4f} mm (k = 2)").format(
+                axis, value, each
+            )
             for axis, value, each in zip("xyz", tip.tolist(), u.tolist(), strict=True)
         ]
         calibration = found.calibration
@@ -240,7 +242,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
             self.tr("LEDs: {0}, U (k = 2) up to {1:.1f} \u00b5m").format(
                 found.pen.n_leds, UM * float(found.led_uncertainty.max())
             ),
-            self.tr("Focal length: {0:.2f} \u00b1 {1:.2f} px").format(fx, u_fx),
+            self.tr("Focal length: {0:.2f} \u00b1 {1:.2f} px (k = 2)").format(fx, u_fx),
             self.tr("Images used: {0} of {1}, noise {2:.3f} px").format(
                 int(calibration.used.sum()),
                 len(calibration.used),

@@ -3,14 +3,17 @@
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
 
 from lightpen.archive.lazy_logbook import LazyLogbook
-from lightpen.record.folder.camera_calibrations import CameraTrial, keep_camera_trial
 from lightpen.record.swings.names import Names
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.notifications import Notifications
+
+if TYPE_CHECKING:
+    from lightpen.record.folder.camera_calibrations import CameraTrial
 
 
 class ArchiveWriter(QObject):
@@ -35,8 +38,10 @@ class ArchiveWriter(QObject):
         logbook = self._logbook
         Job(lambda _: logbook.enter_owed(), self).start()
 
-    def keep_camera_trial(self, trial: CameraTrial, names: Names) -> None:
+    def keep_camera_trial(self, trial: "CameraTrial", names: Names) -> None:
         """Keep the result of the calibration of a camera, and enter it."""
+        from lightpen.record.folder.camera_calibrations import keep_camera_trial
+
         logbook, folder, now = self._logbook, self._folder, self._now
 
         def keep(_: Report) -> None:

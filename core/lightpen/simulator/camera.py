@@ -24,7 +24,6 @@ from lightpen.cameras.protocol import (
     sealed,
 )
 from lightpen.model.rig import Rig
-from lightpen.simulator.boards import HELD_S, expose_board, held_light
 from lightpen.simulator.hand import HandPose, Operator
 from lightpen.simulator.image_plans import (
     ImagePlan,
@@ -269,6 +268,9 @@ class SimulatedCamera:
         if board is None:
             image = render_plan(scene, self._image_plan(scene, seq, times))
         else:
+            # Only while a camera is calibrated: the start does not wait for it.
+            from lightpen.simulator.boards import HELD_S, expose_board, held_light
+
             light = held_light(scene.camera, board, int(times[1] / HELD_S))
             rng = np.random.default_rng([scene.seed, seq])
             image = expose_board(light, scene.sensor, rng)

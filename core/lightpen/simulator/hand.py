@@ -10,13 +10,12 @@ from enum import Enum, auto
 from functools import partial
 from math import inf
 from threading import Lock
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import Clock
-from lightpen.intrinsics.boards import Board
 from lightpen.simulator.motion import (
     STEP,
     TrackingMotion,
@@ -27,6 +26,9 @@ from lightpen.simulator.motion import (
     swing_at,
 )
 from lightpen.simulator.postures import TREMOR, Postures
+
+if TYPE_CHECKING:
+    from lightpen.intrinsics.boards import Board
 
 N_REMEMBERED = 16  # moments: an exposure of 0.15 s
 PATIENCE = 20.0  # s without an image after which the hand rests until the next

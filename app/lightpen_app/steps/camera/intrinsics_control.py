@@ -8,12 +8,12 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from lightpen.formats.opened_files import CameraFile
-from lightpen.record.folder.camera_calibrations import CameraTrial
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.work.job import Job
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
+    from lightpen.record.folder.camera_calibrations import CameraTrial
     from lightpen_app.steps.camera.board_window import BoardWindow
 
 
@@ -80,7 +80,7 @@ class IntrinsicsControl(QObject):
         self._board.show()
         self._board.raise_()
 
-    def _on_calibrated(self, trial: CameraTrial) -> None:
+    def _on_calibrated(self, trial: "CameraTrial") -> None:
         names = self._selection.preparation.names
         self._archive_writer.keep_camera_trial(trial, names)
 

@@ -141,7 +141,7 @@ class RigPanel(Translated, QGroupBox):
             )
             return StatusMessage(words, Sign.WARNING, Tone.WARN)
         rig = self._file.rig
-        words = self.tr("Baseline {2} mm ({0}-{1})").format(
+        words = self.tr("Baseline {2} ({0}-{1})").format(
             rig.names[0], rig.names[1], _baseline(rig)
         )
         if self._problem.value().text:
@@ -166,11 +166,11 @@ class RigPanel(Translated, QGroupBox):
 
 
 def _baseline(rig: Rig) -> str:
-    """Return the baseline, mm."""
+    """Return the baseline, and U of it if it is known."""
     shift = rig.translations[1]
     length = float(np.linalg.norm(shift))
     if rig.covariance is None:
-        return f"{length:.1f}"
+        return f"{length:.1f} mm"
     along = shift / length
     sigma = float(np.sqrt(along @ rig.covariance[3:6, 3:6] @ along))
-    return f"{length:.2f} \u00b1 {2 * sigma:.2f}"
+    return f"{length:.2f} \u00b1 {2 * sigma:.2f} mm (k = 2)"

@@ -44,7 +44,7 @@ class MeasurePresenter(VerifyPresenter):
         spread = COVERAGE_FACTOR * point.covariance(setup.instrument).diagonal() ** 0.5
         numbers = (number_text(x, 2) for x in point.point_cam.tolist())
         u = number_text(float(spread.max()), 3)
-        return self.tr("{0}  {1}  {2}  \u00b1 {3} mm").format(*numbers, u)
+        return self.tr("{0}  {1}  {2}  \u00b1 {3} mm (k = 2)").format(*numbers, u)
 
     @override
     def _purpose(self) -> str:
