@@ -8,6 +8,11 @@ import pefile
 
 FIXED_VERSION = b"\xbd\x04\xef\xfe"  # VS_FIXEDFILEINFO
 AMD64 = 0x8664
+# In the runtime, by newer ones that packages bring.
+REPLACED = (
+    *("vcruntime140.dll", "vcruntime140_1.dll", "msvcp140.dll"),
+    *("libcrypto-3.dll", "libssl-3.dll"),
+)
 SUFFIXES = {".dll", ".exe", ".pyd"}
 # Of Windows 10 1809 and later.
 API_SETS = ("api-ms-win-core-", "api-ms-win-crt-", "api-ms-win-shcore-")
@@ -70,9 +75,9 @@ def unmet_needs(folder: Path) -> list[str]:
 
 
 def missing_exports(folder: Path) -> list[str]:
-    """Return what is asked of the C++ runtime that will be loaded and is not in it."""
+    """Return what is asked of libraries that were replaced and is not in them."""
     missing = []
-    for name in ("vcruntime140.dll", "vcruntime140_1.dll", "msvcp140.dll"):
+    for name in REPLACED:
         library = pefile.PE(str(folder / "runtime" / name))
         has = {symbol.name for symbol in library.DIRECTORY_ENTRY_EXPORT.symbols}
         library.close()

@@ -39,6 +39,7 @@ from installer.payload import (
     add_own,
     all_files,
     promote_cpp_runtime,
+    promote_openssl,
     set_times,
     unpack_wheels,
     write_file_list,
@@ -119,6 +120,7 @@ def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> P
     runtime.unpack(distribution, folder / "runtime")
     unpack_wheels([*wheels, own], folder / PACKAGES)
     promote_cpp_runtime(folder)
+    promote_openssl(folder)
     add_own(folder)
     build_launchers(folder, version)
     if sign:

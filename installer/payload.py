@@ -16,6 +16,7 @@ PACKAGES = "runtime/Lib/site-packages"
 # The C++ runtime that is loaded first must be the newest that anything was linked with.
 CPP_RUNTIME = ("vcruntime140.dll", "vcruntime140_1.dll", "msvcp140.dll")
 CPP_BRINGERS = ("PySide6", "shiboken6")
+OPENSSL = ("libcrypto", "libssl")
 OPENGL = ("QtOpenGL", "QtOpenGLWidgets")
 FILE_LIST = "files.sha256"
 # Without a commit, as in an unpacked source archive: the first day that ZIP can state.
@@ -51,6 +52,22 @@ def promote_cpp_runtime(folder: Path) -> None:
         newest = max(filter(Path.exists, places), key=file_version)
         if newest != own:
             shutil.copyfile(newest, own)
+
+
+def promote_openssl(folder: Path) -> None:
+    """Let the runtime have the OpenSSL of libpq, which is newer; one copy is packed.
+
+    Its libssl is made to ask for the other library by the name that the runtime uses.
+    """
+    libraries = folder / PACKAGES / "psycopg_binary.libs"
+    ((crypto,), (ssl,)) = (libraries.glob(f"{name}-3-*.dll") for name in OPENSSL)
+    shutil.copyfile(crypto, folder / "runtime" / "libcrypto-3.dll")
+    asked = crypto.name.encode() + b"\0"
+    content = ssl.read_bytes()
+    if content.count(asked) != 1:
+        raise ValueError(f"{ssl.name} does not import {crypto.name} once.")
+    content = content.replace(asked, b"libcrypto-3.dll".ljust(len(asked), b"\0"))
+    (folder / "runtime" / "libssl-3.dll").write_bytes(content)
 
 
 def add_own(folder: Path) -> None:

@@ -26,7 +26,8 @@ DROPPED = (
     # Of the C++ runtime, what nothing here loads.
     "*/concrt140.dll", "*/vcamp140.dll", "*/vccorlib140.dll",
     "*/vcomp140.dll",
-    "harvesters/test/*", "numpy/f2py/src/*", "numpy/_pyinstaller/*",
+    "harvesters/test/*", "genicam/*.cti",  # a simulated camera
+    "numpy/f2py/*", "numpy/_pyinstaller/*", "scipy/conftest.py",
     "*/_test_*.pyd", "numpy/*_tests.*.pyd", "numpy/_core/_simd.*",
     "sqlalchemy/testing/*", "alembic/testing/*",
     # Parts of libraries that nothing here imports.
@@ -41,6 +42,7 @@ DROPPED = (
     "PySide6/plugins/imageformats/qwebp.dll",
     # Without FFmpeg OpenCV reads videos of Motion JPEG; see lightpen.formats.videos.
     "cv2/opencv_videoio_ffmpeg*.dll",
+    "cv2/data/*.xml",  # to find faces
     "cv2/LICENSE*",  # a copy of that beside the metadata
     "*/LicenseRef-Qt-Commercial.txt",  # Qt is used under the LGPL
     "*.dist-info/RECORD",  # lists what is no longer there

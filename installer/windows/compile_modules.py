@@ -4,6 +4,7 @@ Run in the folder that is installed. What is not compiled here says so and is le
 The sources of libraries are not installed.
 """
 
+import ast
 import importlib.util
 import marshal
 import sys
@@ -16,6 +17,7 @@ UNCHECKED_HASH = (1).to_bytes(4, "little") + bytes(8)
 # the same name, which is found because it puts a folder first on the path.
 FOUND_BY_PATH = "cv2/"
 OURS = "lightpen"
+NUMPY = "numpy/"  # makes docstrings of numpy.ma from those of its functions
 CONFIGURATION = "__config__.py"  # states the version of OpenBLAS
 
 
@@ -42,11 +44,21 @@ def main() -> int:
 
 
 def compiled_form(path: Path, source: str) -> bytes:
-    """Return what Python would write as the compiled form of a module."""
-    code = compile(
-        path.read_bytes(), f"site-packages/{source}", "exec", dont_inherit=True
-    )
+    """Return what Python would write as the compiled form, without docstrings."""
+    tree = ast.parse(path.read_bytes())
+    if not source.startswith(NUMPY):
+        remove_docstrings(tree)
+    code = compile(tree, f"site-packages/{source}", "exec", dont_inherit=True)
     return importlib.util.MAGIC_NUMBER + UNCHECKED_HASH + marshal.dumps(code)
+
+
+def remove_docstrings(tree: ast.Module) -> None:
+    """Remove those of a module and of its classes and functions."""
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    for node in ast.walk(tree):
+        if isinstance(node, kinds) and ast.get_docstring(node, clean=False) is not None:
+            place = ast.copy_location(ast.Pass(), node.body[0])
+            node.body[:1] = [] if node.body[1:] else [place]
 
 
 if __name__ == "__main__":
