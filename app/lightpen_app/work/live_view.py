@@ -386,6 +386,7 @@ class LiveView(QObject):
         except DeviceLost as error:
             self._closing_failed.emit(worded(error.message))
         else:
+            listener.discard()
             listener.deleteLater()
 
     def _set_connection(self, camera: int, connection: Connection) -> None:
@@ -471,6 +472,10 @@ class _QueuedListener(QObject):
         queued = Qt.ConnectionType.QueuedConnection
         self._images.ready.connect(self._on_image_ready, queued)
         self._said.connect(self.told, queued)
+
+    def discard(self) -> None:
+        """Free the image that waits."""
+        self._images.take()
 
     # On the threads of the camera
 

@@ -156,6 +156,8 @@ class CameraWorker:
             raise DeviceLost(
                 "camera.did-not-stop", serial=self.serial, waited=timeout_s
             )
+        self._queue.clear()  # images are large, and who stopped it may be kept long
+        self._mailbox.take()
 
     def latest(self) -> Frame | None:
         """Return the newest frame for display, if it is new."""

@@ -188,6 +188,7 @@ class Live:
         self._ready.set()
         if self._thread.ident is not None:
             self._thread.join(LONGEST_STOP)
+        self._pairs = FramePairs()  # frees its images now
         with ExitStack() as stack:  # one that does not stop keeps none from it
             for worker in self._workers:
                 stack.callback(worker.stop)

@@ -720,6 +720,9 @@ def test_stopping_ends_a_worker_whose_reader_is_gone(
     workbench.worker.stop(TIMEOUT)
 
     assert workbench.events.connections()[-1] is Connection.CLOSED
+    assert workbench.worker.latest() is None  # no image stays in memory
+    with pytest.raises(EndOfImages):
+        workbench.worker.next_frame(0)
 
 
 def test_stopping_ends_a_worker_that_seeks_its_camera(benches: Benches) -> None:
