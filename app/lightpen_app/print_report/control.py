@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
@@ -23,6 +23,8 @@ from lightpen_app.work.save_place import SavePlace
 
 if TYPE_CHECKING:
     from lightpen_app.print_report.pages import PrintReport
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -113,21 +115,18 @@ class PrintReportControl(QObject):
 
     def show(self, find: Callable[[], Path]) -> None:
         """Show the record on paper of the file that a function finds on the disk."""
-        self.shut_down()
-        self._reading = job = Job(lambda _: read_calibration_file(find()), self)
-
-        # Connections
-        job.succeeded.connect(self._show)
-        job.failed.connect(self.failed)
-        job.start()
+        self._read(lambda: read_calibration_file(find()), self._show)
 
     def show_verification(self, path: Path) -> None:
         """Show the report of a verification."""
+        self._read(lambda: read_kept_verification(path), self._show_verification)
+
+    def _read(self, read: Callable[[], T], show: Callable[[T], None]) -> None:
         self.shut_down()
-        self._reading = job = Job(lambda _: read_kept_verification(path), self)
+        self._reading = job = Job(lambda _: read(), self)
 
         # Connections
-        job.succeeded.connect(self._show_verification)
+        job.succeeded.connect(show)
         job.failed.connect(self.failed)
         job.start()
 

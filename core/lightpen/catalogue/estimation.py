@@ -13,7 +13,7 @@ MESSAGES = {
     "warning.camera-file-contradicted": "The images contradict the camera file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this camera, lens and focus, or calibrate the camera again.",
     "warning.camera-file-of-rig-contradicted": "The images contradict the file of camera {camera}: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this camera, lens and focus, or calibrate the camera again.",
     "file.distortion": "distortion coefficient {name}",
-    "file.rig-turn": "further turn of cam_from_rig about {axis}",
+    "file.rig-turn": "rotation of cam_from_rig about {axis}",
     "file.rig-translation": "translation of cam_from_rig along {axis}",
     "joint.not-settled": "The joint fit did not converge in {n_steps} iterations. Check that both files belong to this pen and camera.",
     "calibrate.images-usable": "{n_usable} of {n_images} images are usable",

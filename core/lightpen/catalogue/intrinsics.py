@@ -24,7 +24,7 @@ MESSAGES = {
     "intrinsics.drift": "The camera drifts during the set: by {px:.2f} px over the image from the first view to the last (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px). Let the camera warm up, fix lens and mount, and take the views again.",
     "intrinsics.step": "The views from {name} on differ from those before by {px:.2f} px over the image (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px), more than by chance. Check whether zoom, focus or mount changed there.",
     "intrinsics.bend-implausible": "The views fit only if the board {board} is bent by {bend:.0f} mm, which is implausible. Check the number and size of its squares, and that all images are from one camera with one setting.",
-    "intrinsics.size-implausible": "The board's squares are stated as {pitch:g} mm, which makes a board of {side:.3g} m. Lengths are in mm: check them. Intrinsics do not depend on it; distances do.",
+    "intrinsics.size-implausible": "A square size of {pitch:g} mm makes a board of {side:.3g} m. Check that it is in mm. The intrinsics do not depend on it; all distances do.",
     "intrinsics.folds": "The estimated distortion folds the image in its corners, where no view shows the board. Add views with the board in each corner of the image.",
     "intrinsics.alike": "The views are too similar: the board tilt differs by at most {apart:.0f} degrees between views, and the focal length is uncertain by {share:.1%}. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image.",
     "corner.top-left": "top left",

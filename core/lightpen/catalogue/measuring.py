@@ -76,5 +76,5 @@ MESSAGES = {
     "part.refined": "Points and tip refined by the known form of {names}: tip shifted by {shift:.4f} mm, its U (k = 2) {before:.4f} mm before and {after:.4f} mm after.",
     "part.not-refined": "The touches of {names} deviate from the known form by more than their U (chi-square {chi_square:.1f} with {n_free} degrees of freedom) and refine nothing.",
     "part.check-known": "Check nominal diameter, ball diameter and cleanliness; then verify the tip.",
-    "measuring.no-format": "{file} has an end of no known format. End its name with one of {suffixes}.",
+    "measuring.no-format": "The suffix of {file} is no export format. Use one of {suffixes}.",
 }

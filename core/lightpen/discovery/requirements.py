@@ -45,7 +45,7 @@ def require_no_second_pen(found: Labelled) -> None:
 def require_length(
     calibration: Calibration, request: Request, lengths: Sequence[KnownLength]
 ) -> None:
-    """Refuse a length by which the discs would be of another size than stated."""
+    """Refuse a length that contradicts the stated diameter of the discs."""
     if not request.lengths:
         return
     for each in calibration.contradictions:

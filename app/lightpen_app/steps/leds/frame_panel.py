@@ -133,7 +133,7 @@ class FramePanel(Translated, QGroupBox):
             case Rule.LINE:
                 return self.tr("LEDs 1-4 on a line")
             case Rule.ORIGIN:
-                return self.tr("LED 1 on the origin axis")
+                return self.tr("LED 1 at x = y = 0")
             case Rule.AXIS:
                 return self.tr("y axis along LEDs 1-4")
             case Rule.PLANE:

@@ -178,7 +178,7 @@ def raw() -> FloatArray:
 def test_the_file_in_use_is_shown(seen: "Seen", workbench: Workbench) -> None:
     assert shown_path(seen) == str(in_use(workbench).path)
     assert [cell(seen, 8, column) for column in (X, Y, Z)] == ["25", "35", "0"]
-    for words in ("LED numbering", "LED 1 on the origin axis", "Right-handed axes"):
+    for words in ("LED numbering", "LED 1 at x = y = 0", "Right-handed axes"):
         assert words in seen.words
     assert seen.page.is_complete()
     assert why_not(seen) == ""
@@ -415,7 +415,7 @@ def test_raw_coordinates_are_put_into_the_pen_frame(
 ) -> None:
     open_file(seen, write_table(tmp_path / "raw.csv", raw()))
     assert "The LEDs are not in the pen frame" in seen.words
-    origin = seen.named("LED 1 on the origin axis")
+    origin = seen.named("LED 1 at x = y = 0")
     assert origin.accessibleDescription() == "not fulfilled"
 
     seen.click("Transform to pen frame")
