@@ -238,7 +238,9 @@ def _calibrated(
     first: BoardFit,
     report: Callable[[float], None],
 ) -> _Found:
-    kept, left_out = _without_outliers(views, first)
+    kept = without_outliers(views, first)
+    require_views(kept)
+    left_out = tuple(name for name in views.names if name not in kept.names)
     fitted = fit_camera(kept, tolerances, first.state.cameras[0])
     denied = board_contradictions(fitted, tolerances)
     if denied.any():  # then the views show how it is, and not what was said of it
@@ -281,7 +283,7 @@ def require_views(views: Views) -> None:
         )
 
 
-def _without_outliers(views: Views, fitted: BoardFit) -> tuple[Views, tuple[str, ...]]:
+def without_outliers(views: Views, fitted: BoardFit) -> Views:
     """Return the views without points, and without views, that fit no others.
 
     Raises
@@ -289,24 +291,22 @@ def _without_outliers(views: Views, fitted: BoardFit) -> tuple[Views, tuple[str,
     CalibrationError
         They are so many that it is the board which is another.
     """
-    rms = fitted.view_rms[:, 0]
-    kept = rms <= OFF_VIEW * max(float(np.median(rms)), FINEST)
-    distances = np.linalg.norm(fitted.residuals, axis=-1)
-    middle = float(np.nanmedian(np.abs(fitted.residuals)))
-    usual = max(middle / normal_quantile(0.25), FINEST)
-    off = distances > OFF_POINT * usual
+    rms = fitted.view_rms
+    kept = rms <= OFF_VIEW * np.maximum(np.nanmedian(rms, axis=0), FINEST)
+    middle = np.nanmedian(np.abs(fitted.residuals), axis=(0, 2, 3))
+    usual = np.maximum(middle / normal_quantile(0.25), FINEST)
+    off = np.linalg.norm(fitted.residuals, axis=-1) > OFF_POINT * usual[:, None]
     pixels = np.where(off[..., None], np.nan, views.pixels)
-    left = replace(views, pixels=pixels).chosen(kept)
-    longer = max(views.image_sizes[0])
+    left = replace(views, pixels=pixels).chosen(np.all(kept | np.isnan(rms), axis=1))
+    longer = np.max(views.image_sizes, axis=1)
     if (
         int(left.seen.sum()) < (1 - MOST_OFF) * int(views.seen.sum())
-        or usual > WORST_RMS * longer
+        or (usual > WORST_RMS * longer).any()
     ):
         raise CalibrationError(
             "intrinsics.misfit", rms=fitted.rms, board=views.board.name
         )
-    require_views(left)
-    return left, _parted(views, kept)[1]
+    return left
 
 
 def _parted(views: Views, kept: BoolArray) -> tuple[Views, tuple[str, ...]]:

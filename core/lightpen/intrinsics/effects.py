@@ -2,7 +2,9 @@
 
 The unknowns are those of the board adjustment but the poses, then the points of the
 board (x y z each, mm), then the nodes of each lens' residual field (u v each, px). Each
-view has its pose and the coefficients of a smooth error of its own.
+view has its pose, the coefficients of a smooth error of its own, and for each further
+camera those of a rigid motion of the board between the exposures, which also takes what
+else a pose may (blur, shadows). The points of each camera are weighted by its noise.
 """
 
 from dataclasses import dataclass
@@ -11,7 +13,7 @@ from functools import cache
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.adjustment import linearise
+from lightpen.intrinsics.adjustment import FINEST, linearise
 from lightpen.intrinsics.board_fit import N_POSE, BoardFit
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.views import Views
@@ -25,11 +27,13 @@ class VarianceComponents:
     Attributes
     ----------
     noise : float
-        Of one coordinate, px.
+        Of one coordinate, px; of several cameras the geometric mean.
     in_plane, out_of_plane : float
         Of the points of the board, mm.
     view : float
         Of the smooth error of a view, px.
+    between : float
+        Of each of six motions of the board in a view of a further camera, px rms.
     lenses : tuple of float
         Amplitude of the residual field of each camera, px.
     """
@@ -38,6 +42,7 @@ class VarianceComponents:
     in_plane: float
     out_of_plane: float
     view: float
+    between: float
     lenses: tuple[float, ...]
 
 
@@ -53,7 +58,9 @@ class Design:
         Of the normal equations of each view, by the first s unknowns.
     cross : (V, p, o) array
     own_own, own_right : (V, o, o) and (V, o) array
-        Of the pose and the smooth error of each view.
+        Of the pose and the smooth errors of each view.
+    n_between : int
+        Number of these that cameras differ by; they are the last.
     squares : float
         Of the residuals, px^2.
     n : int
@@ -70,6 +77,7 @@ class Design:
     cross: FloatArray
     own_own: FloatArray
     own_right: FloatArray
+    n_between: int
     squares: float
     n: int
     shared_prior: FloatArray
@@ -86,6 +94,20 @@ class Design:
     def n_views(self) -> int:
         """Number of views."""
         return len(self.right)
+
+    @property
+    def of_errors(self) -> tuple[slice, slice]:
+        """Indices of the smooth errors of a view, and of those between cameras."""
+        n_own = self.own_right.shape[-1]
+        n_smooth = n_own - self.n_between
+        return slice(N_POSE, n_smooth), slice(n_smooth, n_own)
+
+    def own_prior(self, components: VarianceComponents) -> FloatArray:
+        """Return the information of pose and smooth errors of a view, (o,)."""
+        prior = np.zeros(self.own_right.shape[-1])
+        smooth, between = self.of_errors
+        prior[smooth], prior[between] = components.view**-2, components.between**-2
+        return prior
 
     @property
     def of_points(self) -> slice:
@@ -162,8 +184,11 @@ def design_of(views: Views, fitted: BoardFit, length: float) -> Design:
     points_at = n_shared + np.arange(3 * n_points)
     n = n_shared + 3 * n_points + sum(n_nodes)
     smooth = smooth_functions(views.board)
-    n_smooth = 2 * smooth.shape[1]
-    n_own = N_POSE + n_smooth * len(state.cameras)
+    n_cameras, n_smooth = len(state.cameras), 2 * smooth.shape[1]
+    n_between = N_POSE * (n_cameras - 1)
+    n_own = N_POSE + n_smooth * n_cameras + n_between
+    weights = _weights(views, fitted.residuals)
+    squares = 0.0
     normal = np.zeros((n, n))
     right = np.zeros((n_views, n))
     columns = np.zeros((n_views, n, n_shared))
@@ -177,16 +202,24 @@ def design_of(views: Views, fitted: BoardFit, length: float) -> Design:
         at = np.nan_to_num(views.pixels[:, c] - fitted.residuals[:, c])
         by_field = _both(np.where(seen, fields[c].basis(at), 0.0))
         by_smooth = _both(np.where(seen, smooth, 0.0))
-        few = np.concatenate([sight.shared, by_field], axis=-1)
+        few = weights[c] * np.concatenate([sight.shared, by_field], axis=-1)
         few_at = np.r_[0:n_shared, begin : begin + n_nodes[c]]
         begin += n_nodes[c]
         own = np.zeros((n_views, n_points, 2, n_own))
         own[..., :N_POSE] = sight.own
         mine = slice(N_POSE + n_smooth * c, N_POSE + n_smooth * (c + 1))
         own[..., mine] = by_smooth
+        if c > 0:
+            sizes = np.sqrt(np.square(sight.own).sum(axis=(1, 2)))
+            sizes /= np.sqrt(np.maximum(2 * seen.sum(axis=1), 1))
+            end = n_own - N_POSE * (n_cameras - 1 - c)
+            moved = sight.own / np.where(sizes > 0, sizes, 1.0)[:, None, None]
+            own[..., end - N_POSE : end] = moved
+        own *= weights[c]
         few, own = (each.reshape(n_views, 2 * n_points, -1) for each in (few, own))
-        left = sight.residuals.reshape(n_views, -1, 1)
-        across, B = np.swapaxes(few, 1, 2), sight.by_board
+        left = weights[c] * sight.residuals.reshape(n_views, -1, 1)
+        squares += float(np.sum(left * left))
+        across, B = np.swapaxes(few, 1, 2), weights[c] * sight.by_board
         normal[np.ix_(few_at, few_at)] += np.tensordot(few, few, axes=([0, 1], [0, 1]))
         mixed = np.swapaxes(B, 2, 3) @ few.reshape(n_views, n_points, 2, -1)
         columns[:, few_at] += across @ few[..., :n_shared]
@@ -198,9 +231,9 @@ def design_of(views: Views, fitted: BoardFit, length: float) -> Design:
         for i, j in np.ndindex(3, 3):
             normal[points_at[i::3], points_at[j::3]] += blocks[:, i, j]
         right[:, few_at] += (across @ left)[..., 0]
-        right[:, points_at] += np.einsum("vnik,vni->vnk", B, sight.residuals).reshape(
-            n_views, -1
-        )
+        right[:, points_at] += np.einsum(
+            "vnik,vni->vnk", B, left.reshape(sight.residuals.shape)
+        ).reshape(n_views, -1)
         cross[:, few_at] += across @ own
         by_own = np.swapaxes(B, 2, 3) @ own.reshape(n_views, n_points, 2, -1)
         cross[:, points_at] += by_own.reshape(n_views, 3 * n_points, n_own)
@@ -216,13 +249,36 @@ def design_of(views: Views, fitted: BoardFit, length: float) -> Design:
         cross,
         own_own,
         own_right,
-        float(np.nansum(np.square(fitted.residuals))),
+        n_between,
+        squares,
         2 * int(views.seen.sum()),
         fitted.prior,
         pull,
         fields,
         n_points,
     )
+
+
+def _weights(views: Views, residuals: FloatArray) -> FloatArray:
+    """Return the weight of each camera's coordinates, (C,), their product 1.
+
+    By the scatter of the points about a smooth error of each view.
+    """
+    if residuals.shape[1] == 1:
+        return np.ones(1)
+    x, y = views.board.points[:, 0], views.board.points[:, 1]
+    functions = np.c_[np.ones(len(x)), x / x.std(), y / y.std()]
+    functions = np.concatenate([functions, smooth_functions(views.board)], axis=1)
+    left = np.nan_to_num(residuals)
+    seen = views.seen.astype(np.float64)
+    known = np.einsum("ni,vcn,nj->vcij", functions, seen, functions, optimize=True)
+    known += 1e-9 * len(functions) * np.eye(functions.shape[1])
+    fitted = np.linalg.solve(known, functions.T @ left)
+    left = np.where(views.seen[..., None], left - functions @ fitted, 0.0)
+    n_free = np.maximum(views.seen.sum(axis=2) - functions.shape[1], 0).sum(axis=0)
+    noise = np.sqrt(np.square(left).sum(axis=(0, 2, 3)) / np.maximum(2 * n_free, 1))
+    noise = np.maximum(noise, FINEST)
+    return np.asarray(np.exp(np.mean(np.log(noise))) / noise)
 
 
 @cache

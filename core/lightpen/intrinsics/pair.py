@@ -18,7 +18,12 @@ from lightpen.intrinsics.board_findings import (
     released_tolerances,
 )
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
-from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
+from lightpen.intrinsics.calibration import (
+    CameraCalibration,
+    calibrate_camera,
+    without_outliers,
+)
+from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.variance_components import MixedFit, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
@@ -34,7 +39,11 @@ ALIKE_SHIFT = 0.15  # of its distance
 PEN_SPEED = 100.0  # mm/s
 APART = 3.0  # times the noise of each camera alone
 SIGMAS = 4.0
-OF_BOARD = ("intrinsics.board-stretched", "intrinsics.board-bent")  # of both together
+OF_BOTH = (
+    "intrinsics.board-stretched",
+    "intrinsics.board-bent",
+    "intrinsics.duplicates",
+)  # found again by both cameras together
 LEAST_LAG = 0.02  # of the time between two views
 
 
@@ -162,6 +171,7 @@ def calibrate_pair(
             calibrate_camera(views.of_camera(c), tolerances) for c in range(2)
         )
         cameras = tuple(each.camera for each in alone)
+        views = _as_alone(views, alone)
         # With what keeps their images from folding.
         stated: tuple[FloatArray | None, ...] = tuple(
             each.adjustment.prior_of(0) for each in alone
@@ -171,10 +181,11 @@ def calibrate_pair(
             None if camera.covariance is None else stated_information(camera.covariance)
             for camera in cameras
         )
+    names_of_all = views.names
+    views, duplicates = without_duplicates(views.chosen(np.any(views.found, axis=1)))
     both = np.all(views.found, axis=1)
     if both.sum() < MIN_PAIRS:
         raise CalibrationError("pair.few", n_pairs=int(both.sum()), least=MIN_PAIRS)
-    names_of_all = views.names
     views, place = _ordered(views, cameras, both)
     poses = _poses(views, cameras, place)
     state = BoardState(
@@ -185,28 +196,57 @@ def calibrate_pair(
         np.zeros(N_SHAPE),
     )
     fitted = adjust_board(views, state, tolerances, stated)
+    lag = _lag(views, fitted, np.all(views.found, axis=1), interval_ms)
+    usual = max((each.adjustment.rms for each in alone), default=fitted.rms)
+    moved = _message_on_moved(views, fitted, usual)
+    kept = without_outliers(views, fitted)
+    if int(kept.seen.sum()) < int(views.seen.sum()):
+        which = np.isin(views.names, kept.names)
+        poses = BoardPoses(*(each[which] for each in fitted.state.poses))
+        views, state = kept, replace(state, poses=poses)
+        fitted = adjust_board(views, state, tolerances, stated)
     denied = board_contradictions(fitted, tolerances)
     if denied.any():
         released = released_tolerances(tolerances)
-        fitted = adjust_board(views, fitted.state, released, stated)
+        fitted = adjust_board(views, state, released, stated)
     effects = fit_effects(views, fitted)
     fitted = effects.adjustment
     rig = _rig(effects, names, tolerances)
-    both = np.all(views.found, axis=1)
-    lag = _lag(views, fitted, both, interval_ms)
+    remarks = [
+        of_camera(name, remark)
+        for name, each in zip(names, alone, strict=False)
+        for remark in each.remarks
+        if remark.code not in OF_BOTH
+    ]
+    if duplicates:
+        remarks.append(message_on_duplicates(views.n_views, duplicates))
+    if lag is not None and lag.is_significant:
+        remarks.append(lag.told(names[1]))
+    elif moved is not None:
+        remarks.append(moved)
     return PairCalibration(
         rig=rig,
         views=views,
         alone=alone,
-        n_pairs=int(both.sum()),
-        left_out=tuple(name for name in names_of_all if name not in views.names),
+        n_pairs=int(np.all(views.found, axis=1).sum()),
+        left_out=tuple(
+            name for name in names_of_all if name not in (*views.names, *duplicates)
+        ),
         effects=effects,
         lag=lag,
-        remarks=(
-            *messages_on_board(fitted, tolerances, denied),
-            *_messages(fitted, alone, both, lag, names),
-        ),
+        remarks=(*messages_on_board(fitted, tolerances, denied), *remarks),
     )
+
+
+def _as_alone(views: Views, alone: tuple[CameraCalibration, ...]) -> Views:
+    """Return the views without what was left out of those of each camera alone."""
+    pixels = views.pixels.copy()
+    for c, each in enumerate(alone):
+        rows = {name: v for v, name in enumerate(views.names)}
+        pixels[[rows[name] for name in each.left_out], c] = np.nan
+        kept = [rows[name] for name in each.views.names]
+        pixels[kept, c] = each.views.pixels[:, 0]
+    return replace(views, pixels=pixels)
 
 
 def _rig(effects: MixedFit, names: tuple[str, str], tolerances: BoardTolerances) -> Rig:
@@ -341,31 +381,19 @@ def _means(pixels: FloatArray) -> FloatArray:
     return np.asarray(np.nansum(pixels, axis=1) / np.where(counts > 0, counts, np.nan))
 
 
-def _messages(
-    fitted: BoardFit,
-    alone: tuple[CameraCalibration, ...],
-    both: BoolArray,
-    lag: PairLag | None,
-    names: tuple[str, str],
-) -> tuple[Message, ...]:
-    remarks = [
-        of_camera(name, remark)
-        for name, each in zip(names, alone, strict=False)
-        for remark in each.remarks
-        if remark.code not in OF_BOARD
-    ]
-    if lag is not None and lag.is_significant:
-        return (*remarks, lag.told(names[1]))
-    usual = max((each.adjustment.rms for each in alone), default=fitted.rms)
+def _message_on_moved(views: Views, fitted: BoardFit, usual: float) -> Message | None:
+    """Return the message on views of which the cameras disagree.
+
+    Parameters
+    ----------
+    usual : float
+        Residuals of a camera alone, px rms.
+    """
+    both = np.all(views.found, axis=1)
     rms = np.nanmax(fitted.view_rms[both], axis=1)
     n_apart = int(np.sum(rms > APART * usual))
-    if n_apart > 0:
-        remarks.append(
-            message(
-                "pair.moved",
-                n_views=n_apart,
-                n_pairs=int(both.sum()),
-                rms=float(rms.max()),
-            )
-        )
-    return tuple(remarks)
+    if n_apart == 0:
+        return None
+    return message(
+        "pair.moved", n_views=n_apart, n_pairs=int(both.sum()), rms=float(rms.max())
+    )

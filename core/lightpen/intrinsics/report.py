@@ -346,11 +346,12 @@ def _worst_lines(calibration: CameraCalibration) -> list[str]:
 
 
 def _effects_lines(effects: MixedFit) -> list[str]:
-    found = effects.components
+    found, is_pair = effects.components, len(effects.fields) > 1
     lines = [
         f"{'Effects':<{TITLE}}noise {found.noise:.4f} px, smooth error of a view "
         f"{found.view:.4f} px, points of the board {found.in_plane:.4f} mm in plane "
         f"and {found.out_of_plane:.4f} mm out of plane"
+        + (f", motion between the exposures {found.between:.4f} px" if is_pair else "")
     ]
     lines += [
         f"{'Lens field':<{TITLE}}amplitude {field.amplitude:.4f} px, correlation "
@@ -366,6 +367,7 @@ def _effects_record(effects: MixedFit) -> dict[str, Any]:
     return {
         "noise_px": found.noise,
         "view_px": found.view,
+        "between_exposures_px": found.between if len(effects.fields) > 1 else None,
         "board_in_plane_mm": found.in_plane,
         "board_out_of_plane_mm": found.out_of_plane,
         "lens_fields": [

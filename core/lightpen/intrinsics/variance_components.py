@@ -119,6 +119,7 @@ def fit_effects(views: Views, fitted: BoardFit) -> MixedFit:
         FIRST * noise * mm,
         FIRST * noise * mm,
         FIRST * noise,
+        FIRST * noise,
         (FIRST * noise,) * n_cameras,
     )
     found: list[tuple[Design, _Solution]] = []
@@ -163,6 +164,7 @@ def _no_less(components: VarianceComponents, mm: float) -> VarianceComponents:
         max(components.in_plane, least * mm),
         max(components.out_of_plane, least * mm),
         max(components.view, least),
+        max(components.between, least),
         tuple(max(each, least) for each in components.lenses),
     )
 
@@ -178,9 +180,9 @@ def _reduced(design: Design, components: VarianceComponents) -> _Reduced:
     right = weight * design.right.sum(axis=0)
     right -= np.tensordot(solved, own_right, axes=([0, 2], [0, 1]))
     eliminated = np.einsum("vo,voq,vq->", own_right, inverse_own, own_right)
-    n_smooth = own_normal.shape[-1] - N_POSE
     logarithm = np.linalg.slogdet(own_normal)[1].sum()
-    logarithm += design.n_views * n_smooth * np.log(components.view**2)
+    own_prior = design.own_prior(components)[N_POSE:]
+    logarithm -= design.n_views * np.log(own_prior).sum()
     logarithm += design.n * np.log(components.noise**2)
     return _Reduced(
         normal,
@@ -238,14 +240,17 @@ def _following(
     """Return the next components of the fixed point."""
     x, covariance, components = solution.x, solution.covariance, solution.components
     own = _own(design, reduced, solution)
-    smooth = own[:, N_POSE:]
-    by_others = covariance @ reduced.solved[..., N_POSE:]
-    spread = np.sum(reduced.solved[..., N_POSE:] * by_others)
-    spread += np.diagonal(reduced.inverse_own, axis1=1, axis2=2)[:, N_POSE:].sum()
-    smooth_known = smooth.size - spread * components.view**-2
+    spread = np.sum(reduced.solved * (covariance @ reduced.solved), axis=(0, 1))
+    spread += np.diagonal(reduced.inverse_own, axis1=1, axis2=2).sum(axis=0)
+    of_own = design.n_views - spread * design.own_prior(components)
+    own_known = [float(of_own[at].sum()) for at in design.of_errors]
+    view, between = (
+        float(np.sqrt(np.sum(own[:, at] ** 2) / max(n, KNOWN)))
+        for at, n in zip(design.of_errors, own_known, strict=True)
+    )
     known, sizes = design.effects(x, covariance, components)
     shared = slice(0, design.n_shared)
-    n_known = known.sum() + smooth_known + N_POSE * design.n_views
+    n_known = known.sum() + sum(own_known) + N_POSE * design.n_views
     n_known += design.n_shared - np.sum(
         design.shared_prior * covariance[shared, shared]
     )
@@ -261,7 +266,8 @@ def _following(
         float(np.sqrt(max(squares, 1e-30) / max(design.n - n_known, 1.0))),
         float(deviations[0]),
         float(deviations[1]),
-        float(np.sqrt(np.sum(smooth**2) / max(smooth_known, KNOWN))),
+        view,
+        between,
         tuple(map(float, deviations[2:])),
     )
 
@@ -344,11 +350,8 @@ def _scores(
 
 def _own_normal(design: Design, components: VarianceComponents) -> FloatArray:
     """Return the normal equations of pose and smooth error of each view."""
-    n_own = design.own_own.shape[-1]
-    prior = np.full(n_own, components.view**-2)
-    prior[:N_POSE] = 0.0
-    normal = components.noise**-2 * design.own_own + np.diag(prior)
-    return np.asarray(normal + 1e-12 * np.eye(n_own))
+    prior = np.diag(design.own_prior(components) + 1e-12)
+    return np.asarray(components.noise**-2 * design.own_own + prior)
 
 
 def _field(

@@ -8,8 +8,13 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.intrinsics.adjustment import adjust_board
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardState
 from lightpen.intrinsics.boards import parse_board
+from lightpen.intrinsics.distortion import fit_camera
 from lightpen.intrinsics.pair import PairCalibration, calibrate_pair
+from lightpen.intrinsics.start import start_board_poses
+from lightpen.intrinsics.variance_components import MixedFit, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
@@ -29,8 +34,12 @@ def both_see(
     stretch: float = 0.0,
     turn: FloatArray = TURN,
     shift: FloatArray = SHIFT,
+    moved: float = 0.0,
 ) -> Views:
-    """Return views of a board that moves from view to view, the right one late."""
+    """Return views of a board that moves from view to view, the right one late.
+
+    Between the two exposures of a view it moves at random.
+    """
     board = parse_board("chessboard:9x6:20")
     rng = np.random.default_rng(4)
     poses = simulate_board_poses(camera, board, n_views, rng)
@@ -38,9 +47,11 @@ def both_see(
     pixels = np.full((n_views, 2, board.n_points, 2), np.nan)
     for c, delay in enumerate((0.0, late)):
         speed = np.gradient(poses.translations + drift, axis=0)
-        moved = poses.translations + delay * speed
+        places = poses.translations + delay * speed
+        if c == 1 and moved:
+            places += np.random.default_rng(8).normal(0, moved, places.shape)
         printed = board.points * [1 + stretch, 1.0, 1.0]
-        points = printed @ np.swapaxes(poses.rotations, 1, 2) + moved[:, None]
+        points = printed @ np.swapaxes(poses.rotations, 1, 2) + places[:, None]
         if c == 1:
             points = points @ turn.T + shift
         pixels[:, c] = camera.project(points)
@@ -145,6 +156,47 @@ def test_the_board_is_judged_by_both_cameras_together(camera: Camera) -> None:
     (remark,) = found.remarks
     assert str(remark).startswith("The board does not match")
     assert remark.values["stretch"] == pytest.approx(0.01, abs=1e-3)
+
+
+def fitted_by_both(views: Views, camera: Camera) -> MixedFit:
+    """Return the joint fit, from where the cameras are."""
+    state = BoardState(
+        (camera, camera),
+        np.stack([np.eye(3), TURN]),
+        np.stack([np.zeros(3), SHIFT]),
+        start_board_poses(camera, views),
+        np.zeros(N_SHAPE),
+    )
+    return fit_effects(views, adjust_board(views, state, BoardTolerances()))
+
+
+@pytest.mark.slow
+def test_a_board_that_moves_between_exposures_leaves_the_intrinsics_as_certain_as_alone(
+    camera: Camera,
+) -> None:
+    views = both_see(camera, moved=0.2)
+    both = fitted_by_both(views, camera)
+    own = views.of_camera(0)
+    alone = fit_effects(own, fit_camera(own, BoardTolerances(), camera))
+
+    by_both, by_one = (
+        np.sqrt(np.diag(each.adjustment.covariance)[:4]) for each in (both, alone)
+    )
+    assert both.components.noise == pytest.approx(NOISE, rel=0.1)
+    assert both.components.between > 3 * NOISE
+    assert np.all(by_both < 1.1 * by_one)
+
+
+@pytest.mark.slow
+def test_each_camera_has_its_own_noise(camera: Camera) -> None:
+    views = both_see(camera)
+    pixels = views.pixels.copy()
+    pixels[:, 1] += np.random.default_rng(3).normal(0, 0.12, pixels[:, 1].shape)
+    found = fitted_by_both(replace(views, pixels=pixels), camera)
+
+    u = np.sqrt(np.diag(found.adjustment.covariance))
+    assert found.components.noise == pytest.approx((NOISE * 0.124) ** 0.5, rel=0.1)
+    assert u[9] > 2 * u[0]  # fx of the noisy camera
 
 
 def test_too_few_views_of_both_are_refused(camera: Camera) -> None:
