@@ -131,6 +131,7 @@ class Wizard(QObject):
 
             self._discovery = DiscoveryWindow(self.workbench, self.window)
             self._discovery.continued.connect(lambda: self.window.show_step("swing"))
+        self._discovery.set_camera_known(self.window.page().key == "leds")
         self._discovery.show()
         self._discovery.raise_()
 

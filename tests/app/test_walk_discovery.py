@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from tests.app.walks import NAMES, read_out, result_on_disk, told
 
+from lightpen.model.rigid import fit_rigid
 from lightpen.record.swings.recordings import files_beside
 from lightpen_app.discovery.discovery_run import DISCOVERIES
 from lightpen_app.discovery.discovery_window import DiscoveryWindow
@@ -18,19 +19,26 @@ if TYPE_CHECKING:
 
 FRAME_RATE = 20.0  # a hand that moves farther from image to image cannot be followed
 U_LENGTH = 0.002  # mm
+ORIGIN, ALONG_Y = 3, 9
 SAVE = "Save both files and calibrate the tip"
 
 
 @pytest.mark.qt_log_ignore("^This plugin does not support ")
 @pytest.mark.slow
-def test_a_pen_without_any_file_becomes_an_accepted_tip(
-    walker: "Walker", monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("step", ["Camera", "LEDs"])
+def test_a_pen_without_a_file_becomes_an_accepted_tip(
+    walker: "Walker", monkeypatch: pytest.MonkeyPatch, step: str
 ) -> None:
     monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", FRAME_RATE)
     for name, text in NAMES.items():
         walker.click_into(name, text)
     walker.click("Continue to the camera")
     walker.until_says("Live")
+    if step == "LEDs":  # the camera is known
+        walker.click("Use both files")
+        walker.until(walker.main_button().isEnabled)
+        walker.click("Continue to the LEDs")
+        walker.until_shows("LEDs")
     walker.click("I have no such file...")
     window = walker.window.findChild(DiscoveryWindow)
     assert window is not None
@@ -44,7 +52,16 @@ def test_a_pen_without_any_file_becomes_an_accepted_tip(
     length.setValue(float(np.linalg.norm(leds[:, None] - leds, axis=2).max()))
     u.setValue(U_LENGTH)
     walker.click_on(walker.control("Find pen and camera", window))
+    walker.click_on(walker.control("Cancel", window))
+    assert not walker.control(SAVE, window).isEnabled()
+    walker.click_on(walker.control("Find pen and camera", window))
     walker.until(walker.control(SAVE, window).isEnabled)
+    for led in ORIGIN, ALONG_Y:
+        pen.led_chosen.emit(led)
+    shown = pen.value().pen
+    assert shown is not None
+    np.testing.assert_allclose(shown.leds[ORIGIN - 1], 0, atol=1e-9)
+    np.testing.assert_allclose(shown.leds[ALONG_Y - 1, [0, 2]], 0, atol=1e-9)
     found = "\n".join(walker.texts(window))
     assert re.search(r"LEDs: 10, U \(k = 2\) up to \S+ µm", found)
     assert re.search(r"Focal length: \S+ ± \S+ px", found)
@@ -57,8 +74,9 @@ def test_a_pen_without_any_file_becomes_an_accepted_tip(
     walker.click("Review")
     walker.until(walker.main_button().isEnabled)
     assert walker.says("PASS: Within limits"), told(walker)
-    shown, true = read_out(walker), walker.workbench.around.scene.tip_pen
-    assert (np.abs(shown.tip - true) < 1.5 * shown.u).all()
+    of_tip, true = read_out(walker), walker.workbench.around.scene.tip_pen
+    R, t = fit_rigid(leds, shown.leds)
+    assert (np.abs(of_tip.tip - (R @ true + t)) < 1.5 * of_tip.u).all()
     walker.click("Accept")
     walker.until(lambda: walker.workbench.run.status.result is not None)
 

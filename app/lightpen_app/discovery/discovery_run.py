@@ -12,7 +12,7 @@ from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.detection.spots import Spots
 from lightpen.discovery.discover import discover
-from lightpen.discovery.found import Discovery
+from lightpen.discovery.found import Discovery, with_frame
 from lightpen.discovery.guiding import Guide, guide_of
 from lightpen.discovery.request import Request
 from lightpen.discovery.sightings import sightings_of_spots
@@ -89,6 +89,11 @@ class _Recording:
 class DiscoveryRun(QObject):
     """Records and solves a swing of a pen of which nothing is known.
 
+    Attributes
+    ----------
+    keeps_camera : bool
+        Whether the camera file that is selected is taken as known.
+
     Signals
     -------
     changed()
@@ -107,6 +112,7 @@ class DiscoveryRun(QObject):
     def __init__(self, workbench: Workbench, parent: QObject) -> None:
         super().__init__(parent)
         self._workbench, self._live = workbench, workbench.live
+        self.keeps_camera = False
         self._state = DiscoveryState()
         self._recording: _Recording | None = None
         self._job: Job | None = None
@@ -162,6 +168,17 @@ class DiscoveryRun(QObject):
         self._try(request)
         if self._job is not None:
             self._job.progressed.connect(lambda done: self._become(progress=done))
+
+    def cancel(self) -> None:
+        """End the computation; what was found before stays."""
+        self._drop_job()
+        self._become(progress=None)
+
+    def choose_frame(self, origin: int, along: int) -> None:
+        """Give the pen a frame by two LEDs: the origin, and one along y."""
+        if self._state.found is not None:
+            found = with_frame(self._state.found, origin - 1, along - 1)
+            self._become(found=found)
 
     def save(self) -> None:
         """Write both files beside the images, and use all of them."""
@@ -259,6 +276,9 @@ class DiscoveryRun(QObject):
         if recording is None:
             return
         spots, size = tuple(recording.spots), recording.size
+        camera = self._workbench.selection.preparation.camera
+        if self.keeps_camera and camera is not None and camera.image_size == size:
+            request = replace(request, camera=camera)
 
         def find(report: Report) -> Discovery:
             names = tuple(f"{number:06}.png" for number in range(1, len(spots) + 1))

@@ -107,10 +107,15 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._begin.clicked.connect(self._on_begin_clicked)
         self._compute.clicked.connect(self._on_compute_clicked)
         self._save.clicked.connect(self._run.save)
+        self._pen.led_chosen.connect(self._on_led_chosen)
         for edit in fields:
             edit.valueChanged.connect(self._refresh)
 
         self._retranslate()
+
+    def set_camera_known(self, is_known: bool) -> None:
+        """Take the selected camera file as known, or find the camera as well."""
+        self._run.keeps_camera = is_known
 
     @override
     def closeEvent(self, event: QCloseEvent) -> None:
@@ -127,7 +132,19 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         else:
             self._run.start()
 
+    def _on_led_chosen(self, led: int) -> None:
+        """Take the first LED as origin of the pen's frame, the second along y."""
+        if not self._run.state.is_final:
+            return
+        origin = self._pen.chosen()
+        self._pen.set_chosen(0 if origin else led)
+        if origin not in (0, led):
+            self._run.choose_frame(origin, led)
+
     def _on_compute_clicked(self) -> None:
+        if self._run.state.progress is not None:
+            self._run.cancel()
+            return
         sigma = self._u.value() / 2
         length = MeasuredLength(None, self._length.value(), sigma)
         self._run.solve(Request((length,), self._disc.value()))
@@ -139,7 +156,6 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Find pen and camera"))
         self._image.set_message(self.tr("No image"))
-        self._compute.setText(self.tr("Find pen and camera"))
         self._save.setText(self.tr("Save both files and calibrate the tip"))
         for label, name in zip(
             self._names,
@@ -162,9 +178,11 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         why_not = "" if state.found else self.tr("Swing the pen first.")
         if not why_not and not self._length.value():
             why_not = self.tr("Enter the length.")
-        if state.progress is not None:
-            why_not = self.tr("Being computed.")
-        self._compute.set_why_not(why_not)
+        is_computing = state.progress is not None
+        self._compute.set_why_not("" if is_computing else why_not)
+        self._compute.setText(
+            self.tr("Cancel") if is_computing else self.tr("Find pen and camera")
+        )
         nothing = self.tr("Find pen and camera first.")
         self._save.set_why_not("" if state.is_final else nothing)
 
@@ -174,7 +192,11 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._dial.setVisible(not is_final)
         self._pen.setVisible(found is not None)
         pair = _longest_pair(found)
-        self._how.setText(self._how_to_measure(pair))
+        self._how.setText(
+            self.tr("Frame of the pen: click the LED at the origin, then one along y.")
+            if is_final
+            else self._how_to_measure(pair)
+        )
         self._facts.setText(self._found_text(found) if is_final else "")
         overlay = BoardOverlay()
         if found is not None:

@@ -4,6 +4,7 @@ MESSAGES = {
     "discover.no-start": "No focal length from 0.3 to 12 image widths explains the tracks. Check that the tip stayed in the cone, and tilt the pen in all directions, with roll.",
     "discover.no-fit": "No pen, no camera and no fixed tip explain the tracks: the residuals are {misfit:.1f} px. Check that the tip stayed in the cone, that the LEDs are fixed to one pen, and that camera and cone stand still.",
     "discover.camera-changed": "The camera changed during the swing: its focal length was {first:.0f} px first and {second:.0f} px later. Lock zoom, focus and image stabilisation, and repeat the swing.",
+    "discover.lens-folds": "The distortion that fits the LEDs folds the image beyond them: some pixels would have no direction of view. Move the pen over the whole image, also into the corners, and repeat the swing.",
     "discover.many-left-out": "Only {n_used} of {n_images} images agree on one tip. Press the tip into the cone, clamp cone and camera, and repeat the swing.",
     "discover.weak-swing": "The swing is too weak: U of the tip is {U:.2g} mm, the focal length is uncertain by {focal:.2g} %, and the pen's tilt varies by {tilt:.0f} degrees. Tilt the pen by 30 degrees in all directions, and turn it about its axis.",
     "discover.mirror-undecided": "The images do not decide between the pen and its mirror image. Tilt the pen further towards the camera and away from it, by 30 degrees or more, and come closer to the camera.",

@@ -17,6 +17,7 @@ from lightpen.commands.console import (
 )
 from lightpen.commands.entering import add_entering, keep_record
 from lightpen.errors import UsageError
+from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import sha256
 from lightpen.formats.hashes import all_hashed
@@ -59,6 +60,12 @@ def add_improve_pen(parser: argparse.ArgumentParser) -> None:
         metavar="NEW.json",
         help="new LED file to write",
     )
+    parser.add_argument(
+        "--out-camera",
+        type=Path,
+        metavar="NEW.yaml",
+        help="camera file by the same swings to write",
+    )
 
 
 def _add_swings(parser: argparse.ArgumentParser) -> None:
@@ -94,14 +101,17 @@ def _verify_pen(options: argparse.Namespace) -> int:
 @printing
 def _improve_pen(options: argparse.Namespace) -> None:
     for path in (*options.results, options.camera, options.pen, options.length):
-        if path is not None and are_same(path, options.out):
-            raise UsageError("cli.out-over-input", out=str(options.out))
+        for out in (options.out, options.out_camera):
+            if path is not None and out is not None and are_same(path, out):
+                raise UsageError("cli.out-over-input", out=str(out))
     swings = _swings(options)
     pen = read_pen(options.pen, options.units, options.led_diameter, None)
     camera = read_camera(options.camera)
     scale = None if options.length is None else read_scale(options.length)
     found = improve_pen(swings, camera, pen, scale)
     write_pen(found.pen, options.out, sha256(options.pen))
+    if options.out_camera is not None:
+        write_camera(found.camera, options.out_camera)
     print(shown(improved_pen_text(found)))
     print(shown(f"The new LED file is {options.out}."))
 

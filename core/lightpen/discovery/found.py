@@ -7,7 +7,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.discovery.hypotheses import Hypothesis
 from lightpen.discovery.normals import FACING
-from lightpen.discovery.numbering import framed
+from lightpen.discovery.numbering import frame_by, framed, moved
 from lightpen.discovery.scale import EXACT_SCALE
 from lightpen.discovery.starts import KnownLength
 from lightpen.estimation.calibrate import Calibration
@@ -109,19 +109,14 @@ def discovery_of(
     at = instrument.parameters
     budget = calibration.budget.covariance[:3, :3] - instrument.covariance[:3, :3]
     values, vectors = np.linalg.eigh(budget)
-    pen, R, t = framed(state.pen, tip, sketch)
-    beyond_fit = R @ (vectors * np.maximum(values, 0.0)) @ vectors.T @ R.T
-    turn = np.eye(len(covariance))
-    turn[at.tip, at.tip] = R
-    turn[at.leds, at.leds] = np.kron(np.eye(pen.n_leds), R)
-    covariance = turn @ covariance @ turn.T
+    beyond_fit = (vectors * np.maximum(values, 0.0)) @ vectors.T
     covariance[at.tip, at.tip] += beyond_fit
     camera = replace(
         state.rig.cameras[0], covariance=covariance[at.cameras[0], at.cameras[0]]
     )
     diameter_sigma = float(np.sqrt(covariance[at.diameter, at.diameter][0, 0]))
     pen = replace(
-        pen,
+        state.pen,
         led_covariance=covariance[at.leds, at.leds],
         scale_sigma=EXACT_SCALE,
         diameter_sigma=diameter_sigma,
@@ -129,10 +124,11 @@ def discovery_of(
         nominal_tip=None,
         expansion=None,
     )
-    return Discovery(
+    _, R, t = framed(pen, tip, sketch)
+    found = Discovery(
         pen=pen,
         camera=camera,
-        tip_pen=R @ tip + t,
+        tip_pen=tip,
         covariance=covariance,
         beyond_fit=beyond_fit,
         calibration=calibration,
@@ -140,4 +136,26 @@ def discovery_of(
         is_relative=is_relative,
         hypotheses=(),
         n_lamps=0,
+    )
+    return _in_frame(found, R, t)
+
+
+def with_frame(found: Discovery, origin: int, along: int) -> Discovery:
+    """Return what was found with one LED as origin and y to another, by indices."""
+    return _in_frame(found, *frame_by(found.pen, origin, along))
+
+
+def _in_frame(found: Discovery, R: FloatArray, t: FloatArray) -> Discovery:
+    at = found.parameters
+    turn = np.eye(at.number)
+    turn[at.tip, at.tip] = R
+    turn[at.leds, at.leds] = np.kron(np.eye(found.pen.n_leds), R)
+    covariance = turn @ found.covariance @ turn.T
+    of_leds = covariance[at.leds, at.leds]
+    return replace(
+        found,
+        pen=replace(moved(found.pen, R, t), led_covariance=of_leds),
+        tip_pen=R @ found.tip_pen + t,
+        covariance=covariance,
+        beyond_fit=R @ found.beyond_fit @ R.T,
     )

@@ -103,13 +103,25 @@ def framed(
     elif order_of_paper(leds, leds.mean(axis=0) - tip) is not None:
         R, t = pen_frame_from_raw(leds)
     else:
-        y = _normalised(leds[-1] - leds[0])
-        z = pen.normals.mean(axis=0)
-        z = _normalised(z - (z @ y) * y)
-        R = np.stack([np.cross(y, z), y, z])
-        t = -R @ leds[0]
-    moved = replace(pen, leds=leds @ R.T + t, normals=pen.normals @ R.T)
-    return moved, R, t
+        R, t = frame_by(pen, 0, len(leds) - 1)
+    return moved(pen, R, t), R, t
+
+
+def frame_by(pen: Pen, origin: int, along: int) -> tuple[FloatArray, FloatArray]:
+    """Return R, t of a frame with one LED as origin and y to another, by indices.
+
+    z, at right angles to y, is next to the normal of the discs.
+    """
+    y = _normalised(pen.leds[along] - pen.leds[origin])
+    z = pen.normals.mean(axis=0)
+    z = _normalised(z - (z @ y) * y)
+    R = np.stack([np.cross(y, z), y, z])
+    return R, -R @ pen.leds[origin]
+
+
+def moved(pen: Pen, R: FloatArray, t: FloatArray) -> Pen:
+    """Return LEDs and normals in another frame; covariances stay as they are."""
+    return replace(pen, leds=pen.leds @ R.T + t, normals=pen.normals @ R.T)
 
 
 def _normalised(vector: FloatArray) -> FloatArray:

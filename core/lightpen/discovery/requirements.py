@@ -13,6 +13,8 @@ from lightpen.discovery.starts import KnownLength
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.consistency_findings import DIAMETER
 from lightpen.estimation.calibrate import Calibration
+from lightpen.intrinsics.distortion import folds
+from lightpen.model.camera import Camera
 from lightpen.model.posture import tilts_of
 
 MIN_IMAGES = 40
@@ -73,6 +75,12 @@ def require_length(
             other=first,
             another=second,
         )
+
+
+def require_lens(camera: Camera) -> None:
+    """Refuse a lens that no camera file can state, as the corners were not seen."""
+    if folds(camera):
+        raise CalibrationError("discover.lens-folds")
 
 
 def require_certain(discovery: Discovery) -> None:

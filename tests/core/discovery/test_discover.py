@@ -20,11 +20,12 @@ from lightpen.simulator.swings import swing_from_postures
 
 N = 160  # images: 8 s, a little more than once round the cone
 STATION = random_station(6, n_images=N)
+SHORT = random_station(6, n_images=60)
 
 
 @pytest.fixture(scope="module")
 def found() -> Discovery:
-    return STATION.discovered()
+    return SHORT.discovered()
 
 
 def with_centers(
@@ -43,9 +44,8 @@ def refused(sightings: Sightings, station: Station = STATION) -> str:
 
 
 @pytest.mark.slow
-def test_tip_pen_and_camera_are_found_within_their_uncertainties(
-    found: Discovery,
-) -> None:
+def test_tip_pen_and_camera_are_found_within_their_uncertainties() -> None:
+    found = STATION.discovered()
     errors = errors_of(found, STATION)
 
     # 2 standard deviations of each of 3, 9 and 30 numbers; 3.5 are met by all.
@@ -59,9 +59,9 @@ def test_tip_pen_and_camera_are_found_within_their_uncertainties(
 
 def test_every_image_and_every_led_takes_part(found: Discovery) -> None:
     assert found.calibration.used.all()
-    assert found.pen.n_leds == STATION.pen.n_leds
-    n_seen = int(np.isfinite(STATION.pixels[..., 0]).sum())
-    assert found.calibration.leds_used.sum() > 0.995 * n_seen
+    assert found.pen.n_leds == SHORT.pen.n_leds
+    n_seen = int(np.isfinite(SHORT.pixels[..., 0]).sum())
+    assert found.calibration.leds_used.sum() > 0.99 * n_seen
 
 
 def test_the_mirror_image_fits_far_worse(found: Discovery) -> None:
@@ -101,12 +101,12 @@ def test_a_known_camera_makes_the_tip_more_certain(found: Discovery) -> None:
     sigmas = np.array([1.0, 1.0, 0.5, 0.5, 1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
     camera = replace(STATION.camera, covariance=np.diag(sigmas**2))
 
-    known = discover(STATION.sightings, replace(STATION.request, camera=camera))
+    known = discover(SHORT.sightings, replace(SHORT.request, camera=camera))
 
     # The weak axis gains; the noise is estimated anew, to a part in a hundred.
     assert known.expanded_uncertainty[1] < 0.9 * found.expanded_uncertainty[1]
     assert (known.expanded_uncertainty < 1.02 * found.expanded_uncertainty).all()
-    errors = errors_of(known, STATION)
+    errors = errors_of(known, SHORT)
     assert (np.abs(errors.tip) < 1.75 * known.expanded_uncertainty).all()
 
 

@@ -6,14 +6,16 @@ from tests.simulated_stations import random_station, seen_station
 
 from lightpen.arrays import FloatArray
 from lightpen.discovery.lens_choice import choose_lens
+from lightpen.discovery.requirements import require_lens
 from lightpen.discovery.starts import KnownLength, adjust_start, any_camera
+from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.intrinsics.distortion import Choice
 from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.model.camera import lens_model_of
 from lightpen.model.rig import rig_of
 
-STATION = random_station(0, n_images=60)
+STATION = random_station(0, n_images=48)
 BROWN = [-0.2, 0.05, 2e-4, 1e-4, 0.0]
 FISHEYE = [-0.03, 0.01, -0.004, 0.001]
 SHARE = 0.6  # of the focal length: the lens is wide, the pen seen as large as before
@@ -57,3 +59,10 @@ def test_a_lens_that_five_coefficients_do_not_describe_is_given_another_model() 
     assert choice.n_coefficients in {4, 8}
     assert choice.held_out[choice.n_coefficients] < 0.8 * choice.held_out[5]
     assert focal == pytest.approx(1, abs=1e-3)
+
+
+def test_a_lens_that_folds_the_corners_is_refused_with_advice() -> None:
+    require_lens(STATION.camera)
+    folding = replace(STATION.camera, distortion=np.array([-9.0, 0.0, 0.0, 0.0, 0.0]))
+    with pytest.raises(CalibrationError, match="into the corners"):
+        require_lens(replace(folding, fx=2000.0, fy=2000.0))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -14,10 +15,14 @@ from lightpen.archive.history import Line
 from lightpen.archive.queries import EntryFilter
 from lightpen.model.limits import DueRule
 from lightpen.record.library.supervision import Signature
+from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
+from lightpen.verification.history.pen_over_time import NewLedFile, adjust_together
 from lightpen.verification.history.trend import Trend
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.look.theme import GRID
+from lightpen_app.look.quantities import number_text
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.look.words import shortened
 from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.steps.history.archive_control import NOTICE, ArchiveControl
@@ -29,6 +34,7 @@ from lightpen_app.steps.history.history_table import HistoryTable
 from lightpen_app.steps.history.reader import FirstEntries, HistoryReader
 from lightpen_app.steps.history.selection_panel import SelectionPanel
 from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
+from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Job, Report
@@ -54,7 +60,7 @@ class HistoryContent(Translated, QWidget):
         super().__init__(parent)
         self._chosen, self._tips = workbench.selection, workbench.library
         self._streaming, self._notices = workbench.streaming, workbench.notifications
-        self._folder = workbench.folder
+        self._folder, self._now = workbench.folder, workbench.around.now
         self._logbook = workbench.run.logbook
         self._reader = HistoryReader(self._logbook, self)
         self._paper = PrintReportControl(workbench.save_place, self)
@@ -99,6 +105,7 @@ class HistoryContent(Translated, QWidget):
         self._entry.paper_requested.connect(self._show_paper)
         self._paper.saved.connect(self._on_paper_saved)
         self._paper.failed.connect(self._tell)
+        self._selection.adjust_requested.connect(self._adjust_together)
         self._due.rule_changed.connect(self._on_rule_changed)
         self._whole.checked.connect(self.checked)
         self._whole.imported.connect(self.read_anew)
@@ -208,6 +215,42 @@ class HistoryContent(Translated, QWidget):
     def _on_rule_changed(self, rule: DueRule) -> None:
         self._chosen.set_due_rule(rule)
         self._reader.read_due(rule, self._tips.library)
+
+    # What several swings come to
+
+    def _adjust_together(self) -> None:
+        results = (each.entry.event.result for each in self._selection.selected())
+        chosen = {self._folder / each.place for each in results if each is not None}
+        archive, now = FolderArchive(self._folder), self._now()
+        prepared = self._chosen.preparation
+        if prepared.pen_file is None or prepared.camera_file is None:
+            self._on_not_adjusted(self.tr("Open the files of camera and LEDs first."))
+            return
+        job = Job(partial(adjust_together, archive, prepared, chosen, now), self)
+
+        # Connections
+        job.progressed.connect(self._on_adjusting)
+        job.succeeded.connect(self._on_adjusted)
+        job.failed.connect(self._on_not_adjusted)
+        job.start()
+
+    def _on_adjusting(self, fraction: float) -> None:
+        words = self.tr("Computing: {0:.0%}").format(fraction)
+        self._selection.set_adjusted(StatusMessage(words, Sign.WAIT, Tone.QUIET))
+
+    def _on_adjusted(self, new: NewLedFile) -> None:
+        improved = new.improved
+        words = self.tr(
+            "Saved in {0}: {1} and {2}. Residuals of the swing held out: {3} px, with "
+            "the old file {4} px."
+        ).format(
+            *(new.path.parent, new.path.name, new.camera_path.name),
+            *(number_text(x, 4) for x in (improved.sigma_after, improved.sigma_before)),
+        )
+        self._selection.set_adjusted(StatusMessage(words, Sign.CHECK, Tone.GOOD))
+
+    def _on_not_adjusted(self, why: str) -> None:
+        self._selection.set_adjusted(StatusMessage(why, Sign.CROSS, Tone.BAD))
 
     # What is entered
 

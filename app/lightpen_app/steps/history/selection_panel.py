@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.entries import StoredEntry
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import VerificationLimits
+from lightpen.verification.history.led_file import MIN_POOLED
 from lightpen.verification.history.trend import (
     Comparison,
     Trend,
@@ -25,6 +26,7 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import moment_text
 from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.widgets.number_table import Figures, NumberTable
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
@@ -36,7 +38,14 @@ class SelectionPanel(Translated, QWidget):
     """Compares two entries, and shows the scatter of all selected ones.
 
     With fewer than two selected, the scatter is that of the whole trend.
+
+    Signals
+    -------
+    adjust_requested()
+        LED file and camera file by all selected swings are asked for.
     """
+
+    adjust_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -51,6 +60,7 @@ class SelectionPanel(Translated, QWidget):
         self._touched.setWordWrap(True)
         self._limits = VerificationLimits()
         self._study = CapabilityRow()
+        self._adjust, self._adjusted = PushButton(), SignLabel()
 
         # Layout
         layout = grid_layout(
@@ -70,10 +80,13 @@ class SelectionPanel(Translated, QWidget):
             layout.setAlignment(remark, Qt.AlignmentFlag.AlignTop)
         layout.addWidget(self._touched, 3, 1)
         layout.addWidget(self._study, 4, 1)
-        layout.setRowStretch(5, 1)
+        layout.addWidget(self._adjust, 5, 0, Qt.AlignmentFlag.AlignLeft)
+        layout.addWidget(self._adjusted, 5, 1)
+        layout.setRowStretch(6, 1)
 
         # Connections
         self._study.value_changed.connect(self._retranslate)
+        self._adjust.clicked.connect(self.adjust_requested)
 
         self._retranslate()
 
@@ -88,6 +101,14 @@ class SelectionPanel(Translated, QWidget):
         self._selected = tuple(filter(has_tip, selected))
         self._trend = trend
         self._retranslate()
+
+    def selected(self) -> tuple[StoredEntry, ...]:
+        """Return the selected entries with a tip."""
+        return self._selected
+
+    def set_adjusted(self, told: StatusMessage) -> None:
+        """Show what the adjustment of the selected swings came to."""
+        self._adjusted.set_value(told)
 
     def comparison(self) -> Comparison | None:
         """Return the comparison; None unless two tips are selected."""
@@ -113,6 +134,12 @@ class SelectionPanel(Translated, QWidget):
         return tuple(filter(None, said))
 
     def _retranslate(self) -> None:
+        self._adjust.setText(self.tr("Adjust together"))
+        self._adjust.setToolTip(
+            self.tr("LED file and camera file by all selected swings of a pen")
+        )
+        too_few = self.tr("Select {0} or more calibrations.").format(MIN_POOLED + 1)
+        self._adjust.set_why_not(too_few if len(self._selected) <= MIN_POOLED else "")
         self._show_comparison(self.comparison())
         self._show_repeatability(self.repeatability())
 

@@ -1,4 +1,4 @@
-"""A better LED file from several swings of one pen.
+"""A better LED file, and camera file, from several swings of one pen.
 
 Each swing measures camera, disc diameter, scale and LEDs by the information of its
 images, ``N_k x = b_k``, with its own tip, cone, seat and drift eliminated. The sum over
@@ -48,6 +48,8 @@ class ImprovedPen:
     ----------
     pen : Pen
         Pen with the covariance of its LEDs.
+    camera : Camera
+        The camera of all swings, with its covariance.
     moves : (L, 3) array
         New less old places of the LEDs, mm.
     pooled : tuple of str
@@ -59,6 +61,7 @@ class ImprovedPen:
     """
 
     pen: Pen
+    camera: Camera
     moves: FloatArray
     pooled: tuple[str, ...]
     held_out: str
@@ -127,7 +130,7 @@ def improve_pen(
     for n, calibration in enumerate(calibrations, start=1):
         again.append(calibrate_again(calibration, camera, pen))
         report(n / len(calibrations))
-    improved, confirming = _pooled(again[:-1], pen, scale), again[-1]
+    (improved, refined), confirming = _pooled(again[:-1], camera, pen, scale), again[-1]
     before, after = (_fit_held(confirming, each) for each in (pen, improved))
     if not _is_better(before, after):
         raise CalibrationError(
@@ -138,6 +141,7 @@ def improve_pen(
         )
     return ImprovedPen(
         pen=improved,
+        camera=refined,
         moves=improved.leds - pen.leds,
         pooled=tuple(each.path.name for each in pooled),
         held_out=held_out.path.name,
@@ -165,7 +169,9 @@ def _require_unchanged(calibrations: Sequence[CalibrationFile], pen: Pen) -> Non
     )
 
 
-def _pooled(calibrations: Sequence[Calibration], pen: Pen, scale: Scale | None) -> Pen:
+def _pooled(
+    calibrations: Sequence[Calibration], camera: Camera, pen: Pen, scale: Scale | None
+) -> tuple[Pen, Camera]:
     first = calibrations[0].bundle
     at = first.layout
     common = _common_to_swings(first)
@@ -193,7 +199,12 @@ def _pooled(calibrations: Sequence[Calibration], pen: Pen, scale: Scale | None) 
     moves = unknowns.basis @ values[leds] + unknowns.scaling * values[at_scale]
     led_covariance = unknowns.basis @ covariance[np.ix_(leds, leds)] @ unknowns.basis.T
     at_diameter = int(np.flatnonzero(common == at.diameter.start)[0])
-    return replace(
+    intrinsics = np.flatnonzero(np.isin(common, np.r_[at.cameras[0]]))
+    refined = replace(
+        camera.with_intrinsics(camera.intrinsics + values[intrinsics]),
+        covariance=covariance[np.ix_(intrinsics, intrinsics)],
+    )
+    better = replace(
         pen,
         leds=pen.leds + moves.reshape(-1, 3),
         diameter=pen.diameter + float(values[at_diameter]),
@@ -202,6 +213,7 @@ def _pooled(calibrations: Sequence[Calibration], pen: Pen, scale: Scale | None) 
         scale_sigma=float(np.sqrt(covariance[at_scale, at_scale])),
         diameter_sigma=float(np.sqrt(covariance[at_diameter, at_diameter])),
     )
+    return better, refined
 
 
 def _common_to_swings(bundle: Bundle) -> IntArray:

@@ -1,13 +1,14 @@
 """A pen over its accepted swings, and a better LED file by them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import count
 from pathlib import Path
 
 from lightpen.errors import FileError, UsageError
+from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.hashes import hashed
 from lightpen.formats.pen_files import write_pen
 from lightpen.model.camera import Camera
@@ -72,9 +73,10 @@ class PenOverTime:
 
 @dataclass(frozen=True, eq=False)
 class NewLedFile:
-    """An improved LED file and its content."""
+    """An improved LED file, the camera file of the same swings, and their content."""
 
     path: Path
+    camera_path: Path
     improved: ImprovedPen
 
 
@@ -150,4 +152,32 @@ def improve_led_file(
     names = (f"{stem}{'' if n == 1 else f'-{n}'}.json" for n in count(1))
     path = next(folder / name for name in names if not (folder / name).exists())
     write_pen(improved.pen, path, pen.pen_sha256)
-    return NewLedFile(path, improved)
+    camera_path = path.with_suffix(".yaml")
+    write_camera(improved.camera, camera_path)
+    return NewLedFile(path, camera_path, improved)
+
+
+def adjust_together(
+    archive: FolderArchive,
+    preparation: Preparation,
+    chosen: Collection[Path],
+    now: datetime,
+    report: Tell = lambda _: None,
+) -> NewLedFile:
+    """Write LED file and camera file by accepted swings with the files that are chosen.
+
+    Parameters
+    ----------
+    chosen : collection of Path
+        Files of the results; those with other files take no part.
+
+    Raises
+    ------
+    CalibrationError, FileError
+        As of `improve_led_file`.
+    """
+    pen = read_pen_over_time(archive, preparation)
+    swings = tuple(each for each in pen.swings if each.path in chosen)
+    return improve_led_file(
+        archive.folder, replace(pen, swings=swings), None, now, report
+    )

@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 from pytestqt.qtbot import QtBot
+from tests.accepted_tip import accept_tip
 
 from lightpen.archive.chains import append, own_chain
 from lightpen.archive.check import ArchiveCheckResult, check_archive
@@ -35,6 +36,9 @@ from lightpen.archive.exchange import export_entries, import_entries
 from lightpen.archive.lazy_logbook import LazyLogbook
 from lightpen.archive.logbook import ARCHIVE
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import DueRule, StationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.library.library_changes import Author, add_item
@@ -44,6 +48,10 @@ from lightpen.record.library.tip_library import ListedTip
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
+from lightpen.simulator.scene_files import write_sample_files
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import paper_camera
+from lightpen.swing.preparation import Preparation
 from lightpen.verification.storage.verification_files import keep_verification
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import LIGHT, apply_theme
@@ -67,6 +75,7 @@ from lightpen_app.steps.history.page import HistoryPage
 from lightpen_app.steps.history.selection_panel import SelectionPanel
 from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
@@ -450,6 +459,39 @@ def test_the_capability_is_studied_with_a_tolerance_and_a_reference(desk: Desk) 
     assert "Cgk: x 0.30" in row.words()
     assert "Not capable: 1.33 is required." in row.words()
     assert "A study needs 30 to 50 repeats; 3 are available." in row.words()
+
+
+@pytest.mark.slow
+def test_several_swings_are_adjusted_together(desk: Desk, tmp_path: Path) -> None:
+    folder, scene = desk.workbench.folder, Scene(camera=paper_camera(binning=2))
+    files = write_sample_files(scene, tmp_path / "files")
+    prepared = Preparation(
+        names=names("T-10"),
+        camera_file=CameraFile.read(files.camera),
+        pen_file=PenFile.read(files.pen),
+        image_size=scene.camera.image_size,
+    )
+    for seed in range(1, 5):
+        accept_tip(folder, prepared, seed, led_error=0.01)
+    desk.workbench.selection.set_preparation(prepared)
+    desk.workbench.run.logbook.enter_owed()
+    desk.open()
+    desk.show_tab(SELECTION)
+    panel = desk.child(SelectionPanel)
+    desk.select(0, 1, 2)
+    assert not desk.button("Adjust together").isEnabled()
+    desk.select(0, 1, 2, 3)
+    desk.click("Adjust together")
+    remark = panel.findChildren(SignLabel)[-1]
+    desk.until(lambda: "Residuals of the swing held out" in remark.value().text)
+
+    (camera,) = folder.rglob("led files/*.yaml")
+    (leds,) = folder.rglob("led files/*.json")
+    refined = read_camera(camera)
+    assert refined.covariance is not None
+    assert read_pen(leds).led_covariance is not None
+    sigma = float(refined.covariance[0, 0]) ** 0.5
+    assert abs(refined.fx - scene.camera.fx) < 4 * sigma
 
 
 @pytest.mark.slow
