@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 from tests.app.walks import NAMES, read_out, result_on_disk, told
 
 from lightpen.model.rigid import fit_rigid
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 FRAME_RATE = 20.0  # a hand that moves farther from image to image cannot be followed
 U_LENGTH = 0.002  # mm
 ORIGIN, ALONG_Y = 3, 9
+LEFT = Qt.MouseButton.LeftButton
 SAVE = "Save both files and calibrate the tip"
 
 
@@ -57,7 +60,7 @@ def test_a_pen_without_a_file_becomes_an_accepted_tip(
     walker.click_on(walker.control("Find pen and camera", window))
     walker.until(walker.control(SAVE, window).isEnabled)
     for led in ORIGIN, ALONG_Y:
-        pen.led_chosen.emit(led)
+        QTest.mouseClick(pen, LEFT, pos=pen.place_of(led).toPoint())
     shown = pen.value().pen
     assert shown is not None
     np.testing.assert_allclose(shown.leds[ORIGIN - 1], 0, atol=1e-9)

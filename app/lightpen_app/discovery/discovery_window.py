@@ -87,7 +87,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
             grid.addWidget(name, row, 0)
             grid.addWidget(edit, row, 1)
             name.setBuddy(edit)
-        fill(side, self._compute, self._facts, self._save, 1)
+        fill(side, self._compute, self._save, self._facts, 1)
         for picture in (self._dial, self._pen):
             picture.setMinimumHeight(LEAST_PICTURE)
         scroll = PageScroll()
