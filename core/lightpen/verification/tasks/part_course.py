@@ -109,9 +109,7 @@ def with_move(
         raise CalibrationError(
             "part.few-datums", n_points=len(centres), needed=MIN_POINTS
         )
-    return structs.replace(
-        options, moves=(*options.moves, Move(len(runs), datums))
-    )
+    return structs.replace(options, moves=(*options.moves, Move(len(runs), datums)))
 
 
 def touches_of_part(
