@@ -35,7 +35,7 @@ class PathField(QWidget):
     Signals
     -------
     value_changed(str)
-        Another path was given, or the same one again by Enter.
+        Another path was given, or a faulty one again by Enter.
     path_chosen(str)
         So it was, and it is not empty.
     """
@@ -46,6 +46,7 @@ class PathField(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._value = ""
+        self._is_faulty = False
 
         # Widgets
         self._edit = EnterEdit()
@@ -75,6 +76,7 @@ class PathField(QWidget):
 
     def set_faulty(self, faulty: bool) -> None:
         """Mark the path as one that leads to nothing."""
+        self._is_faulty = faulty
         set_tone(self._edit, Tone.BAD if faulty else Tone.PLAIN)
 
     def add_button(self, button: QPushButton) -> None:
@@ -114,7 +116,9 @@ class PathField(QWidget):
         return str(Path(text).expanduser()) if text.startswith("~") else text
 
     def _on_return_pressed(self) -> None:
-        self.take(self._typed())
+        """Take what was typed; the window has an Enter that is not of the path."""
+        if self._edit.isModified() or self._is_faulty:
+            self.take(self._typed())
 
     def _on_editing_finished(self) -> None:
         if self._typed() != self._value:

@@ -359,6 +359,8 @@ class TracePlot(Plot):
         if value is not None:
             self._limit.setValue(float(self._height(np.array([value]))[0]))
             self._limit.label.setFormat(text)
+        if not len(next(iter(self._columns.values()), ())):
+            self._show_nothing()
         self._place_words()
 
     def words_cover(self) -> float:
@@ -393,7 +395,11 @@ class TracePlot(Plot):
 
     def _show_nothing(self) -> None:
         """Show the axes as they are before the first image."""
-        self._item.setRange(xRange=(1, N_LEAST), yRange=(0, 1), padding=0.01)
+        top = np.ones(1)
+        if self._limit_at is not None and self._y_log:
+            top = np.maximum(top, self._height(np.array([LABEL_ROOM * self._limit_at])))
+        y_range = (0.0, float(top[0]))
+        self._item.setRange(xRange=(1, N_LEAST), yRange=y_range, padding=0.01)
 
     def _place_words(self) -> None:
         """Put the words of the limit where they cover the least of the curves."""

@@ -60,11 +60,14 @@ def test_leaving_the_field_takes_a_path_over_once(form: Form) -> None:
     assert form.taken == ["/data/camera.yaml"]
 
 
-def test_enter_takes_the_same_path_again(form: Form) -> None:
+def test_enter_takes_a_faulty_path_again_and_no_other(form: Form) -> None:
     form.field.set_value("/data/camera.yaml")
 
     form.press(Qt.Key.Key_Return)
+    assert form.taken == []  # it is the window's
 
+    form.field.set_faulty(True)
+    form.press(Qt.Key.Key_Return)
     assert form.taken == ["/data/camera.yaml"]
 
 

@@ -46,6 +46,16 @@ def test_a_limit_has_room_for_its_words_above_it(decades: TracePlot) -> None:
     assert high > np.log10(5.0) + 0.3
 
 
+def test_before_the_first_image_the_words_of_a_limit_have_room(
+    decades: TracePlot,
+) -> None:
+    decades.set_limit(10.0, "limit 10")
+
+    (_, _), (_, high) = decades.ranges()
+
+    assert high > np.log10(10.0) + 0.3
+
+
 def test_the_first_values_do_not_hide_the_newest(qtbot: QtBot) -> None:
     plot = shown(qtbot, TracePlot(Axes("Tip / um"), [Curve("x_um")], tail=0.75))
     values = np.where(np.arange(40) < 8, 5000.0, 0.5)

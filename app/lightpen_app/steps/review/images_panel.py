@@ -185,7 +185,7 @@ class ImagesPanel(Translated, QWidget):
         self._take_out.setText(self.tr("Exclude"))
         self._put_back.setText(self.tr("Include"))
         self._misfits.set_axes(
-            Axes(self.tr("RMS residual / px (x: excluded)"), self.tr("image"))
+            Axes(self.tr("RMS / px (x: excluded)"), self.tr("image"))
         )
         self._misfits.set_limit_words(
             self.tr("drag down to exclude"), self.tr("Exclude {0} above {1} px")

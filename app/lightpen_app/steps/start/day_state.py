@@ -123,6 +123,7 @@ def readiness(
     return (
         ReadinessItem("camera", _camera_message(now, camera)),
         ReadinessItem("leds", _leds_message(now, statuses, camera, file_doubt)),
+        ReadinessItem("start", _temperature_message(now)),
         ReadinessItem("verify", _reference_message(verification)),
     )
 
@@ -154,7 +155,11 @@ def _row(pen: str, tip: str, statuses: StationStatus, *, is_simulated: bool) -> 
     if found is None:
         mark = status_message(None if is_simulated else status)
         is_due = status is TipStatus.UNCALIBRATED and not is_simulated
-        return TipRow(pen, tip, mark, "", "", StatusMessage(), is_due)
+        practice = StatusMessage()
+        if is_simulated:
+            words = translate("DayPage", "Practice")
+            practice = StatusMessage(words, Sign.RING, Tone.QUIET)
+        return TipRow(pen, tip, mark, "", "", practice, is_due)
     assert statuses.now is not None
     today, last = local_time(statuses.now).date(), statuses.due(pen, tip)
     is_over = status is TipStatus.OVERDUE
@@ -238,10 +243,19 @@ def _leds_message(
     return StatusMessage(text, Sign.CHECK, Tone.GOOD)
 
 
+def _temperature_message(now: Preparation) -> StatusMessage:
+    translate, measured = QCoreApplication.translate, now.assumptions.temperature_c
+    if measured is None:
+        text = translate("DayPage", "No temperature")
+        return StatusMessage(text, Sign.RING, Tone.QUIET)
+    text = translate("DayPage", "Pen at {0:.1f} \u00b0C").format(measured)
+    return StatusMessage(text, Sign.CHECK, Tone.GOOD)
+
+
 def _reference_message(status: VerificationStatus) -> StatusMessage:
     translate, drift = QCoreApplication.translate, status.lamp_drift
     if drift is None:
-        text = translate("DayPage", "Drift reference not watched")
+        text = translate("DayPage", "No drift reference")
         return StatusMessage(text, Sign.RING, Tone.QUIET)
     grade = drift.assessment.grade
     if grade is not Grade.PASS:

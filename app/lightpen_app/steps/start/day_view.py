@@ -23,7 +23,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.row_table import RowTable
 from lightpen_app.widgets.translated import Translated
 
-N_ITEMS = 3  # of the readiness line
+N_ITEMS = 4  # of the readiness line
 N_COLUMNS = 6
 LEAST_HEIGHT = 22 * GRID  # px, of the table
 
@@ -108,7 +108,7 @@ class DayView(Translated, QWidget):
         horizontal_layout(layout, self._setup, 1, self._swing)
 
         # Connections
-        self._ready.step_requested.connect(self.step_requested)
+        self._ready.step_requested.connect(self._on_step_requested)
         self._search.textChanged.connect(self._fill)
         self._search.entered.connect(self.tip_entered)
         self._which.activated.connect(self._fill)
@@ -143,7 +143,10 @@ class DayView(Translated, QWidget):
     ) -> None:
         """Show who is where, and what is ready; offer a swing where not all is."""
         self._ready.set_place(place)
-        names = self.tr("Camera"), self.tr("LEDs"), self.tr("Drift reference")
+        names = (
+            *(self.tr("Camera"), self.tr("LEDs")),
+            *(self.tr("Temperature"), self.tr("Drift reference")),
+        )
         self._ready.set_items(items, names)
         is_amber = any(item.is_amber for item in items)
         self._swing.setVisible(is_amber and can_swing)
@@ -194,6 +197,13 @@ class DayView(Translated, QWidget):
         for cell in cells:
             cell.setToolTip(cell.text())
         return cells
+
+    def _on_step_requested(self, step: str) -> None:
+        """Lead to a step, or to what is set up on this one."""
+        if step == "start":
+            self.setup_requested.emit()
+        else:
+            self.step_requested.emit(step)
 
     def _on_row_changed(self, now: QModelIndex) -> None:
         if now.isValid() and now.row() < len(self._shown):

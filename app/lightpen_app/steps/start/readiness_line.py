@@ -34,15 +34,17 @@ class ReadinessLine(QFrame):
 
         # Widgets
         self._place = text_label(TextSize.LEAD)
-        self._place.setWordWrap(False)
         self._buttons = tuple(PushButton(0) for _ in range(n_items))
         self._reasons = tuple(SignLabel() for _ in range(n_items))
 
         # Layout
         margins = (2 * GRID, GRID, 2 * GRID, GRID)
         layout = vertical_layout(self, margins=margins)
-        self._row = horizontal_layout(layout, self._place, 1)
-        horizontal_layout(self._row, *self._buttons, 1)
+        self._row = horizontal_layout(layout, (self._place, 1))
+        pairs = (self._buttons[i : i + 2] for i in range(0, n_items, 2))
+        self._pairs = horizontal_layout(self._row)
+        for pair in pairs:
+            horizontal_layout(self._pairs, *pair, 1)
         for reason in self._reasons:
             layout.addWidget(reason)
 
@@ -58,9 +60,8 @@ class ReadinessLine(QFrame):
     def set_narrow(self, narrow: bool) -> None:
         """Put the place above the items where there is little width."""
         direction = QBoxLayout.Direction
-        self._row.setDirection(
-            direction.TopToBottom if narrow else direction.LeftToRight
-        )
+        for row in (self._row, self._pairs):
+            row.setDirection(direction.TopToBottom if narrow else direction.LeftToRight)
 
     def set_place(self, place: str) -> None:
         """Show station and operator."""

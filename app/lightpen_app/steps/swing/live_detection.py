@@ -9,6 +9,9 @@ from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.swing_run import SwingRun
 
 RATE_S = 2.0  # over which the images are counted
+N_LAST = 20  # images by which spots are said not to match the pen
+MOST = 0.8  # of them
+MISSED = 2  # LEDs, more than a finger and a stray light explain
 
 
 class LiveDetectionView(QObject):
@@ -19,10 +22,12 @@ class LiveDetectionView(QObject):
         self._run = run
         self._seen: LiveImage | None = None
         self._arrivals: deque[tuple[float, int]] = deque()  # time, number of the image
+        self._unfit: deque[bool] = deque(maxlen=N_LAST)
 
     def take(self, shown: DisplayedImage) -> None:
         """Look at one more image."""
         self._seen = shown.seen
+        self._unfit.append(self._is_unfit(shown.seen))
         frame = shown.seen.frame
         time = frame.host_ts_ns * 1e-9
         if self._arrivals:
@@ -46,6 +51,16 @@ class LiveDetectionView(QObject):
         n_leds = seen.detection.n_leds
         text = self.tr("{0} of {1} LEDs, {2} fps")
         return text.format(n_leds, setup.pen.n_leds, round(self.rate()))
+
+    def has_unfit_spots(self) -> bool:
+        """Return whether enough spots are seen that do not match the pen."""
+        return sum(self._unfit) >= MOST * N_LAST
+
+    def _is_unfit(self, seen: LiveImage) -> bool:
+        setup, found = self._run.status.setup, seen.detection
+        if setup is None or found is None or len(seen.spots) < setup.pen.n_leds:
+            return False
+        return not found.has_pose or found.n_leds <= setup.pen.n_leds - MISSED
 
     def rate(self) -> float:
         """Return the frame rate, 1/s."""

@@ -156,6 +156,7 @@ class SwingPresenter(QObject):
             short=progress.short,
             connection=self._live.worst_connection,
             seen=self.sight.words(),
+            has_unfit_spots=self.sight.has_unfit_spots(),
             has_fault=status.has_fault,
             solving=self.solved if status.is_solving else None,
             verdict=status.verdict,

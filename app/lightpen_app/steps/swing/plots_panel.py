@@ -122,8 +122,8 @@ class SwingPlots(Translated, QWidget):
         self._misfit.set_axes(Axes(self.tr("RMS residual per image / px")))
         self._scatter.set_axes(Axes(self.tr("Tip per image / µm")))
         self._estimate.set_axes(Axes(self.tr("Tip estimate / µm")))
-        self._uncertainty.set_axes(Axes(self.tr("U (k = 2) of the tip / µm")))
-        self._uncertainty.set_names("U", self.tr("lowest achievable U"))
+        self._uncertainty.set_axes(Axes(self.tr("U (k = 2) / µm")))
+        self._uncertainty.set_names("U", self.tr("lowest achievable"))
         self._show_limit()
 
 

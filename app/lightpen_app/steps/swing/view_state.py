@@ -10,7 +10,7 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.worker_events import Connection
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.verdict import Grade, NextStep, Verdict
-from lightpen.messages import Message
+from lightpen.messages import Message, message
 from lightpen.model.origin import Origin
 from lightpen.model.posture import Posture, posture_of
 from lightpen.simulator.follower import FIRST_LEAN
@@ -68,6 +68,8 @@ class SwingViewState:
         How the camera is.
     seen : str
         Content of the last image in a few words.
+    has_unfit_spots : bool
+        Whether the last images show enough spots, but not those of the pen.
     has_fault : bool
         Whether the swing was paused because an image could not be recorded.
     solving : float or None
@@ -91,6 +93,7 @@ class SwingViewState:
     short: Shortfall
     connection: Connection = Connection.STREAMING
     seen: str = ""
+    has_unfit_spots: bool = False
     has_fault: bool = False
     solving: float | None = None
     verdict: Verdict | None = None
@@ -209,6 +212,9 @@ class SwingWords(QObject):
         why = out_of_reach(moment.setup.limits, moment.state, moment.short)
         if len(kept) >= FEW and kept.sigma > USUAL_SIGMA:
             why = leds_misfit(kept.sigma, USUAL_SIGMA)
+        elif moment.has_unfit_spots and moment.state.phase in (Phase.WAIT, Phase.SEEN):
+            n_leds = moment.setup.pen.n_leds
+            why = message("diagnosis.spots-do-not-fit", n_needed=n_leds, n_leds=n_leds)
         is_asked = not moment.setup.is_recording
         if why is None or not is_asked or moment.state.phase is Phase.VERDICT:
             return StatusMessage()

@@ -134,6 +134,21 @@ def test_what_the_files_leave_open_is_told_during_the_swing(words: SwingWords) -
     assert words.warning(replace(late, setup=is_read)) == StatusMessage()
 
 
+def test_spots_that_do_not_match_the_pen_point_to_its_file_before_the_swing(
+    words: SwingWords,
+) -> None:
+    waiting = moment(start_swing(SETUP))
+    assert words.warning(waiting) == StatusMessage()
+
+    told = words.warning(replace(waiting, has_unfit_spots=True))
+
+    assert told.text.endswith(
+        "Check that the LED file belongs to this pen and the camera file to these "
+        "images."
+    )
+    assert words.warning(replace(at_verdict(), has_unfit_spots=True)) == StatusMessage()
+
+
 def test_the_pen_in_space_stands_as_the_dial_has_it(words: SwingWords) -> None:
     value = words.stand(at_verdict())
 
