@@ -44,7 +44,7 @@ from lightpen.model.rigid import rotation_from_vector, skew
 MAX_STEPS = 100
 MAX_DAMPING = 1e12
 FIRST_DAMPING = 1e-3
-CONVERGED = 1e-7  # of the sum of squares; far below what changes a digit that is shown
+CONVERGED = 1e-6  # of the sum of squares: a thousandth of a standard uncertainty
 FINEST = 1e-4  # px; exact points that weigh more drown the priors in rounding
 NOISE_ROUNDS = 3
 ROUNDING = 1e-9  # of a variance; a standard deviation for 0

@@ -32,7 +32,7 @@ from lightpen.intrinsics.variance_components import MixedFit
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
-from lightpen.model.quantiles import chi_square_quantile
+from lightpen.model.quantiles import chi_square_quantile, normal_quantile
 
 FEWEST = 3  # views of a group
 MAX_ROUNDS = 8
@@ -43,6 +43,7 @@ RIDGE, HELD = 1e-8, 1e4  # of the information of a point: of nothing, of what is
 LESSENED = 0.97  # of the rms without it, or an alternative is no explanation
 HALVED = 0.5  # the same, of views that no single camera fits
 CHANCE = 1e-3  # of a change, by chance
+N_WAYS = 3  # of a change: zoom; zoom and axis; all
 LEAST_KNOWN = 1e-10  # least eigenvalue of an information matrix scaled to ones
 USELESS = 0.001  # of the image's longer side, by which a change moves the image
 SHEARED = 0.01  # of the slope of the columns, first step
@@ -87,16 +88,14 @@ def find_change(mixed: MixedFit, names: tuple[str, ...]) -> CameraChange | None:
     camera = mixed.adjustment.state.cameras[0]
     at = mixed.adjustment.of_intrinsics(0)
     n = at.stop - at.start
-    zoom = np.zeros((n, 1))
-    zoom[:2, 0] = camera.fx, camera.fy
-    ways = (zoom, np.eye(n)[:, :4], np.eye(n))
+    ways = (_zoom(camera), np.eye(n)[:, :4], np.eye(n))
     clustering = max(mixed.scores.clustering, 1.0)
     best, most = None, 1.0
     for first, share in trials:
         score, information = mixed.scores.change(share)
         for way in ways:
             difference, squares = _fitted_change(score[at], information[at, at], way)
-            chance = CHANCE / (len(trials) * len(ways))
+            chance = CHANCE / (len(trials) * N_WAYS)
             least = clustering * chi_square_quantile(way.shape[1], chance)
             if squares > most * least:
                 most = squares / least
@@ -104,6 +103,29 @@ def find_change(mixed: MixedFit, names: tuple[str, ...]) -> CameraChange | None:
                 in_image = float(np.sqrt(np.mean(np.square(moves).sum(axis=-1))))
                 best = CameraChange(names[first] if first else "", difference, in_image)
     return best
+
+
+def detectable_zoom(mixed: MixedFit) -> float:
+    """Return the least zoom at the middle of the views that is found, relative.
+
+    With 95 % probability; `find_change` tries all views as the first after it.
+    """
+    n_views, at = len(mixed.scores.scores), mixed.adjustment.of_intrinsics(0)
+    share = (np.arange(n_views) >= n_views // 2).astype(np.float64)
+    _, information = mixed.scores.change(share)
+    zoom = _zoom(mixed.adjustment.state.cameras[0])[:, 0]
+    clustering = max(mixed.scores.clustering, 1.0)
+    sigma = np.sqrt(clustering / (zoom @ information[at, at] @ zoom))
+    n_trials = max(n_views - 2 * FEWEST + 2, 1)
+    least = chi_square_quantile(1, CHANCE / (n_trials * N_WAYS)) ** 0.5
+    return float((least + normal_quantile(0.05)) * sigma)
+
+
+def _zoom(camera: Camera) -> FloatArray:
+    """Return how a zoom changes the intrinsics, (4 + n, 1)."""
+    zoom = np.zeros((len(camera.intrinsics), 1))
+    zoom[:2, 0] = camera.fx, camera.fy
+    return zoom
 
 
 def _fitted_change(

@@ -16,6 +16,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.alternatives import (
     HALVED,
+    detectable_zoom,
     explain,
     find_change,
     message_on_change,
@@ -75,11 +76,14 @@ class ViewHalves:
         U (k = 2) of it.
     in_image : float
         Distance that the two put between the images of one point, px rms.
+    detectable_zoom : float
+        Least zoom from the first half in time to the second that is found, relative.
     """
 
     difference: FloatArray
     expanded_uncertainty: FloatArray
     in_image: float
+    detectable_zoom: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -371,4 +375,5 @@ def _halves(effects: MixedFit) -> ViewHalves | None:
         change[:4],
         2 * np.sqrt(np.diag(covariance)[:4]),
         float(np.sqrt(np.mean(np.square(moves).sum(axis=-1)))),
+        detectable_zoom(effects),
     )

@@ -172,6 +172,7 @@ def intrinsics_record(
             "difference_px": halves.difference,
             "expanded_uncertainty_px": halves.expanded_uncertainty,
             "in_image_px": halves.in_image,
+            "detectable_zoom": halves.detectable_zoom,
         },
         "board_found": _board_record(fitted),
         "coverage": {
@@ -304,7 +305,9 @@ def _halves_lines(calibration: CameraCalibration) -> list[str]:
         )
     )
     return [
-        f"{'Halves':<{TITLE}}{differences} px; {halves.in_image:.3f} px in the image"
+        f"{'Halves':<{TITLE}}{differences} px; {halves.in_image:.3f} px in the image",
+        f"{'Zoom':<{TITLE}}a change of {halves.detectable_zoom:.2%} after half of the "
+        "views would be found",
     ]
 
 

@@ -8,7 +8,10 @@ import pytest
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.intrinsics.alternatives import find_change
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
+from lightpen.intrinsics.distortion import fit_camera
+from lightpen.intrinsics.variance_components import fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 
@@ -91,6 +94,22 @@ def test_zoom_in_the_middle_of_a_set_is_refused_with_the_first_view_after_it(
 
     with pytest.raises(CalibrationError, match=r"changed at view_15\.png"):
         calibrated(merged(before, after, np.arange(28) >= 14))
+
+
+@pytest.mark.slow
+def test_the_least_zoom_that_is_said_to_be_found_is(
+    make_views: MakeViews, camera: Camera
+) -> None:
+    before = make_views(n_views=20)
+    halves = calibrated(before).halves
+    assert halves is not None
+    assert halves.detectable_zoom < 0.005
+    for times, is_found in ((1.2, True), (0.2, False)):
+        other = zoomed(camera, 1 + times * halves.detectable_zoom)
+        after = make_views(n_views=20, of=other)
+        views = merged(before, after, np.arange(20) >= 10)
+        fit = fit_effects(views, fit_camera(views, BoardTolerances(), camera))
+        assert (find_change(fit, views.names) is not None) == is_found
 
 
 @pytest.mark.slow
