@@ -8,6 +8,8 @@ from PySide6.QtCore import QCoreApplication, QPointF, QRectF
 from PySide6.QtGui import QColor, QPainter
 
 from lightpen.arrays import FloatArray
+from lightpen.measuring.compensation import ROUND, Evidence
+from lightpen.measuring.surfaces import FeatureKind
 from lightpen.measuring.touches import at_position
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import LIGHT
@@ -114,7 +116,7 @@ def _budget(entries: list[dict[str, Any]]) -> Iterator[Block]:
 def _features(entries: list[dict[str, Any]]) -> Iterator[Block]:
     columns = [
         Column(translate("paper", "Feature"), 1.6),
-        Column(translate("paper", "Kind"), 1.0),
+        Column(translate("paper", "Kind"), 1.6),
         *_numbers("x", "y", "z", translate("paper", "U (k = 2)")),
         Column(translate("paper", "Sizes"), 2.2),
         *_numbers(translate("paper", "Form error"), translate("paper", "Points")),
@@ -124,13 +126,21 @@ def _features(entries: list[dict[str, Any]]) -> Iterator[Block]:
         sizes = ", ".join(f"{k} {_text(v)}" for k, v in _sizes(each["sizes"]))
         rows.append(
             [
-                *(each["name"], each["kind"]),
+                *(each["name"], _kind(each)),
                 *map(_text, each["origin_mm"]),
                 _text(max(each["expanded_uncertainty"][:3])),
                 *(sizes, _text(each["form_error_mm"]), str(each["n_touches"])),
             ]
         )
     yield from table(columns, rows, size=PrintSize.SMALL)
+
+
+def _kind(feature: Mapping[str, Any]) -> str:
+    """Return the kind of a feature, with the side of a round one and its evidence."""
+    kind, by = feature["kind"], feature["side_by"]
+    if FeatureKind(kind) not in ROUND or by == Evidence.NONE:
+        return str(kind)
+    return f"{kind}, {feature['side']} ({by})"
 
 
 def _sizes(sizes: Mapping[str, float]) -> Iterator[tuple[str, float]]:

@@ -15,10 +15,11 @@ from lightpen.commands.console import (
 from lightpen.commands.entering import add_entering, keep_record
 from lightpen.commands.touched import add_touch_inputs, measure_runs
 from lightpen.errors import FileError, UsageError
+from lightpen.formats.file_format import FileFormat
 from lightpen.formats.files import write_whole
 from lightpen.formats.hashes import hashed
 from lightpen.formats.json_records import file_entry
-from lightpen.measuring.exports import EXPORTS, PartExport
+from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.plan import Plan, read_plan
 from lightpen.verification.probing.drift_reference import (
     judged_with,
@@ -113,12 +114,12 @@ def _measure(given: argparse.Namespace) -> int:
         rule,
     )
     for path, export in exports.items():
-        write_whole(path, export.content(found.part))
+        write_whole(path, export.encoded(found.part))
     keep_record(given, record, measured.calibration, measured.origin)
     return verdict_status(given, judged.grade)
 
 
-def _export_of(path: Path) -> PartExport:
+def _export_of(path: Path) -> FileFormat:
     """Return the format that the end of a file name states."""
     for export in EXPORTS:
         if path.suffix.lower() == export.suffix:

@@ -4,7 +4,10 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.measuring.characteristics import Measured
-from lightpen.measuring.features import AXIS, PLACE
+from lightpen.measuring.compensation import Evidence, TouchedSurface
+from lightpen.measuring.features import AXIS, PLACE, Feature
+from lightpen.measuring.plan import Side
+from lightpen.measuring.quantities import Quantity
 from lightpen.measuring.starts import frame_about
 from lightpen.measuring.surfaces import FeatureKind
 
@@ -47,6 +50,14 @@ def outline_of(one: Measured, *, in_part: bool = False) -> list[FloatArray]:
             radii = (max(sizes[0] + sign * reach * slope, 0.0) for sign in (-1, 1))
             pairs = zip(along, radii, strict=True)
             return [_ring(origin + each, frame, radius) for each, radius in pairs]
+
+
+def of_centres(fit: Feature, points: FloatArray) -> Measured:
+    """Return the feature of ball centres (N, 3) without an uncertainty, to be drawn."""
+    values = Quantity(fit.values, np.zeros((len(fit.values), 0)))
+    centres = Quantity(points.ravel(), np.zeros((points.size, 0)))
+    surface = TouchedSurface(fit.kind, values, Side.OUTSIDE, Evidence.NONE)
+    return Measured(surface, values, fit, centres)
 
 
 def _ring(center: FloatArray, frame: FloatArray, radius: float) -> FloatArray:

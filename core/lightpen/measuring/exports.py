@@ -9,47 +9,21 @@ References
    framework (QIF)".
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import numpy as np
 
 from lightpen.formats.csv_cells import csv_table
+from lightpen.formats.file_format import FileFormat
 from lightpen.formats.files import printable
 from lightpen.local_time import local_now
 from lightpen.measuring.characteristics import IS_ANGLE, Measured
 from lightpen.measuring.drawing import outline_of
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
 from lightpen.measuring.qif import qif_text
-from lightpen.messages import Message, message
+from lightpen.messages import message
 
 N_DECIMALS = 6
 ENDS = ("10", "20", "30", "11", "21", "31")  # codes of x, y, z of a line in DXF
 DEGREE, MILLIMETRE = "degree", "mm"
-
-
-@dataclass(frozen=True)
-class PartExport:
-    """A format of measured parts.
-
-    Attributes
-    ----------
-    name : str
-        Name on the command line.
-    suffix : str
-        End of the names of its files.
-    text : callable
-        Returns the content of a file.
-    """
-
-    name: str
-    label: Message
-    suffix: str
-    text: Callable[[MeasuredPart], str]
-
-    def content(self, part: MeasuredPart) -> bytes:
-        """Return the content of a file, in UTF-8."""
-        return self.text(part).encode("utf-8", "backslashreplace")
 
 
 def unit_of(result: CharacteristicResult) -> str:
@@ -119,8 +93,8 @@ def _drawn(name: str, one: Measured) -> list[str]:
 
 
 EXPORTS = (
-    PartExport("csv", message("part.csv"), ".csv", _csv),
-    PartExport("qdas", message("part.qdas"), ".dfq", _qdas),
-    PartExport("qif", message("part.qif"), ".qif", qif_text),
-    PartExport("dxf", message("part.dxf"), ".dxf", _dxf),
+    FileFormat("csv", message("part.csv"), ".csv", _csv),
+    FileFormat("qdas", message("part.qdas"), ".dfq", _qdas),
+    FileFormat("qif", message("part.qif"), ".qif", qif_text),
+    FileFormat("dxf", message("part.dxf"), ".dxf", _dxf),
 )

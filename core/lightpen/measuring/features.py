@@ -16,7 +16,6 @@ References
 .. [2] ISO 10360-6:2001, Estimation of errors in computing Gaussian associated features.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -237,8 +236,3 @@ def _standard(kind: FeatureKind, points: FloatArray, at: Start) -> Start:
     elif kind not in FRAMED and z[int(np.argmax(np.abs(z)))] < 0:
         axes = axes * (1, -1, -1)
     return origin, axes, sizes
-
-
-def joint_values(features: Sequence[Feature]) -> FloatArray:
-    """Return the values of several features, one after the other."""
-    return np.concatenate([feature.values for feature in features])

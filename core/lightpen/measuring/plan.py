@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Annotated, TypeAlias
 
 import msgspec
+import numpy as np
 from msgspec import Meta, Struct, structs
 
 from lightpen.errors import FileError
@@ -31,15 +32,17 @@ MAX_SIZE = 1_000_000  # bytes
 MAX_FEATURES = 1000
 MAX_FREE = 50  # features of a part without a plan
 NEVER = "least squares"
+FARTHEST = 1e6  # mm or degrees, of what a plan states
 REDUNDANT = 2  # times as many points as determine a feature
 UNKNOWN_TOUCHES = 8  # of a feature to be recognised
 OF_ONE_SIZE = {FeatureKind.CIRCLE, FeatureKind.SPHERE, FeatureKind.CYLINDER}
 KNOWN_FORMS = "a plane, or a circle, sphere or cylinder with its nominal diameter"
 NEEDS_FRAME = ("x", "y", "z", "position")
 
-Vector: TypeAlias = tuple[float, float, float]
+Coordinate: TypeAlias = Annotated[float, Meta(ge=-FARTHEST, le=FARTHEST)]
+Vector: TypeAlias = tuple[Coordinate, Coordinate, Coordinate]
 Name: TypeAlias = Annotated[str, Meta(min_length=1, max_length=80)]
-Positive: TypeAlias = Annotated[float, Meta(gt=0)]
+Positive: TypeAlias = Annotated[float, Meta(gt=0, le=FARTHEST)]
 
 
 class Side(StrEnum):
@@ -186,7 +189,7 @@ class PlannedCharacteristic(_Entry, frozen=True):
     of: tuple[Name, ...]
     name: str = ""
     datum: str = ""
-    nominal: float | None = None
+    nominal: Coordinate | None = None
     tolerance: float | tuple[float, float] | None = None
 
     @property
@@ -324,6 +327,8 @@ def _problems(plan: Plan) -> Iterator[str]:
             yield f"a {each.kind.value} needs {needed} touches - at {each.name!r}"
         if "@" in each.name:
             yield f"'@' in the name {each.name!r}"
+        if each.nominal is not None and each.nominal.axis == (0, 0, 0):
+            yield f"an axis of length 0 - at {each.name!r}"
         if each.known is not None and not _has_known_form(each):
             yield f"a known form needs {KNOWN_FORMS} - at {each.name!r}"
         if each.criterion not in {NEVER, *(known.value for known in Criterion)}:
@@ -336,6 +341,11 @@ def _problems(plan: Plan) -> Iterator[str]:
         yield from _alignment_problems(plan, plan.alignment, known)
     for characteristic in plan.characteristics:
         yield from _unknown(characteristic.label, characteristic.features, known)
+        # WORKAROUND for msgspec 0.22: bounds of a number in a union with a tuple fail.
+        stated = characteristic.tolerance
+        ends = np.atleast_1d(0.0 if stated is None else stated)
+        if not (np.abs(ends) <= FARTHEST).all() or ends[0] > ends[-1]:
+            yield f"the tolerance {stated} - at {characteristic.label!r}"
 
 
 def _alignment_problems(

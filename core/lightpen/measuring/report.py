@@ -7,9 +7,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from lightpen.measuring.characteristics import IS_ANGLE
+from lightpen.measuring.characteristics import IS_ANGLE, Measured
+from lightpen.measuring.compensation import ROUND, Evidence
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
-from lightpen.measuring.plan import Nominal
+from lightpen.measuring.plan import Nominal, Side
 from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind
 from lightpen.messages import Message, message
 from lightpen.model.decision_rules import Decision
@@ -19,6 +20,13 @@ DECISIONS: dict[Decision | None, Message | str] = {
     Decision.OPEN: message("part.open"),
     Decision.REJECTED: message("part.rejected"),
     None: "",
+}
+
+EVIDENCES = {
+    Evidence.PLAN: message("measuring.by-plan"),
+    Evidence.AIR: message("measuring.by-air"),
+    Evidence.APPROACH: message("measuring.by-approach"),
+    Evidence.STYLUS: message("measuring.by-stylus"),
 }
 
 
@@ -47,8 +55,20 @@ def feature_rows(part: MeasuredPart) -> Iterator[PartRow]:
         form = one.feature.form_error if has_form and one.feature is not None else None
         place = (float(x) for x in values[:3])
         yield PartRow(
-            name, (*place, float(spread[:3].max()), *size, form), NAMES[one.kind]
+            name, (*place, float(spread[:3].max()), *size, form), _kind_and_side(one)
         )
+
+
+def _kind_and_side(one: Measured) -> Message:
+    """Return the kind of a feature, with the side of a round one and its evidence."""
+    surface = one.surface
+    if one.kind not in ROUND or surface.evidence not in EVIDENCES:
+        return NAMES[one.kind]
+    side = message(
+        "measuring.inside" if surface.side is Side.INSIDE else "measuring.outside"
+    )
+    by = EVIDENCES[surface.evidence]
+    return message("measuring.sided", kind=NAMES[one.kind], side=side, by=by)
 
 
 def characteristic_rows(part: MeasuredPart) -> Iterator[PartRow]:

@@ -9,6 +9,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.measuring.part import MeasuredPart, measure_part
 from lightpen.measuring.plan import Plan, Side, parse_plan
+from lightpen.measuring.report import feature_rows
 from lightpen.measuring.touches import PartTouches
 from lightpen.model.decision_rules import Decision
 from lightpen.model.rigid import rotation_from_vector
@@ -162,6 +163,31 @@ def test_the_side_comes_from_the_approach(plan: Plan) -> None:
     surface = part.features["hole"].surface
     assert surface.quantity.values[6] == pytest.approx(10)
     assert (surface.side, surface.evidence) == ("inside", "approach")
+
+
+def test_the_side_comes_from_a_point_in_air(plan: Plan) -> None:
+    import msgspec
+
+    in_air = msgspec.structs.replace(
+        replace_side(plan, "bore"), air=tuple((R @ [60, 0, 5] + T).tolist())
+    )
+    part = measure_part(Plan(plan.name, (in_air,)), only(touched(), "bore"))
+
+    surface = part.features["bore"].surface
+    assert surface.quantity.values[6] == pytest.approx(8)
+    assert (surface.side, surface.evidence) == ("inside", "point in air")
+    assert str(next(feature_rows(part)).remark) == "cylinder, inside (point in air)"
+
+
+def test_without_an_approach_the_side_comes_from_the_stylus(plan: Plan) -> None:
+    touches = only(touched(), "dome")
+    unknown = np.full_like(touches.approaches_cam, np.nan)
+    auto = Plan(plan.name, (replace_side(plan, "dome"),))
+    part = measure_part(auto, replace(touches, approaches_cam=unknown))
+
+    surface = part.features["dome"].surface
+    assert surface.quantity.values[6] == pytest.approx(5)
+    assert (surface.side, surface.evidence) == ("outside", "stylus")
 
 
 def test_touches_that_do_not_show_their_side_ask_for_it(plan: Plan) -> None:

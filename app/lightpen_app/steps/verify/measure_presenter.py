@@ -44,7 +44,9 @@ class MeasurePresenter(VerifyPresenter):
         spread = COVERAGE_FACTOR * point.covariance(setup.instrument).diagonal() ** 0.5
         numbers = (number_text(x, 2) for x in point.point_cam.tolist())
         u = number_text(float(spread.max()), 3)
-        return self.tr("{0}  {1}  {2}  \u00b1 {3} mm (k = 2)").format(*numbers, u)
+        place = self.tr("{0}  {1}  {2}  \u00b1 {3} mm (k = 2)").format(*numbers, u)
+        tail = place.rindex("\u00b1")  # from which number and unit stay together
+        return place[:tail] + place[tail:].replace(" ", "\u00a0", 2)
 
     @override
     def _purpose(self) -> str:

@@ -9,11 +9,11 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.measuring.drawing import outline_of
+from lightpen.measuring.drawing import of_centres, outline_of
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.verification.session.session_state import SessionSetup, SessionState
 from lightpen.verification.tasks.part import PART
-from lightpen.verification.tasks.part_course import feature_so_far
+from lightpen.verification.tasks.part_course import course, feature_so_far, fit_of
 from lightpen.verification.tasks.registry import AnyTask
 from lightpen_app.look.theme import GRID, colors_of
 from lightpen_app.widgets.translated import Translated
@@ -48,7 +48,8 @@ class PartValue:
     goal: FloatArray | None = None
 
 
-NOTHING = PartValue(np.zeros((0, 3)), np.zeros((0, 3)))
+EMPTY = np.zeros((0, 3))
+NOTHING = PartValue(EMPTY, EMPTY)
 
 
 def part_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> PartValue:
@@ -68,15 +69,22 @@ def part_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> PartV
             off[moved] = off[moved] @ motion.rotation.T
         outlines = [line for one in part.features.values() for line in outline_of(one)]
         return PartValue(points, off, tuple(outlines), tip)
-    earlier = [point.point_cam for run in progress.runs for point in run]
-    now = [point.point_cam for point in progress.points]
-    points = np.array([*earlier, *now]).reshape(-1, 3)
-    feature = feature_so_far(setup.choices.options_of(PART), progress, setup.conditions)
+    options = setup.choices.options_of(PART)
+    begin = options.moves[-1].run if options.moves else 0  # where the part is now
+    runs = (*progress.runs, progress.points)[begin:]
+    shown = [EMPTY]
+    offsets, lines = [EMPTY], list[FloatArray]()
+    for planned, run in zip(course(options)[begin:], runs, strict=False):
+        _, fit = fit_of(planned, run, setup.instrument)
+        shown.append(np.array([point.point_cam for point in run]).reshape(-1, 3))
+        offsets.append(np.zeros_like(shown[-1]) if fit is None else fit.offsets)
+        lines += [] if fit is None else outline_of(of_centres(fit, shown[-1]))
+    feature = feature_so_far(options, progress, setup.conditions)
     next_touch = None if feature is None else feature.next_touch
     return PartValue(
-        points,
-        np.zeros_like(points),
-        (),
+        np.concatenate(shown),
+        np.concatenate(offsets),
+        tuple(lines),
         tip,
         None if next_touch is None else next_touch.point,
     )

@@ -8,7 +8,8 @@ from msgspec import structs
 from PySide6.QtWidgets import QBoxLayout, QFileDialog, QWidget
 from typing_extensions import override
 
-from lightpen.measuring.exports import EXPORTS, PartExport
+from lightpen.formats.file_format import FileFormat
+from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.part import MeasuredPart, taught_plan
 from lightpen.measuring.plan import (
     Plan,
@@ -244,11 +245,11 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         if part is not None and name:
             self.export(part, filters[chosen], Path(name))
 
-    def export(self, part: MeasuredPart, export: PartExport, path: Path) -> None:
+    def export(self, part: MeasuredPart, export: FileFormat, path: Path) -> None:
         """Write a measured part in a format for other programs."""
         named = path if path.suffix else path.with_suffix(export.suffix)
         self._save(
-            lambda _: save_new(named.parent, named.name, export.content(part)), named
+            lambda _: save_new(named.parent, named.name, export.encoded(part)), named
         )
 
     def _save(self, work: Callable[[Report], object], path: Path) -> None:

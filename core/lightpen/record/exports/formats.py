@@ -9,7 +9,7 @@ parallel to the pen frame.
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -17,6 +17,7 @@ import yaml
 
 from lightpen.estimation.reports.verdict import AXES
 from lightpen.formats.csv_cells import csv_table
+from lightpen.formats.file_format import FileFormat
 from lightpen.formats.files import printable
 from lightpen.formats.json_records import record_bytes
 from lightpen.local_time import local_time
@@ -31,28 +32,17 @@ PEN_FRAME, TIP_FRAME = "pen", "tip"
 
 
 @dataclass(frozen=True)
-class ExportFormat:
-    """A format of exported calibrations.
+class ExportFormat(FileFormat):
+    """A format of exported calibrations; its `text` takes a `CalibrationFile`.
 
     Attributes
     ----------
-    name : str
-        Name on the command line.
-    suffix : str
-        End of the names of its files.
-    text : callable
-        Returns the content of a file for a `CalibrationFile`, which holds tip,
-        covariance, origin, grade, names and acceptance.
     needs_laboratory : bool
         Whether `text` takes a `Laboratory`, too.
     has_status : bool
         Whether its files state what the library says of pen and tip.
     """
 
-    name: str
-    label: Message
-    suffix: str
-    text: Callable[..., str]
     description: Message
     needs_laboratory: bool = False
     has_status: bool = True
@@ -62,12 +52,10 @@ class ExportFormat:
     ) -> bytes:
         """Return the content of a file, in UTF-8."""
         if not self.needs_laboratory:
-            text = self.text(file)
-        elif laboratory is None:
+            return self.encoded(file)
+        if laboratory is None:
             raise ValueError(f"The format {self.name} needs a `laboratory`.")
-        else:
-            text = self.text(file, laboratory)
-        return text.encode("utf-8", "backslashreplace")
+        return self.encoded(file, laboratory)
 
 
 def _remark(file: CalibrationFile) -> str:

@@ -6,7 +6,7 @@ again before the others; all runs since then are those of another position.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from itertools import combinations
 from typing import Annotated
 
@@ -15,9 +15,10 @@ from msgspec import Meta, Struct, structs
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.measuring.alignment import MIN_POINTS, THIN
 from lightpen.measuring.characteristics import CENTRED
-from lightpen.measuring.features import fit_feature
+from lightpen.measuring.features import Feature, fit_feature
 from lightpen.measuring.next_touch import Place, area_of, best_places, nominal_area
 from lightpen.measuring.part import kind_of
 from lightpen.measuring.plan import Plan, PlannedFeature, Side
@@ -34,6 +35,7 @@ from lightpen.verification.tasks.task import (
 )
 
 BALL_UNCERTAINTY = 0.001  # mm, U (k = 2)
+N_KEPT = 64  # fits of runs
 
 # The simulated part: its origin from the bottom of the cone, and its axes x to the
 # right, y away from the camera, z up, as columns in the camera frame.
@@ -93,11 +95,8 @@ def with_move(
     """
     centres: dict[str, FloatArray] = {}
     for planned, points in zip(course(options), runs, strict=False):
-        found = [(planned.name, point) for point in points]
-        touches = touches_of_part(found, conditions, options)
-        kind = planned.kind or kind_of(planned.name, touches)
-        if kind in CENTRED:
-            fit = fit_feature(kind, touches.points_cam)
+        kind, fit = fit_of(planned, points, conditions.instrument)
+        if kind in CENTRED and fit is not None:
             centres.setdefault(base_name(planned.name), fit.origin)
     largest, datums = 0.0, tuple[str, ...]()
     for names in combinations(centres, MIN_POINTS):
@@ -171,24 +170,34 @@ def feature_so_far(
     if planned is None:
         return None
     points = progress.points
-    unknown = FeatureSoFar(planned, planned.kind, np.full(len(points), np.nan))
-    if not points:
-        return unknown
-    found = [(planned.name, point) for point in points]
-    touches = touches_of_part(found, conditions, options)
-    kind = planned.kind or kind_of(planned.name, touches)
-    if kind is None:
-        return unknown
-    try:
-        fit = fit_feature(kind, touches.points_cam)
-    except CalibrationError:
-        return replace(unknown, kind=kind)
-    area = area_of(fit, touches.points_cam)
-    place = best_places(area, 1, touches.points_cam)[0]
+    kind, fit = fit_of(planned, points, conditions.instrument)
+    if fit is None:
+        return FeatureSoFar(planned, kind, np.full(len(points), np.nan))
+    places = np.array([point.point_cam for point in points])
+    place = best_places(area_of(fit, places), 1, places)[0]
     off = np.linalg.norm(fit.distances, axis=1)
     if fit.distances.shape[1] == 1:
         off = fit.distances[:, 0]
     return FeatureSoFar(planned, kind, off, place)
+
+
+@lru_cache(maxsize=N_KEPT)
+def fit_of(
+    planned: PlannedFeature, points: Points, instrument: Instrument
+) -> tuple[FeatureKind | None, Feature | None]:
+    """Return the kind of a run, planned or recognised, and the fit to its ball centres.
+
+    The fit is None if the points do not determine it.
+    """
+    if not points:
+        return planned.kind, None
+    found = [(planned.name, point) for point in points]
+    touches = touches_of_part(found, Conditions(instrument), PartOptions())
+    kind = planned.kind or kind_of(planned.name, touches)
+    try:
+        return kind, None if kind is None else fit_feature(kind, touches.points_cam)
+    except CalibrationError:
+        return kind, None
 
 
 @cache

@@ -166,7 +166,7 @@ def test_every_export_names_the_characteristics(
     measured: Station, export: object
 ) -> None:
     part = measured.found.part
-    text = export.content(part).decode()  # type: ignore[attr-defined]
+    text = export.encoded(part).decode()  # type: ignore[attr-defined]
 
     if export.name == "dxf":  # type: ignore[attr-defined]
         drawing = read_drawing(StringIO(text))
