@@ -60,6 +60,7 @@ def test_a_part_is_measured_without_a_key_between_first_and_last_point(
     walker.until_says("Part measured")
 
     assert walker.n_inputs == n_inputs
+    assert walker.tells("guard band")
     folder = walker.workbench.folder / SIMULATED / VERIFICATIONS
     records = [json.loads(each.read_bytes()) for each in sorted(folder.glob("*.json"))]
     assert [each["verification"] for each in records] == [PART.kind, CONCLUSION]

@@ -247,9 +247,9 @@ class VerifyPresenter(QObject):
             return State(self.tr("READING"), "", Sign.WAIT, Tone.ACTIVE)
         if task is None and status.assessment is not None:
             grade = status.assessment.grade
-            last = self.tasks[-1]
+            leading = self.tasks[0]
             rule = worded(
-                last.rule_of(setup.choices.options_of(last), setup.choices.limits)
+                leading.rule_of(setup.choices.options_of(leading), setup.choices.limits)
             )
             why = f"{worded(status.assessment.reason)} {rule}"
             return State(self._grade_text(grade), why, *GRADE_MARKS[grade])
