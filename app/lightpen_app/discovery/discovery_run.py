@@ -284,9 +284,10 @@ class DiscoveryRun(QObject):
             names = tuple(f"{number:06}.png" for number in range(1, len(spots) + 1))
             return discover(sightings_of_spots(names, spots, size), request, report)
 
-        self._run(find, self._on_found)
+        self._run(find, self.take)
 
-    def _on_found(self, found: Discovery) -> None:
+    def take(self, found: Discovery) -> None:
+        """Take over pen, camera and tip as found."""
         guide = guide_of(found)
         mask = self._workbench.selection.preparation.mask
         self._live.set_region(RegionOfInterest(found.camera, found.pen, mask))
@@ -299,6 +300,8 @@ class DiscoveryRun(QObject):
     def _on_saved(self, opened: OpenedFiles) -> None:
         """Use the files with the camera, then with the images."""
         recording, selection = self._recording, self._workbench.selection
+        if opened.faults:
+            self._become(trouble=worded(opened.faults[0]))
         if recording is None or opened.camera_file is None or opened.pen_file is None:
             return
         files = {"camera_file": opened.camera_file, "pen_file": opened.pen_file}

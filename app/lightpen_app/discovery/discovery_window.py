@@ -134,7 +134,8 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
 
     def _on_led_chosen(self, led: int) -> None:
         """Take the first LED as origin of the pen's frame, the second along y."""
-        if not self._run.state.is_final:
+        state = self._run.state
+        if state.found is None or not (state.is_final and state.found.has_free_frame):
             return
         origin = self._pen.chosen()
         self._pen.set_chosen(0 if origin else led)
@@ -192,11 +193,12 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._dial.setVisible(not is_final)
         self._pen.setVisible(found is not None)
         pair = _longest_pair(found)
-        self._how.setText(
-            self.tr("Frame of the pen: click the LED at the origin, then one along y.")
-            if is_final
-            else self._how_to_measure(pair)
-        )
+        self._how.setText(self._how_to_measure(pair))
+        if is_final:
+            words = self.tr(
+                "Frame of the pen: click the LED at the origin, then one along y."
+            )
+            self._how.setText(words if found and found.has_free_frame else "")
         self._facts.setText(self._found_text(found) if is_final else "")
         overlay = BoardOverlay()
         if found is not None:

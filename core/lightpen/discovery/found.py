@@ -17,7 +17,7 @@ from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mi
 from lightpen.intrinsics.distortion import Choice
 from lightpen.model.camera import Camera
 from lightpen.model.information import inverse
-from lightpen.model.pen import Pen
+from lightpen.model.pen import Pen, order_of_paper
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +65,12 @@ class Discovery:
     def parameters(self) -> Parameters:
         """Indices of each kind of parameter in the covariance."""
         return self.calibration.instrument.parameters
+
+    @property
+    def has_free_frame(self) -> bool:
+        """Whether the frame may be chosen: it is not that of the paper's layout."""
+        up = self.pen.leds.mean(axis=0) - self.tip_pen
+        return order_of_paper(self.pen.leds, up) is None
 
     @property
     def expanded_uncertainty(self) -> FloatArray:
