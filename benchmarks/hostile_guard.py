@@ -1,12 +1,13 @@
-"""Damaged limits, keys, verifications and imports: rejected, never valid.
+"""Damaged limits, keys, results, archives and imports: rejected, never valid.
 
 Usage: python benchmarks/hostile_guard.py [N_MUTATIONS [SEED]]
 
 A data folder with a supervisor password is damaged, one file at a time, as a hand with
-write access but without password and key would. Whatever happens, the limits, the
-key and the verification that are read are those that were kept, or reading raises a
-`LightpenError`. Processes that set limits, introduce station keys or import are killed
-at random: afterwards all files are complete and can be used further.
+write access but without password and key would. Whatever happens, what is read (limits,
+key, result, library, verification, entries) is what was kept, or reading raises a
+`LightpenError`, or the check of the archive tells of it. Processes that set limits,
+introduce station keys or import are killed at random: afterwards all files are complete
+and can be used further.
 """
 
 import os
@@ -26,11 +27,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.hostile_records import NAMES, small_result
 from benchmarks.json_mutations import mutated
+from benchmarks.mutations import mutated as mutated_bytes
 from benchmarks.rows import Row
 
-from lightpen.archive.chains import heads
-from lightpen.archive.database import open_file
+from lightpen.archive.chains import entries_of, heads
+from lightpen.archive.check import check_archive
+from lightpen.archive.database import look_into, open_file
 from lightpen.archive.exchange import export_entries, import_entries
 from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.archive.station_events import account_of_station
@@ -38,6 +42,7 @@ from lightpen.errors import LightpenError
 from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.record.folder.verifications import CONCLUSION
 from lightpen.record.library.guard_files import LIMITS_FOLDER
+from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.supervision import (
     Signature,
     read_supervision,
@@ -48,7 +53,8 @@ from lightpen.record.library.supervision_changes import (
     set_limits,
     set_password,
 )
-from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.library.tip_library import LIBRARY, ListedTip, read_library
+from lightpen.record.results.result_folder import RECORDS, RESULTS, FolderArchive
 from lightpen.record.signing.keys import KEYS, chain_of, key_folder
 from lightpen.record.signing.station import memory_file
 from lightpen.verification.storage.verification_files import keep_verification
@@ -72,11 +78,13 @@ ACCEPTED = {
 
 @dataclass(frozen=True)
 class Guarded:
-    """A data folder with limits and a verification, its exported archive, and keys."""
+    """A data folder with one file of each kind, its exported archive, and keys."""
 
     data: Path
     export: Path
     verification: Path
+    result: Path
+    archive: Path  # a copy that nobody writes to
 
     @property
     def key(self) -> Path:
@@ -88,8 +96,9 @@ class Guarded:
     def files(self) -> tuple[Path, ...]:
         """The files that are damaged."""
         limits = sorted((self.data / LIMITS_FOLDER).iterdir())
-        others = memory_file(self.data), self.key, self.verification
-        return (*limits, *others, self.export)
+        library = sorted((self.data / LIBRARY).iterdir())
+        others = memory_file(self.data), self.key, self.verification, self.result
+        return (*limits, *library, *others, self.export, self.archive)
 
 
 @contextmanager
@@ -105,10 +114,16 @@ def guarded_folder() -> Iterator[Guarded]:
             renew_station_key(data, logbook.chain, None, NOON)
             key = require_supervisor(read_supervision(data), EVE)
             file = keep_verification(data, ACCEPTED, key, is_simulated=False)
+            add_item(data, ListedTip(id=NAMES.tip), Author(signature=EVE), NOON)
+            FolderArchive(data).store(small_result(1.0, data / RECORDS / "swing"))
+            (result,) = sorted((data / RESULTS).iterdir())
             logbook.enter_owed()
             export_entries(logbook.database, export)
+        copy = Path(folder, "copy", ARCHIVE)
+        copy.parent.mkdir()
+        shutil.copy(data / ARCHIVE, copy)
         try:
-            yield Guarded(data, export, file)
+            yield Guarded(data, export, file, result, copy)
         finally:
             os.environ.pop(KEYS)
             if before is not None:
@@ -124,14 +139,23 @@ def damage(guarded: Guarded, n_mutations: int, seed: int = SEED) -> Counter[str]
     results = FolderArchive(guarded.data)
     n_exported = contents[guarded.export].count(b"\n") - 2
     archive = guarded.export.with_name("other") / ARCHIVE
+    entered = _entered(guarded.archive)
     with closing(open_file(archive)) as other:
         for _ in range(n_mutations):
             file = files[int(rng.integers(len(files)))]
-            file.write_bytes(mutated(contents[file], rng))
+            spoil = mutated_bytes if file == guarded.archive else mutated
+            file.write_bytes(spoil(contents[file], rng))
             try:
                 if file == guarded.export:
                     import_entries(other, file)
                     is_right = sum(head.number for head in heads(other)) <= n_exported
+                elif file == guarded.archive:
+                    is_right = _is_found(file, entered)
+                elif file == guarded.result:
+                    current = results.in_force(NAMES.pen, NAMES.tip)
+                    is_right = current is not None and current.tip_pen[0] == 1 / 3
+                elif file.parent.name == LIBRARY:
+                    is_right = list(read_library(guarded.data).tips) == [NAMES.tip]
                 elif file == key_file:
                     found = read_supervision(guarded.data)
                     is_right = found.signers().station.public == key
@@ -149,6 +173,23 @@ def damage(guarded: Guarded, n_mutations: int, seed: int = SEED) -> Counter[str]
                 print(file.name, repr(error), flush=True)
             file.write_bytes(contents[file])
     return outcomes
+
+
+def _entered(archive: Path) -> list[str]:
+    """Return the hashes of the entries in an archive."""
+    with closing(look_into(archive)) as database:
+        return [
+            entry.sha256
+            for head in heads(database)
+            for entry in entries_of(database, head.chain)
+        ]
+
+
+def _is_found(archive: Path, entered: list[str]) -> bool:
+    """Return whether the check finds damage, or there is none in the entries."""
+    with closing(look_into(archive)) as database:
+        has_findings = bool(check_archive(database).findings)
+    return has_findings or _entered(archive) == entered
 
 
 def killed_changes(guarded: Guarded, kind: str, n_kills: int, seed: int = SEED) -> int:
@@ -236,8 +277,9 @@ def hostile_guard_rows(
         right = {k: killed_changes(guarded, k, n_kills, seed) for k in kinds}
     return [
         Row(
-            f"{n_mutations} damaged files of limits, keys, verifications and imports: "
-            "wrong limits in force, forged entries or tracebacks",
+            f"{n_mutations} damaged files of limits, keys, results, library, "
+            "verifications, archives and imports: wrong ones that count, forged "
+            "entries or tracebacks",
             str(outcomes["wrong"]),
             "0",
             met=not outcomes["wrong"],

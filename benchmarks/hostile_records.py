@@ -91,7 +91,7 @@ def make_data(folder: Path) -> Data:
         writer.set_taken_out({2: "excluded"})
     archive = FolderArchive(folder)
     for x in (1.0, 2.0):
-        archive.store(_result(x, swing))
+        archive.store(small_result(x, swing))
     _, newest = sorted(archive.folder.iterdir())
     settings = Settings(folder / "lightpen.json")
     settings.set_station("Hall 3", Station(Names(operator="Ann", pen="LP-04")))
@@ -176,7 +176,8 @@ def hostile_record_rows(n_mutations: int = N_MUTATIONS, seed: int = SEED) -> lis
     ]
 
 
-def _result(x: float, swing: Path) -> Result:
+def small_result(x: float, swing: Path) -> Result:
+    """Return the result of a swing with the tip at (x / 3, ...) mm."""
     return Result(
         names=NAMES,
         accepted=NOON,

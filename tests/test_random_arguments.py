@@ -1,6 +1,7 @@
 """No command ends in a traceback, whatever words it is given."""
 
-from collections.abc import Callable
+import argparse
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from subprocess import CompletedProcess
 
@@ -8,63 +9,111 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from lightpen.cli import COMMANDS
+from lightpen.archive.lazy_logbook import SERVER
+from lightpen.cli import COMMANDS, _parser
 
-# These wait for poses or write whole sets of images; their options are tried elsewhere.
-LONG = {"stream", "simulate", "repeatability"}
-NAMES = sorted({name for name, _, _ in COMMANDS} - LONG)
-ACTIONS = {
-    "archive": ["check", "list", "export", "import", "deliver"],
-    "tips": ["list", "add", "change", "retire", "return", "spin"],
-}
+NAMES = sorted({"archive", "tips", *(name for name, _, _ in COMMANDS)})
+# After all others, so that nothing long is done.
+LAST = {"simulate": ["--images", "1", "--binning", "4"]}
 WORDS = st.sampled_from(
     [
-        *("--data", "--since", "--until", "--most", "--kind", "--csv", "--json"),
-        *("--camera", "--pen", "--centers", "--tip", "--station", "--units"),
-        *("--limit", "--due", "--ball", "--nominal", "--axis", "--reason"),
-        *("0001-01-01", "9999-12-31", "1970-01-01", "2026-02-30"),
+        *("0001-01-01", "9999-12-31", "1970-01-01", "2026-02-30", "1x1", "0x9"),
         *("-1", "0", "1e309", "nan", "inf", "99999999999999999999", "1.5", "-0.0"),
         *("", " ", ".", "..", "/dev/null", "/dev/zero", "nowhere", "a\x00b", "\udcff"),
         *("tip", "pen", "cone", "T-1", "a/b", "笔", "=1+1", "verification", "limits"),
+        *("text.csv", "tree.json", "chessboard:3x3:1"),
     ]
 )
 TEXTS = st.text(max_size=12)
+SERVERS = ("", "nowhere", "\udcff", "sqlite:///x", "postgresql://x@127.0.0.1:1/x")
+QUICK = settings(
+    max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
+def options_of(
+    parser: argparse.ArgumentParser, words: tuple[str, ...]
+) -> Iterator[tuple[tuple[str, ...], list[str]]]:
+    """Yield each command below a parser with the names and values of its options."""
+    options, is_leaf = [], True
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            is_leaf = False
+            for name, below in action.choices.items():
+                yield from options_of(below, (*words, name))
+        elif not isinstance(action, argparse._HelpAction):
+            options += [*action.option_strings, *map(str, action.choices or ())]
+    if is_leaf:
+        yield words, options
+
+
+def every_command() -> dict[tuple[str, ...], list[str]]:
+    found = dict[tuple[str, ...], list[str]]()
+    for name in NAMES:
+        parser, commands = _parser([name], None)
+        assert isinstance(commands, dict), parser
+        found.update(options_of(commands[name], (name,)))
+    return found
+
+
+EVERY = every_command()
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("random")
+    folder = tmp_path_factory.mktemp("random")
+    (folder / "text.csv").write_text("frame,led,x_px,y_px\n0,1,1,1\n", "utf-8")
+    (folder / "tree.json").write_text('{"program": {"name": "x"}}', "utf-8")
+    return folder
 
 
 def tried(
-    lightpen: Callable[..., CompletedProcess[str]], place: Path, words: list[str]
+    lightpen: Callable[..., CompletedProcess[str]],
+    place: Path,
+    words: list[str],
+    server: str = "",
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(place)
+        patch.setenv(SERVER, server)
+        patch.setenv("LIGHTPEN_PASSWORD", "correct horse")
         done = lightpen(*words)
     assert done.returncode in (0, 1, 2, 3, 4)
     assert "Traceback" not in done.stderr
 
 
+def test_the_commands_are_those_of_the_program() -> None:
+    for command in (
+        "discover",
+        "measure",
+        "archive fetch",
+        "tips spin",
+        "verify plane",
+    ):
+        assert tuple(command.split()) in EVERY
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*NAMES, *ACTIONS])
-@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@pytest.mark.parametrize("command", EVERY, ids=" ".join)
+@QUICK
 @given(data=st.data())
 def test_no_words_make_a_command_crash(
     lightpen: Callable[..., CompletedProcess[str]],
     place: Path,
-    name: str,
+    command: tuple[str, ...],
     data: st.DataObject,
 ) -> None:
-    action = data.draw(st.sampled_from(ACTIONS[name])) if name in ACTIONS else ""
-    words = data.draw(st.lists(WORDS | TEXTS, max_size=6))
-    tried(lightpen, place, [name, *filter(None, [action]), *words])
+    words = data.draw(
+        st.lists(st.sampled_from(EVERY[command]) | WORDS | TEXTS, max_size=8)
+    )
+    server = data.draw(st.sampled_from(SERVERS))
+    tried(lightpen, place, [*command, *words, *LAST.get(command[0], ())], server)
 
 
+@QUICK
 @given(words=st.lists(WORDS | TEXTS, max_size=4))
 @example(words=["--since", "0001-01-01"])
 @example(words=["--until", "9999-12-31"])
-@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_words_make_the_list_of_an_archive_crash(
     lightpen: Callable[..., CompletedProcess[str]], data: Path, words: list[str]
 ) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from lightpen.formats.files import A_FILE, MEGABYTE, read_bytes, write_whole
+from lightpen.formats.files import A_FILE, LARGEST_RECORD, read_bytes, write_whole
 from lightpen.record.exports.exports import save_new
 from lightpen.record.folder.verifications import is_verification
 from lightpen_app.application import has_display, make_application
@@ -17,8 +17,6 @@ from lightpen_app.print_report.control import (
     read_kept_verification,
 )
 from lightpen_app.print_report.printing import paper_of, paper_stem, pdf_of
-
-LIMIT = 64 * MEGABYTE
 
 
 def write_paper(result: Path, out: Path | None, language: str) -> Path:
@@ -46,7 +44,7 @@ def write_paper(result: Path, out: Path | None, language: str) -> Path:
     UsageError
         The file holds no calibration, or not all that is put on paper.
     """
-    content = read_bytes(result, A_FILE, LIMIT)
+    content = read_bytes(result, A_FILE, LARGEST_RECORD)
     if is_verification(content):
         return _write_verification(result, out, language)
     found = read_calibration_file(result)

@@ -12,7 +12,7 @@ from lightpen.archive.entries import Event, FileHash, Kind, text_sha256, this_pr
 from lightpen.errors import FileError
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.files import read_bytes
+from lightpen.formats.files import LARGEST_RECORD, read_bytes
 from lightpen.formats.files import sha256 as file_sha256
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.stored_messages import StoredMessage
@@ -24,7 +24,7 @@ from lightpen.record.library.tip_library import (
     read_change,
 )
 from lightpen.record.results.assessment import SwingAssessment
-from lightpen.record.results.result_folder import LIMIT, WHAT, FolderArchive
+from lightpen.record.results.result_folder import WHAT, FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.header import HEADER, header_copies
 from lightpen.record.swings.journal import JOURNAL, journal_bytes
@@ -64,7 +64,7 @@ def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
     FileError
         It cannot be read, or is damaged.
     """
-    content = read_bytes(file, WHAT, LIMIT)
+    content = read_bytes(file, WHAT, LARGEST_RECORD)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())
     found = results.content(file)
     if isinstance(found, Result):
@@ -92,7 +92,7 @@ def account_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
     FileError
         It cannot be read, or is damaged.
     """
-    content, change = read_bytes(file, WHAT, LIMIT), read_change(file)
+    content, change = read_bytes(file, WHAT, LARGEST_RECORD), read_change(file)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())
     item, picture = change.item, None
     if isinstance(item, ListedTip):

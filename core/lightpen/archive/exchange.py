@@ -42,7 +42,7 @@ FORMAT = 1
 WHAT = message("file.exported-archive")
 DELIVERED = 20  # entries at one time: some MB, which a slow line carries in time
 LIMIT = 10**6 * MEGABYTE  # it is read line by line
-LONGEST_LINE = 16 * MEGABYTE  # an entry with its record; 2000 images take some 4
+LONGEST_LINE = 10 * MEGABYTE  # an entry with its record; 2000 images take some 4
 LARGEST_BATCH = 16 * MEGABYTE  # of texts that are copied in one transaction
 
 

@@ -64,7 +64,6 @@ from lightpen.record.library.supervision import (
     Signature,
     Supervision,
     approval_of_change,
-    read_supervision,
 )
 from lightpen.record.library.supervision_changes import renew_station_key
 from lightpen.record.library.tip_library import LIBRARY, library_files
@@ -297,8 +296,9 @@ class Logbook:
 
     def _renew_lost_key(self) -> None:
         """Go on with a new key in a folder that was moved here, without a password."""
-        with suppress(FileError):  # which every acceptance reports
-            guard = read_supervision(self._data)
+        # Every acceptance reports these errors.
+        with suppress(FileError, AcceptanceError):
+            guard = self._results.supervision()
             name = (
                 chain_of(guard.station_keys[-1]) if guard.station_keys else self.chain
             )

@@ -131,10 +131,12 @@ def of_chain(chain: str) -> ColumnElement[bool]:
 
 
 def revoked(entries: FromClause) -> Exists:
-    """Return the condition that an entry was revoked since."""
+    """Return the condition that an entry was revoked since, by its own station."""
     back = ENTRIES.alias()
     return exists().where(
-        back.c.concerns == entries.c.sha256, back.c.kind == Kind.TAKEN_BACK.value
+        back.c.concerns == entries.c.sha256,
+        back.c.kind == Kind.TAKEN_BACK.value,
+        func.coalesce(back.c.chain, "") == entries.c.chain,  # by the index of concerns
     )
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from lightpen.errors import FileError, NoArchiveError
 from lightpen.formats.files import printable
-from lightpen.record.folder.verifications import VERIFICATIONS
+from lightpen.record.folder.verifications import data_folder_of_verification
 from lightpen.record.results.opening import data_folder_of
-from lightpen.record.results.result_folder import SIMULATED, FolderArchive
+from lightpen.record.results.result_folder import FolderArchive
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def entry_of_file(result: Path, sha256: str) -> ArchivePlace | None:
     FileError
         It is not the file that was entered.
     """
-    data = _verifying(result) or data_folder_of(result)
+    data = data_folder_of_verification(result) or data_folder_of(result)
     if data is None:
         return None
     # A fifth of a second, which a file in no data folder need not take.
@@ -67,11 +67,3 @@ def entry_of_file(result: Path, sha256: str) -> ArchivePlace | None:
     if entered is None or entered.sha256 != sha256:
         raise FileError("archive.another-result", file=printable(str(result)))
     return ArchivePlace(found.entry.number, found.sha256, found.entry.previous)
-
-
-def _verifying(file: Path) -> Path | None:
-    """Return the data folder of a verification; None of other files."""
-    folder = file.absolute().parent
-    if folder.name != VERIFICATIONS:
-        return None
-    return folder.parents[folder.parent.name == SIMULATED]

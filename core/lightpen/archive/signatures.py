@@ -64,7 +64,9 @@ def key_in(signature: str) -> str:
 
 
 class ChainKeys:
-    """The keys that may sign a chain, as far as its entries were followed.
+    """The key that may sign a chain, as far as its entries were followed.
+
+    Once another key is introduced, the one before signs nothing more.
 
     Parameters
     ----------
@@ -75,7 +77,7 @@ class ChainKeys:
 
     def __init__(self, chain: str, entries: Iterable[StoredEntry] = ()) -> None:
         self._chain = chain
-        self._stations = set[str]()
+        self._station = ""  # the present key
         self._supervisors = set[str]()
         for each in entries:
             self.finding(each)
@@ -91,16 +93,18 @@ class ChainKeys:
         key, signature = key_in(entry.signature), entry.signature[_KEY_LENGTH:]
         if not key or not is_signed(key, signature, _content(entry.sha256)):
             return message("archive.signature-wrong", number=number, chain=chain)
-        is_known = key in self._stations or chain_of(key) == self._chain
+        is_known = key == self._station or (
+            not self._station and chain_of(key) == self._chain
+        )
         is_introduced = event.kind is Kind.LIMITS and (
             event.settings.get(STATION_KEY) == key
         )
         if is_known or (is_introduced and self._is_approved(event, key)):
             self._follow(event)
-            self._stations.add(key)
+            self._station = key
             return None
         if is_introduced and not self._supervisors:
-            self._stations.add(key)
+            self._station = key
             return message("archive.key-unapproved", number=number, chain=chain)
         return message("archive.signature-foreign", number=number, chain=chain)
 
@@ -113,8 +117,7 @@ class ChainKeys:
         content = key_change(self._chain, key)
         old = str(event.settings.get(OLD_KEY_SIGNATURE, ""))
         approval = str(event.settings.get(SUPERVISOR_SIGNATURE, ""))
-        stations = self._stations
-        return any(is_signed(each, old, content) for each in stations) or any(
+        return is_signed(self._station, old, content) or any(
             is_signed(each, approval, content) for each in self._supervisors
         )
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lightpen.archive.entries import Event, FileHash, Kind, this_program
 from lightpen.archive.event_extraction import ExtractedEvent, file_text
-from lightpen.formats.files import MEGABYTE, read_bytes
+from lightpen.formats.files import LARGEST_RECORD, read_bytes
 from lightpen.record.folder.camera_calibrations import (
     CAMERA_CALIBRATIONS,
     WHAT,
@@ -32,7 +32,6 @@ from lightpen.record.swings.assumed import Plain
 from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.names import Names
 
-LIMIT = 64 * MEGABYTE
 FOLDERS = (
     *(LIMITS_FOLDER, CAMERA_CALIBRATIONS, VERIFICATIONS),
     f"{SIMULATED}/{VERIFICATIONS}",
@@ -64,7 +63,7 @@ def account_of_station(results: FolderArchive, file: Path) -> ExtractedEvent:
     FileError
         It cannot be read, or is damaged.
     """
-    content = read_bytes(file, WHAT, LIMIT)
+    content = read_bytes(file, WHAT, LARGEST_RECORD)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())
     if file.parent.name == LIMITS_FOLDER:
         return ExtractedEvent(_of_limits(file, content, place))
@@ -120,10 +119,6 @@ def _of_tip(
 ) -> Event:
     """Return the verification of a tip."""
     done = read_verification(content, file)
-    data = results.folder.parent
-    read_supervision(data).require_signed(
-        *(data, file, content), has_supervisor=bool(done.supervisor)
-    )
     verdict = done.verdict
     limits = {} if verdict is None else verdict.limits_mm
     settings: dict[str, Plain] = {

@@ -27,6 +27,7 @@ from lightpen.commands.supervisor import supervisor_signature
 from lightpen.errors import UsageError
 from lightpen.formats.files import printable
 from lightpen.local_time import local_now, local_time
+from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.supervision_changes import renew_station_key
 
 CHANGED = 1  # exit status of a check that found something
@@ -130,6 +131,7 @@ def _new_key(options: argparse.Namespace) -> None:
     data = _data(options)
     with closing(Logbook(data)) as logbook:
         signature = supervisor_signature(options.supervisor)
+        logbook.confirm(read_supervision(data))
         public = renew_station_key(data, logbook.chain, signature, local_now())
         for trouble in logbook.enter_owed():
             print(shown(str(trouble)))

@@ -9,7 +9,8 @@ import csv
 import io
 from collections.abc import Iterable
 
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a text that a spreadsheet calculates
+# What a text that a spreadsheet calculates begins with, also in full width.
+_FORMULA = (*"=+-@\t\r\n", *"\uff1d\uff0b\uff0d\uff20")
 
 
 def csv_table(rows: Iterable[Iterable[object]]) -> str:

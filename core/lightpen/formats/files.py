@@ -18,6 +18,7 @@ from lightpen.formats.system_reasons import strerror
 from lightpen.messages import Message, message
 
 MEGABYTE = 1_000_000  # bytes
+LARGEST_RECORD = 32 * MEGABYTE  # of the own files; 5000 images of 4 cameras take 26
 A_FILE = message("file.file")  # of unknown kind
 FOLDER = message("file.folder")
 PATIENCE = 2.0  # s to wait for another program's rename

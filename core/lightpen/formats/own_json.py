@@ -17,6 +17,8 @@ from typing import Annotated, Any, NoReturn, TypeAlias, TypeVar
 from msgspec import Meta, convert
 
 CHECKSUM = b', "checksum": "'  # no text in JSON holds quotation marks as they are
+MOST_VALUES = 2_000_000  # 5000 images of four cameras take less; some 300 MB
+_BEFORE_VALUES = (b",", b"[", b"{")
 FIRST_YEAR, LAST_YEAR = 1970, 9998  # of dates that can be told in any time zone
 
 ZonedTime: TypeAlias = Annotated[datetime, Meta(tz=True)]
@@ -46,8 +48,10 @@ def parse_own_json(data: bytes, shape: type[T]) -> T:
     Raises
     ------
     DamagedError
-        It does not hold that.
+        It does not hold that, or more values than the program ever writes.
     """
+    if sum(map(data.count, _BEFORE_VALUES)) > MOST_VALUES:
+        raise DamagedError("There are too many values.")
     try:
         tree = json.loads(
             data,

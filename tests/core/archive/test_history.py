@@ -82,6 +82,19 @@ def test_an_entry_from_another_station_replaces_no_tip_here(
     assert states(here, EntryFilter(station="Hall 3")) == [IN_FORCE]
 
 
+def test_an_entry_from_another_station_takes_no_tip_back_here(
+    make_station: Callable[[str], Station], tmp_path: Path
+) -> None:
+    here, there = make_station("Hall 2"), make_station("Hall 3")
+    (own,) = here.enter(1)
+    enter(there, about(own, Kind.TAKEN_BACK, 10))
+    export_entries(there.database, tmp_path / "hall-3.jsonl")
+    import_entries(here.database, tmp_path / "hall-3.jsonl")
+
+    assert states(here) == [IN_FORCE]
+    assert len(due_tips(here.database, here.chain, DueRule())) == 1
+
+
 def test_every_block_of_lines_follows_the_one_before(station: Station) -> None:
     station.enter(7)
     blocks = [lines(station.database, ALL, first, 3) for first in (0, 3, 6, 9)]

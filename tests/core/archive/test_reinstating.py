@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -12,23 +13,31 @@ from msgspec import structs
 from tests.core.archive.conftest import Station
 from tests.core.archive.test_logbook import NAMES, checked, result
 
-from lightpen.archive.chains import append, entries_of
+from lightpen.archive.chains import append, copy_entries, entries_of, records_of
 from lightpen.archive.due import due_tips
-from lightpen.archive.entries import Event, Kind, StoredEntry, text_sha256
+from lightpen.archive.entries import (
+    ChainHead,
+    Event,
+    Kind,
+    StoredEntry,
+    chained,
+    text_sha256,
+)
 from lightpen.archive.history import lines, messages_on
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.queries import EntryFilter, last_accepted
 from lightpen.errors import AcceptanceError, ArchiveError, FileError
 from lightpen.local_time import local_now
 from lightpen.model.limits import DueRule
+from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.library_changes import Author, add_item, retire_item
-from lightpen.record.library.supervision import Signature
+from lightpen.record.library.supervision import Signature, read_supervision
 from lightpen.record.library.supervision_changes import renew_station_key, set_password
 from lightpen.record.library.tip_library import ItemKind, ListedTip
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import result_bytes
-from lightpen.record.signing.keys import key_folder
+from lightpen.record.signing.keys import key_folder, station_key
 from lightpen.record.signing.station import memory_file
 from lightpen.record.swings.names import Names
 
@@ -278,6 +287,46 @@ def test_a_result_that_was_written_by_hand_is_neither_in_force_nor_entered(
         archive.in_force("LP-04", "T-10")
 
 
+def test_files_from_before_the_password_count_only_as_they_were(data: Path) -> None:
+    archive = FolderArchive(data)
+    set_password(data, EVE, EVE.password, local_now())
+    assert archive.in_force("LP-04", "T-10") is not None
+
+    other = result_bytes(result(data, 7), "records/swing")
+    (archive.folder / "000002.json").write_bytes(other)
+    with pytest.raises(FileError, match="not signed"):
+        archive.in_force("LP-04", "T-10")
+
+
+def test_a_station_key_that_a_supervisor_replaced_signs_no_result_any_more(
+    data: Path, logbook: Logbook
+) -> None:
+    archive = FolderArchive(data)
+    set_password(data, EVE, EVE.password, local_now())
+    archive.store(result(data, 2))
+    old = read_supervision(data).signers()
+    renew_station_key(data, logbook.chain, EVE, local_now())
+    assert archive.in_force("LP-04", "T-10") is not None
+
+    sign = partial(old.signed, place="results/000004.json")
+    forged = result_bytes(result(data, 3), "records/swing", sign)
+    (archive.folder / "000004.json").write_bytes(forged)
+    with pytest.raises(FileError, match="not signed"):
+        archive.in_force("LP-04", "T-10")
+
+
+def test_a_result_that_was_written_by_hand_is_neither_exported_nor_reported(
+    data: Path,
+) -> None:
+    set_password(data, EVE, EVE.password, local_now())
+    file = data / "results" / "000003.json"
+    chef = replace(result(data, 2), supervisor="Chef")
+    file.write_bytes(result_bytes(chef, "records/swing"))
+    with pytest.raises(FileError, match="not signed"):
+        read_calibration(file)
+    assert read_calibration(data / "results" / "000002.json").names.tip == "T-10"
+
+
 def lost_key(logbook: Logbook) -> None:
     (key_folder() / f"{logbook.chain}.key").unlink()
 
@@ -295,6 +344,38 @@ def test_a_key_that_a_supervisor_approves_continues_the_chain(
         assert moved.enter_owed() == ()
         moved.enter_note(entries(moved)[0], "Moved.", "Bea")
     assert checked(data).findings == ()
+
+
+def test_a_key_that_was_replaced_signs_nothing_more(
+    data: Path, logbook: Logbook, make_station: Callable[[str], Station]
+) -> None:
+    old = station_key(logbook.chain)
+    assert old is not None
+    renew_station_key(data, logbook.chain, None, local_now())
+    logbook.enter_owed()
+    *_, last = known = entries(logbook)
+    there = make_station("Hall 9").database
+    records = records_of(logbook.database, known)
+    copy_entries(there, logbook.chain, known, records)
+
+    head = ChainHead(logbook.chain, len(known), last.sha256, last.entry.since)
+    entry = chained(head, structs.replace(last.entry.event, kind=Kind.NOTE))
+    signature = old.public + old.sign(b"lightpen entry\n" + entry.sha256.encode())
+    with pytest.raises(ArchiveError, match="signed by a key that is not the station's"):
+        copy_entries(
+            there, logbook.chain, [replace(entry, signature=signature)], records
+        )
+
+
+def test_no_new_key_begins_where_the_limits_of_the_archive_are_gone(
+    data: Path, logbook: Logbook
+) -> None:
+    set_password(data, EVE, EVE.password, local_now())
+    logbook.enter_owed()
+    shutil.rmtree(data / LIMITS_FOLDER)
+    shutil.rmtree(key_folder())  # as in another account
+    with closing(Logbook(data)):
+        assert not (data / LIMITS_FOLDER).exists()
 
 
 def test_without_a_password_a_moved_folder_goes_on_with_a_new_key_and_a_finding(

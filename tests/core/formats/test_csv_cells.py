@@ -8,7 +8,9 @@ import pytest
 from lightpen.formats.csv_cells import csv_table
 
 
-@pytest.mark.parametrize("text", ["=1+1", "+1", "-1+1", "@SUM(A1)", " =1", "\t=1"])
+@pytest.mark.parametrize(
+    "text", [*("=1+1", "+1", "-1+1", "@SUM(A1)", " =1", "\t=1", "\n=1", "\uff1d1")]
+)
 def test_a_text_that_could_be_a_formula_is_marked(text: str) -> None:
     ((cell, number),) = csv.reader(io.StringIO(csv_table([(text, -1.5)])))
     assert (cell, number) == (f"'{text}", "-1.5")

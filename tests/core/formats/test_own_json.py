@@ -77,3 +77,13 @@ class Converted(Struct):
 def test_a_number_larger_than_any_float_is_damage() -> None:
     with pytest.raises(DamagedError, match="too large"):
         parse_own_json(b'{"length": 1%b}' % (b"0" * 400), Converted)
+
+
+def test_a_text_with_more_values_than_are_ever_written_is_damage(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lightpen.formats.own_json.MOST_VALUES", 10)
+    assert parse_own_json(b"[" + b"[]," * 4 + b"1]", list) == [[], [], [], [], 1]
+    for value in (b"[]", b"{}", b"1"):
+        with pytest.raises(DamagedError, match="too many"):
+            parse_own_json(b"[" + (value + b",") * 10 + b"1]", list)

@@ -15,16 +15,18 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import FileError, UsageError
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.files import LARGEST_RECORD, printable, read_bytes
 from lightpen.formats.own_json import DamagedError, has_checksum, parse_checked
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import message
 from lightpen.model.origin import Origin
+from lightpen.record.library.supervision import read_supervision
+from lightpen.record.results.opening import data_folder_of
+from lightpen.record.results.result_folder import signed_heading
 from lightpen.record.results.results import TipChange, has_head, parse_result
 from lightpen.record.swings.names import Names
 
 WHAT = message("file.calibration")
-LIMIT = 64 * MEGABYTE
 NOBODY = Names()
 
 
@@ -198,11 +200,15 @@ def read_calibration(path: Path) -> CalibrationFile:
     Raises
     ------
     FileError
-        It cannot be read, or is not as it was written.
+        It cannot be read, is not as it was written, or is a result in a data folder
+        and not signed as it must be.
     UsageError
         It is no calibration.
     """
-    return parse_calibration(read_bytes(path, WHAT, LIMIT), path)
+    content, data = read_bytes(path, WHAT, LARGEST_RECORD), data_folder_of(path)
+    if data is not None and has_head(content):
+        signed_heading(data, path, content, read_supervision(data))
+    return parse_calibration(content, path)
 
 
 def parse_calibration(data: bytes, path: Path) -> CalibrationFile:

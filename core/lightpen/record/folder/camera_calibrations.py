@@ -8,7 +8,7 @@ from pathlib import Path
 from msgspec import Struct
 
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE, printable
+from lightpen.formats.files import printable
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import (
     ProgramName,
@@ -33,7 +33,6 @@ from lightpen.record.swings.names import Names
 
 CAMERA_CALIBRATIONS = "camera-calibrations"
 WHAT = message("file.camera-calibration")
-LIMIT = 64 * MEGABYTE
 
 
 @dataclass(frozen=True, eq=False)

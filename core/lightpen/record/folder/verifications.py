@@ -17,6 +17,8 @@ from lightpen.formats.own_json import (
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.library.supervision import read_supervision
+from lightpen.record.results.result_folder import SIMULATED
 
 VERIFICATIONS = "verifications"
 TOUCHES = "touches"  # in that folder: the images of live touches, run by run
@@ -103,9 +105,23 @@ def read_verification(content: bytes, file: Path) -> StoredVerification:
     Raises
     ------
     FileError
-        It is damaged.
+        It is damaged, or in a data folder and not signed as it must be.
     """
     try:
-        return parse_checked(content, StoredVerification)
+        done = parse_checked(content, StoredVerification)
     except DamagedError as error:
         raise FileError("verification.damaged", file=printable(str(file))) from error
+    data = data_folder_of_verification(file)
+    if data is not None:
+        read_supervision(data).require_signed(
+            *(data, file, content), has_supervisor=bool(done.supervisor)
+        )
+    return done
+
+
+def data_folder_of_verification(file: Path) -> Path | None:
+    """Return the data folder that a file is a verification of; None of other files."""
+    folder = file.absolute().parent
+    if folder.name != VERIFICATIONS:
+        return None
+    return folder.parents[folder.parent.name == SIMULATED]

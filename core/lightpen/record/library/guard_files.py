@@ -2,7 +2,8 @@
 
 Each file has the hash of the one before and the signatures of the station and of the
 supervisor who made the change, see `lightpen.record.signing`. The first introduces the
-station key, and says which files of the folder were there before, without signatures.
+station key. Where a supervisor introduces a key or a password, the hashes of the files
+that count until then are listed: all others must be signed by the new one.
 All files have the mode 0600: a password can be guessed by its salt and public key.
 """
 
@@ -15,7 +16,7 @@ from msgspec import Meta, Struct
 
 from lightpen.errors import FileError
 from lightpen.formats import upgrades
-from lightpen.formats.files import create_whole, printable
+from lightpen.formats.files import MEGABYTE, create_whole, printable
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import (
     DamagedError,
@@ -38,6 +39,7 @@ from lightpen.record.signing.keys import (
 from lightpen.record.signing.signed_text import Signers, place_in
 
 LIMITS_FOLDER = "limits"
+LIMIT = 8 * MEGABYTE  # some 80,000 files are listed in that
 WHAT = message("file.limits")
 NOTHING_BEFORE = "0" * 64
 
@@ -80,9 +82,10 @@ class LimitsChange(Struct, omit_defaults=True, kw_only=True):
     station_key_signature, key_approval : str
         By the station key before, and by the supervisor, of
         `lightpen.record.library.key_changes.key_change`.
-    unsigned : mapping of str to int
-        Number of the newest file without signatures in each folder; with the first
-        password.
+    known : mapping of str to str or None
+        Hashes of the files that count as they are, by their places, see
+        `lightpen.record.signing.signed_text.entries_sha256`; with each password, and
+        each station key that a supervisor introduces.
     """
 
     format: int
@@ -96,7 +99,7 @@ class LimitsChange(Struct, omit_defaults=True, kw_only=True):
     station_key: Annotated[str, Meta(pattern="^([0-9a-f]{64})?$")] = ""
     station_key_signature: _Signed = ""
     key_approval: _Signed = ""
-    unsigned: Mapping[str, int] = {}
+    known: Mapping[str, Digest] | None = None
 
     def __post_init__(self) -> None:
         require_usual(self.at)

@@ -13,9 +13,10 @@ from hashlib import sha256
 from pathlib import Path
 
 from lightpen.errors import AcceptanceError, FileError
-from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.files import printable, read_bytes
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.guard_files import (
+    LIMIT,
     LIMITS_FOLDER,
     NOTHING_BEFORE,
     WHAT,
@@ -27,7 +28,12 @@ from lightpen.record.library.key_changes import key_change
 from lightpen.record.library.numbered_files import number_of, numbered_files
 from lightpen.record.library.password_delay import note_attempt, require_patience
 from lightpen.record.signing.keys import SigningKey, chain_of, is_signed, station_key
-from lightpen.record.signing.signed_text import Signers, place_in, signatures_of
+from lightpen.record.signing.signed_text import (
+    Signers,
+    entries_sha256,
+    place_in,
+    signatures_of,
+)
 from lightpen.record.signing.station import memory_file, remembered
 
 
@@ -52,9 +58,9 @@ class Supervision:
     chain : str
         Name of the first station key, and of the archive's chain; empty where there
         are no files.
-    station_keys, supervisor_keys : tuple of str
-        Public keys that were ever in use, the present one last.
-    unsigned : mapping of str to int
+    station_keys : tuple of str
+        Public keys whose signatures count, the present one last.
+    known : mapping of str to str
         As of `LimitsChange`.
     hashes : tuple of str
         Of the files, the oldest first.
@@ -64,8 +70,7 @@ class Supervision:
     limits: Mapping[str, StationLimits] = field(default_factory=dict)
     chain: str = ""
     station_keys: tuple[str, ...] = ()
-    supervisor_keys: tuple[str, ...] = ()
-    unsigned: Mapping[str, int] = field(default_factory=dict)
+    known: Mapping[str, str] = field(default_factory=dict)
     hashes: tuple[str, ...] = ()
 
     @property
@@ -107,7 +112,7 @@ class Supervision:
     ) -> None:
         """Refuse a file of a guarded folder that is not signed as it must be.
 
-        Files that were there before the first password need no signatures.
+        It must be by keys that count, or as it was when a supervisor introduced them.
 
         Parameters
         ----------
@@ -121,12 +126,12 @@ class Supervision:
         FileError
             It is not.
         """
-        folder = place_in(data, file.parent)
-        if not self.is_guarded or number_of(file) <= self.unsigned.get(folder, 0):
+        place = place_in(data, file)
+        if self.password is None or self.known.get(place) == entries_sha256(text):
             return
-        found = signatures_of(text, place_in(data, file))
+        found = signatures_of(text, place)
         is_signed_so = any(map(found.is_by_station, self.station_keys)) and (
-            not has_supervisor or any(map(found.is_by_supervisor, self.supervisor_keys))
+            not has_supervisor or found.is_by_supervisor(self.password.key)
         )
         if not is_signed_so:
             raise FileError("signing.unsigned-file", file=printable(str(file)))
@@ -152,7 +157,7 @@ def read_supervision(data: Path) -> Supervision:
     for number, file in enumerate(reversed(numbered_files(folder)), start=1):
         if number_of(file) != number:
             raise FileError("limits.missing", folder=printable(str(folder)))
-        content = read_bytes(file, WHAT, MEGABYTE)
+        content = read_bytes(file, WHAT, LIMIT)
         guard = _followed(guard, data, file, content)
     before = remembered(data)
     if before is not None:
@@ -227,29 +232,29 @@ def _followed(
     """Return what is set after one more change."""
     change = read_limits_change(content, file)
     found = signatures_of(content, place_in(data, file))
-    station_keys, supervisor_keys = guard.station_keys, guard.supervisor_keys
-    password = change.password or guard.password
+    password, station_keys = change.password or guard.password, guard.station_keys
     is_sound = change.previous == (guard.hashes[-1:] or (NOTHING_BEFORE,))[0]
     if change.station_key:
         is_sound &= _is_introduced(guard, change)
-        station_keys = *station_keys, change.station_key
+        before = station_keys if change.known is None else ()
+        station_keys = *before, change.station_key
     is_sound &= bool(station_keys) and found.is_by_station(station_keys[-1])
     if password is not None:
         # The first password approves itself, the others are approved by those before.
         approving = guard.password or password
         is_sound &= found.is_by_supervisor(approving.key) or (
-            _is_by_old_key(guard, change) and change.password is None
+            _is_by_old_key(guard, change)
+            and change.password is None
+            and change.known is None
         )
-    if change.password is not None:
-        supervisor_keys = *supervisor_keys, change.password.key
     if not is_sound:
         raise FileError("limits.unsigned", file=printable(str(file)))
     return Supervision(
         password,
         _with_limits(guard.limits, change),
         guard.chain or change.chain,
-        *(station_keys, supervisor_keys),
-        guard.unsigned or change.unsigned,
+        station_keys,
+        guard.known if change.known is None else change.known,
         (*guard.hashes, sha256(content).hexdigest()),
     )
 

@@ -5,14 +5,22 @@ nothing is written.
 """
 
 import os
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from msgspec import structs
+from msgspec import Struct, structs
 
-from lightpen.errors import AcceptanceError, NameTakenError
+from lightpen.errors import AcceptanceError, FileError, NameTakenError
 from lightpen.formats import upgrades
+from lightpen.formats.files import A_FILE, LARGEST_RECORD, read_bytes
+from lightpen.formats.own_json import (
+    CHECKSUM,
+    DamagedError,
+    parse_own_json,
+    with_checksum,
+)
 from lightpen.formats.upgrades import newest_format
 from lightpen.model.limits import LIMITS, StationLimits
 from lightpen.record.library.guard_files import (
@@ -22,7 +30,7 @@ from lightpen.record.library.guard_files import (
     write_limits_change,
 )
 from lightpen.record.library.key_changes import key_change
-from lightpen.record.library.numbered_files import newest_number
+from lightpen.record.library.numbered_files import numbered_files
 from lightpen.record.library.supervision import (
     Signature,
     Supervision,
@@ -30,6 +38,7 @@ from lightpen.record.library.supervision import (
     require_name,
     require_supervisor,
 )
+from lightpen.record.library.tip_library import LIBRARY
 from lightpen.record.signing.keys import (
     SALT_LENGTH,
     SigningKey,
@@ -38,14 +47,18 @@ from lightpen.record.signing.keys import (
     station_key,
     supervisor_key,
 )
-from lightpen.record.signing.signed_text import Signers
+from lightpen.record.signing.signed_text import Signers, entries_sha256, place_in
 from lightpen.record.signing.station import remember, station_name
 
 LEAST_PASSWORD = 8  # characters
 SIGNED_FOLDERS = (
-    *("results", "simulated/results", "library"),
+    *("results", "simulated/results", LIBRARY),
     *("verifications", "simulated/verifications"),
 )
+
+
+class _Approval(Struct):
+    supervisor: str = ""
 
 
 def set_password(data: Path, signature: Signature, new: str, now: datetime) -> None:
@@ -74,10 +87,8 @@ def set_password(data: Path, signature: Signature, new: str, now: datetime) -> N
     change = structs.replace(
         _change(guard, now, signature),
         password=PasswordVerifier(salt.hex(), key.public),
+        known=_known(data, guard),
     )
-    if not guard.is_guarded:
-        folders = {each: newest_number(data / each) for each in SIGNED_FOLDERS}
-        change = structs.replace(change, unsigned=folders)
     _write(data, guard, change, approving or key)
 
 
@@ -158,7 +169,8 @@ def renew_station_key(
     """Introduce another station key, and return its public half.
 
     It is approved by the key before where that is in this user account, and by the
-    supervisor who signs. Where there is a password, one of both is needed.
+    supervisor who signs. Where there is a password, one of both is needed. If a
+    supervisor signs, the keys before sign no file any more.
 
     Parameters
     ----------
@@ -185,6 +197,7 @@ def renew_station_key(
         station_key=new.public,
         station_key_signature="" if old is None else old.sign(content),
         key_approval="" if approving is None else approving.sign(content),
+        known=None if approving is None else _known(data, guard),
     )
     _write(data, guard, change, approving, new)
     return new.public
@@ -197,6 +210,21 @@ def _change(guard: Supervision, now: datetime, signature: Signature) -> LimitsCh
         supervisor=signature.name.strip(),
         previous=guard.hashes[-1] if guard.hashes else NOTHING_BEFORE,
     )
+
+
+def _known(data: Path, guard: Supervision) -> dict[str, str]:
+    """Return the hashes of the files that count by now, by their places."""
+    known = {}
+    for folder in SIGNED_FOLDERS:
+        for file in numbered_files(data / folder):
+            with suppress(DamagedError, FileError):  # which does not count
+                start = read_bytes(file, A_FILE, LARGEST_RECORD).partition(CHECKSUM)[0]
+                text = with_checksum(start + b"}")
+                named = parse_own_json(text, _Approval).supervisor
+                has_supervisor = folder == LIBRARY or named != ""
+                guard.require_signed(data, file, text, has_supervisor=has_supervisor)
+                known[place_in(data, file)] = entries_sha256(text)
+    return known
 
 
 def _write(

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE, opened, printable, read_bytes
+from lightpen.formats.files import LARGEST_RECORD, opened, printable, read_bytes
 from lightpen.messages import message
 from lightpen.record.library.numbered_files import add_numbered, numbered_files
 from lightpen.record.library.supervision import (
@@ -42,7 +42,6 @@ from lightpen.record.signing.signed_text import place_in
 RECORDS, RESULTS = "records", "results"
 SIMULATED = "simulated"  # that the files of the simulated pen, and its results, are in
 WHAT = message("file.result")
-LIMIT = 64 * MEGABYTE
 HEAD = 16_384  # bytes, in which the first entries of a result end, or it is read whole
 
 _logger = logging.getLogger(__name__)
@@ -266,7 +265,7 @@ class FolderArchive:
         """
         if self._heading(file, read_supervision(self._data)).takes_back is None:
             return self.read(file)
-        return parse_withdrawal(read_bytes(file, WHAT, LIMIT), file)
+        return parse_withdrawal(read_bytes(file, WHAT, LARGEST_RECORD), file)
 
     def place_of(self, path: Path) -> str:
         """Return where a file or folder is, from the data folder if it is in there."""
@@ -317,15 +316,11 @@ class FolderArchive:
 
     def _heading(self, file: Path, supervision: Supervision) -> ResultHeading:
         """Read the first entries of a result, all of them if it has no calibration."""
-        with opened(file, WHAT, LIMIT) as stream:
+        with opened(file, WHAT, LARGEST_RECORD) as stream:
             start = stream.read(HEAD)
         if not has_head(start):
-            start = read_bytes(file, WHAT, LIMIT)
-        heading = parse_heading(start, file)
-        supervision.require_signed(
-            *(self._data, file, head_of(start)), has_supervisor=bool(heading.supervisor)
-        )
-        return heading
+            start = read_bytes(file, WHAT, LARGEST_RECORD)
+        return signed_heading(self._data, file, start, supervision)
 
     def _signing(
         self, supervision: Supervision, supervisor: SigningKey | None
@@ -345,7 +340,24 @@ class FolderArchive:
             It cannot be read.
         """
         located = self._data.joinpath  # where an absolute folder stays what it is
-        return parse_result(read_bytes(file, WHAT, LIMIT), file, located)
+        return parse_result(read_bytes(file, WHAT, LARGEST_RECORD), file, located)
+
+
+def signed_heading(
+    data: Path, file: Path, start: bytes, supervision: Supervision
+) -> ResultHeading:
+    """Return the heading in the start of a result of a data folder.
+
+    Raises
+    ------
+    FileError
+        It is damaged, or not signed as it must be.
+    """
+    heading = parse_heading(start, file)
+    supervision.require_signed(
+        *(data, file, head_of(start)), has_supervisor=bool(heading.supervisor)
+    )
+    return heading
 
 
 def _is_same(one: Result, other: Result) -> bool:

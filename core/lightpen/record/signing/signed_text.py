@@ -7,6 +7,7 @@ the marks.
 """
 
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 
 from lightpen.formats.own_json import CHECKSUM
@@ -73,6 +74,11 @@ def signatures_of(text: bytes, place: str) -> FoundSignatures:
         _content(before_station, place),
         _content(before_supervisor, place),
     )
+
+
+def entries_sha256(text: bytes) -> str:
+    """Return the hash of the entries of a text before its first checksum."""
+    return sha256(text.partition(CHECKSUM)[0]).hexdigest()
 
 
 def place_in(data: Path, file: Path) -> str:

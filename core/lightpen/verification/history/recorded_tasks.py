@@ -8,7 +8,7 @@ from msgspec import Meta, Struct
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE, read_bytes
+from lightpen.formats.files import LARGEST_RECORD, read_bytes
 from lightpen.formats.own_json import (
     DamagedError,
     Vector,
@@ -24,7 +24,6 @@ from lightpen.verification.tasks.repeatability import RepeatedPoint
 FIXED_POINT = message("file.fixed-point")
 LENGTH = message("file.length")
 DRIFT = message("file.drift")
-LIMIT = 64 * MEGABYTE
 
 T = TypeVar("T")
 
@@ -97,7 +96,7 @@ def read_drift(path: Path) -> FloatArray:
 
 
 def _read(path: Path, shape: type[T], what: Message) -> T:
-    data = read_bytes(path, what, LIMIT)
+    data = read_bytes(path, what, LARGEST_RECORD)
     try:
         has_checksum(data)
         return parse_own_json(data, shape)

@@ -19,6 +19,7 @@ from msgspec import Struct, to_builtins
 from lightpen.errors import FileError
 from lightpen.formats.file_locks import NO_LOCKS, locked
 from lightpen.formats.files import (
+    LARGEST_RECORD,
     MEGABYTE,
     printable,
     read_bytes,
@@ -269,7 +270,7 @@ def written_since(folder: Path, under_way: VerificationCheckpoint) -> UnlistedRe
         if file.name in under_way.files:
             break
         try:
-            record = parse_own_json(read_bytes(file, WHAT, 64 * MEGABYTE), _OfSession)
+            record = parse_own_json(read_bytes(file, WHAT, LARGEST_RECORD), _OfSession)
         except (FileError, DamagedError):
             continue  # reported by whoever reads the archive
         if record.created < under_way.began.replace(microsecond=0):

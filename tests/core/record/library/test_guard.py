@@ -6,12 +6,18 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 from lightpen.errors import AcceptanceError, FileError
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import parse_own_json, with_checksum
 from lightpen.model.limits import StationLimits, SwingLimits
-from lightpen.record.library.guard_files import LIMITS_FOLDER
+from lightpen.record.library.guard_files import (
+    LIMITS_FOLDER,
+    LimitsChange,
+    write_limits_change,
+)
+from lightpen.record.library.key_changes import key_change
 from lightpen.record.library.password_delay import FREE
 from lightpen.record.library.supervision import (
     Signature,
@@ -23,7 +29,8 @@ from lightpen.record.library.supervision_changes import (
     set_limits,
     set_password,
 )
-from lightpen.record.signing.keys import key_folder, station_key
+from lightpen.record.signing.keys import chain_of, key_folder, station_key
+from lightpen.record.signing.signed_text import Signers
 from lightpen.record.signing.station import memory_file, station_name
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
@@ -139,7 +146,7 @@ def test_a_lost_station_key_is_replaced_by_a_supervisor_alone(guarded: Path) -> 
     set_limits(guarded, "Hall 2", LAX, EVE, NOON)
     supervision = read_supervision(guarded)
     assert supervision.limits_at("Hall 2", STRICT) == LAX
-    assert len(supervision.station_keys) == 2
+    assert chain not in map(chain_of, supervision.station_keys)
 
 
 def test_the_station_key_introduces_the_next(guarded: Path) -> None:
@@ -147,3 +154,27 @@ def test_the_station_key_introduces_the_next(guarded: Path) -> None:
     assert station_key(chain) is not None
     public = renew_station_key(guarded, chain, None, NOON)
     assert read_supervision(guarded).station_keys[-1] == public
+
+
+def test_the_station_key_alone_makes_no_file_count(guarded: Path) -> None:
+    """Whoever has the key of a station, and no password, approves nothing."""
+    renew_station_key(guarded, station_name(guarded), None, NOON)
+    guard = read_supervision(guarded)
+    new = guard.signers().station
+    content = key_change(guard.chain, new.public)
+    change = LimitsChange(
+        format=1,
+        at=NOON,
+        supervisor="Chef",
+        previous=guard.hashes[-1],
+        station_key=new.public,
+        station_key_signature=new.sign(content),
+    )
+    write_limits_change(guarded, 4, change, Signers(new))
+    assert len(read_supervision(guarded).hashes) == 4
+
+    (guarded / LIMITS_FOLDER / "000004.json").unlink()
+    listed = structs.replace(change, known={"results/000001.json": "0" * 64})
+    write_limits_change(guarded, 4, listed, Signers(new))
+    with pytest.raises(FileError, match="not signed by this station"):
+        read_supervision(guarded)
