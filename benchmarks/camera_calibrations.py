@@ -229,10 +229,3 @@ def _calibrated(views: Views) -> Camera:
         return calibrate_camera(views, TOLERANCES).camera
     except CalibrationError as error:
         raise RuntimeError(f"A set of boards was refused: {error}") from error
-
-
-def _deviations(found: Camera, truth: Camera) -> FloatArray:
-    assert found.covariance is not None
-    n = min(len(found.intrinsics), len(truth.intrinsics))
-    errors = found.intrinsics[:n] - truth.intrinsics[:n]
-    return np.asarray(errors / np.sqrt(np.diag(found.covariance))[:n])

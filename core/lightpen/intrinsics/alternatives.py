@@ -13,7 +13,7 @@ References
    465-471.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,15 +26,12 @@ from lightpen.intrinsics.adjustment import (
     linearise,
 )
 from lightpen.intrinsics.board_fit import N_POSE, N_SHAPE, BoardFit
+from lightpen.intrinsics.camera_change import FEWEST, CameraChange
 from lightpen.intrinsics.distortion import fit_camera, rough_poses
-from lightpen.intrinsics.uncertainty_map import error_fields
-from lightpen.intrinsics.variance_components import MixedFit
-from lightpen.intrinsics.views import BoardTolerances, Views
-from lightpen.messages import Message, message
+from lightpen.intrinsics.uncertainty_map import moved_in_image
+from lightpen.intrinsics.views import BoardTolerances, Views, shortened
 from lightpen.model.camera import Camera
-from lightpen.model.quantiles import chi_square_quantile, normal_quantile
 
-FEWEST = 3  # views of a group
 MAX_ROUNDS = 8
 CORRELATED = 4.0  # points of a view that tell as much as an independent one
 MAX_PASSES = 8  # of turning one view
@@ -42,110 +39,9 @@ ENOUGH = 0.998  # of the rms before, or one turned view more is not worth it
 RIDGE, HELD = 1e-8, 1e4  # of the information of a point: of nothing, of what is known
 LESSENED = 0.97  # of the rms without it, or an alternative is no explanation
 HALVED = 0.5  # the same, of views that no single camera fits
-CHANCE = 1e-3  # of a change, by chance
-N_WAYS = 3  # of a change: zoom; zoom and axis; all
-LEAST_KNOWN = 1e-10  # least eigenvalue of an information matrix scaled to ones
 USELESS = 0.001  # of the image's longer side, by which a change moves the image
 SHEARED = 0.01  # of the slope of the columns, first step
 MOST_SINGLE = 40  # views that are turned one by one
-SHOWN = 6  # names
-
-
-@dataclass(frozen=True)
-class CameraChange:
-    """A camera that changed while its views were taken.
-
-    Attributes
-    ----------
-    name : str
-        Of the first view after it; empty if it continued gradually.
-    difference : (4 + n,) array
-        Of the intrinsics, after less before, or last less first.
-    in_image : float
-        Distance that it puts between the images of one point, px rms.
-    """
-
-    name: str
-    difference: FloatArray
-    in_image: float
-
-
-def find_change(mixed: MixedFit, names: tuple[str, ...]) -> CameraChange | None:
-    """Return the most significant change of the camera in time, if one is.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Of the views.
-    """
-    n_views = len(mixed.scores.scores)
-    splits = range(FEWEST, n_views - FEWEST + 1)
-    if not splits:
-        return None
-    order = np.arange(n_views)
-    trials = [(first, (order >= first).astype(float)) for first in splits]
-    trials.append((0, np.linspace(-0.5, 0.5, n_views)))
-    camera = mixed.adjustment.state.cameras[0]
-    at = mixed.adjustment.of_intrinsics(0)
-    n = at.stop - at.start
-    ways = (_zoom(camera), np.eye(n)[:, :4], np.eye(n))
-    clustering = max(mixed.scores.clustering, 1.0)
-    best, most = None, 1.0
-    for first, share in trials:
-        score, information = mixed.scores.change(share)
-        for way in ways:
-            difference, squares = _fitted_change(score[at], information[at, at], way)
-            chance = CHANCE / (len(trials) * N_WAYS)
-            least = clustering * chi_square_quantile(way.shape[1], chance)
-            if squares > most * least:
-                most = squares / least
-                moves = error_fields(camera) @ difference
-                in_image = float(np.sqrt(np.mean(np.square(moves).sum(axis=-1))))
-                best = CameraChange(names[first] if first else "", difference, in_image)
-    return best
-
-
-def detectable_zoom(mixed: MixedFit) -> float:
-    """Return the least zoom at the middle of the views that is found, relative.
-
-    With 95 % probability; `find_change` tries all views as the first after it.
-    """
-    n_views, at = len(mixed.scores.scores), mixed.adjustment.of_intrinsics(0)
-    share = (np.arange(n_views) >= n_views // 2).astype(np.float64)
-    _, information = mixed.scores.change(share)
-    zoom = _zoom(mixed.adjustment.state.cameras[0])[:, 0]
-    clustering = max(mixed.scores.clustering, 1.0)
-    sigma = np.sqrt(clustering / (zoom @ information[at, at] @ zoom))
-    n_trials = max(n_views - 2 * FEWEST + 2, 1)
-    least = chi_square_quantile(1, CHANCE / (n_trials * N_WAYS)) ** 0.5
-    return float((least + normal_quantile(0.05)) * sigma)
-
-
-def _zoom(camera: Camera) -> FloatArray:
-    """Return how a zoom changes the intrinsics, (4 + n, 1)."""
-    zoom = np.zeros((len(camera.intrinsics), 1))
-    zoom[:2, 0] = camera.fx, camera.fy
-    return zoom
-
-
-def _fitted_change(
-    score: FloatArray, information: FloatArray, way: FloatArray
-) -> tuple[FloatArray, float]:
-    """Return the change that fits best of some kind, and its size by its covariance.
-
-    Parameters
-    ----------
-    way : (n, k) array
-        Its directions.
-    """
-    known = way.T @ information @ way
-    scale = 1 / np.sqrt(np.maximum(np.diag(known), 1e-300))
-    values, vectors = np.linalg.eigh(known * np.outer(scale, scale))
-    if values[0] <= LEAST_KNOWN:  # one part alone does not show
-        return np.zeros(len(score)), 0.0
-    vectors = scale[:, None] * vectors
-    found = (vectors / values) @ (vectors.T @ (way.T @ score))
-    return way @ found, float(score @ way @ found)
 
 
 def explain(
@@ -234,10 +130,9 @@ def _differ(cameras: tuple[Camera, Camera]) -> bool:
     """Return whether two cameras image a point at places that matter."""
     one, other = cameras
     try:
-        moves = error_fields(one) @ (other.intrinsics - one.intrinsics)
+        in_image = moved_in_image(one, other.intrinsics - one.intrinsics)
     except CalibrationError:  # one of them folds the image
         return False
-    in_image = float(np.sqrt(np.mean(np.square(moves).sum(axis=-1))))
     return in_image > USELESS * max(one.image_size)
 
 
@@ -260,32 +155,11 @@ def _change_error(
     )
 
 
-def message_on_change(change: CameraChange) -> Message:
-    """Return the message on a change that does not make the set useless."""
-    if not change.name:
-        return message(
-            "intrinsics.drift",
-            px=change.in_image,
-            fx=float(change.difference[0]),
-            cx=float(change.difference[2]),
-            cy=float(change.difference[3]),
-        )
-    return message(
-        "intrinsics.step",
-        name=change.name,
-        px=change.in_image,
-        fx=float(change.difference[0]),
-        cx=float(change.difference[2]),
-        cy=float(change.difference[3]),
-    )
-
-
 def _fewer(views: Views, which: BoolArray) -> tuple[str, int]:
     """Return the names of the fewer views of two groups, and their number."""
     fewer = which if which.sum() <= len(which) / 2 else ~which
-    names = [n for n, own in zip(views.names, fewer, strict=True) if own]
-    shown = ", ".join(names[:SHOWN]) + (" ..." if len(names) > SHOWN else "")
-    return shown, len(names)
+    names = tuple(n for n, own in zip(views.names, fewer, strict=True) if own)
+    return shortened(names), len(names)
 
 
 def _fitted(views: Views, tolerances: BoardTolerances, near: Camera) -> BoardFit | None:

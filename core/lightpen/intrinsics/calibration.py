@@ -14,13 +14,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.alternatives import (
-    HALVED,
-    detectable_zoom,
-    explain,
-    find_change,
-    message_on_change,
-)
+from lightpen.intrinsics.alternatives import HALVED, explain
 from lightpen.intrinsics.board_findings import (
     board_contradictions,
     messages_on_board,
@@ -29,6 +23,11 @@ from lightpen.intrinsics.board_findings import (
     require_plausible_bend,
 )
 from lightpen.intrinsics.board_fit import BoardFit
+from lightpen.intrinsics.camera_change import (
+    detectable_zoom,
+    find_change,
+    message_on_change,
+)
 from lightpen.intrinsics.distortion import (
     FEW,
     Choice,
@@ -39,7 +38,7 @@ from lightpen.intrinsics.distortion import (
 )
 from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
 from lightpen.intrinsics.start import start_board_poses, start_camera
-from lightpen.intrinsics.uncertainty_map import error_fields, map_uncertainty
+from lightpen.intrinsics.uncertainty_map import map_uncertainty, moved_in_image
 from lightpen.intrinsics.variance_components import MixedFit, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.messages import Message, message
@@ -370,10 +369,9 @@ def _halves(effects: MixedFit) -> ViewHalves | None:
     covariance = np.linalg.pinv(information[at, at], rcond=1e-14, hermitian=True)
     covariance *= max(effects.scores.clustering, 1.0)
     change = covariance @ score[at] / max(effects.scores.clustering, 1.0)
-    moves = error_fields(effects.adjustment.state.cameras[0]) @ change
     return ViewHalves(
         change[:4],
         2 * np.sqrt(np.diag(covariance)[:4]),
-        float(np.sqrt(np.mean(np.square(moves).sum(axis=-1)))),
+        moved_in_image(effects.adjustment.state.cameras[0], change),
         detectable_zoom(effects),
     )

@@ -7,12 +7,11 @@ shadows) is the same in all of them, so more of them tell nothing more of the ca
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.views import Views
+from lightpen.intrinsics.views import Views, shortened
 from lightpen.messages import Message, message
 
 SAME = 0.002  # of the image's longer side: distance of the points, rms
 COMMON = 0.8  # of the points of the view that shows fewer
-SHOWN = 5  # names
 
 
 def without_duplicates(views: Views) -> tuple[Views, tuple[str, ...]]:
@@ -38,9 +37,11 @@ def message_on_duplicates(n_views: int, names: tuple[str, ...]) -> Message:
     n_views : int
         Number of those that do.
     """
-    shown = ", ".join(names[:SHOWN]) + (" ..." if len(names) > SHOWN else "")
     return message(
-        "intrinsics.duplicates", n_duplicates=len(names), n_views=n_views, names=shown
+        "intrinsics.duplicates",
+        n_duplicates=len(names),
+        n_views=n_views,
+        names=shortened(names),
     )
 
 

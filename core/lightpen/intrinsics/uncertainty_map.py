@@ -80,6 +80,12 @@ def error_fields(camera: Camera) -> FloatArray:
     return np.asarray((flat - explained).reshape(fields.shape))
 
 
+def moved_in_image(camera: Camera, difference: FloatArray) -> float:
+    """Return how far a difference of the intrinsics moves the image, px rms."""
+    moves = error_fields(camera) @ difference
+    return float(np.sqrt(np.mean(np.square(moves).sum(axis=-1))))
+
+
 def _pixels(camera: Camera) -> FloatArray:
     grid = np.meshgrid(
         np.linspace(0, camera.width - 1, COLUMNS),

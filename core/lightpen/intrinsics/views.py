@@ -7,6 +7,13 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.intrinsics.boards import Board
 
+SHOWN = 6  # names in a message
+
+
+def shortened(names: tuple[str, ...]) -> str:
+    """Return the first names of views as text."""
+    return ", ".join(names[:SHOWN]) + (" ..." if len(names) > SHOWN else "")
+
 
 @dataclass(frozen=True)
 class BoardTolerances:

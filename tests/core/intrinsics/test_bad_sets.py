@@ -8,8 +8,8 @@ import pytest
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.alternatives import find_change
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
+from lightpen.intrinsics.camera_change import find_change
 from lightpen.intrinsics.distortion import fit_camera
 from lightpen.intrinsics.variance_components import fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views

@@ -1,0 +1,123 @@
+"""Change of a camera while its views were taken, by the scores of the views."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.intrinsics.uncertainty_map import moved_in_image
+from lightpen.intrinsics.variance_components import MixedFit
+from lightpen.messages import Message, message
+from lightpen.model.camera import Camera
+from lightpen.model.quantiles import chi_square_quantile, normal_quantile
+
+FEWEST = 3  # views of a group
+CHANCE = 1e-3  # of a change, by chance
+N_WAYS = 3  # of a change: zoom; zoom and axis; all
+LEAST_KNOWN = 1e-10  # least eigenvalue of an information matrix scaled to ones
+
+
+@dataclass(frozen=True)
+class CameraChange:
+    """A camera that changed while its views were taken.
+
+    Attributes
+    ----------
+    name : str
+        Of the first view after it; empty if it continued gradually.
+    difference : (4 + n,) array
+        Of the intrinsics, after less before, or last less first.
+    in_image : float
+        Distance that it puts between the images of one point, px rms.
+    """
+
+    name: str
+    difference: FloatArray
+    in_image: float
+
+
+def find_change(mixed: MixedFit, names: tuple[str, ...]) -> CameraChange | None:
+    """Return the most significant change of the camera in time, if one is.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the views.
+    """
+    n_views = len(mixed.scores.scores)
+    splits = range(FEWEST, n_views - FEWEST + 1)
+    if not splits:
+        return None
+    order = np.arange(n_views)
+    trials = [(first, (order >= first).astype(float)) for first in splits]
+    trials.append((0, np.linspace(-0.5, 0.5, n_views)))
+    camera = mixed.adjustment.state.cameras[0]
+    at = mixed.adjustment.of_intrinsics(0)
+    n = at.stop - at.start
+    ways = (_zoom(camera), np.eye(n)[:, :4], np.eye(n))
+    clustering = max(mixed.scores.clustering, 1.0)
+    best, most = None, 1.0
+    for first, share in trials:
+        score, information = mixed.scores.change(share)
+        for way in ways:
+            difference, squares = _fitted_change(score[at], information[at, at], way)
+            chance = CHANCE / (len(trials) * N_WAYS)
+            least = clustering * chi_square_quantile(way.shape[1], chance)
+            if squares > most * least:
+                most = squares / least
+                in_image = moved_in_image(camera, difference)
+                best = CameraChange(names[first] if first else "", difference, in_image)
+    return best
+
+
+def detectable_zoom(mixed: MixedFit) -> float:
+    """Return the least zoom at the middle of the views that is found, relative.
+
+    With 95 % probability; `find_change` tries all views as the first after it.
+    """
+    n_views, at = len(mixed.scores.scores), mixed.adjustment.of_intrinsics(0)
+    share = (np.arange(n_views) >= n_views // 2).astype(np.float64)
+    _, information = mixed.scores.change(share)
+    zoom = _zoom(mixed.adjustment.state.cameras[0])[:, 0]
+    clustering = max(mixed.scores.clustering, 1.0)
+    sigma = np.sqrt(clustering / (zoom @ information[at, at] @ zoom))
+    n_trials = max(n_views - 2 * FEWEST + 2, 1)
+    least = chi_square_quantile(1, CHANCE / (n_trials * N_WAYS)) ** 0.5
+    return float((least + normal_quantile(0.05)) * sigma)
+
+
+def _zoom(camera: Camera) -> FloatArray:
+    """Return how a zoom changes the intrinsics, (4 + n, 1)."""
+    zoom = np.zeros((len(camera.intrinsics), 1))
+    zoom[:2, 0] = camera.fx, camera.fy
+    return zoom
+
+
+def _fitted_change(
+    score: FloatArray, information: FloatArray, way: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return the change that fits best of some kind, and its size by its covariance.
+
+    Parameters
+    ----------
+    way : (n, k) array
+        Its directions.
+    """
+    known = way.T @ information @ way
+    scale = 1 / np.sqrt(np.maximum(np.diag(known), 1e-300))
+    values, vectors = np.linalg.eigh(known * np.outer(scale, scale))
+    if values[0] <= LEAST_KNOWN:  # one part alone does not show
+        return np.zeros(len(score)), 0.0
+    vectors = scale[:, None] * vectors
+    found = (vectors / values) @ (vectors.T @ (way.T @ score))
+    return way @ found, float(score @ way @ found)
+
+
+def message_on_change(change: CameraChange) -> Message:
+    """Return the message on a change that does not make the set useless."""
+    fx, _, cx, cy, *_ = change.difference.tolist()
+    if not change.name:
+        return message("intrinsics.drift", px=change.in_image, fx=fx, cx=cx, cy=cy)
+    return message(
+        "intrinsics.step", name=change.name, px=change.in_image, fx=fx, cx=cx, cy=cy
+    )
