@@ -115,8 +115,8 @@ def _budget(entries: list[dict[str, Any]]) -> Iterator[Block]:
 
 def _features(entries: list[dict[str, Any]]) -> Iterator[Block]:
     columns = [
-        Column(translate("paper", "Feature"), 1.6),
-        Column(translate("paper", "Kind"), 1.6),
+        Column(translate("paper", "Feature"), 1.3),
+        Column(translate("paper", "Kind"), 2.1),
         *_numbers("x", "y", "z", translate("paper", "U (k = 2)")),
         Column(translate("paper", "Sizes"), 2.2),
         *_numbers(translate("paper", "Form error"), translate("paper", "Points")),

@@ -80,6 +80,8 @@ MESSAGES = {
     "measuring.not-tied": "Position {position} shares {n_shared} datum points (points, circles, slots, spheres) with the positions before; at least {needed} are needed. Probe more of them again.",
     "part.few-datums": "{n_points} points, circles, slots and spheres were probed; {needed} that are not on one line are needed as datum points to connect the new position. Start over.",
     "part.moved": "Position {position}: datum points agree with the first position within {residual:.4f} mm.",
+    "part.datums-moved": "Position {position}: datum points are up to {residual:.4f} mm off the first position, much more than their U. The datum points were not the same, or the part moved once more.",
+    "part.probe-again": "Measure the part again.",
     "part.refined": "Points and tip refined by the known form of {names}: tip shifted by {shift:.4f} mm, its U (k = 2) {before:.4f} mm before and {after:.4f} mm after.",
     "part.not-refined": "The touches of {names} deviate from the known form by more than their U (chi-square {chi_square:.1f} with {n_free} degrees of freedom) and refine nothing.",
     "part.check-known": "Check nominal diameter, ball diameter and cleanliness; then verify the tip.",

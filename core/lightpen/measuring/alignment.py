@@ -6,12 +6,13 @@ in the frame of the part hold what the alignment leaves uncertain.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.measuring.features import AXIS, PLACE
 from lightpen.measuring.quantities import Quantity, derive, stacked
 from lightpen.model.rigid import (
@@ -21,6 +22,7 @@ from lightpen.model.rigid import (
 )
 
 MIN_POINTS = 3
+DISAGREEING = 3.0  # times U of a datum point; form errors make some of it
 THIN = 1e-3  # of the extent: points on a line determine no frame
 
 
@@ -34,10 +36,19 @@ class Alignment:
         Rotation vector and translation of part_from_cam, (6,), rad and mm.
     residuals : (N,) array
         Distances of datum points from their nominals; empty for 3-2-1.
+    residual_uncertainties : (N,) array
+        U (k = 2) of them where both touches of a point are known; else empty.
     """
 
     motion: Quantity
     residuals: FloatArray
+    residual_uncertainties: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def is_consistent(self) -> bool:
+        """Whether datum points that were touched again are where they were."""
+        limits = DISAGREEING * self.residual_uncertainties
+        return not len(limits) or bool((self.residuals <= limits).all())
 
     @property
     def rotation(self) -> FloatArray:
@@ -135,7 +146,9 @@ def align_points(
     return Alignment(found, np.linalg.norm(actual @ R.T + t - nominals, axis=1))
 
 
-def tie(then: Sequence[Quantity], now: Sequence[Quantity]) -> Alignment:
+def tie(
+    then: Sequence[Quantity], now: Sequence[Quantity], inputs: FloatArray
+) -> Alignment:
     """Return the motion that brings datum points touched again to where they were.
 
     The part or the camera was moved in between. Both touches of each point are
@@ -145,6 +158,8 @@ def tie(then: Sequence[Quantity], now: Sequence[Quantity]) -> Alignment:
     ----------
     then, now : sequence of Quantity
         The same features before and after; their origins count.
+    inputs : (P, P) array
+        Covariance of all inputs.
     """
     n = len(then)
 
@@ -154,8 +169,15 @@ def tie(then: Sequence[Quantity], now: Sequence[Quantity]) -> Alignment:
         return align_points(after, before).motion.values
 
     before = np.array([each.values[PLACE] for each in then])
-    residuals = align_points(now, before).residuals
-    return Alignment(derive(motion, *then, *now), residuals)
+    fit = align_points(now, before)
+    differences = [
+        fit.rotation @ after.by_inputs[PLACE] - earlier.by_inputs[PLACE]
+        for earlier, after in zip(then, now, strict=True)
+    ]
+    variances = [float(np.trace(D @ inputs @ D.T)) for D in differences]
+    return Alignment(
+        derive(motion, *then, *now), fit.residuals, COVERAGE_FACTOR * np.sqrt(variances)
+    )
 
 
 def _thinness(points: FloatArray) -> float:

@@ -170,6 +170,7 @@ def _probed(
             ties[position] = motion = tie(
                 [surfaces[name].quantity for name in shared],
                 [own[name].quantity for name in shared],
+                touches.inputs,
             )
             own = {
                 name: replace(each, quantity=motion.in_part(each.quantity))

@@ -109,6 +109,8 @@ def part_entries(part: MeasuredPart) -> dict[str, Any]:
                 "first_from_here_rotation": motion.rotation,
                 "first_from_here_translation_mm": motion.translation,
                 "residuals_mm": motion.residuals,
+                "residual_uncertainties_mm": motion.residual_uncertainties,
+                "is_consistent": motion.is_consistent,
             }
             for position, motion in part.ties.items()
         ],

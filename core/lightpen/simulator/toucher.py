@@ -13,7 +13,7 @@ from lightpen.verification.session.session_state import (
     is_at_rest,
 )
 from lightpen.verification.tasks.registry import AnyTask
-from lightpen.verification.tasks.task import HandGoal
+from lightpen.verification.tasks.task import HandGoal, TaskOptions
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,7 @@ class _TouchGoal:
     """A point that the operator was sent to."""
 
     task: AnyTask | None
+    options: TaskOptions | None
     run: int
     step: int
 
@@ -36,18 +37,18 @@ class ProbingOperator:
         """React to a state of the verification; reseat a lifted tip."""
         task, operator = state.task(setup), self._operator
         n_runs = len(state.runs) + len(state.visits)
-        wanted = _TouchGoal(task, n_runs, len(state.touches))
+        options = None if task is None else setup.choices.options_of(task)
+        wanted = _TouchGoal(task, options, n_runs, len(state.touches))
         is_lifted = operator.doing in (HandActivity.LIFTED, HandActivity.ABSENT)
         if wanted == self._wanted and not (is_lifted and task is not None):
             return
-        if task is None:
+        if task is None or options is None:
             self._wanted = wanted
             operator.leave()
             return
         if is_at_rest(state) and not is_lifted:
             operator.lift()
             return
-        options = setup.choices.options_of(task)
         is_same_again = not any(task.newness(options))
         must_move_on = is_same_again and state.touching.phase is ProbingPhase.RECORDED
         if must_move_on and is_lifted:

@@ -294,7 +294,7 @@ class VerificationWorkflow:
             self._on_runs_unread(error.message)
             return
         self._faults.end()
-        self._choices = before.setup.choices
+        self._choices = before.setup.choices.with_moves(())  # which are its own
         self._publish(
             VerificationStatus(
                 tip=before.tip,

@@ -158,6 +158,12 @@ def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) ->
         each.name for each in options.plan.features if each.name not in names
     )
     assessment = _assessment(part, missing)
+    for position, motion in part.ties.items():
+        if not motion.is_consistent:
+            residual = float(motion.residuals.max())
+            said = message("part.datums-moved", position=position, residual=residual)
+            doubt = refused(said, message("part.probe-again"))
+            assessment = worst((doubt, assessment))
     if refinement is not None and not refinement.is_used:
         said = _refined(refinement, conditions.instrument)
         assessment = worst((assessment, check(said, message("part.check-known"))))

@@ -321,6 +321,21 @@ def test_a_part_moved_in_between_goes_on_after_three_datum_points(
     assert any(note.code == "part.moved" for note in notes)
 
 
+def test_other_datum_points_than_before_are_told(instrument: Instrument) -> None:
+    holes = [structs.replace(each, touches=3) for each in plate_plan().features[2:6]]
+    plan = Plan("Holes", tuple(holes))
+    runs = probed_plate(instrument, plan)
+    again = [(f"{name}@2", points) for name, points in runs]
+    setup, options = station(instrument, plan).setup, PartOptions(plan)
+    swapped = [(again[0][0], runs[1][1]), (again[1][0], runs[0][1]), *again[2:]]
+
+    good = PART.measure([*runs, *again], setup.conditions, options)
+    bad = PART.measure([*runs, *swapped], setup.conditions, options)
+
+    assert good.assessment.grade is Grade.PASS
+    assert bad.assessment.reason.code == "part.datums-moved"
+
+
 def test_a_part_is_not_moved_before_three_datum_points_are_probed(
     instrument: Instrument,
 ) -> None:
