@@ -69,7 +69,7 @@ MESSAGES = {
     "part.out": "{part}: {n_out} of {n_judged} characteristics are out of tolerance: {names}.",
     "part.unclear": "{part}: {n_open} of {n_judged} characteristics are neither proven within nor out of tolerance: {names}.",
     "part.incomplete": "{part}: not all features were probed. Missing: {names}.",
-    "part.done": "The part is measured.",
+    "part.done": "You can put the pen down.",
     "part.rework": "Check the part, its clamping and its cleanliness; then measure it again.",
     "part.more-points": "Probe more points, or use a precise probing, for a smaller U.",
     "part.complete": "Measure the missing features.",

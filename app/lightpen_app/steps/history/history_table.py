@@ -45,7 +45,7 @@ NAMED = {  # the least and the most that is shown whole, of what anybody may hav
     BY: ("A. Name", 16 * "n"),
 }
 MOMENT, COORDINATE, UNCERTAINTY = "0000-00-00 00:00", "-000.0000", "0.0000"
-CELL_MARGIN = 25  # px, beside the words
+CELL_MARGIN = 24  # px, beside the words
 LEAST_WORDS = 8 * GRID  # px, of the last column
 LEAST_ROWS = 5
 MOST_BLOCKS = 40  # that are kept

@@ -81,7 +81,7 @@ class ProbingPage(ResponsiveLayout, Page):
         for panel in self._panels.values():
             self._pages.add(panel)
         self._image = ImageView()
-        self._hand = ProbingSimulatorControls(self._live)
+        self._hand = ProbingSimulatorControls(self._live, presenter.tasks)
         self._showing = QTimer(self)
         self._showing.setSingleShot(True)
         self._showing.setInterval(SHOWING_MS)

@@ -1,11 +1,14 @@
 """Buttons for the simulated operator who probes."""
 
+from collections.abc import Collection
+
 from PySide6.QtWidgets import QToolButton, QWidget
 from typing_extensions import override
 
 from lightpen.simulator.hand import Operator
-from lightpen.verification.tasks.circle import SIMULATED_RADIUS
+from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS
 from lightpen.verification.tasks.length import SIMULATED_LENGTH
+from lightpen.verification.tasks.registry import AnyTask
 from lightpen.verification.tasks.sphere import SIMULATED_RADIUS as SPHERE_RADIUS
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -15,10 +18,19 @@ from lightpen_app.work.live_view import LiveView
 
 
 class ProbingSimulatorControls(SimulatorControls):
-    """Lets the simulated operator touch, or lift the pen; hidden with a real pen."""
+    """Lets the simulated operator touch, or lift the pen; hidden with a real pen.
 
-    def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:
+    Parameters
+    ----------
+    tasks : collection of VerificationTask
+        Tasks of the page, whose artefacts are described.
+    """
+
+    def __init__(
+        self, live: LiveView, tasks: Collection[AnyTask], parent: QWidget | None = None
+    ) -> None:
         super().__init__(live, parent)
+        self._has_ring = CIRCLE in tasks
         self.setProperty("area", "panel")
 
         # Widgets
@@ -59,7 +71,8 @@ class ProbingSimulatorControls(SimulatorControls):
             "diameter of {2} mm by the ball centres."
         )
         found = SIMULATED_RADIUS, SIMULATED_LENGTH, 2 * SPHERE_RADIUS
-        self._sizes.setText(sizes.format(*(f"{each:g}" for each in found)))
+        words = sizes.format(*(f"{each:g}" for each in found))
+        self._sizes.setText(words if self._has_ring else "")
 
     @override
     def _follow_connection(self) -> None:
