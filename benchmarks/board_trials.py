@@ -78,8 +78,20 @@ def draw_points(
     """Return where the points are seen, (V, N, 2), px."""
     true = board.points.copy()
     true[:, :2] += rng.normal(0, rng.uniform(*UNEVEN), (board.n_points, 2))
+    return observe_points(CAMERA, board, true, poses, field, rng)
+
+
+def observe_points(
+    camera: Camera,
+    board: Board,
+    true: FloatArray,
+    poses: BoardPoses,
+    field: LensField,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Return where a camera sees points (N, 3), mm, of a board, (V, N, 2), px."""
     points = true @ np.swapaxes(poses.rotations, 1, 2) + poses.translations[:, None]
-    pixels = CAMERA.project(points)
+    pixels = camera.project(points)
     pixels += field.at(pixels)
     functions = smooth_functions(board)
     drawn = rng.standard_normal((len(pixels), functions.shape[1], 2))
