@@ -3,9 +3,9 @@
     python -m benchmarks.pair_trials --pairs 40
 
 As `benchmarks.board_trials`, each camera with its own noise, lens field and smooth
-errors. It prints how often 95 % intervals contain the truth, the size of differences between
-random halves of the views over their standard uncertainty, and U of fx in the pair
-over U by the camera alone.
+errors. It prints how often 95 % intervals contain the truth, the size of differences
+between random halves of the views over their standard uncertainty, and U of fx in the
+pair over U by the camera alone.
 """
 
 import argparse
