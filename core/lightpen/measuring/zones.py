@@ -101,31 +101,34 @@ def fit_zone(
     extent = float(np.ptp(points, axis=0).max())
     reach = 0.1 * extent
 
+    def merit_of(d: FloatArray, sizes: FloatArray) -> float:
+        radius = float(sizes[0]) if len(sizes) else 0.0
+        match criterion:
+            case Criterion.MINIMUM_ZONE:
+                return float(np.abs(d).max())
+            case Criterion.CIRCUMSCRIBED:
+                return radius + float(d.max())
+            case Criterion.INSCRIBED:
+                return -radius - float(d.min())
+
     def evaluated(
         origin: FloatArray, axes: FloatArray, sizes: FloatArray
     ) -> tuple[FloatArray, FloatArray, float]:
-        q = (points - origin) @ axes
-        (values, *_), J = surface.derivatives(q, sizes)
-        radius = sizes[0] if len(sizes) else 0.0
-        d, J = values[:, 0], J[:, 0]
-        match criterion:
-            case Criterion.MINIMUM_ZONE:
-                merit = float(np.abs(d).max())
-            case Criterion.CIRCUMSCRIBED:
-                merit = float(radius + d.max())
-            case Criterion.INSCRIBED:
-                merit = -float(radius + d.min())
-        return d, J, merit
+        (values, *_), J = surface.derivatives((points - origin) @ axes, sizes)
+        return values[:, 0], J[:, 0], merit_of(values[:, 0], sizes)
 
     d, J, merit = evaluated(origin, axes, sizes)
     for _ in range(MAX_STEPS):
         step = _best_step(d, J, len(free), criterion, reach)
+        resized = sizes + step[len(free) :]
+        if merit - merit_of(d + J @ step, resized) <= CONVERGED * extent:
+            break
         motion = np.zeros(6)
         motion[free] = step[: len(free)]
         after = (
             origin + axes @ motion[:3],
             axes @ rotation_from_vector(motion[3:]),
-            sizes + step[len(free) :],
+            resized,
         )
         d_after, J_after, merit_after = evaluated(*after)
         if merit_after < merit:
