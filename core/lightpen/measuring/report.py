@@ -22,6 +22,10 @@ DECISIONS: dict[Decision | None, Message | str] = {
     None: "",
 }
 
+SIDES = {
+    Side.INSIDE: message("measuring.inside"),
+    Side.OUTSIDE: message("measuring.outside"),
+}
 EVIDENCES = {
     Evidence.PLAN: message("measuring.by-plan"),
     Evidence.AIR: message("measuring.by-air"),
@@ -64,10 +68,7 @@ def _kind_and_side(one: Measured) -> Message:
     surface = one.surface
     if one.kind not in ROUND or surface.evidence not in EVIDENCES:
         return NAMES[one.kind]
-    side = message(
-        "measuring.inside" if surface.side is Side.INSIDE else "measuring.outside"
-    )
-    by = EVIDENCES[surface.evidence]
+    side, by = SIDES[surface.side], EVIDENCES[surface.evidence]
     return message("measuring.sided", kind=NAMES[one.kind], side=side, by=by)
 
 
