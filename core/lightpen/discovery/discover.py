@@ -25,9 +25,15 @@ from lightpen.discovery.requirements import (
     require_length,
     require_lens,
     require_no_second_pen,
+    require_one_focal_length,
 )
 from lightpen.discovery.scale import with_lengths_known
-from lightpen.discovery.scaled_start import LEAST_LENGTH_SIGMA, numbered, scaled_start
+from lightpen.discovery.scaled_start import (
+    LEAST_LENGTH_SIGMA,
+    focal_lengths_of_halves,
+    numbered,
+    scaled_start,
+)
 from lightpen.discovery.sightings import Report, Sightings
 from lightpen.discovery.starts import any_covariance, scaled_to
 from lightpen.discovery.touched_length import with_touched_length
@@ -94,7 +100,9 @@ def _adjusted(
     """Return tip, pen and camera by a swing with numbered LEDs."""
     sightings = swing.sightings
     pixels = pixels_of(swing.found.spots, swing.centers)
-    start, lengths, choice = scaled_start(request, swing.found, pixels)
+    scaled = start, lengths, choice = scaled_start(request, swing.found, pixels)
+    halves = focal_lengths_of_halves(scaled, pixels[swing.found.images], request.camera)
+    require_one_focal_length(*halves)
     report(0.6)
     second = None
     if request.second is not None:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lightpen.arrays import FloatArray
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.labelling import Labelled
 from lightpen.discovery.request import Request
@@ -21,6 +22,8 @@ MIN_IMAGES = 40
 MIN_LEDS = 5
 SECOND_PEN = 3  # lights that move with one another, beside those of the pen
 OTHER_SIZE = 0.1  # relative: discs that are another size than stated
+ZOOMED = 1e-3  # of the focal length, between both halves of a swing, and
+HALVES_APART = 6.0  # standard deviations of the difference
 MOST_USED = 0.5  # of the images
 WORST_TIP, WORST_FOCAL = 0.02, 0.03  # U over the pen's size, and relative
 
@@ -81,6 +84,14 @@ def require_lens(camera: Camera) -> None:
     """Refuse a lens that no camera file can state, as the corners were not seen."""
     if folds(camera):
         raise CalibrationError("discover.lens-folds")
+
+
+def require_one_focal_length(halves: FloatArray, sigmas: FloatArray) -> None:
+    """Refuse a swing whose halves have focal lengths, (2,), px, of their own."""
+    first, second = halves.tolist()
+    by_chance = HALVES_APART * float(np.linalg.norm(sigmas))
+    if abs(first - second) > max(ZOOMED * first, by_chance):
+        raise CalibrationError("discover.camera-changed", first=first, second=second)
 
 
 def require_certain(discovery: Discovery) -> None:

@@ -14,14 +14,22 @@ from lightpen.discovery.numbering import framed, number_by_place, number_by_sket
 from lightpen.discovery.request import Request
 from lightpen.discovery.requirements import MIN_LEDS
 from lightpen.discovery.scale import MeasuredLength, known_lengths, scale_by
-from lightpen.discovery.starts import KnownLength, Start, adjust_start, scaled_to
+from lightpen.discovery.starts import (
+    KnownLength,
+    Start,
+    adjust_start,
+    focal_sigma,
+    scaled_to,
+)
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.intrinsics.distortion import Choice
+from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 
 N_ADJUSTED = 100  # images that the start is adjusted to
+N_HALF_STEPS = 15
 MIN_SHARE, MIN_SEEN = 0.05, 10  # of the images, and images, in which an LED is seen
 USUAL_DISC = 0.05  # of the largest distance of two LEDs
 RELATIVE = 100.0  # the largest distance of two LEDs, where no length is known
@@ -106,6 +114,30 @@ def scaled_start(request: Request, found: Labelled, pixels: FloatArray) -> Scale
     tip, rotations = R @ every.tip_pen + t, every.rotations @ R.T
     every = replace(every, pen=pen, tip_pen=tip, rotations=rotations)
     return ScaledStart(every, lengths, choice)
+
+
+def focal_lengths_of_halves(
+    start: ScaledStart, pixels: FloatArray, known: Camera | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return focal length and its sigma by each half of the images, (2,) each, px.
+
+    Parameters
+    ----------
+    pixels : (N, L, 2) array
+        Of the images of the start, px.
+    """
+    state, n = start.state, len(pixels)
+    prior = camera_prior(state.rig.cameras[0], known)
+    found, sigmas = np.empty(2), np.empty(2)
+    for k, half in enumerate(np.array_split(np.arange(n), 2)):
+        some = half[
+            np.unique(np.linspace(0, len(half) - 1, N_ADJUSTED // 2).astype(int))
+        ]
+        part = replace(state, rotations=state.rotations[some])
+        alone = adjust_start(part, pixels[some], prior, N_HALF_STEPS, start.lengths)
+        found[k] = alone.state.rig.cameras[0].fx
+        sigmas[k] = focal_sigma(alone, pixels[some], prior, start.lengths)
+    return found, sigmas
 
 
 def _with_discs(pen: Pen, request: Request) -> Pen:

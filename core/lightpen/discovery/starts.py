@@ -224,6 +224,23 @@ def adjust_start(
     return Start(state, robust_sigma(view.residuals, 3))
 
 
+def focal_sigma(
+    start: Start,
+    pixels: FloatArray,
+    prior: CameraPrior,
+    lengths: tuple["KnownLength", ...],
+) -> float:
+    """Return the standard uncertainty of the focal length of an adjusted start, px."""
+    state = start.state
+    view = _view(state, pixels[:, None])
+    used = np.isfinite(view.residuals[..., 0])[:, None]
+    each = eliminate((_weighted(view, start.sigma),), used, start.sigma)
+    N, b = _with_priors(each.N, each.b, state, prior, lengths)
+    unit = np.zeros_like(b)
+    unit[N_CONE] = 1.0
+    return float(np.sqrt(_damped_step(N, unit, 0.0)[N_CONE]))
+
+
 @dataclass(frozen=True)
 class KnownLength:
     """A length between two LEDs by index, with its standard uncertainty, mm."""
