@@ -9,6 +9,7 @@ from sqlalchemy import (
     Column,
     Connection,
     Row,
+    Select,
     delete,
     func,
     insert,
@@ -25,7 +26,6 @@ from lightpen.archive.entries import (
     SHORT,
     ChainHead,
     Event,
-    FileHash,
     Kind,
     StoredEntry,
     chained,
@@ -281,17 +281,11 @@ def entry_of_result(database: Database, chain: str, place: str) -> StoredEntry |
     return None if row is None else read_row(database, row)
 
 
-def limits_entered(database: Database, chain: str) -> tuple[FileHash, ...]:
-    """Return the files of limits that a chain has entries of, the oldest first."""
-    wanted = (
-        select(*READ)
-        .where(ENTRIES.c.chain == chain, ENTRIES.c.kind == Kind.LIMITS.value)
-        .order_by(ENTRIES.c.number)
-    )
+def entries_of_limits(database: Database, chain: str) -> tuple[StoredEntry, ...]:
+    """Return the entries of limits of a chain, the oldest first."""
     with database.reading() as connection:
-        rows = connection.execute(wanted).all()
-    files = (read_row(database, row).entry.event.result for row in rows)
-    return tuple(file for file in files if file is not None)
+        rows = connection.execute(_of_limits(chain)).all()
+    return tuple(read_row(database, row) for row in rows)
 
 
 class ArchivedFiles:
@@ -511,15 +505,9 @@ def _require_elsewhere(connection: Connection, new: StoredEntry) -> None:
 def _require_signed(
     connection: Connection, chain: str, new: Iterable[StoredEntry]
 ) -> None:
-    limits = (
-        select(*READ)
-        .where(ENTRIES.c.chain == chain, ENTRIES.c.kind == Kind.LIMITS.value)
-        .order_by(ENTRIES.c.number)
-    )
+    limits = connection.execute(_of_limits(chain))
     try:
-        before = [
-            read_entry(row.text, row.signature) for row in connection.execute(limits)
-        ]
+        before = [read_entry(row.text, row.signature) for row in limits]
     except DamagedError as error:
         raise ArchiveError("archive.copy-damaged", chain=chain[:SHORT]) from error
     keys = ChainKeys(chain, before)
@@ -527,6 +515,14 @@ def _require_signed(
         finding = keys.finding(each)
         if finding is not None and finding.code != UNAPPROVED:
             raise ArchiveError(finding)
+
+
+def _of_limits(chain: str) -> Select[Any]:
+    return (
+        select(*READ)
+        .where(ENTRIES.c.chain == chain, ENTRIES.c.kind == Kind.LIMITS.value)
+        .order_by(ENTRIES.c.number)
+    )
 
 
 def _named(

@@ -9,23 +9,20 @@ from datetime import datetime
 from pathlib import Path
 
 from msgspec import Struct
-from sqlalchemy import select
 
 from lightpen.archive.chains import (
-    READ,
     ArchivedFiles,
     batch_of,
     chain_at_home,
+    entries_of_limits,
     heads,
-    read_row,
     records_of,
 )
 from lightpen.archive.database import Database, is_open
-from lightpen.archive.entries import IN_FORCE_BY, Kind, StoredEntry
+from lightpen.archive.entries import IN_FORCE_BY
 from lightpen.archive.seal import seal_of
 from lightpen.archive.signatures import UNAPPROVED, ChainKeys
 from lightpen.archive.station_events import station_files
-from lightpen.archive.tables import ENTRIES
 from lightpen.errors import FileError
 from lightpen.formats.files import printable
 from lightpen.formats.own_json import DamagedError, ZonedTime, parse_own_json
@@ -69,21 +66,10 @@ def _missing_seal(database: Database) -> Iterator[Message]:
 
 def _unapproved_keys(database: Database, chain: str) -> Iterator[Message]:
     keys = ChainKeys(chain)
-    for entry in _limits(database, chain):
+    for entry in entries_of_limits(database, chain):
         finding = keys.finding(entry)
         if finding is not None and finding.code == UNAPPROVED:
             yield finding
-
-
-def _limits(database: Database, chain: str) -> list[StoredEntry]:
-    wanted = (
-        select(*READ)
-        .where(ENTRIES.c.chain == chain, ENTRIES.c.kind == Kind.LIMITS.value)
-        .order_by(ENTRIES.c.number)
-    )
-    with database.reading() as connection:
-        rows = connection.execute(wanted).all()
-    return [read_row(database, row) for row in rows]
 
 
 def _not_entered(database: Database, data: Path, home: str) -> Iterator[Message]:

@@ -23,9 +23,9 @@ from msgspec import structs
 from lightpen.archive.chains import (
     ArchivedFiles,
     append,
+    entries_of_limits,
     entry_of_result,
     heads,
-    limits_entered,
     own_chain,
     records_of,
 )
@@ -382,7 +382,8 @@ def confirm_limits(
     """
     if supervision.chain not in ("", chain):
         raise AcceptanceError("limits.other-archive")
-    for file in limits_entered(database, chain) if chain else ():
+    entries = entries_of_limits(database, chain) if chain else ()
+    for file in filter(None, (each.entry.event.result for each in entries)):
         number = number_of(Path(file.place))
         if supervision.hashes[number - 1 : number] != (file.sha256,):
             raise AcceptanceError("limits.not-entered", file=printable(file.place))
