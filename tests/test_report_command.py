@@ -119,15 +119,34 @@ def test_a_measured_part_is_put_on_paper(
     feature = {
         "name": "hole",
         "kind": "circle",
+        "side": "inside",
+        "side_by": "approach",
         "origin_mm": [0.0, 1.0, 2.0],
         "expanded_uncertainty": [0.1] * 7,
         "sizes": {"radius": 10.005},
         "form_error_mm": 0.002,
         "n_touches": 3,
     }
+    moved = {
+        "position": 2,
+        "first_from_here_rotation": [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0, 0, 1.0]],
+        "first_from_here_translation_mm": [1.0, 2.0, 3.0],
+    }
+    refinement = {
+        "features": ["hole"],
+        "is_used": True,
+        "tip_shift_pen_mm": [0.001, 0.002, 0.003],
+        "tip_expanded_uncertainty_before_mm": [0.01, 0.01, 0.01],
+        "tip_expanded_uncertainty_after_mm": [0.005, 0.005, 0.005],
+        "chi_square": 8.5,
+        "degrees_of_freedom": 9,
+    }
+    again = {**touch, "feature": "hole@2", "point_cam_mm": [5.0, 6.0, 900.0]}
     record = {
         **record_heading(local_now()),
         "verification": "part",
+        "positions": [moved],
+        "refinement": refinement,
         "pen": "LP-04",
         "tip": "T-10",
         "alignment": None,
@@ -136,7 +155,8 @@ def test_a_measured_part_is_put_on_paper(
         "plan": {"features": [{"name": "hole", "kind": "circle"}]},
         "touches": [
             {**touch, "point_cam_mm": [float(i), float(i * i), 900.0]} for i in range(3)
-        ],
+        ]
+        + [again],
         "inputs": {},
     }
     file, out = tmp_path / "part.json", tmp_path / "part.pdf"
