@@ -20,6 +20,7 @@ from lightpen.discovery.report import (
     swings_text,
 )
 from lightpen.discovery.request import Request, SecondSightings, TouchedLength
+from lightpen.discovery.requirements import require_lens
 from lightpen.discovery.scale import MeasuredLength
 from lightpen.discovery.sightings import (
     Report,
@@ -195,6 +196,8 @@ def _discover(options: argparse.Namespace) -> None:
         if len(swings) > 1:
             together = discover_together(swings, request, rest)
         found = together.found if together else discover(swings[0], request, rest)
+    if options.out_camera is not None:
+        require_lens(found.camera)
     if options.out_pen is not None:
         write_pen(found.pen, options.out_pen)
     if options.out_camera is not None:

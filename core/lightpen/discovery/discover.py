@@ -23,7 +23,6 @@ from lightpen.discovery.requirements import (
     require_certain,
     require_enough,
     require_length,
-    require_lens,
     require_no_second_pen,
     require_one_focal_length,
 )
@@ -113,9 +112,7 @@ def _adjusted(
     )
     camera = _camera_to_adjust(start, request)
     pen = with_lengths_known(start.pen, lengths)
-    require_lens(camera)
     calibration = calibrate(camera, pen, observations, second=second)
-    require_lens(calibration.instrument.camera)
     require_length(calibration, request, lengths)
     report(0.95)
     discovery = discovery_of(
