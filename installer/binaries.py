@@ -76,19 +76,14 @@ def unmet_needs(folder: Path) -> list[str]:
 
 def missing_exports(folder: Path) -> list[str]:
     """Return what is asked of libraries that were replaced and is not in them."""
-    missing = []
-    for name in REPLACED:
-        library = pefile.PE(str(folder / "runtime" / name))
-        has = {symbol.name for symbol in library.DIRECTORY_ENTRY_EXPORT.symbols}
-        library.close()
-        for path in sorted(folder.rglob("*")):
-            if path.suffix.lower() in SUFFIXES:
-                wanted = _imported_symbols(path, name)
-                missing += [
-                    f"{path.relative_to(folder)} needs {symbol.decode()} of {name}."
-                    for symbol in sorted(wanted - has)
-                ]
-    return missing
+    has = {name: _exported_symbols(folder / "runtime" / name) for name in REPLACED}
+    return [
+        f"{path.relative_to(folder)} needs {symbol.decode()} of {name}."
+        for path in sorted(folder.rglob("*"))
+        if path.suffix.lower() in SUFFIXES
+        for name, symbols in _imported_symbols(path).items()
+        for symbol in sorted(symbols - has.get(name, symbols))
+    ]
 
 
 def _added_folders(binaries: list[Path]) -> set[Path]:
@@ -109,16 +104,23 @@ def _imports(image: pefile.PE) -> Iterator[str]:
             yield entry.dll.decode("ascii").lower()
 
 
-def _imported_symbols(path: Path, library: str) -> set[bytes]:
+def _exported_symbols(path: Path) -> set[bytes]:
+    image = pefile.PE(str(path))
+    found = {symbol.name for symbol in image.DIRECTORY_ENTRY_EXPORT.symbols}
+    image.close()
+    return found
+
+
+def _imported_symbols(path: Path) -> dict[str, set[bytes]]:
+    """Return the names that a library imports, by the other library."""
     image = pefile.PE(str(path), fast_load=True)
     kind = pefile.DIRECTORY_ENTRY["IMAGE_DIRECTORY_ENTRY_IMPORT"]
     image.parse_data_directories([kind])
     found = {
-        symbol.name
+        entry.dll.decode("ascii").lower(): {
+            symbol.name for symbol in entry.imports if symbol.name
+        }
         for entry in getattr(image, "DIRECTORY_ENTRY_IMPORT", ())
-        if entry.dll.decode("ascii").lower() == library
-        for symbol in entry.imports
-        if symbol.name
     }
     image.close()
     return found
