@@ -9,10 +9,8 @@ from fnmatch import fnmatchcase
 
 from lightpen_resources import languages
 
-QT_MODULES = {
-    *("Core", "Gui", "Network", "PrintSupport", "Svg", "SvgWidgets", "Test", "Widgets")
-}
-QT_PLUGINS = ("generic/*", "iconengines/*", "imageformats/*", "platforms/*", "styles/*")
+QT_MODULES = {*("Core", "Gui", "PrintSupport", "Svg", "Widgets")}
+QT_PLUGINS = ("iconengines/*", "imageformats/*", "platforms/*", "styles/*")
 QT_TRANSLATIONS = tuple(f"qtbase_{language}.qm" for language in languages())
 DROPPED = (
     "*.pyi", "*.pxd", "*.h", "*.hpp", "*.lib", "*/tests/*",  # to develop and test
@@ -27,7 +25,7 @@ DROPPED = (
     "*/concrt140.dll", "*/vcamp140.dll", "*/vccorlib140.dll",
     "*/vcomp140.dll",
     "harvesters/test/*", "genicam/*.cti",  # a simulated camera
-    "numpy/f2py/*", "numpy/_pyinstaller/*", "scipy/conftest.py",
+    "numpy/f2py/src/*", "numpy/_pyinstaller/*", "scipy/conftest.py",
     "*/_test_*.pyd", "numpy/*_tests.*.pyd", "numpy/_core/_simd.*",
     "sqlalchemy/testing/*", "alembic/testing/*",
     # Parts of libraries that nothing here imports.

@@ -17,7 +17,8 @@ UNCHECKED_HASH = (1).to_bytes(4, "little") + bytes(8)
 # the same name, which is found because it puts a folder first on the path.
 FOUND_BY_PATH = "cv2/"
 OURS = "lightpen"
-NUMPY = "numpy/"  # makes docstrings of numpy.ma from those of its functions
+# numpy.ma makes docstrings from theirs.
+WITH_DOCSTRINGS = "numpy/_core/numeric.py", "numpy/_core/fromnumeric.py"
 CONFIGURATION = "__config__.py"  # states the version of OpenBLAS
 
 
@@ -46,7 +47,7 @@ def main() -> int:
 def compiled_form(path: Path, source: str) -> bytes:
     """Return what Python would write as the compiled form, without docstrings."""
     tree = ast.parse(path.read_bytes())
-    if not source.startswith(NUMPY):
+    if source not in WITH_DOCSTRINGS:
         remove_docstrings(tree)
     code = compile(tree, f"site-packages/{source}", "exec", dont_inherit=True)
     return importlib.util.MAGIC_NUMBER + UNCHECKED_HASH + marshal.dumps(code)
