@@ -600,6 +600,10 @@
         <translation>U 的限值 {0:g} mm</translation>
     </message>
     <message>
+        <source>Practice</source>
+        <translation>练习</translation>
+    </message>
+    <message>
         <source>{0} µm</source>
         <translation>{0} µm</translation>
     </message>
@@ -648,8 +652,16 @@
         <translation>光笔 {0} 的 LED</translation>
     </message>
     <message>
-        <source>Drift reference not watched</source>
-        <translation>未监视漂移参考</translation>
+        <source>No temperature</source>
+        <translation>未给出温度</translation>
+    </message>
+    <message>
+        <source>Pen at {0:.1f} °C</source>
+        <translation>光笔温度 {0:.1f} °C</translation>
+    </message>
+    <message>
+        <source>No drift reference</source>
+        <translation>无漂移参考</translation>
     </message>
     <message>
         <source>The camera moved. Verify the tip.</source>
@@ -673,6 +685,10 @@
     <message>
         <source>Drift reference</source>
         <translation>漂移参考</translation>
+    </message>
+    <message>
+        <source>Temperature</source>
+        <translation>温度</translation>
     </message>
     <message>
         <source>Scan or type a tip</source>
@@ -817,12 +833,24 @@
         <translation>请输入长度。</translation>
     </message>
     <message>
-        <source>Being computed.</source>
-        <translation>正在计算。</translation>
+        <source>Cancel</source>
+        <translation>取消</translation>
+    </message>
+    <message>
+        <source>Tip {0}: {1:.4f} ± {2:.4f} mm (k = 2)</source>
+        <translation>测头 {0}：{1:.4f} ± {2:.4f} mm (k = 2)</translation>
+    </message>
+    <message>
+        <source>Focal length: {0:.2f} ± {1:.2f} px (k = 2)</source>
+        <translation>焦距：{0:.2f} ± {1:.2f} px (k = 2)</translation>
     </message>
     <message>
         <source>Find pen and camera first.</source>
         <translation>请先求光笔和相机。</translation>
+    </message>
+    <message>
+        <source>Frame of the pen: click the LED at the origin, then one along y.</source>
+        <translation>光笔坐标系：先点击原点处的 LED，再点击 y 方向上的一个 LED。</translation>
     </message>
     <message>
         <source>Computing: {0:.0%}</source>
@@ -857,16 +885,8 @@
         <translation>测量所标 LED {0} 与 {1} 的中心距：用卡尺测两圆盘外缘之间的尺寸，再减去一个圆盘直径。请在摆动时的温度下测量。</translation>
     </message>
     <message>
-        <source>Tip {0}: {1:.4f} ± {2:.4f} mm</source>
-        <translation>测头 {0}：{1:.4f} ± {2:.4f} mm</translation>
-    </message>
-    <message>
         <source>LEDs: {0}, U (k = 2) up to {1:.1f} µm</source>
         <translation>LED：{0} 个，U (k = 2) 最大 {1:.1f} µm</translation>
-    </message>
-    <message>
-        <source>Focal length: {0:.2f} ± {1:.2f} px</source>
-        <translation>焦距：{0:.2f} ± {1:.2f} px</translation>
     </message>
     <message>
         <source>Images used: {0} of {1}, noise {2:.3f} px</source>
@@ -1343,8 +1363,8 @@
         <translation>LED 1-4 共线</translation>
     </message>
     <message>
-        <source>LED 1 on the origin axis</source>
-        <translation>LED 1 位于原点轴上</translation>
+        <source>LED 1 at x = y = 0</source>
+        <translation>LED 1 位于 x = y = 0</translation>
     </message>
     <message>
         <source>y axis along LEDs 1-4</source>
@@ -1395,6 +1415,18 @@
     <message>
         <source>{0} entries</source>
         <translation>{0} 个条目</translation>
+    </message>
+    <message>
+        <source>Open the files of camera and LEDs first.</source>
+        <translation>请先打开相机文件和 LED 文件。</translation>
+    </message>
+    <message>
+        <source>Computing: {0:.0%}</source>
+        <translation>正在计算：{0:.0%}</translation>
+    </message>
+    <message>
+        <source>Saved in {0}: {1} and {2}. Residuals of the swing held out: {3} px, with the old file {4} px.</source>
+        <translation>已保存到 {0}：{1} 和 {2}。留出的摆动的残差：{3} px，用旧文件时为 {4} px。</translation>
     </message>
     <message>
         <source>Tip {0} of pen {1} reinstated from the earlier calibration.</source>
@@ -1530,8 +1562,8 @@
         <translation>恢复</translation>
     </message>
     <message>
-        <source>RMS residual / px (x: excluded)</source>
-        <translation>残差均方根 / px（x：已剔除）</translation>
+        <source>RMS / px (x: excluded)</source>
+        <translation>RMS / px（x：已排除）</translation>
     </message>
     <message>
         <source>drag down to exclude</source>
@@ -2899,8 +2931,8 @@
 <context>
     <name>MeasurePresenter</name>
     <message>
-        <source>{0}  {1}  {2}  ± {3} mm</source>
-        <translation>{0}  {1}  {2}  ± {3} mm</translation>
+        <source>{0}  {1}  {2}  ± {3} mm (k = 2)</source>
+        <translation>{0}  {1}  {2}  ± {3} mm (k = 2)</translation>
     </message>
     <message>
         <source>Measure features of a part with the current tip.</source>
@@ -3355,6 +3387,14 @@
     <message>
         <source>Recognise</source>
         <translation>识别</translation>
+    </message>
+    <message>
+        <source>Part moved</source>
+        <translation>工件已移动</translation>
+    </message>
+    <message>
+        <source>Part or camera was moved: probe three datum points again, which connect the new position with the old.</source>
+        <translation>工件或相机已移动：重新探测三个基准点，把新位置与原位置联系起来。</translation>
     </message>
     <message>
         <source>Save plan...</source>
@@ -4065,8 +4105,8 @@
         <translation>请打开含两台相机外参的文件。可由标定板图像生成：&quot;lightpen extrinsics LEFT RIGHT --board BOARD --out rig.json&quot;。</translation>
     </message>
     <message>
-        <source>Baseline {2} mm ({0}-{1})</source>
-        <translation>基线 {2} mm（{0}-{1}）</translation>
+        <source>Baseline {2} ({0}-{1})</source>
+        <translation>基线 {2}（{0}-{1}）</translation>
     </message>
     <message>
         <source>{0} remains in use: {1}</source>
@@ -4149,6 +4189,18 @@
     <message>
         <source>Repeatability needs two calibrations of one tip.</source>
         <translation>重复性至少需要同一测头的两次标定。</translation>
+    </message>
+    <message>
+        <source>Adjust together</source>
+        <translation>联合平差</translation>
+    </message>
+    <message>
+        <source>LED file and camera file by all selected swings of a pen</source>
+        <translation>用同一光笔的所选全部摆动求 LED 文件和相机文件</translation>
+    </message>
+    <message>
+        <source>Select {0} or more calibrations.</source>
+        <translation>请选择至少 {0} 次标定。</translation>
     </message>
     <message>
         <source>Mean / mm</source>
@@ -4793,12 +4845,12 @@
         <translation>测头估计值 / µm</translation>
     </message>
     <message>
-        <source>U (k = 2) of the tip / µm</source>
-        <translation>测头的 U (k = 2) / µm</translation>
+        <source>U (k = 2) / µm</source>
+        <translation>U (k = 2) / µm</translation>
     </message>
     <message>
-        <source>lowest achievable U</source>
-        <translation>可达到的最小 U</translation>
+        <source>lowest achievable</source>
+        <translation>可达到的最小值</translation>
     </message>
 </context>
 <context>
@@ -5154,6 +5206,10 @@ mm</translation>
         <translation>选择带测头数据的条目以查看其趋势。</translation>
     </message>
     <message>
+        <source>Pen {0}, tip {1}: {2} calibrations, {3} to {4}. Dashed: the limit of U. Ten calibrations give control limits.</source>
+        <translation>光笔 {0}，测头 {1}：{2} 次标定，{3} 至 {4}。虚线：U 的限值。十次标定后给出控制限。</translation>
+    </message>
+    <message>
         <source>Pen {0}, tip {1}: {2} calibrations, {3} to {4}. Dashed: mean ± three standard deviations, and the limit of U.</source>
         <translation>光笔 {0}，测头 {1}：{2} 次标定，{3} 至 {4}。虚线：平均值 ± 三倍标准差，以及 U 的限值。</translation>
     </message>
@@ -5393,6 +5449,10 @@ mm</translation>
         <translation>握住不动</translation>
     </message>
     <message>
+        <source>Pick up the pen</source>
+        <translation>请拿起光笔</translation>
+    </message>
+    <message>
         <source>Probed before</source>
         <translation>已触测过</translation>
     </message>
@@ -5524,12 +5584,12 @@ mm</translation>
         <translation>以固定不动的锥孔作为漂移参考点：它在相邻两次触测之间的位移计入其间所测结果的 U。</translation>
     </message>
     <message>
-        <source>A pen file needs one known length. Measure the distance between two LEDs and state it, or swing in a second cone at a known distance.</source>
-        <translation>光笔文件需要一个已知长度。请测量两个 LED 的距离并给出，或在已知距离的第二个锥孔中摆动。</translation>
-    </message>
-    <message>
         <source>A pen needs {least} to {most} LEDs; the file has {n_leds}. Check that it is the complete file of a pen.</source>
         <translation>光笔需要 {least} 至 {most} 个 LED；文件有 {n_leds} 个。请检查是否为一支光笔的完整文件。</translation>
+    </message>
+    <message>
+        <source>A square size of {pitch:g} mm makes a board of {side:.3g} m. Check that it is in mm. The intrinsics do not depend on it; all distances do.</source>
+        <translation>方格边长 {pitch:g} mm 意味着标定板长 {side:.3g} m。请检查单位是否为 mm。内参与它无关，所有距离都与它有关。</translation>
     </message>
     <message>
         <source>Actual</source>
@@ -5598,6 +5658,10 @@ mm</translation>
     <message>
         <source>Characteristics / mm, degrees</source>
         <translation>特性 / mm，度</translation>
+    </message>
+    <message>
+        <source>Check nominal diameter, ball diameter and cleanliness; then verify the tip.</source>
+        <translation>请检查标称直径、测球直径和清洁情况，然后验证测头。</translation>
     </message>
     <message>
         <source>Check the part, its clamping and its cleanliness; then measure it again.</source>
@@ -6080,10 +6144,6 @@ mm</translation>
         <translation>端口 {port} 已被另一个窗口或程序占用。请选择其他端口，或关闭那个程序。</translation>
     </message>
     <message>
-        <source>Position {position} shares {n_shared} features with the first one; at least {needed} datum points have to be probed in both. Probe more of them again.</source>
-        <translation>位置 {position} 与第一个位置有 {n_shared} 个共同要素；两处至少都要探测 {needed} 个基准点。请再探测更多基准点。</translation>
-    </message>
-    <message>
         <source>Postures</source>
         <translation>姿态</translation>
     </message>
@@ -6256,20 +6316,12 @@ mm</translation>
         <translation>圆环</translation>
     </message>
     <message>
-        <source>Ring: radius error</source>
-        <translation>圆环：半径误差</translation>
-    </message>
-    <message>
         <source>Roundness</source>
         <translation>圆度</translation>
     </message>
     <message>
         <source>Runs</source>
         <translation>轮数</translation>
-    </message>
-    <message>
-        <source>Scale of the pen by it: {factor:.6f}, U (k = 2) {uncertainty:.1f} ppm; without it {before:.1f} ppm.</source>
-        <translation>由此得到的光笔尺度：{factor:.6f}，U (k = 2) {uncertainty:.1f} ppm；不用它时为 {before:.1f} ppm。</translation>
     </message>
     <message>
         <source>Simulated pen</source>
@@ -6352,6 +6404,14 @@ mm</translation>
         <translation>{name} 的相机矩阵不是 fx 0 cx, 0 fy cy, 0 0 1 的形式；可能被转置或不完整。请重新导出文件。</translation>
     </message>
     <message>
+        <source>The cameras are not synchronised: {camera} lags by {lag:.1f} ± {u:.1f} ms (k = 2), an error of {px:.2f} px at a pen speed of 100 mm/s. Trigger both cameras by one signal.</source>
+        <translation>两台相机不同步：{camera} 滞后 {lag:.1f} ± {u:.1f} ms (k = 2)，光笔速度为 100 mm/s 时误差为 {px:.2f} px。请用同一信号触发两台相机。</translation>
+    </message>
+    <message>
+        <source>The cameras are not synchronised: {camera} lags by {lag:.2f} ± {u:.2f} view intervals (k = 2). Each millisecond is an error of {px:.2f} px at a pen speed of 100 mm/s. Trigger both cameras by one signal.</source>
+        <translation>两台相机不同步：{camera} 滞后 {lag:.2f} ± {u:.2f} 个视图间隔 (k = 2)。光笔速度为 100 mm/s 时，每毫秒误差为 {px:.2f} px。请用同一信号触发两台相机。</translation>
+    </message>
+    <message>
         <source>The distortion coefficients of {name} fold the image of {width} x {height} px: some pixels have no direction of view, or two. Check them, or calibrate the camera again with views that reach into the corners.</source>
         <translation>{name} 的畸变系数使 {width} × {height} px 的图像折叠：有些像素没有视线方向，或有两个。请检查这些系数，或用覆盖到图像边角的视图重新标定相机。</translation>
     </message>
@@ -6372,16 +6432,8 @@ mm</translation>
         <translation>测头库文件 {file} 由更新版本的程序写成。请使用该版本。</translation>
     </message>
     <message>
-        <source>The file {file} was changed since it was closed.</source>
-        <translation>文件 {file} 在关闭之后被改动过。</translation>
-    </message>
-    <message>
         <source>The first camera of {name}, {camera}, is the reference of the rig: its cam_from_rig must be the identity. List the reference camera first, and give the others from its frame.</source>
         <translation>{name} 中的第一台相机 {camera} 是相机组的基准：其 cam_from_rig 必须是单位变换。请把基准相机列在第一位，其余相机均相对于它的坐标系给出。</translation>
-    </message>
-    <message>
-        <source>The line, the plane and the columns are not parallel, or too close.</source>
-        <translation>直线、平面和两列不平行，或相距太近。</translation>
     </message>
     <message>
         <source>The normal of LED {led} points away from the viewer (nz = {nz:.3f}); nz must be positive in the pen frame. Change its sign.</source>
@@ -6560,10 +6612,6 @@ mm</translation>
         <translation>文件</translation>
     </message>
     <message>
-        <source>further turn of cam_from_rig about {axis}</source>
-        <translation>cam_from_rig 绕 {axis} 轴的附加转角</translation>
-    </message>
-    <message>
         <source>in a groove</source>
         <translation>槽中</translation>
     </message>
@@ -6678,10 +6726,6 @@ mm</translation>
     <message>
         <source>{covered:.0f} of {needed:.0f}°</source>
         <translation>{covered:.0f}° / {needed:.0f}°</translation>
-    </message>
-    <message>
-        <source>{file} has an end of no known format. End its name with one of {suffixes}.</source>
-        <translation>{file} 的扩展名不属于已知格式。请使用以下扩展名之一：{suffixes}。</translation>
     </message>
     <message>
         <source>{file} is not an exported archive, or was modified (line {line}). Export it again with this version of the program.</source>
@@ -6942,10 +6986,6 @@ mm</translation>
     <message>
         <source>The touches of {name} do not show its kind. Probe more points of it, or state its kind: {kinds}.</source>
         <translation>{name} 的触测点无法确定其类型。请探测更多点，或指定类型：{kinds}。</translation>
-    </message>
-    <message>
-        <source>The two points are {distance:.2f} mm apart, certified are {certified} mm: they are not the two ends. Probe the end opposite to the last point.</source>
-        <translation>两点相距 {distance:.2f} mm，校准值为 {certified} mm：它们不是两端。请探测与上一点相对的一端。</translation>
     </message>
     <message>
         <source>The verification belongs to {result}, which is no longer current for tip {tip} of pen {pen}. Close the verification and start another one.</source>
@@ -7484,6 +7524,10 @@ mm</translation>
         <translation>缺少名称、相机图像或文件。请完成前面的步骤，然后继续验证。</translation>
     </message>
     <message>
+        <source>A pen file needs one known length. Measure the distance between two LEDs and state it, touch both ends of a certified length, or swing in a second cone at a known distance.</source>
+        <translation>光笔文件需要一个已知长度。请测量两个 LED 的间距并给出，或触测校准长度的两端，或在已知距离处的第二个锥孔中摆动。</translation>
+    </message>
+    <message>
         <source>A point {distance:.1f} mm from the others does not count: the tip was not in the cone. Put it into the cone and hold it still.</source>
         <translation>与其他各点相距 {distance:.1f} mm 的测点不计入：测头不在锥孔中。请把测头放入锥孔并保持不动。</translation>
     </message>
@@ -7582,10 +7626,6 @@ mm</translation>
     <message>
         <source>Camera {serial} rejects a setting: {why}. Choose another value.</source>
         <translation>相机 {serial} 拒绝一项设置：{why}。请另选。</translation>
-    </message>
-    <message>
-        <source>Chain {chain} does not end with the last entry.</source>
-        <translation>链 {chain} 的末尾不是最后录入的那个条目。</translation>
     </message>
     <message>
         <source>Columns {first} and {second} of {name} both contain {column}. Remove one of them.</source>
@@ -7844,6 +7884,10 @@ mm</translation>
         <translation>最大变化 {limit:g} mm 无效。请输入大于 0 且不超过 {most:g} mm 的值。</translation>
     </message>
     <message>
+        <source>Measure the part again.</source>
+        <translation>请重新测量工件。</translation>
+    </message>
+    <message>
         <source>Most images show fewer than {n_needed} spots (median {median:.0f}); at least {n_needed} of the {n_leds} LEDs are needed. Check that the LEDs are lit and in the image, and check the exposure.</source>
         <translation>多数图像中的光点少于 {n_needed} 个（中位数 {median:.0f}）；光笔的 {n_leds} 个 LED 中须看到 {n_needed} 个。请检查 LED 是否点亮并在图像内，以及曝光是否合适。</translation>
     </message>
@@ -7910,6 +7954,10 @@ mm</translation>
     <message>
         <source>Next: probe more points with more images each, tilt the pen farther to all sides, and turn it.</source>
         <translation>下一步：探测更多的点，每点更多图像，将光笔向各侧进一步倾斜并转动。</translation>
+    </message>
+    <message>
+        <source>Next: repeat the calibration, with the tip seated anew each time.</source>
+        <translation>下一步：重复标定，每次都重新放置测头。</translation>
     </message>
     <message>
         <source>Next: tighten the tip, inspect the LEDs, calibrate again, and verify the new result.</source>
@@ -8008,6 +8056,22 @@ mm</translation>
         <translation>各姿态下该点的标准差：u {u:.4f}、v {v:.4f}、w {w:.4f} mm。</translation>
     </message>
     <message>
+        <source>Points and tip refined by the known form of {names}: tip shifted by {shift:.4f} mm, its U (k = 2) {before:.4f} mm before and {after:.4f} mm after.</source>
+        <translation>已按 {names} 的已知形状修正测点和测头：测头移动 {shift:.4f} mm，其 U (k = 2) 修正前 {before:.4f} mm，修正后 {after:.4f} mm。</translation>
+    </message>
+    <message>
+        <source>Position {position} shares {n_shared} datum points (points, circles, slots, spheres) with the positions before; at least {needed} are needed. Probe more of them again.</source>
+        <translation>位置 {position} 与先前位置共有 {n_shared} 个基准点（点、圆、槽、球）；至少需要 {needed} 个。请再探测几个。</translation>
+    </message>
+    <message>
+        <source>Position {position}: datum points agree with the first position within {residual:.4f} mm.</source>
+        <translation>位置 {position}：基准点与第一位置的偏差不超过 {residual:.4f} mm。</translation>
+    </message>
+    <message>
+        <source>Position {position}: datum points are up to {residual:.4f} mm off the first position, much more than their U. The datum points were not the same, or the part moved once more.</source>
+        <translation>位置 {position}：基准点与第一位置相差达 {residual:.4f} mm，远大于其 U。所测基准点不是同一些点，或工件又移动了。</translation>
+    </message>
+    <message>
         <source>Probe one end of the length, then the other, and hold still on each: {n_touches} of 2.</source>
         <translation>先触测长度的一端，再触测另一端，各保持不动：{n_touches} / 2。</translation>
     </message>
@@ -8048,12 +8112,20 @@ mm</translation>
         <translation>误判风险</translation>
     </message>
     <message>
+        <source>Scale factor of the pen from this length: {factor:.6f}, U (k = 2) {uncertainty:.1f} ppm; before {before:.1f} ppm.</source>
+        <translation>由该长度得到的光笔比例系数：{factor:.6f}，U (k = 2) {uncertainty:.1f} ppm；此前为 {before:.1f} ppm。</translation>
+    </message>
+    <message>
         <source>Settings not saved: {file} cannot be written ({reason}). Check free space and write permission of its folder.</source>
         <translation>无法保存设置：无法写入 {file}（{reason}）。请确认您对其文件夹有写入权限，且磁盘未满。</translation>
     </message>
     <message>
         <source>Settings saved, but another program had locked {file} for {seconds:g} s. End that program if it hangs; it may overwrite the settings.</source>
         <translation>设置已保存，但另一个程序将 {file} 锁定了 {seconds:g} s。如果该程序无响应，请结束它，否则它可能覆盖设置。</translation>
+    </message>
+    <message>
+        <source>Swing {number} shows too little of the lens to be adjusted with the others. Omit it, or move the pen over more of the image.</source>
+        <translation>摆动 {number} 覆盖的镜头视场太小，无法与其他摆动联合平差。请略去它，或让光笔覆盖更大的图像范围。</translation>
     </message>
     <message>
         <source>Swings given: {n_swings}. {needed} are needed for pooling, and one more for confirmation.</source>
@@ -8152,10 +8224,6 @@ mm</translation>
         <translation>标定板 {text} 需要 {needed} 个标记；{dictionary} 有 {known} 个。请给出印制时的字典。</translation>
     </message>
     <message>
-        <source>The board&apos;s squares are stated as {pitch:g} mm, which makes a board of {side:.3g} m. Lengths are in mm: check them. Intrinsics do not depend on it; distances do.</source>
-        <translation>标定板方格给出为 {pitch:g} mm，即板长 {side:.3g} m。长度单位为 mm：请检查。内参与此无关；距离则有关。</translation>
-    </message>
-    <message>
         <source>The calibration of this tip expired on {due}. Calibrate it again.</source>
         <translation>此测头的标定已于 {due} 到期。请重新标定。</translation>
     </message>
@@ -8208,14 +8276,6 @@ mm</translation>
         <translation>两台相机不同步：曝光时刻相差 {lag:.1f} ms。光笔以 100 mm/s 运动时，其间移动 {way:.2f} mm。请用同一信号触发两台相机。</translation>
     </message>
     <message>
-        <source>The cameras are not synchronised: {camera} lags by {lag:.1f} ± {u:.1f} ms, an error of {px:.2f} px at a pen speed of 100 mm/s. Trigger both cameras by one signal.</source>
-        <translation>两台相机不同步：{camera} 相差 {lag:.1f} ± {u:.1f} ms，光笔以 100 mm/s 移动时相当于 {px:.2f} px。请用同一信号触发两台相机。</translation>
-    </message>
-    <message>
-        <source>The cameras are not synchronised: {camera} lags by {lag:.2f} ± {u:.2f} view intervals. Each millisecond is an error of {px:.2f} px at a pen speed of 100 mm/s. Trigger both cameras by one signal.</source>
-        <translation>两台相机不同步：{camera} 相差两幅视图间隔的 {lag:.2f} ± {u:.2f} 倍。光笔以 100 mm/s 移动时，每毫秒相当于 {px:.2f} px。请用同一信号触发两台相机。</translation>
-    </message>
-    <message>
         <source>The characteristic {name} is not defined for features of this kind or number. Check the plan.</source>
         <translation>特性 {name} 对此类或此数量的要素没有定义。请检查计划。</translation>
     </message>
@@ -8266,6 +8326,10 @@ mm</translation>
     <message>
         <source>The distortion of the camera file is not invertible for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.</source>
         <translation>内参文件的镜头畸变在某些像点无法消除：其系数使图像折叠。请检查畸变系数，或重新标定相机。</translation>
+    </message>
+    <message>
+        <source>The distortion that fits the LEDs folds the image beyond them: some pixels would have no direction of view. Move the pen over the whole image, also into the corners, and repeat the swing.</source>
+        <translation>与 LED 拟合的畸变会使其范围之外的图像折叠：有些像素没有视线方向。请让光笔移遍整个图像，包括边角，并重新摆动。</translation>
     </message>
     <message>
         <source>The drift reference stays within {distance:.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
@@ -8328,6 +8392,10 @@ mm</translation>
         <translation>第 {number} 个条目的文件 {file} 与录入时不符。</translation>
     </message>
     <message>
+        <source>The file {file} was changed by another program after Lightpen closed it.</source>
+        <translation>文件 {file} 在本程序关闭后被其他程序改动过。</translation>
+    </message>
+    <message>
         <source>The file {path} cannot be read: {reason}. Check the name and the read permission.</source>
         <translation>文件 {path} 无法读取：{reason}。请检查名称和读取权限。</translation>
     </message>
@@ -8356,28 +8424,16 @@ mm</translation>
         <translation>文件夹 {folder} 不是空的：其中有 {example}。请选择其他文件夹，或将其清空；不会覆盖任何内容。</translation>
     </message>
     <message>
+        <source>The frame is not defined: the line of LEDs 1-4 is not parallel to the plane and the columns of LEDs 5-10, or is too close to them.</source>
+        <translation>坐标系无法确定：LED 1-4 的连线与 LED 5-10 的平面和列不平行，或相距太近。</translation>
+    </message>
+    <message>
         <source>The images are from two cameras, or one camera with two zoom or focus settings (fx {fx:.1f} and {other_fx:.1f} px): {n_named} of {n_views} differ from the others: {names}. Give the images of one camera with one setting.</source>
         <translation>图像来自两台相机，或来自同一相机的两种变焦或对焦设置（fx {fx:.1f} 和 {other_fx:.1f} px）：{n_views} 个视图中有 {n_named} 个与其他不同：{names}。请给出同一相机同一设置的图像。</translation>
     </message>
     <message>
         <source>The images contradict the LED file: the standard deviation of its coordinates is {found:.4f} mm, stated {stated:.4f} mm. Measure the pen again, or check that the file belongs to this pen.</source>
         <translation>图像与 LED 文件矛盾：其坐标的标准差为 {found:.4f} mm，文件给出 {stated:.4f} mm。请重新测量光笔，或检查该文件是否属于此光笔。</translation>
-    </message>
-    <message>
-        <source>The images contradict the LED file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file. Check that the file belongs to this pen, or measure the pen again.</source>
-        <translation>图像与 LED 文件矛盾：{what}由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件为 {stated:.6g} ± {stated_u:.2g}{unit}。请检查该文件是否属于此光笔，或重新测量光笔。</translation>
-    </message>
-    <message>
-        <source>The images contradict the camera file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file. Check that the file belongs to this camera, lens and focus, or calibrate the camera again.</source>
-        <translation>图像与内参文件矛盾：{what}由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件为 {stated:.6g} ± {stated_u:.2g}{unit}。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
-    </message>
-    <message>
-        <source>The images contradict the file of camera {camera}: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file. Check that the file belongs to this camera, lens and focus, or calibrate the camera again.</source>
-        <translation>图像与相机 {camera} 的文件矛盾：{what}由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件为 {stated:.6g} ± {stated_u:.2g}{unit}。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
-    </message>
-    <message>
-        <source>The images contradict the rig file: {what} of camera {camera} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file. Check that no camera was moved, or calibrate the rig again.</source>
-        <translation>图像与相机组文件矛盾：相机 {camera} 的{what}由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件为 {stated:.6g} ± {stated_u:.2g}{unit}。请检查是否有相机移动过，或重新标定相机组。</translation>
     </message>
     <message>
         <source>The images do not decide between the pen and its mirror image. Tilt the pen further towards the camera and away from it, by 30 degrees or more, and come closer to the camera.</source>
@@ -8424,6 +8480,10 @@ mm</translation>
         <translation>位于 {x:.0f}, {y:.0f} px 的灯在摆动过程中移动了 {shift:.2f} px，而光笔没有随之移动。未作任何扣除。请固定该灯，或将其遮住。</translation>
     </message>
     <message>
+        <source>The last entry of chain {chain} is not the one that its head names: entries were added or removed.</source>
+        <translation>链 {chain} 的最后一条记录与链头所指的不同：有记录被添加或删除。</translation>
+    </message>
+    <message>
         <source>The led_covariance of {name} is not a covariance matrix: it must be symmetric with no negative variance. Correct or remove it.</source>
         <translation>{name} 的 led_covariance 不是协方差矩阵：它必须对称，且方差不得为负。请改正或删除。</translation>
     </message>
@@ -8468,6 +8528,10 @@ mm</translation>
         <translation>此处保存的内容与{entry}不相接。可能是数据文件夹被复制后两份都在继续使用，或条目被改动过。请检查两边的档案库。</translation>
     </message>
     <message>
+        <source>The measured diameter is {measured:.3f} mm, the certified one {certified} mm. Check that it is this sphere, that a diameter and no radius is stated, and that the ball diameter of the tip is.</source>
+        <translation>测得直径为 {measured:.3f} mm，校准值为 {certified} mm。请检查是否为该球、给出的是否为直径而非半径，以及是否给出了测头的测球直径。</translation>
+    </message>
+    <message>
         <source>The measured length {measured:g} mm (stated {stated:g}, U {u:g} mm) is not valid: all must be above 0, and U at most a twentieth of the length. Measure over as many squares as possible.</source>
         <translation>测得长度 {measured:g} mm（标称 {stated:g}，U {u:g} mm）无效：均须大于 0，且 U 不超过长度的二十分之一。请跨尽可能多的方格测量。</translation>
     </message>
@@ -8502,6 +8566,10 @@ mm</translation>
     <message>
         <source>The pen is lifted. Put the tip back to continue.</source>
         <translation>光笔已抬起。放回测头即可继续。</translation>
+    </message>
+    <message>
+        <source>The pen rests. Pick it up: a point counts once the pen has moved.</source>
+        <translation>光笔静止未动。请拿起光笔：光笔移动之后测点才计入。</translation>
     </message>
     <message>
         <source>The pen was lifted or moved before the point was recorded, so it does not count. Hold it still until it is recorded.</source>
@@ -8652,6 +8720,10 @@ mm</translation>
         <translation>工位 {station} 在本数据文件夹中没有限值。需要主管批准并说明理由，或为该工位设置限值。</translation>
     </message>
     <message>
+        <source>The suffix of {file} is no export format. Use one of {suffixes}.</source>
+        <translation>{file} 的扩展名不是导出格式。请使用其中之一：{suffixes}。</translation>
+    </message>
+    <message>
         <source>The supervisor password was wrong several times. Wait {seconds:.0f} s, then enter it again.</source>
         <translation>主管密码多次错误。请等待 {seconds:.0f} s 后重新输入。</translation>
     </message>
@@ -8748,6 +8820,14 @@ mm</translation>
         <translation>奇数与偶数图像求得的测头相差 {difference:.4f} mm，通常为 {usual:.4f} mm。测头可能移动过。请压紧测头，重新摆动。</translation>
     </message>
     <message>
+        <source>The touched length of {length:g} mm gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. Check which length was touched, its certified value, and the disc diameter.</source>
+        <translation>触测的长度 {length:g} mm 对应的圆盘直径为 {found:.2f} mm，而给出的是 {stated:g} mm。请检查触测的是哪个长度、其校准值以及圆盘直径。</translation>
+    </message>
+    <message>
+        <source>The touches of {names} deviate from the known form by more than their U (chi-square {chi_square:.1f} with {n_free} degrees of freedom) and refine nothing.</source>
+        <translation>{names} 的测点与已知形状的偏差超过其 U（卡方 {chi_square:.1f}，自由度 {n_free}），未作修正。</translation>
+    </message>
+    <message>
         <source>The touches of {name} come from both sides of the surface. Probe the feature again from one side.</source>
         <translation>{name} 的测点来自表面的两侧。请从一侧重新探测该要素。</translation>
     </message>
@@ -8758,6 +8838,10 @@ mm</translation>
     <message>
         <source>The translations seem to be in metres: as millimetres they are only {typical:.3f} mm long (median). Multiply tx, ty and tz by 1000.</source>
         <translation>平移似乎以米为单位：若按毫米计，其长度只有 {typical:.3f} mm（中位数）。需要毫米：请将 tx、ty、tz 乘以 1000。</translation>
+    </message>
+    <message>
+        <source>The two points are {distance:.2f} mm apart; the certified length is {certified} mm. Probe its other end.</source>
+        <translation>两点相距 {distance:.2f} mm，校准长度为 {certified} mm。请探测其另一端。</translation>
     </message>
     <message>
         <source>The two recordings have different numbers of images. Choose two simultaneous recordings.</source>
@@ -9004,6 +9088,10 @@ mm</translation>
         <translation>主管密码错误。请重新输入。</translation>
     </message>
     <message>
+        <source>You can put the pen down.</source>
+        <translation>可以放下光笔。</translation>
+    </message>
+    <message>
         <source>You excluded {n_excluded} images. Undo, or repeat the swing.</source>
         <translation>您剔除了 {n_excluded} 幅图像。请撤销，或重新摆动。</translation>
     </message>
@@ -9018,6 +9106,10 @@ mm</translation>
     <message>
         <source>an ITK transform (.tfm) that maps points from the tip to the pen</source>
         <translation>将点从测头坐标系映射到光笔坐标系的 ITK 变换 (.tfm)</translation>
+    </message>
+    <message>
+        <source>approach</source>
+        <translation>接近方向</translation>
     </message>
     <message>
         <source>by the ball centres</source>
@@ -9080,6 +9172,10 @@ mm</translation>
         <translation>保护带（ISO 14253-1）</translation>
     </message>
     <message>
+        <source>inside</source>
+        <translation>内侧</translation>
+    </message>
+    <message>
         <source>length verification</source>
         <translation>长度验证记录</translation>
     </message>
@@ -9124,12 +9220,24 @@ mm</translation>
         <translation>在其内侧</translation>
     </message>
     <message>
+        <source>outside</source>
+        <translation>外侧</translation>
+    </message>
+    <message>
+        <source>plan</source>
+        <translation>计划</translation>
+    </message>
+    <message>
         <source>plane</source>
         <translation>平面</translation>
     </message>
     <message>
         <source>point</source>
         <translation>点</translation>
+    </message>
+    <message>
+        <source>point in air</source>
+        <translation>空中点</translation>
     </message>
     <message>
         <source>port out of range</source>
@@ -9142,6 +9250,10 @@ mm</translation>
     <message>
         <source>program error</source>
         <translation>程序错误</translation>
+    </message>
+    <message>
+        <source>rotation of cam_from_rig about {axis}</source>
+        <translation>cam_from_rig 绕 {axis} 的旋转</translation>
     </message>
     <message>
         <source>same as another image</source>
@@ -9170,6 +9282,10 @@ mm</translation>
     <message>
         <source>station key</source>
         <translation>工位密钥</translation>
+    </message>
+    <message>
+        <source>stylus</source>
+        <translation>测杆</translation>
     </message>
     <message>
         <source>systematic errors common to all poses: the scale of the tracker and of the pen, a worn or badly seated tip</source>
@@ -9260,6 +9376,10 @@ mm</translation>
         <translation>{place}的 {key} 必须给出绕 x y z 的转角（rad）和平移（mm）的不确定度：6 个非负的标准差，或一个对称的正定协方差矩阵；最大为 1 rad 和 10 m。请更正或删除它。</translation>
     </message>
     <message>
+        <source>{kind}, {side} ({by})</source>
+        <translation>{kind}，{side}（{by}）</translation>
+    </message>
+    <message>
         <source>{n_copies} of {n_images} images are copies of others and count once. Check the recording, and give each image once.</source>
         <translation>{n_images} 幅图像中有 {n_copies} 幅是其他图像的副本，只计一次。请检查记录，每幅图像只给出一次。</translation>
     </message>
@@ -9298,6 +9418,14 @@ mm</translation>
     <message>
         <source>{n_points} points do not determine a {kind}; at least {needed} are needed. Probe more points.</source>
         <translation>{n_points} 个点不能确定{kind}；至少需要 {needed} 个。请触测更多点。</translation>
+    </message>
+    <message>
+        <source>{n_points} points, circles, slots and spheres were probed; {needed} that are not on one line are needed as datum points to connect the new position. Start over.</source>
+        <translation>已探测 {n_points} 个点、圆、槽和球；联系新位置需要 {needed} 个不共线的基准点。请重新开始。</translation>
+    </message>
+    <message>
+        <source>{n_tips} calibrations do not suffice for a verdict on repeatability: {needed} are needed, and ten for control limits.</source>
+        <translation>{n_tips} 次标定不足以对重复性作出结论：需要 {needed} 次，控制限需要十次。</translation>
     </message>
     <message>
         <source>{name} describes a fisheye lens ({model}). The fisheye model of Kannala and Brandt (equidistant) is supported: calibrate the camera again with it.</source>
@@ -9468,6 +9596,22 @@ mm</translation>
         <translation>图像延迟 {size:.3f} 个图像周期；结果已修正，其余计入 U。请用同一信号触发所有相机。</translation>
     </message>
     <message>
+        <source>The images contradict the LED file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this pen, or measure the pen again.</source>
+        <translation>图像与 LED 文件矛盾：{what} 由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查该文件是否属于这支光笔，或重新测量光笔。</translation>
+    </message>
+    <message>
+        <source>The images contradict the camera file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this camera, lens and focus, or calibrate the camera again.</source>
+        <translation>图像与相机文件矛盾：{what} 由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
+    </message>
+    <message>
+        <source>The images contradict the file of camera {camera}: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this camera, lens and focus, or calibrate the camera again.</source>
+        <translation>图像与相机 {camera} 的文件矛盾：{what} 由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
+    </message>
+    <message>
+        <source>The images contradict the rig file: {what} of camera {camera} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that no camera was moved, or calibrate the rig again.</source>
+        <translation>图像与相机组文件矛盾：相机 {camera} 的 {what} 由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查是否有相机被移动，或重新标定相机组。</translation>
+    </message>
+    <message>
         <source>The images of swing {number} are of another size than those of the first. Give swings of one camera.</source>
         <translation>摆动 {number} 的图像尺寸与第一次不同。请给出同一相机的摆动。</translation>
     </message>
@@ -9500,10 +9644,6 @@ mm</translation>
         <translation>镜头偏离畸变模型 {size:.3f} px (RMS)；结果已修正，其余计入 U。请用充满图像的视图标定相机；其文件随后会给出镜头残差场。</translation>
     </message>
     <message>
-        <source>The part is measured.</source>
-        <translation>工件已测量。</translation>
-    </message>
-    <message>
         <source>The pen tilt differs from that of the first visit, so this point does not count. Hold the pen as at the first visit, so that systematic errors of the pen cancel.</source>
         <translation>光笔倾斜与首次探测时不同，因此此点不计入。请按首次的姿态握持光笔，使光笔的系统误差抵消。</translation>
     </message>
@@ -9526,10 +9666,6 @@ mm</translation>
     <message>
         <source>The points lie on a circle of radius {measured:.3f} mm; certified are {certified} mm. Check that it is this ring, and that the radius is entered, not the diameter.</source>
         <translation>各点位于半径 {measured:.3f} mm 的圆上；校准值为 {certified} mm。请检查是否为此环规，且填写的是半径而不是直径。</translation>
-    </message>
-    <message>
-        <source>The points lie on a sphere of diameter {measured:.3f} mm, certified are {certified} mm. Is it this sphere, its diameter rather than its radius, and is the ball diameter stated?</source>
-        <translation>这些点位于直径 {measured:.3f} mm 的球面上，校准值为 {certified} mm。是否为此球？填写的是直径而不是半径吗？是否给出了测球直径？</translation>
     </message>
     <message>
         <source>The points lie on no sphere: {n_off} of {n} are outliers, and the others deviate by up to {off:.2f} mm. Probe one sphere.</source>
@@ -10490,6 +10626,18 @@ mm</translation>
     <message>
         <source>Shift</source>
         <translation>平移</translation>
+    </message>
+    <message>
+        <source>Features of known form: {0}. Refinement of points and tip: {1}. Shift of the tip {2} mm; U (k = 2) {3} mm before, {4} mm after; chi-square {5} with {6} degrees of freedom.</source>
+        <translation>已知形状的要素：{0}。测点和测头的修正：{1}。测头移动 {2} mm；U (k = 2) 修正前 {3} mm，修正后 {4} mm；卡方 {5}，自由度 {6}。</translation>
+    </message>
+    <message>
+        <source>used</source>
+        <translation>已采用</translation>
+    </message>
+    <message>
+        <source>not used</source>
+        <translation>未采用</translation>
     </message>
     <message>
         <source>{0} points; deviations are drawn {1} times as large, at most {2} mm.</source>
