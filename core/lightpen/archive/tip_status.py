@@ -1,9 +1,14 @@
 """Calibration status of a station's tips, from its archive."""
 
+from contextlib import closing
 from datetime import datetime
+from pathlib import Path
 
-from lightpen.archive.database import Database
+from lightpen.archive.chains import chain_at_home
+from lightpen.archive.database import Database, look_into
 from lightpen.archive.due import due_tips
+from lightpen.archive.logbook import ARCHIVE
+from lightpen.errors import NoArchiveError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import CurrentResult, StationStatus
@@ -33,3 +38,21 @@ def statuses(
             Grade(event.grade) if event.grade else None,
         )
     return StationStatus(library, in_force, now)
+
+
+def folder_statuses(
+    data: Path, rule: DueRule, library: Library, now: datetime
+) -> StationStatus:
+    """Return the same by the archive of a data folder, which is only read.
+
+    Raises
+    ------
+    ArchiveError
+        It is not of this program, or cannot be used.
+    """
+    try:
+        with closing(look_into(data / ARCHIVE)) as database:
+            chain = chain_at_home(database) or ""
+            return statuses(database, chain, rule, library, now)
+    except NoArchiveError:
+        return StationStatus(library, now=now)

@@ -15,6 +15,7 @@ from lightpen.record.calibrations.calibrations import NOBODY, CalibrationFile
 from lightpen.record.library.tip_library import read_library
 from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.swings.names import Names
 from lightpen.verification.storage.verification_files import keep_verification
 
 
@@ -79,23 +80,27 @@ def keep_record(
     data = options.data or (None if tip is None else data_folder_of(tip.path))
     if options.no_entry or data is None:
         print("This result is not entered in an archive.")
+        if data is not None and not is_simulated:
+            _tell_overdue(data, names)
         return
     # A fifth of a second, which a result without an entry need not take.
     from lightpen.archive.lazy_logbook import server_address
     from lightpen.archive.logbook import Logbook
-    from lightpen.archive.tip_status import statuses
 
     kept = keep_verification(data, record, is_simulated=is_simulated)
     with closing(Logbook(data, server_address())) as logbook:
         for trouble in logbook.enter_owed():
             print(shown(str(trouble)))
-        if not is_simulated:
-            supervision = FolderArchive(data).supervision()
-            rule = supervision.limits_at(names.station, StationLimits()).due
-            found = statuses(
-                logbook.database, logbook.chain, rule, read_library(data), local_now()
-            )
-            overdue = found.overdue(names.pen, names.tip)
-            if overdue is not None:
-                print(shown(str(overdue)))
+    if not is_simulated:
+        _tell_overdue(data, names)
     print(shown(f"Entered in the archive: {kept}"))
+
+
+def _tell_overdue(data: Path, names: Names) -> None:
+    from lightpen.archive.tip_status import folder_statuses
+
+    rule = FolderArchive(data).supervision().limits_at(names.station, StationLimits())
+    found = folder_statuses(data, rule.due, read_library(data), local_now())
+    overdue = found.overdue(names.pen, names.tip)
+    if overdue is not None:
+        print(shown(str(overdue)))

@@ -17,7 +17,7 @@ from lightpen.archive.lazy_logbook import server_address
 from lightpen.archive.logbook import ARCHIVE, Logbook, confirm_limits
 from lightpen.archive.server import open_server
 from lightpen.archive.shared_library import TakenOver, take_over
-from lightpen.archive.tip_status import statuses
+from lightpen.archive.tip_status import folder_statuses
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
 from lightpen.commands.tips import FORGOTTEN
@@ -263,13 +263,7 @@ def _tell(options: argparse.Namespace, item: AnyItem, library: Library) -> None:
 
 def _statuses(data: Path, library: Library, max_days: int | None) -> StationStatus:
     rule = DueRule() if not max_days else DueRule(max_days)
-    now = local_now()
-    try:
-        with closing(look_into(data / ARCHIVE)) as database:
-            chain = chain_at_home(database) or ""
-            return statuses(database, chain, rule, library, now)
-    except NoArchiveError:
-        return StationStatus(library, now=now)
+    return folder_statuses(data, rule, library, local_now())
 
 
 def _record(item: AnyItem, found: StationStatus) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from lightpen.archive.due import due_tips
 from lightpen.archive.entries import Entry, Kind
 from lightpen.archive.history import known_names
 from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.tip_status import statuses
+from lightpen.archive.tip_status import folder_statuses, statuses
 from lightpen.formats.decoding import encode_png
 from lightpen.messages import Message
 from lightpen.model.limits import DueRule
@@ -133,6 +133,20 @@ def test_tips_are_valid_overdue_not_calibrated_or_retired(station: Station) -> N
     retired = Library(tips={"T-10": ListedTip(id="T-10", is_retired=True)})
     assert stand(station, retired, 1).of_tip("LP-04", "T-10") is TipStatus.RETIRED
     assert StationStatus().of_tip("LP-04", "T-10") is None  # nothing was read yet
+
+
+def test_a_data_folder_tells_the_same_of_its_tips(
+    station: Station, tmp_path: Path
+) -> None:
+    append(station.database, station.chain, *accepted(0))
+    now = NOON + timedelta(days=31)
+    file = station.database.file
+    assert file is not None and file.name == ARCHIVE
+
+    found = folder_statuses(file.parent, RULE, Library(), now)
+    assert found.of_tip("LP-04", "T-10") is TipStatus.OVERDUE
+    empty = folder_statuses(tmp_path / "empty", RULE, Library(), now)
+    assert empty.of_tip("LP-04", "T-10") is TipStatus.UNCALIBRATED
 
 
 def test_a_tip_of_a_day_still_to_come_is_overdue_for_its_age_is_not_known(
