@@ -141,7 +141,8 @@ def test_a_data_folder_tells_the_same_of_its_tips(
     append(station.database, station.chain, *accepted(0))
     now = NOON + timedelta(days=31)
     file = station.database.file
-    assert file is not None and file.name == ARCHIVE
+    assert file is not None
+    assert file.name == ARCHIVE
 
     found = folder_statuses(file.parent, RULE, Library(), now)
     assert found.of_tip("LP-04", "T-10") is TipStatus.OVERDUE
