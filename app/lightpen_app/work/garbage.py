@@ -22,7 +22,6 @@ class GarbageCollector(QObject):
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         gc.disable()
-        gc.collect()
         gc.freeze()  # what is there now stays: the window is not to wait for a search
         for period_ms, action in (
             (PERIOD_MS, collect_if_due),

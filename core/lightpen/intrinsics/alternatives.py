@@ -29,7 +29,7 @@ from lightpen.intrinsics.board_fit import N_POSE, N_SHAPE, BoardFit
 from lightpen.intrinsics.camera_change import FEWEST, CameraChange
 from lightpen.intrinsics.distortion import fit_camera, rough_poses
 from lightpen.intrinsics.uncertainty_map import moved_in_image
-from lightpen.intrinsics.views import BoardTolerances, Views, shortened
+from lightpen.intrinsics.views import BoardTolerances, Views, listed_names
 from lightpen.model.camera import Camera
 
 MAX_ROUNDS = 8
@@ -159,7 +159,7 @@ def _fewer(views: Views, which: BoolArray) -> tuple[str, int]:
     """Return the names of the fewer views of two groups, and their number."""
     fewer = which if which.sum() <= len(which) / 2 else ~which
     names = tuple(n for n, own in zip(views.names, fewer, strict=True) if own)
-    return shortened(names), len(names)
+    return listed_names(names), len(names)
 
 
 def _fitted(views: Views, tolerances: BoardTolerances, near: Camera) -> BoardFit | None:

@@ -7,7 +7,7 @@ shadows) is the same in all of them, so more of them tell nothing more of the ca
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.views import Views, shortened
+from lightpen.intrinsics.views import Views, listed_names
 from lightpen.messages import Message, message
 
 SAME = 0.002  # of the image's longer side: distance of the points, rms
@@ -41,7 +41,7 @@ def message_on_duplicates(n_views: int, names: tuple[str, ...]) -> Message:
         "intrinsics.duplicates",
         n_duplicates=len(names),
         n_views=n_views,
-        names=shortened(names),
+        names=listed_names(names),
     )
 
 

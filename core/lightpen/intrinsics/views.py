@@ -10,7 +10,7 @@ from lightpen.intrinsics.boards import Board
 SHOWN = 6  # names in a message
 
 
-def shortened(names: tuple[str, ...]) -> str:
+def listed_names(names: tuple[str, ...]) -> str:
     """Return the first names of views as text."""
     return ", ".join(names[:SHOWN]) + (" ..." if len(names) > SHOWN else "")
 

@@ -27,7 +27,6 @@ SIDES = {
     Side.OUTSIDE: message("measuring.outside"),
 }
 EVIDENCES = {
-    Evidence.PLAN: message("measuring.by-plan"),
     Evidence.AIR: message("measuring.by-air"),
     Evidence.APPROACH: message("measuring.by-approach"),
     Evidence.STYLUS: message("measuring.by-stylus"),
@@ -64,12 +63,17 @@ def feature_rows(part: MeasuredPart) -> Iterator[PartRow]:
 
 
 def _kind_and_side(one: Measured) -> Message:
-    """Return the kind of a feature, with the side of a round one and its evidence."""
-    surface = one.surface
-    if one.kind not in ROUND or surface.evidence not in EVIDENCES:
-        return NAMES[one.kind]
-    side, by = SIDES[surface.side], EVIDENCES[surface.evidence]
-    return message("measuring.sided", kind=NAMES[one.kind], side=side, by=by)
+    """Return the kind of a feature; of a round one its side, and what decided it.
+
+    What the plan states needs no evidence.
+    """
+    kind, side, evidence = NAMES[one.kind], one.surface.side, one.surface.evidence
+    if one.kind not in ROUND or evidence is Evidence.NONE:
+        return kind
+    if evidence is Evidence.PLAN:
+        return message("measuring.sided", kind=kind, side=SIDES[side])
+    by = EVIDENCES[evidence]
+    return message("measuring.sided-by", kind=kind, side=SIDES[side], by=by)
 
 
 def characteristic_rows(part: MeasuredPart) -> Iterator[PartRow]:

@@ -1563,7 +1563,7 @@
     </message>
     <message>
         <source>RMS / px (x: excluded)</source>
-        <translation>RMS / px（x：已排除）</translation>
+        <translation>均方根 / px（×：已排除）</translation>
     </message>
     <message>
         <source>drag down to exclude</source>
@@ -6732,6 +6732,10 @@ mm</translation>
         <translation>{file} 不是导出的存档，或已被修改（第 {line} 行）。请用此版本程序重新导出。</translation>
     </message>
     <message>
+        <source>{kind}, {side}</source>
+        <translation>{kind}，{side}</translation>
+    </message>
+    <message>
         <source>{n_duplicates} views repeat the board position of another view and do not count; {n_views} views remain: {names}. Move the board between views.</source>
         <translation>{n_duplicates} 个视图与其他视图的标定板位置重复，不计入；剩余 {n_views} 个视图：{names}。请在视图之间移动标定板。</translation>
     </message>
@@ -9222,10 +9226,6 @@ mm</translation>
     <message>
         <source>outside</source>
         <translation>外侧</translation>
-    </message>
-    <message>
-        <source>plan</source>
-        <translation>计划</translation>
     </message>
     <message>
         <source>plane</source>

@@ -24,7 +24,7 @@ from lightpen.verification.probing.probing import (
 from lightpen.verification.probing.sources import require_leds_fit
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session_state import (
-    MeasuredRuns,
+    RunsOfTask,
     SessionSetup,
     SessionState,
     n_visits,
@@ -172,7 +172,7 @@ def measure(setup: SessionSetup, task: AnyTask, runs: Runs) -> Found:
     return found
 
 
-def measure_with_drift(setup: SessionSetup, done: MeasuredRuns) -> Found:
+def measure_with_drift(setup: SessionSetup, done: RunsOfTask) -> Found:
     """Return the result of a task, with the motion of the camera.
 
     Raises
@@ -186,7 +186,7 @@ def measure_with_drift(setup: SessionSetup, done: MeasuredRuns) -> Found:
 
 
 def with_read(
-    setup: SessionSetup, state: SessionState, read: MeasuredRuns, found: Found
+    setup: SessionSetup, state: SessionState, read: RunsOfTask, found: Found
 ) -> SessionState:
     """Return it with what recorded images have found.
 
@@ -201,7 +201,7 @@ def with_read(
     return with_found(state, read, found)
 
 
-def with_found(state: SessionState, done: MeasuredRuns, found: Found) -> SessionState:
+def with_found(state: SessionState, done: RunsOfTask, found: Found) -> SessionState:
     """Return the session with a task's result; the next begins when the pen moves."""
     kind = done.task.kind
     return replace(
@@ -369,9 +369,9 @@ def _done(
         state = _after_visit(setup, state, runs)
     found = measure(setup, task, runs)
     if task is not DRIFT and state.awaits_drift(setup):
-        done = MeasuredRuns(task, runs)
+        done = RunsOfTask(task, runs)
         state = replace(state, pending=(*state.pending, done))
-    return with_found(state, MeasuredRuns(task, runs, setup), found)
+    return with_found(state, RunsOfTask(task, runs, setup), found)
 
 
 def _with_visit(setup: SessionSetup, state: SessionState) -> SessionState:

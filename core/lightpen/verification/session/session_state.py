@@ -67,7 +67,7 @@ def with_drift(
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredRuns:
+class RunsOfTask:
     """Points of a task that is done, to be measured again.
 
     Attributes
@@ -102,11 +102,11 @@ class SessionState:
         number does.
     found : mapping of str to Found
         Results of the completed tasks by kind.
-    measured : mapping of str to MeasuredRuns
+    measured : mapping of str to RunsOfTask
         Their points by kind.
     visits : tuple of tuple of ProbedPoint
         Visits of the reference cone so far.
-    pending : tuple of MeasuredRuns
+    pending : tuple of RunsOfTask
         Results since the last visit, which do not include the drift yet.
     """
 
@@ -115,9 +115,9 @@ class SessionState:
     runs: tuple[Points, ...] = ()
     trouble: Message | None = None
     found: Mapping[str, Found] = field(default_factory=dict)
-    measured: Mapping[str, MeasuredRuns] = field(default_factory=dict)
+    measured: Mapping[str, RunsOfTask] = field(default_factory=dict)
     visits: tuple[Points, ...] = ()
-    pending: tuple[MeasuredRuns, ...] = ()
+    pending: tuple[RunsOfTask, ...] = ()
 
     def found_by(self, task: VerificationTask[OptionsT, FoundT]) -> FoundT | None:
         """Return the result of a task; None until it is complete."""

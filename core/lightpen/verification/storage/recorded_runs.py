@@ -10,7 +10,7 @@ from lightpen.verification.probing.probing import ProbingRules
 from lightpen.verification.probing.sources import lamp_drift_of, touch_run
 from lightpen.verification.session.session import measure_with_drift
 from lightpen.verification.session.session_state import (
-    MeasuredRuns,
+    RunsOfTask,
     SessionSetup,
     with_drift,
 )
@@ -34,13 +34,13 @@ class ReadRuns:
 
     Attributes
     ----------
-    touched : MeasuredRuns
+    touched : RunsOfTask
         Their touches, in which a drift reference that is read later may count.
     """
 
     done: CompletedTask
     found: Found
-    touched: MeasuredRuns
+    touched: RunsOfTask
 
 
 def read_runs(
@@ -69,7 +69,7 @@ def read_runs(
         report(i / len(places))
     lamp_drift = lamp_drift_of(runs, tip.instrument, setup.choices.limits)
     named = [(run.name, run.touches) for run in runs]
-    touched = MeasuredRuns(task, named, with_drift(setup, lamp_drift), lamp_drift)
+    touched = RunsOfTask(task, named, with_drift(setup, lamp_drift), lamp_drift)
     found = measure_with_drift(setup, touched)
     images = TaskImages(
         origin=places[0].origin,
