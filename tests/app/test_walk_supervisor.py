@@ -94,7 +94,7 @@ def test_beyond_the_limits_a_supervisor_accepts_after_a_wrong_password(
     bent = Holder(rig_of(camera), pen, PAPER_TIP + np.array([0.3, 0.0, 0.0]))
     status = workbench.verification.status
     assert status.region is not None
-    for hold in leant(5):
+    for hold in leant(6):  # the first is the rest that the pen leaves
         for detection in bent.still(hold):
             workbench.verification.runner.take(FRAME, detection, status.region)
     walker.until_says("Not verified")

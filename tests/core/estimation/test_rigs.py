@@ -201,7 +201,7 @@ def test_a_camera_that_was_turned_is_found_by_its_turn() -> None:
     result = calibrated(SEEN, placed(turn @ RIG.rotations[1], RIG.translations[1]))
     (denied,) = result.contradictions
 
-    assert "turn of cam_from_rig about z" in str(denied.message)
+    assert "rotation of cam_from_rig about z" in str(denied.message)
     assert denied.estimated == pytest.approx(-np.degrees(0.003), abs=0.01)
 
 

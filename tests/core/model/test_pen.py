@@ -211,7 +211,7 @@ def test_mirrored_raw_coordinates_are_refused() -> None:
     [
         (3, [4.0, 0.0, 0.0], r"LED 3 is \d\.\d\d mm off the line of LEDs 1 to 4"),
         (6, [0.0, 0.0, 4.0], r"LED \d+ is \d\.\d\d mm off the plane of LEDs 5 to 10"),
-        (6, [9.0, 0.0, 0.0], "are not parallel"),
+        (6, [9.0, 0.0, 0.0], "not parallel to the plane"),
     ],
 )
 def test_what_keeps_raw_leds_from_the_frame_is_named(
