@@ -25,11 +25,6 @@ FOLDER = "cp313/"
 LIBRARY = "python313.zip"
 # Compiled modules whose sources were not at hand to compare them with.
 UNPROVEN = ("__phello__/", "_pydecimal.pyc", "pydoc_data/topics.pyc")
-# What nothing here imports: the interactive shell, mail, FTP, a web server, tools.
-UNUSED = (
-    *("_pyrepl/", "wsgiref/", "venv/", "ensurepip/", "mailbox.pyc", "imaplib.pyc"),
-    *("poplib.pyc", "ftplib.pyc", "smtplib.pyc", "pickletools.pyc", "_pyio.pyc"),
-)
 # Paths from the folder of the runtime in which modules are looked for, and no others.
 PATHS = "python313.zip\r\n.\r\nLib\\site-packages\r\n"
 
@@ -79,7 +74,7 @@ def unpack(distribution: Path, folder: Path) -> None:
 
 
 def without_unproven(library: bytes) -> bytes:
-    """Return the library of Python without modules that are unproven or unused.
+    """Return the library of Python without the modules that could not be proven.
 
     They are stored as they are: the installer packs them better.
     """
@@ -89,6 +84,6 @@ def without_unproven(library: bytes) -> bytes:
         zipfile.ZipFile(packed, "w") as after,
     ):
         for entry in before.infolist():
-            if not entry.filename.startswith((*UNPROVEN, *UNUSED)):
+            if not entry.filename.startswith(UNPROVEN):
                 after.writestr(entry, before.read(entry), zipfile.ZIP_STORED)
     return packed.getvalue()
