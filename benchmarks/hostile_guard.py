@@ -84,7 +84,7 @@ class Guarded:
     export: Path
     verification: Path
     result: Path
-    archive: Path  # a copy that nobody writes to
+    archive: Path  # a copy that is only read
 
     @property
     def key(self) -> Path:

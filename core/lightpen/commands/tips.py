@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from lightpen.commands.archive import DataFolder, parse_date
-from lightpen.commands.arguments import add_pen_options, finite, whole_number
+from lightpen.commands.arguments import add_camera_and_pen, finite, whole_number
 
 T = TypeVar("T")
 
@@ -67,17 +67,7 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
         metavar="IMAGES",
         help="images of the pen turned about its stylus in a cone",
     )
-    spun.add_argument(
-        "--camera",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="camera file: intrinsics of the camera",
-    )
-    spun.add_argument(
-        "--pen", type=Path, required=True, metavar="FILE", help="LED file of the pen"
-    )
-    add_pen_options(spun)
+    add_camera_and_pen(spun)
     for action in (added, changed, retired, returned, spun):
         _add_author(action)
     shared.add_argument(

@@ -9,7 +9,7 @@ from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.swing_run import SwingRun
 
 RATE_S = 2.0  # over which the images are counted
-N_LAST = 20  # images by which spots are said not to match the pen
+N_LAST = 20  # images that decide whether the spots match the pen
 MOST = 0.8  # of them
 MISSED = 2  # LEDs, more than a finger and a stray light explain
 

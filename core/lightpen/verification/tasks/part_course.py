@@ -83,7 +83,7 @@ def base_name(name: str) -> str:
 def with_move(
     options: PartOptions, runs: Sequence[Points], conditions: Conditions
 ) -> PartOptions:
-    """Return options by which the part is moved after some runs.
+    """Return the options with a new position of the part after the runs so far.
 
     Its datum points are the three features with a centre that span the largest
     triangle.

@@ -16,6 +16,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.formats.file_format import FileFormat
 from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.part import taught_plan
 from lightpen.measuring.plan import Plan, free_plan
@@ -163,12 +164,12 @@ def test_tables_have_a_decision_for_each_characteristic(measured: Station) -> No
 
 @pytest.mark.parametrize("export", EXPORTS, ids=lambda each: each.name)
 def test_every_export_names_the_characteristics(
-    measured: Station, export: object
+    measured: Station, export: FileFormat
 ) -> None:
     part = measured.found.part
-    text = export.encoded(part).decode()  # type: ignore[attr-defined]
+    text = export.encoded(part).decode()
 
-    if export.name == "dxf":  # type: ignore[attr-defined]
+    if export.name == "dxf":
         drawing = read_drawing(StringIO(text))
         assert not drawing.audit().errors
         assert len(drawing.modelspace().query('*[layer=="BORE"]')) > 2 * 70
