@@ -13,7 +13,9 @@ QT_MODULES = {*("Core", "Gui", "PrintSupport", "Svg", "Widgets")}
 QT_PLUGINS = ("iconengines/*", "imageformats/*", "platforms/*", "styles/*")
 QT_TRANSLATIONS = tuple(f"qtbase_{language}.qm" for language in languages())
 DROPPED = (
-    "*.pyi", "*.pxd", "*.h", "*.hpp", "*.lib", "*/tests/*",  # to develop and test
+    # To develop and test.
+    "*.pyi", "*.pxd", "*.pyx", "*.c", "*.h", "*.hpp", "*.lib", "*.a", "*.cmake",
+    "*/tests/*", "*/translations/*.ts",
     "PySide6/*.exe", "PySide6/doc/*", "PySide6/glue/*", "PySide6/include/*",
     "PySide6/lib/*", "PySide6/metatypes/*", "PySide6/qml/*", "PySide6/resources/*",
     "PySide6/scripts/*", "PySide6/typesystems/*",
@@ -30,7 +32,7 @@ DROPPED = (
     "sqlalchemy/testing/*", "alembic/testing/*",
     # Parts of libraries that nothing here imports.
     "pyqtgraph/console/*", "pyqtgraph/dockarea/*", "pyqtgraph/examples/*",
-    "pyqtgraph/flowchart/*",
+    "pyqtgraph/flowchart/*", "pyqtgraph/icons/peegee/*.png",
     "sqlalchemy/dialects/mssql/*", "sqlalchemy/dialects/mysql/*",
     "sqlalchemy/dialects/oracle/*", "sqlalchemy/orm/*",
     "scipy/optimize/cython_optimize*", "scipy/special/cython_special*",
@@ -44,6 +46,7 @@ DROPPED = (
     "cv2/LICENSE*",  # a copy of that beside the metadata
     "*/LicenseRef-Qt-Commercial.txt",  # Qt is used under the LGPL
     "*.dist-info/RECORD",  # lists what is no longer there
+    "platformdirs-*.dist-info/sboms/*",  # lists its tools of development
 )  # fmt: skip
 # Sub-packages of scipy that are imported, and those that they import.
 SCIPY = {
