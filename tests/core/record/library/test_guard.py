@@ -2,11 +2,12 @@
 
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from msgspec import structs
+from msgspec import ValidationError, convert, structs, to_builtins
 
 from lightpen.errors import AcceptanceError, FileError
 from lightpen.formats.json_records import json_bytes
@@ -15,6 +16,7 @@ from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.record.library.guard_files import (
     LIMITS_FOLDER,
     LimitsChange,
+    PasswordVerifier,
     write_limits_change,
 )
 from lightpen.record.library.key_changes import key_change
@@ -29,7 +31,7 @@ from lightpen.record.library.supervision_changes import (
     set_limits,
     set_password,
 )
-from lightpen.record.signing.keys import chain_of, key_folder, station_key
+from lightpen.record.signing.keys import SALT_LENGTH, chain_of, key_folder, station_key
 from lightpen.record.signing.signed_text import Signers
 from lightpen.record.signing.station import memory_file, station_name
 
@@ -108,7 +110,6 @@ def test_limits_hold_for_every_spelling_of_the_station(guarded: Path) -> None:
     assert supervision.is_unknown("Hall 22")
 
 
-@pytest.mark.slow
 def test_wrong_passwords_are_delayed(guarded: Path) -> None:
     supervision = read_supervision(guarded)
     for _ in range(FREE + 1):
@@ -116,6 +117,26 @@ def test_wrong_passwords_are_delayed(guarded: Path) -> None:
             require_supervisor(supervision, Signature("Eve", "wrong"))
     with pytest.raises(AcceptanceError, match="Wait 1 s"):
         require_supervisor(supervision, EVE)
+
+
+def test_a_right_password_forgets_wrong_ones(guarded: Path) -> None:
+    supervision = read_supervision(guarded)
+    for signature in (
+        [Signature("Eve", "wrong")] * FREE + [EVE] + [Signature("Eve", "wrong")]
+    ):
+        with suppress(AcceptanceError):
+            require_supervisor(supervision, signature)
+    require_supervisor(supervision, EVE)
+
+
+@pytest.mark.parametrize("salt", ["", "zz" * SALT_LENGTH, "00" * (SALT_LENGTH - 1)])
+def test_a_malformed_salt_is_damage(guarded: Path, salt: str) -> None:
+    guard = read_supervision(guarded)
+    assert guard.password is not None
+    with pytest.raises(ValidationError, match="salt"):
+        convert(
+            to_builtins(structs.replace(guard.password, salt=salt)), PasswordVerifier
+        )
 
 
 def test_limits_that_were_changed_meanwhile_are_not_overwritten(guarded: Path) -> None:
