@@ -1,6 +1,6 @@
 """Honest histories with power cuts: whether the check accuses any of them.
 
-Usage: python benchmarks/honest_histories.py [N]
+Usage: python benchmarks/honest_histories.py [N [SEED]]
 
 Each history is a data folder in which tips are accepted, the library is changed and
 notes are made, while all is delivered to a PostgreSQL server under the role of a
@@ -42,13 +42,13 @@ LONGEST_LIFE_S = 1.5  # of a program until it is killed
 WRITES = (accept, change_library, note)
 
 
-def honest_row(n_histories: int = N_HISTORIES) -> Row:
+def honest_row(n_histories: int = N_HISTORIES, seed: int = SEED) -> Row:
     """Return how many honest histories have a finding."""
     what = f"archive, {n_histories} honest histories with power cuts: with a finding"
     programs = postgres_programs()
     if programs is None or not hasattr(os, "fork"):
         return Row(what, "needs PostgreSQL")
-    rng, n_cuts, n_accused, n_entries = random.Random(SEED), 0, 0, 0
+    rng, n_cuts, n_accused, n_entries = random.Random(seed), 0, 0, 0
     with tempfile.TemporaryDirectory(prefix="lightpen-honest-") as name:
         folder = Path(name)
         folder.chmod(0o755)  # for the user of the server
@@ -127,7 +127,7 @@ def _findings(data: Path, address: str) -> tuple[list[str], int]:
 
 def main() -> int:
     """Measure, print the table, and return the exit status."""
-    row = honest_row(int(sys.argv[1]) if len(sys.argv) > 1 else N_HISTORIES)
+    row = honest_row(*map(int, sys.argv[1:3]))
     print(f"{description()}\n\n{table([row])}")
     return 0 if row.met else 1
 

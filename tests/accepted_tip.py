@@ -16,7 +16,7 @@ from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, with_content
+from lightpen.formats.hashes import Inputs, RigInputs, with_content
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import read_rig
@@ -63,8 +63,8 @@ def accept_tip(
         camera_file, rig_inputs = preparation.camera_file.path, None
     else:
         camera_file = rig_file.camera_files[0]
-        files = all_hashed(rig_file.camera_files)
-        rig_inputs = RigInputs(hashed(rig_file.path), files)
+        files = tuple(map(with_content, rig_file.camera_files))
+        rig_inputs = RigInputs(with_content(rig_file.path), files)
     found = _calibrated(
         *(camera_file, pen.path, seed, led_error),
         None if rig_file is None else rig_file.path,

@@ -248,3 +248,22 @@ def test_the_record_is_not_written_over_a_rig_file(copied: Path, lightpen: Run) 
     outcome = calibrate(lightpen, copied, "--json", copied / "rig.json")
 
     assert_refused(outcome, "would replace the input file", 2)
+
+
+def test_the_record_alone_gives_the_same_tip_where_a_camera_lost_an_image(
+    copied: Path, lightpen: Run, tmp_path: Path
+) -> None:
+    record, again = tmp_path / "tip.json", tmp_path / "again.json"
+    sorted((copied / "right").iterdir())[4].unlink()
+    assert calibrate(lightpen, copied, "--json", record).returncode == 0
+    shutil.rmtree(copied)
+    outcome = lightpen("calibrate", "--from-record", record, "--json", again)
+
+    assert outcome.returncode == 0, outcome.stderr
+    before, after = (json.loads(each.read_bytes()) for each in (record, again))
+    assert after["inputs"] == before["inputs"]
+    for name in ("tip_pen_mm", "expanded_uncertainty_mm"):
+        np.testing.assert_allclose(after[name], before[name], rtol=0, atol=1e-7)
+    assert [(f["file"], f["reason"]) for f in after["frames"]] == [
+        (f["file"], f["reason"]) for f in before["frames"]
+    ]

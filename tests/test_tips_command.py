@@ -52,6 +52,25 @@ def test_a_tip_is_added_changed_retired_and_listed(
     assert events[-1].reason == "chipped"
 
 
+def test_certificates_are_kept_and_only_references_have_a_value(
+    lightpen: Run, tmp_path: Path
+) -> None:
+    where = ("--data", tmp_path / "data")
+    dated = ("--certificate", "K-17", "--certified", "2026-03-01")
+    lightpen("tips", "add", "reference", "R-1", *where, *dated, "--value", "31.7512")
+    lightpen("tips", "add", "camera", "CAM-7", *where, *dated)
+    refused = lightpen("tips", "change", "camera", "CAM-7", *where, "--value", "3")
+    lightpen("tips", "change", "camera", "CAM-7", *where, "--certified", "none")
+
+    camera, reference = json.loads(lightpen("tips", "list", *where, "--json").stdout)
+    assert "Only a reference has a certified value" in refused.stderr
+    assert (camera["certificate"], camera["certified"]) == ("K-17", None)
+    assert (reference["certified"], reference["certified_mm"]) == (
+        "2026-03-01",
+        31.7512,
+    )
+
+
 def test_a_library_without_anything_is_named(lightpen: Run, tmp_path: Path) -> None:
     listed = lightpen("tips", "list", "--data", tmp_path / "elsewhere")
 

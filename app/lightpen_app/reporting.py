@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from lightpen.formats.files import A_FILE, LARGEST_RECORD, read_bytes, write_whole
+from lightpen.record.exports.dcc import Laboratory
 from lightpen.record.exports.exports import save_new
 from lightpen.record.folder.verifications import is_verification
 from lightpen_app.application import has_display, make_application
@@ -17,6 +18,7 @@ from lightpen_app.print_report.control import (
     read_kept_verification,
 )
 from lightpen_app.print_report.printing import paper_of, paper_stem, pdf_of
+from lightpen_app.work.settings import Settings, settings_file
 
 
 def write_paper(result: Path, out: Path | None, language: str) -> Path:
@@ -44,12 +46,12 @@ def write_paper(result: Path, out: Path | None, language: str) -> Path:
     UsageError
         The file holds no calibration, or not all that is put on paper.
     """
-    content = read_bytes(result, A_FILE, LARGEST_RECORD)
-    if is_verification(content):
+    if is_verification(read_bytes(result, A_FILE, LARGEST_RECORD)):
         return _write_verification(result, out, language)
     found = read_calibration_file(result)
     with _speaking(language):
-        pdf = pdf_of(paper_of(found.calibration_file, found.reestimated, found.entered))
+        content = found.calibration_file, found.reestimated, found.entered
+        pdf = pdf_of(paper_of(*content, _laboratory()))
     return _written(pdf, paper_stem(found.calibration_file), out)
 
 
@@ -62,8 +64,13 @@ def _write_verification(file: Path, out: Path | None, language: str) -> Path:
 
     found = read_kept_verification(file)
     with _speaking(language):
-        pdf = pdf_of(verification_paper(*found))
+        pdf = pdf_of(verification_paper(*found, _laboratory()))
     return _written(pdf, verification_stem(file, found.done), out)
+
+
+def _laboratory() -> Laboratory | None:
+    """Return the laboratory that was named in the window."""
+    return Settings(settings_file()).laboratory()
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """Opens the report of a result file in its own window."""
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,18 @@ from lightpen.record.calibrations.reestimated_poses import (
     reestimate_poses,
 )
 from lightpen.record.exports.export_status import with_status
-from lightpen.record.folder.verifications import StoredVerification, read_verification
+from lightpen.record.folder.verifications import (
+    StoredVerification,
+    data_folder_of_verification,
+    read_verification,
+)
+from lightpen.record.library.tip_library import Library, read_library
+from lightpen.record.library.traceability import (
+    TracedItem,
+    certified_values,
+    traced_items,
+)
+from lightpen.record.swings.names import Names
 from lightpen_app.work.job import Job
 from lightpen_app.work.save_place import SavePlace
 
@@ -69,6 +81,7 @@ class KeptVerification(NamedTuple):
     file: InputFile
     done: StoredVerification
     entered: ArchivePlace | None
+    traced: tuple[TracedItem, ...] = ()
 
 
 def read_kept_verification(path: Path) -> KeptVerification:
@@ -83,7 +96,14 @@ def read_kept_verification(path: Path) -> KeptVerification:
     """
     file = with_content(path)
     done = read_verification(file.content or b"", path)
-    return KeptVerification(file, done, entry_of_file(path, file.sha256))
+    data = data_folder_of_verification(path)
+    library = Library() if data is None else read_library(data)
+    names = Names(done.station, done.operator, done.pen, done.tip)
+    certified = certified_values(json.loads(file.content or b"{}"))
+    return KeptVerification(
+        *(file, done, entry_of_file(path, file.sha256)),
+        traced_items(library, names, certified=certified),
+    )
 
 
 class PrintReportControl(QObject):
@@ -139,7 +159,10 @@ class PrintReportControl(QObject):
         # Printing takes long to be imported, and few swings are printed.
         from lightpen_app.print_report.printing import paper_of, paper_stem
 
-        paper = paper_of(found.calibration_file, found.reestimated, found.entered)
+        paper = paper_of(
+            *(found.calibration_file, found.reestimated, found.entered),
+            self._place.settings.laboratory(),
+        )
         self._open(paper, paper_stem(found.calibration_file))
 
     def _show_verification(self, found: KeptVerification) -> None:
@@ -149,7 +172,8 @@ class PrintReportControl(QObject):
         )
 
         stem = verification_stem(found.file.path, found.done)
-        self._open(verification_paper(*found), stem)
+        laboratory = self._place.settings.laboratory()
+        self._open(verification_paper(*found, laboratory), stem)
 
     def _open(self, paper: "PrintReport", stem: str) -> None:
         from lightpen_app.print_report.preview import PrintReportWindow

@@ -19,6 +19,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
+from lightpen.record.exports.dcc import Laboratory
 from lightpen.record.exports.exports import export_stem
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.print_report.blocks import DOTS_AN_INCH
@@ -44,6 +45,7 @@ def paper_of(
     calibration_file: CalibrationFile,
     reestimated: ReestimatedPoses | None,
     entered: ArchivePlace | None = None,
+    laboratory: Laboratory | None = None,
 ) -> PrintReport:
     """Return the pages of a record, in the language that is chosen.
 
@@ -53,8 +55,10 @@ def paper_of(
         The images of the calibration; some plots are left out without.
     entered : ArchivePlace, optional
         Archive entry of the calibration.
+    laboratory : Laboratory, optional
+        Where it was made.
     """
-    blocks = all_sections(calibration_file, reestimated, entered)
+    blocks = all_sections(calibration_file, reestimated, entered, laboratory)
     return PrintReport(
         calibration_file.names.operator, _margins(calibration_file), lay_out(blocks)
     )

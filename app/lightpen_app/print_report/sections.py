@@ -1,6 +1,6 @@
 """Sections of a calibration report."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import datetime
 
@@ -11,7 +11,10 @@ from lightpen.archive.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
+from lightpen.record.exports.dcc import Laboratory
 from lightpen.record.exports.export_status import OVERDUE, RETIRED
+from lightpen.record.library.tip_library import ItemKind
+from lightpen.record.library.traceability import TracedItem
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import LIGHT
@@ -19,6 +22,7 @@ from lightpen_app.print_report.blocks import (
     MM,
     WIDTH,
     Block,
+    Column,
     PrintSize,
     draw_text,
     facts,
@@ -26,6 +30,7 @@ from lightpen_app.print_report.blocks import (
     line_pen,
     paragraph,
     printed_text,
+    table,
     text_height,
 )
 from lightpen_app.print_report.evidence import file_blocks, image_blocks, led_blocks
@@ -45,11 +50,14 @@ def all_sections(
     calibration_file: CalibrationFile,
     reestimated: ReestimatedPoses | None,
     entered: ArchivePlace | None,
+    laboratory: Laboratory | None = None,
 ) -> tuple[Block, ...]:
     """Return the whole record, from its title to its end mark."""
     return (
         *_title(calibration_file),
         *_items(calibration_file),
+        *laboratory_blocks(laboratory),
+        *traced_blocks(calibration_file.traced),
         *result_blocks(calibration_file),
         *rule_blocks(calibration_file),
         *budget_blocks(calibration_file.calibration),
@@ -124,6 +132,7 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
     measured = calibration_file.measured
     diameter = names.ball_diameter
     temperature = calibration.assumptions.temperature_c
+    humidity = calibration.assumptions.humidity_percent
     yield heading(translate("paper", "Item under calibration"))
     yield from facts(
         [
@@ -154,6 +163,12 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
                 if temperature is None
                 else f"{temperature:.1f} \xb0C",
             ),
+            (
+                translate("paper", "Relative humidity"),
+                translate("paper", "not measured")
+                if humidity is None
+                else f"{humidity:g} %",
+            ),
             (translate("paper", "Method"), _method(calibration.method)),
             (
                 translate("paper", "Next due"),
@@ -175,6 +190,54 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
                 "of this report.",
             )
         )
+
+
+def laboratory_blocks(laboratory: Laboratory | None) -> Iterable[Block]:
+    """Return who calibrates where, and by which procedure."""
+    known = laboratory or Laboratory("", "", "", "")
+    place = (known.street, f"{known.post_code} {known.city}".strip(), known.country)
+    yield from facts(
+        [
+            (translate("paper", "Laboratory"), stated(known.name)),
+            (translate("paper", "Place"), stated(", ".join(filter(None, place)))),
+            (translate("paper", "Procedure"), stated(known.procedure)),
+        ],
+        n_columns=1,
+    )
+
+
+def traced_blocks(traced: Sequence[TracedItem]) -> Iterable[Block]:
+    """Return the certificates of what was measured with."""
+    kinds = {
+        ItemKind.CAMERA: translate("paper", "Camera (intrinsics)"),
+        ItemKind.PEN: translate("paper", "Pen (LED measurement)"),
+        ItemKind.TIP: translate("paper", "Probe tip (ball)"),
+        ItemKind.CONE: translate("paper", "Cone"),
+        ItemKind.REFERENCE: translate("paper", "Reference"),
+    }
+    columns = [
+        Column(translate("paper", "Measured with"), 1.6),
+        Column(translate("paper", "ID"), 1.2),
+        Column(translate("paper", "Certificate"), 1.4),
+        Column(translate("paper", "Date"), 0.8),
+        Column(translate("paper", "Next due"), 0.8),
+    ]
+    rows = []
+    for each in traced:
+        item = each.item
+        dates = (None, None) if item is None else (item.certified, item.due)
+        rows.append(
+            (
+                *(kinds[each.kind], each.id),
+                stated("" if item is None else item.certificate),
+                *(stated("" if day is None else day.isoformat()) for day in dates),
+            )
+        )
+    yield heading(translate("paper", "Traceability"))
+    if rows:
+        yield from table(columns, rows)
+    else:
+        yield paragraph(stated(""))
 
 
 def record_number(sha256: str) -> str:

@@ -5,7 +5,7 @@ a task that is added needs nothing here.
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,9 @@ from lightpen.archive.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.hashes import InputFile
 from lightpen.model.origin import Origin
+from lightpen.record.exports.dcc import Laboratory
 from lightpen.record.folder.verifications import StoredVerification
+from lightpen.record.library.traceability import TracedItem
 from lightpen.verification.tasks.part import PART
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.sentences import worded
@@ -33,10 +35,12 @@ from lightpen_app.print_report.blocks import (
 from lightpen_app.print_report.pages import Margins, PrintReport, lay_out
 from lightpen_app.print_report.part import part_blocks
 from lightpen_app.print_report.sections import (
+    laboratory_blocks,
     proof_blocks,
     record_number,
     signature_blocks,
     stated,
+    traced_blocks,
     zoned_moment_text,
 )
 
@@ -54,7 +58,11 @@ LONGEST_TABLE = 50  # rows
 
 
 def verification_paper(
-    file: InputFile, done: StoredVerification, entered: ArchivePlace | None
+    file: InputFile,
+    done: StoredVerification,
+    entered: ArchivePlace | None,
+    traced: Sequence[TracedItem] = (),
+    laboratory: Laboratory | None = None,
 ) -> PrintReport:
     """Return the pages of a verification, in the language that is chosen.
 
@@ -62,6 +70,10 @@ def verification_paper(
     ----------
     file : InputFile
         Its file with the content.
+    traced : sequence of TracedItem
+        What was verified and measured with.
+    laboratory : Laboratory, optional
+        Where it was made.
     """
     record: dict[str, Any] = json.loads(file.content or b"{}")
     is_part = done.verification == PART.kind
@@ -73,6 +85,8 @@ def verification_paper(
     blocks = (
         paragraph(title, PrintSize.TITLE, bold=True),
         *_items(done),
+        *laboratory_blocks(laboratory),
+        *traced_blocks(traced),
         *_verdict(done, record.get("verdict")),
         *(part_blocks(record) if is_part else _figures(record)),
         *_inputs(record.get("inputs", {})),

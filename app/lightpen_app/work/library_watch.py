@@ -15,10 +15,15 @@ from lightpen.record.library.calibration_status import StationStatus
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import Library, read_library
 from lightpen.record.results.result_folder import FolderArchive
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.theme import Tone
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.notifications import Notifications
 
 AGAIN_MS = 15 * 60 * 1000  # after which a tip may be overdue that was not
+LOOK_MS = 5000  # at what was taken over from other stations
+MOST_TOLD = 5  # changes; the newest
+SHARED = "shared library"  # cause of what is to be read
 
 Change = Callable[[], Library]
 
@@ -71,9 +76,13 @@ class LibraryWatch(QObject):
         self._is_over = False
         self._timer = QTimer(self)
         self._timer.setInterval(AGAIN_MS)
+        self._n_shared = 0
+        self._look = QTimer(self)
+        self._look.start(LOOK_MS)
 
         # Connections
         self._timer.timeout.connect(self.refresh)
+        self._look.timeout.connect(self.look_at_shared)
 
     @property
     def statuses(self) -> StationStatus:
@@ -125,6 +134,16 @@ class LibraryWatch(QObject):
         job.failed.connect(self._on_read_failed)
         job.start()
 
+    def look_at_shared(self) -> None:
+        """Tell what was taken over from other stations, and read it."""
+        shared = self._logbook.shared()
+        if len(shared) == self._n_shared:
+            return
+        self._n_shared = len(shared)
+        told = " ".join(map(worded, shared[-MOST_TOLD:]))
+        self._notifications.tell(SHARED, told, Tone.WARN)
+        self.refresh()
+
     def change(self, asked: object, change: Change) -> None:
         """Make a change of the library in its turn, and enter it in the archive.
 
@@ -160,6 +179,7 @@ class LibraryWatch(QObject):
         """Read nothing more."""
         self._is_over = True
         self._timer.stop()
+        self._look.stop()
         if self._reading is not None:
             self._reading.cancel()
 

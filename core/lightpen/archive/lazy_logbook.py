@@ -107,6 +107,11 @@ class LazyLogbook:
             raise closed()
         return logbook
 
+    def shared(self) -> tuple[Message, ...]:
+        """Return what was taken over from other stations since the start."""
+        logbook = self._opened
+        return () if logbook is None else logbook.shared
+
     def close(self) -> None:
         """Let go of the archive; nothing is entered any more.
 

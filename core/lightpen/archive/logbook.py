@@ -47,16 +47,17 @@ from lightpen.archive.reinstating import (
 )
 from lightpen.archive.replication import Replicator
 from lightpen.archive.seal import close_sealed
+from lightpen.archive.shared_library import newer_elsewhere, take_over
 from lightpen.archive.station_events import (
     account_of_station,
     is_station_file,
     station_files,
 )
-from lightpen.errors import AcceptanceError, ArchiveError, FileError
+from lightpen.errors import AcceptanceError, ArchiveError, FileError, UsageError
 from lightpen.formats.files import FOLDER, printable, unreadable
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.local_time import local_now
-from lightpen.messages import Message
+from lightpen.messages import Message, message
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.numbered_files import number_of, numbered_files
@@ -112,6 +113,12 @@ class Logbook:
         Address of the server that all is delivered to, as soon as it answers; none if
         empty.
 
+    Attributes
+    ----------
+    shared : tuple of Message
+        What was taken over from the libraries of other stations since the start, and
+        what waits for a supervisor.
+
     Raises
     ------
     ArchiveError
@@ -130,9 +137,11 @@ class Logbook:
             raise
         self._renew_lost_key()
         self._entered = ArchivedFiles(self.database, self.chain)
-        self._replicator = (
-            Replicator(self.database, self.chain, server) if server else None
-        )
+        self.shared: tuple[Message, ...] = ()
+        self._replicator: Replicator | None = None
+        if server:
+            own = self.database, self.chain, server
+            self._replicator = Replicator(*own, self.share_library)
 
     def enter_owed(
         self, report: Callable[[float], None] = lambda fraction: None
@@ -281,6 +290,29 @@ class Logbook:
         ends = {head.chain: head.number for head in heads(self.database)}
         return ReplicationState(max(0, ends.get(self.chain, 0) - n_delivered), trouble)
 
+    def share_library(self, server: Database) -> None:
+        """Take over what other stations changed later in their libraries.
+
+        Where a supervisor must sign, only tell how much waits. A library that cannot
+        be read, or is not as it was entered, is reported by all who need it.
+
+        Raises
+        ------
+        ArchiveError
+            One of the archives cannot be read.
+        """
+        with suppress(FileError, AcceptanceError, UsageError):
+            guard = self._results.supervision()
+            found = self._data, self.database, local_now(), server
+            if not guard.is_guarded:
+                taken = take_over(*found)
+                self.shared += tuple(each.message for each in taken)
+                if taken:
+                    self.enter_owed()
+            elif waiting := newer_elsewhere(*found):
+                told = message("library.share-waits", n=len(waiting))
+                self.shared += () if told in self.shared else (told,)
+
     def close(self) -> None:
         """Close the archive, and seal its file unless another process has it open.
 
@@ -289,9 +321,9 @@ class Logbook:
         ArchiveError, FileError
             It cannot be sealed.
         """
+        if self._replicator is not None:
+            self._replicator.close(LONGEST_FAREWELL_S)
         with self._lock:
-            if self._replicator is not None:
-                self._replicator.close(LONGEST_FAREWELL_S)
             close_sealed(self.database)
 
     def _renew_lost_key(self) -> None:

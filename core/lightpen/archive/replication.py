@@ -6,9 +6,11 @@ as entries are copied in their order and known ones passed over, none is doubled
 
 The server is called for each delivery and then let go of: it has many stations to
 serve, and a line that is kept may be dead without either end knowing. At the first
-call the whole chain is compared, at each other its end.
+call the whole chain is compared, at each other its end. With each call, and every five
+minutes, the library is shared.
 """
 
+from collections.abc import Callable
 from contextlib import closing
 from threading import Event, Thread
 
@@ -20,6 +22,7 @@ from lightpen.errors import ArchiveError
 from lightpen.messages import Message
 
 AGAIN_S = 30.0  # after a server did not answer
+LOOK_S = 300.0  # at what other stations have shared
 
 
 class Replicator:
@@ -31,6 +34,8 @@ class Replicator:
         Chain of the data folder.
     address : str
         Address of the server; see `lightpen.archive.database.open_server`.
+    share : callable, optional
+        Takes over from a server what other stations share with this one.
 
     Attributes
     ----------
@@ -40,10 +45,17 @@ class Replicator:
         Why the last attempt failed.
     """
 
-    def __init__(self, database: Database, chain: str, address: str) -> None:
+    def __init__(
+        self,
+        database: Database,
+        chain: str,
+        address: str,
+        share: Callable[[Database], None] = lambda server: None,
+    ) -> None:
         self._database = database
         self._chain = chain
         self._address = address
+        self._share = share
         self._is_due, self._is_ending = Event(), Event()
         self.n_delivered: int | None = None
         self.trouble: Message | None = None
@@ -63,13 +75,15 @@ class Replicator:
 
     def _run(self) -> None:
         while True:
-            self._is_due.wait(None if self.trouble is None else AGAIN_S)
+            self._is_due.wait(LOOK_S if self.trouble is None else AGAIN_S)
             self._is_due.clear()
             try:
                 with closing(open_server(self._address)) as server:
                     if self.n_delivered is None:
                         require_same(self._database, self._chain, server)
                     copied = deliver(self._database, self._chain, server)
+                    if not self._is_ending.is_set():
+                        self._share(server)
                 self.n_delivered = copied.n_known + copied.n_new
                 self.trouble = None
             except ArchiveError as error:

@@ -21,10 +21,14 @@ from lightpen.archive.database import Database
 from lightpen.archive.entries import Kind, StoredEntry, read_entry, text_sha256
 from lightpen.archive.signatures import ChainKeys
 from lightpen.archive.tables import ENTRIES
+from lightpen.formats.files import printable
 from lightpen.formats.own_json import DamagedError
+from lightpen.local_time import local_time
+from lightpen.messages import Message, message
 from lightpen.record.library.library_changes import adopt_change
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.tip_library import (
+    KIND_WORDS,
     AnyItem,
     ItemKind,
     LibraryChange,
@@ -54,6 +58,61 @@ class TakenOver:
     change: LibraryChange
     replaced: LibraryChange | None
 
+    @property
+    def message(self) -> Message:
+        """Whose change counts now, and whose it replaces."""
+        item, before = self.change.item, self.replaced
+        told: dict[str, Message | str] = {
+            "kind": KIND_WORDS[item.kind],
+            "id": printable(item.id),
+            "by": _author_of(self.change),
+        }
+        if before is not None:
+            told["before"] = _author_of(before)
+        if item.is_retired:
+            return message("library.shared-retired", **told)
+        code = "library.shared" if before is None else "library.shared-replacing"
+        return message(code, **told)
+
+
+def newer_elsewhere(
+    data: Path, database: Database, now: datetime, server: Database | None = None
+) -> tuple[TakenOver, ...]:
+    """Return what other stations changed later than this one.
+
+    Parameters
+    ----------
+    database : Database
+        Archive of the data folder, with copies of other chains.
+    now : datetime
+        A change that is dated later, by a clock that is ahead, does not count.
+    server : Database, optional
+        Archive of the plant.
+
+    Raises
+    ------
+    ArchiveError, FileError
+        An archive or the library cannot be read.
+    """
+    home, found = chain_at_home(database), list(_copied(database))
+    if server is not None:
+        found += _on_server(server)
+    newest = _newest(
+        change
+        for entry, change in found
+        if entry.entry.chain != home and change.at <= now + CLOCKS_AGREE
+    )
+    own = _newest(change for _, change in library_changes(data))
+    newer = []
+    for key, change in newest.items():
+        before = own.get(key)
+        if before is not None and before.at >= change.at:
+            continue
+        change = structs.replace(change, item=_without_picture(change.item, data))
+        if before is None or before.item != change.item:
+            newer.append(TakenOver(change, before))
+    return tuple(newer)
+
 
 def take_over(
     data: Path,
@@ -66,12 +125,8 @@ def take_over(
 
     Parameters
     ----------
-    database : Database
-        Archive of the data folder, with copies of other chains.
-    now : datetime
-        A change that is dated later, by a clock that is ahead, does not count.
-    server : Database, optional
-        Archive of the plant.
+    database, now, server
+        As of `newer_elsewhere`.
     signature : Signature, optional
         Of a supervisor, where the data folder has a password.
 
@@ -80,27 +135,17 @@ def take_over(
     AcceptanceError
         There is a password, and no supervisor signs.
     ArchiveError, FileError
-        An archive or the library cannot be read, or a change not be kept.
+        As of `newer_elsewhere`, or a change cannot be kept.
     """
-    home, found = chain_at_home(database), list(_copied(database))
-    if server is not None:
-        found += _on_server(server)
-    newest = _newest(
-        change
-        for entry, change in found
-        if entry.entry.chain != home and change.at <= now + CLOCKS_AGREE
-    )
-    own = _newest(change for _, change in library_changes(data))
-    taken = []
-    for key, change in newest.items():
-        before = own.get(key)
-        if before is not None and before.at >= change.at:
-            continue
-        change = structs.replace(change, item=_without_picture(change.item, data))
-        if before is None or before.item != change.item:
-            adopt_change(data, change, signature)
-            taken.append(TakenOver(change, before))
-    return tuple(taken)
+    newer = newer_elsewhere(data, database, now, server)
+    for each in newer:
+        adopt_change(data, each.change, signature)
+    return newer
+
+
+def _author_of(change: LibraryChange) -> str:
+    who = " ".join(filter(None, (change.station, change.operator))) or "-"
+    return f"{printable(who)}, {local_time(change.at):%Y-%m-%d %H:%M}"
 
 
 def _newest(

@@ -46,6 +46,7 @@ MESSAGES = {
     "cli.centers-need": "{option} FILE is missing. LED centres need it.",
     "stream.another-size": "The images have {width} x {height} px; the intrinsics are for {its_width} x {its_height} px. Give the camera file of these images.",
     "library.only-tips": "Only a tip has a ball, an axis, limits and a picture; {id} is not a tip.",
+    "library.only-references": "Only a reference has a certified value; {id} is none.",
     "library.no-point": "--{option} takes three numbers, X Y Z, or none.",
     "cli.discover-length-words": "'{words}' is not a length. Give two LEDs and a length in mm, as in 'longest 180.02' or '1 4 180.02', and IMAGES before it.",
     "cli.discover-output-twice": "{file} would replace an input file or another result. Give each result a different name.",

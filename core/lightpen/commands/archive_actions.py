@@ -6,7 +6,7 @@ from contextlib import closing, contextmanager
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
-from lightpen.archive.chains import chain_at_home, chain_head, note_delivered, own_chain
+from lightpen.archive.chains import chain_at_home, chain_head, note_delivered
 from lightpen.archive.check import check_file
 from lightpen.archive.comparison import check_server, require_same
 from lightpen.archive.database import Database, look_into, open_file
@@ -102,13 +102,20 @@ def _import(options: argparse.Namespace) -> None:
 
 @printing
 def _deliver(options: argparse.Namespace) -> None:
-    with _opened(_data(options)) as database, _server() as server:
-        chain = own_chain(database)
+    with closing(Logbook(_data(options))) as logbook, _server() as server:
+        database, chain = logbook.database, logbook.chain
         if options.again:
             note_delivered(database, chain, chain_head(server, chain).number)
         require_same(database, chain, server)
+        for trouble in logbook.enter_owed():
+            print(shown(str(trouble)))
         copied = deliver(database, chain, server)
-    print(f"{copied.n_new} entries are new, {copied.n_known} were there already.")
+        logbook.share_library(server)
+        shared = deliver(database, chain, server)
+    n_new = copied.n_new + shared.n_new
+    print(f"{n_new} entries are new, {copied.n_known} were there already.")
+    for told in logbook.shared:
+        print(shown(str(told)))
 
 
 @printing

@@ -38,7 +38,7 @@ from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import judge
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, with_content
+from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, with_content
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pairing import pair_images
@@ -135,8 +135,8 @@ def _require_none_given(options: argparse.Namespace, record: Path) -> None:
     """Reject options that duplicate the content of a record."""
     own = (
         "camera rig pen units led-diameter nominal-tip camera-sigma scale-sigma "
-        "temperature temperature-sigma form-error center-bias second-cone distance "
-        "distance-sigma"
+        "temperature temperature-sigma humidity form-error center-bias second-cone "
+        "distance distance-sigma"
     )
     values = vars(options)
     given = [
@@ -297,12 +297,17 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
         SwingLimits(),
         origin,
         lambda: Inputs(
-            camera=hashed(rig_file.camera_files[0]),
-            pen=hashed(options.pen),
+            camera=with_content(rig_file.camera_files[0]),
+            pen=with_content(options.pen),
             observations=all_hashed(files),
             nominal_tip=pen.nominal_tip,
-            rig=RigInputs(hashed(options.rig), all_hashed(rig_file.camera_files)),
+            rig=RigInputs(
+                with_content(options.rig),
+                tuple(map(with_content, rig_file.camera_files)),
+            ),
             origin=origin,
+            units=options.units,
+            led_diameter=options.led_diameter,
         ),
         options.method,
     )

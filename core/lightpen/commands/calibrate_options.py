@@ -86,6 +86,12 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         help="pen temperature during the swing, for thermal expansion",
     )
     parser.add_argument(
+        "--humidity",
+        type=number_from(0.0, 100.0, "relative humidity", "%"),
+        metavar="PERCENT",
+        help="relative humidity during the swing, for the record",
+    )
+    parser.add_argument(
         "--temperature-sigma",
         type=number_from(0.001, 50.0, "uncertainty", "K"),
         metavar="K",
@@ -170,6 +176,7 @@ def assumptions_of(options: argparse.Namespace) -> Assumptions:
     given = {
         "scale": options.scale_sigma,
         "temperature_c": options.temperature,
+        "humidity_percent": options.humidity,
         temperature: options.temperature_sigma,
         "form_error": options.form_error,
         "compliance": options.compliance,

@@ -8,7 +8,7 @@ from lightpen.errors import UsageError
 from lightpen.formats.files import printable, write_whole
 from lightpen.local_time import local_now
 from lightpen.record.calibrations.calibrations import read_calibration
-from lightpen.record.exports.dcc import Laboratory, is_country
+from lightpen.record.exports.dcc import PLACES, Laboratory, is_country
 from lightpen.record.exports.export_status import with_status
 from lightpen.record.exports.formats import FORMATS
 
@@ -17,6 +17,11 @@ LABORATORY = {
     "email": "its e-mail address",
     "city": "its city",
     "country": "its country, two letters such as DE",
+}
+MORE_OF_IT = {
+    "street": "its street",
+    "post-code": "its post code",
+    "procedure": "its working instruction",
 }
 BY_NAME = {each.name: each for each in FORMATS}
 
@@ -43,7 +48,13 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="export a retired or overdue tip in a format that cannot state it, too",
     )
-    for name, told in LABORATORY.items():
+    parser.add_argument(
+        "--place",
+        choices=PLACES,
+        default=PLACES[0],
+        help="for dcc: where it was calibrated",
+    )
+    for name, told in (LABORATORY | MORE_OF_IT).items():
         parser.add_argument(
             f"--{name}", default="", metavar="TEXT", help=f"for dcc: {told}"
         )
@@ -56,7 +67,8 @@ def _laboratory(options: argparse.Namespace) -> Laboratory:
     if not is_country(options.country):
         country = printable(options.country)
         raise UsageError("cli.no-country", country=country)
-    return Laboratory(*(getattr(options, name) for name in LABORATORY))
+    names = (*LABORATORY, "street", "post_code", "procedure", "place")
+    return Laboratory(*(getattr(options, name) for name in names))
 
 
 @printing

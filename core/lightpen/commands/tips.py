@@ -11,7 +11,7 @@ from lightpen.commands.arguments import add_camera_and_pen, finite, whole_number
 
 T = TypeVar("T")
 
-KINDS = ("pen", "tip", "cone")
+KINDS = ("pen", "tip", "cone", "camera", "reference")
 NOTHING = "none"  # typed in place of a value that is to be forgotten
 FORGOTTEN = object()
 
@@ -21,7 +21,7 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
     parser.set_defaults(run=_run)
     actions = parser.add_subparsers(required=True, metavar="ACTION", dest="action")
     listed = actions.add_parser("list", help="list items and their calibration status")
-    added = actions.add_parser("add", help="add a pen, tip or cone")
+    added = actions.add_parser("add", help="add a pen, tip, cone, camera or reference")
     changed = actions.add_parser("change", help="edit an item")
     retired = actions.add_parser(
         "retire", help="retire an item; it stays in the archive"
@@ -78,11 +78,33 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
 
 
 def _add_entries(action: argparse.ArgumentParser) -> None:
-    of_all = action.add_argument_group("pens, tips and cones")
+    of_all = action.add_argument_group("all items")
     of_all.add_argument(
         "--due", type=_or_nothing(parse_date), metavar="YYYY-MM-DD", help="expiry date"
     )
+    of_all.add_argument(
+        "--certificate",
+        metavar="NUMBER",
+        help="number of the certificate: of the LED measurement of a pen, the ball of "
+        "a tip, a cone, the intrinsics of a camera (its ID: the serial number), a "
+        "reference",
+    )
+    of_all.add_argument(
+        "--certified",
+        type=_or_nothing(parse_date),
+        metavar="YYYY-MM-DD",
+        help="date of the certificate",
+    )
     of_all.add_argument("--note", metavar="TEXT")
+    of_references = action.add_argument_group(
+        "references: rings, bars, spheres, plates"
+    )
+    of_references.add_argument(
+        "--value",
+        type=_or_nothing(finite),
+        metavar="MM",
+        help="certified value as given in a verification, by which reports find it",
+    )
     of_tips = action.add_argument_group(
         "tips", f"'{NOTHING}' instead of a value clears the field"
     )

@@ -16,7 +16,7 @@ from lightpen.archive.exchange import deliver
 from lightpen.archive.lazy_logbook import server_address
 from lightpen.archive.logbook import ARCHIVE, Logbook, confirm_limits
 from lightpen.archive.server import open_server
-from lightpen.archive.shared_library import TakenOver, take_over
+from lightpen.archive.shared_library import take_over
 from lightpen.archive.tip_status import folder_statuses
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
@@ -27,7 +27,7 @@ from lightpen.estimation.spin import SpinFit, fit_spin
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.pen_files import read_pen
-from lightpen.local_time import local_now, local_time
+from lightpen.local_time import local_now
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import StationStatus
 from lightpen.record.library.library_changes import (
@@ -40,13 +40,12 @@ from lightpen.record.library.library_changes import (
 )
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import (
+    MADE,
     AnyItem,
     AxisOrigin,
     ItemKind,
     Library,
-    LibraryChange,
-    ListedCone,
-    ListedPen,
+    ListedReference,
     ListedTip,
     read_library,
 )
@@ -85,12 +84,7 @@ def _list(options: argparse.Namespace) -> None:
 
 @printing
 def _add(options: argparse.Namespace) -> None:
-    kinds: dict[ItemKind, type[AnyItem]] = {
-        ListedPen.kind: ListedPen,
-        ListedTip.kind: ListedTip,
-    }
-    made = kinds.get(ItemKind(options.kind), ListedCone)(id=options.id)
-    item = _with_entries(made, options)
+    item = _with_entries(MADE[ItemKind(options.kind)](id=options.id), options)
     _tell(options, item, add_item(_data(options), item, _author(options), local_now()))
 
 
@@ -129,23 +123,10 @@ def _share(options: argparse.Namespace) -> None:
         if server is not None:
             deliver(logbook.database, logbook.chain, server)
     for each in taken:
-        print(shown(_taken_line(each)))
+        print(shown(str(each.message)))
     for trouble in faults:
         print(shown(f"It is not in the archive yet: {trouble}"))
     print(f"{len(taken)} changes of other stations were taken over.")
-
-
-def _taken_line(taken: TakenOver) -> str:
-    """Return whose change counts now, and whose it replaces."""
-
-    def told(change: LibraryChange) -> str:
-        who = " ".join(filter(None, (change.station, change.operator))) or "-"
-        return f"{who}, {local_time(change.at):%Y-%m-%d %H:%M}"
-
-    change, before = taken.change, taken.replaced
-    retired = ", retired" if change.item.is_retired else ""
-    line = f"{change.item.kind} {change.item.id}{retired}: {told(change)}"
-    return line if before is None else f"{line}; replaces {told(before)}"
 
 
 @printing
@@ -201,10 +182,14 @@ def _set_retired(options: argparse.Namespace, *, is_retired: bool) -> None:
 
 def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:
     """Return an item with the given entries."""
-    if options.note is not None:
-        item = structs.replace(item, note=options.note)
-    if options.due is not None:
-        item = structs.replace(item, due=_said(options.due))
+    for name in ("note", "certificate", "due", "certified"):
+        value = getattr(options, name)
+        if value is not None:
+            item = structs.replace(item, **{name: _said(value)})
+    if options.value is not None:
+        if not isinstance(item, ListedReference):
+            raise UsageError("library.only-references", id=item.id)
+        item = structs.replace(item, certified_mm=_said(options.value))
     said = dict(_entries_of_tip(options))
     if said and not isinstance(item, ListedTip):
         raise UsageError("library.only-tips", id=item.id)

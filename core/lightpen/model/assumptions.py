@@ -33,6 +33,8 @@ class Assumptions:
         Relative standard uncertainty of a stated expansion coefficient.
     temperature_c : float or None
         Temperature of the pen during the swing, degrees Celsius; None if not measured.
+    humidity_percent : float or None
+        Relative humidity during the swing, for the record; None if not measured.
     temperature : float
         Standard uncertainty of the temperature, K.
     warmth : float
@@ -64,6 +66,7 @@ class Assumptions:
     expansion: float = 2.3e-5
     expansion_share: float = 0.1
     temperature_c: float | None = None
+    humidity_percent: float | None = None
     temperature: float = 0.5
     warmth: float = 1.5  # U (k = 2) of 3 K
     diameter: float = 0.05
@@ -79,6 +82,9 @@ class Assumptions:
             if item.name == "temperature_c":
                 if value is not None and not COLDEST <= value <= WARMEST:
                     raise ValueError(f"{value} degrees C is no temperature of a pen.")
+            elif item.name == "humidity_percent":
+                if value is not None and not 0 <= value <= 100:
+                    raise ValueError(f"{value} % is no relative humidity.")
             elif not (isfinite(value) and value >= 0):
                 raise ValueError(f"`{item.name}` must be 0 or more, got {value}.")
 

@@ -20,6 +20,8 @@ from lightpen.formats.stored_messages import StoredMessage
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.calibrations.reestimated_poses import reestimate_poses
+from lightpen.record.exports.dcc import Laboratory
+from lightpen.record.library.traceability import TracedItem
 from lightpen.record.results.results import Result, result_bytes
 from lightpen.record.swings.names import Names
 from lightpen.swing_messages import tip_changed
@@ -79,14 +81,16 @@ def printed(tmp_path: Path) -> Callable[..., PrintReport]:
     """Return a function that writes a result and puts what it states on paper."""
 
     def put_on_paper(
-        result: Result, entered: ArchivePlace | None = None
+        result: Result,
+        entered: ArchivePlace | None = None,
+        traced: tuple[TracedItem, ...] = (),
+        laboratory: Laboratory | None = None,
     ) -> PrintReport:
         path = tmp_path / "000017.json"
         write_whole(path, result_bytes(result, "records/1"))
-        calibration_file = read_calibration(path)
-        return paper_of(
-            calibration_file, reestimate_poses(calibration_file.calibration), entered
-        )
+        calibration_file = replace(read_calibration(path), traced=traced)
+        poses = reestimate_poses(calibration_file.calibration)
+        return paper_of(calibration_file, poses, entered, laboratory)
 
     return put_on_paper
 

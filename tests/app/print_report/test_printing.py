@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,9 @@ from lightpen.archive.result_entry import ArchivePlace
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import message
 from lightpen.model.origin import Origin
+from lightpen.record.exports.dcc import Laboratory
+from lightpen.record.library.tip_library import ItemKind, ListedPen
+from lightpen.record.library.traceability import TracedItem
 from lightpen.record.results.results import Result, TipChange, result_bytes
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.sentences import worded
@@ -86,6 +89,45 @@ def test_the_tip_is_told_to_the_second_digit_of_its_uncertainty(
         assert len(told[i].partition(".")[2]) == len(within[i].partition(".")[2])
         decimals = len(told[i].partition(".")[2])
         assert float(told[i]) == round(stated["tip_pen_mm"][i], decimals)
+
+
+def test_certificates_laboratory_and_conditions_are_on_the_report(
+    result: Result, printed: Printed, words: Words
+) -> None:
+    pen = ListedPen(
+        id="LP-04", certificate="K-17", certified=date(2026, 3, 1), due=date(2027, 3, 1)
+    )
+    traced = (
+        TracedItem(ItemKind.PEN, "LP-04", pen),
+        TracedItem(ItemKind.CONE, "C-1", None),
+    )
+    calibration = result.calibration
+    assumed = replace(
+        calibration.assumptions, temperature_c=21.5, humidity_percent=45.0
+    )
+    result = replace(
+        result, calibration=structs.replace(calibration, assumptions=assumed)
+    )
+    laboratory = Laboratory(
+        *("Metrology", "m@example.com", "Berlin", "DE"),
+        street="Seestr. 1",
+        procedure="WI 7.3",
+    )
+    pages = words(printed(result, traced=traced, laboratory=laboratory))
+    lines = [line for page in pages for line in page]
+
+    at = lines.index("Pen (LED measurement)")
+    assert lines[at : at + 5] == [
+        lines[at],
+        "LP-04",
+        "K-17",
+        "2026-03-01",
+        "2027-03-01",
+    ]
+    at = lines.index("C-1", at)
+    assert lines[at + 1 : at + 4] == 3 * ["not stated"]
+    for text in ("Metrology", "Seestr. 1, Berlin, DE", "WI 7.3", "45 %", "21.5 \xb0C"):
+        assert text in lines
 
 
 def test_what_an_auditor_asks_for_is_there(

@@ -20,6 +20,7 @@ from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
 from lightpen.live.sources import sample_files
+from lightpen.messages import message
 from lightpen.model.assumptions import USUAL, with_focal_length
 from lightpen.model.limits import SwingLimits
 from lightpen.record.results.result_folder import SIMULATED
@@ -500,6 +501,20 @@ def test_shutting_down_twice_does_no_harm(stage: Stage) -> None:
     stage.workbench.shut_down()
 
     assert not stage.workbench.live.is_open
+
+
+def test_what_other_stations_shared_is_told_once_and_read(stage: Stage) -> None:
+    library, notices = stage.workbench.library, stage.workbench.notifications
+    logbook = stage.workbench.run.logbook.opened()
+    raised: list[str] = []
+    notices.raised.connect(lambda text, tone: raised.append(text))
+    told = message("library.share-waits", n=2)
+    logbook.shared += (told,)
+
+    with stage.qtbot.waitSignal(library.changed):
+        library.look_at_shared()
+    library.look_at_shared()
+    assert raised == [str(told)]
 
 
 def test_what_is_told_after_shutting_down_begins_nothing(stage: Stage) -> None:

@@ -1,5 +1,7 @@
 """Tests of `lightpen.archive.recompute_check`: whoever has the key can still lie."""
 
+import json
+import shutil
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
@@ -13,10 +15,11 @@ from lightpen.archive.check import ArchiveCheckResult, check_archive
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.recompute_check import with_recomputed
 from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.formats.rig_files import read_rig
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
-from lightpen.swing.preparation import Preparation
+from lightpen.swing.preparation import Preparation, SecondCamera
 
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
 
@@ -48,6 +51,37 @@ def test_honest_tips_follow_from_their_centres(tmp_path: Path, result: Result) -
     checked = entered_and_recomputed(tmp_path)
 
     assert (checked.n_tips, checked.findings, checked.notes) == (1, (), ())
+
+
+def test_a_tip_of_two_cameras_follows_from_the_centres_of_both(
+    tmp_path: Path, shared_data: Path, shifted: Callable[..., Result]
+) -> None:
+    data, folder = tmp_path / "data", tmp_path / "files"
+    shutil.copytree(shared_data / "fixed-point", folder)
+    shutil.copy(folder / "camera.yaml", folder / "right.yaml")
+    left = {"name": "left", "intrinsics": "camera.yaml"}
+    right = {
+        "name": "right",
+        "intrinsics": "right.yaml",
+        "cam_from_rig_rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1],
+        "cam_from_rig_translation": [-300.0, 0.0, 0.0],
+    }
+    (folder / "rig.json").write_text(json.dumps({"cameras": [left, right]}))
+    rig_file = read_rig(folder / "rig.json")
+    prepared = Preparation(
+        names=NAMES,
+        second=SecondCamera(rig_file=rig_file),
+        pen_file=PenFile.read(folder / "leds.csv"),
+    )
+    honest = FolderArchive(data).content(accept_tip(data, prepared))
+    shutil.rmtree(folder)
+    assert isinstance(honest, Result)
+    FolderArchive(data).store(shifted(honest, "tip"))
+
+    checked = entered_and_recomputed(data)
+
+    assert (checked.n_tips, checked.notes) == (2, ())
+    assert [each.values["number"] for each in checked.findings] == [2]
 
 
 def test_no_more_tips_are_recomputed_than_asked_for(

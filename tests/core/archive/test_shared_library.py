@@ -1,10 +1,12 @@
 """The newest change of each item of the library counts at all stations."""
 
+import time
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import psycopg
 import pytest
@@ -13,6 +15,7 @@ from msgspec import structs
 from tests.core.archive.conftest import NOON
 
 from lightpen.archive.exchange import deliver, export_entries, import_entries
+from lightpen.archive.lazy_logbook import SERVER
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.server import open_server
 from lightpen.archive.shared_library import TakenOver, take_over
@@ -34,6 +37,7 @@ from lightpen.record.library.tip_library import (
     read_library,
 )
 
+PATIENCE_S = 60.0
 HOUR = timedelta(hours=1)
 LATER = NOON + 100 * HOUR
 TIP = ListedTip(id="T-10", ball_diameter_mm=10.0)
@@ -118,6 +122,65 @@ def test_of_two_changes_the_later_one_counts_at_both_stations(
     assert one.tip() == other.tip() == structs.replace(TIP, note="one, changed")
     assert taken.replaced is not None
     assert taken.replaced.item.note == "other, changed"
+
+
+def shared_since_start(site: Site) -> tuple[str, ...]:
+    """Return what a station tells of others once its program has asked the server."""
+    with closing(Logbook(site.data, site.address)) as logbook:
+        deadline = time.monotonic() + PATIENCE_S
+        while not logbook.shared:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        return tuple(map(str, logbook.shared))
+
+
+def test_a_running_station_takes_over_by_itself_and_tells_whose_change_is_replaced(
+    site: Callable[[str], Site],
+) -> None:
+    one, other = site("one"), site("other")
+    for each, hours in ((one, 2), (other, 1)):
+        add_item(each.data, structs.replace(TIP, note=each.data.name), each.by, NOON)
+        changed = structs.replace(TIP, note=f"{each.data.name}, changed")
+        change_item(each.data, changed, each.by, NOON + hours * HOUR)
+    one.share()
+
+    (told,) = shared_since_start(other)
+    assert told.startswith("Taken over from another station: tip T-10, one Ann, ")
+    assert "It replaces the earlier change by other Ann, " in told
+    assert other.tip().note == "one, changed"
+
+
+def test_a_running_station_with_a_password_tells_that_changes_wait(
+    site: Callable[[str], Site],
+) -> None:
+    one, guarded = site("one"), site("guarded")
+    eve = Signature("Eve", "correct horse")
+    save_limits(guarded.data, "guarded", StationLimits(), eve, "", NOON)
+    add_item(one.data, TIP, one.by, NOON)
+    one.share()
+
+    (told,) = shared_since_start(guarded)
+    assert told.startswith("1 changes of other stations")
+    assert read_library(guarded.data).tips == {}
+
+
+def test_the_command_deliver_shares_the_library(
+    site: Callable[[str], Site],
+    lightpen: Callable[..., CompletedProcess[str]],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    one, other = site("one"), site("other")
+    add_item(one.data, TIP, one.by, NOON)
+    one.share()
+    monkeypatch.setenv(SERVER, other.address)
+
+    first = lightpen("archive", "deliver", "--data", other.data)
+    again = lightpen("archive", "deliver", "--data", other.data)
+
+    assert first.stdout.startswith("1 entries are new, 0 were there already.\n")
+    assert "Taken over from another station: tip T-10, one Ann" in first.stdout
+    assert again.stdout == "0 entries are new, 1 were there already.\n"
+    assert other.tip() == TIP
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QTabWidget, QWidget
 
 from lightpen.archive.check import ArchiveCheckResult
-from lightpen.archive.entries import StoredEntry
+from lightpen.archive.entries import Kind, StoredEntry
 from lightpen.archive.history import Line
 from lightpen.archive.queries import EntryFilter
 from lightpen.model.limits import DueRule
@@ -294,7 +294,11 @@ class HistoryContent(Translated, QWidget):
 
     def _show_paper(self, entry: StoredEntry) -> None:
         result, folder = entry.entry.event.result, self._folder
-        if result is not None:
+        if result is None:
+            return
+        if entry.entry.event.kind is Kind.VERIFICATION:
+            self._paper.show_verification(folder / result.place)
+        else:
             self._paper.show(lambda: folder / result.place)
 
     def _on_paper_saved(self, path: Path) -> None:

@@ -180,7 +180,12 @@ class EntryPanel(Translated, QWidget):
         self._restore.set_why_not(
             nothing or self._why_not_restored(line), self.tr("Adds a new entry")
         )
-        self._paper.setText(self.tr("Calibration report..."))
+        kind = None if entry is None else entry.entry.event.kind
+        self._paper.setText(
+            self.tr("Verification report...")
+            if kind is Kind.VERIFICATION
+            else self.tr("Calibration report...")
+        )
         self._paper.set_why_not(
             nothing or self._why_not_on_paper(line),
             self.tr("Preview, save as PDF, or print"),
@@ -235,8 +240,8 @@ class EntryPanel(Translated, QWidget):
     def _why_not_on_paper(self, line: Line | None) -> str:
         if line is None or line.entry is None:
             return ""
-        if line.entry.entry.event.kind not in IN_FORCE_BY:
-            return self.tr("Only an accepted tip has a calibration report.")
+        if line.entry.entry.event.kind not in (*IN_FORCE_BY, Kind.VERIFICATION):
+            return self.tr("Only accepted tips and verifications have a report.")
         if line.chain != self._home:
             return self.tr("The result is stored at its own station.")
         return ""

@@ -1,24 +1,24 @@
 """Asks for the laboratory that a Digital Calibration Certificate names."""
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLineEdit, QWidget
+from PySide6.QtWidgets import QComboBox, QDialog, QDialogButtonBox, QLineEdit, QWidget
 from typing_extensions import override
 
-from lightpen.record.exports.dcc import Laboratory, is_country
-from lightpen_app.look.layouts import vertical_layout
+from lightpen.record.exports.dcc import PLACES, Laboratory, is_country
+from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.translated import Translated
 
 LONGEST = 200  # characters
-N_FIELDS = 4
+N_NEEDED, N_FIELDS = 4, 7  # the others may be empty
 
 
 class LaboratoryDialog(FittedWindow, Translated, QDialog):
-    """Name, e-mail address, city and country; can be confirmed when all are there.
+    """Who calibrates where; name, e-mail address, city and country are needed.
 
     Signals
     -------
@@ -32,16 +32,20 @@ class LaboratoryDialog(FittedWindow, Translated, QDialog):
 
         # Widgets
         self._edits = [QLineEdit() for _ in range(N_FIELDS)]
-        self._labels = [field_label(edit) for edit in self._edits]
+        self._place = QComboBox()
+        self._place.addItems([""] * len(PLACES))
+        self._labels = [field_label(edit) for edit in (*self._edits, self._place)]
         standard = QDialogButtonBox.StandardButton
         self._buttons = QDialogButtonBox(standard.Ok | standard.Cancel)
 
         # Layout
         layout = vertical_layout(self, spacing=2 * GRID, margins=3 * GRID)
-        for label, edit in zip(self._labels, self._edits, strict=True):
-            add_labelled(layout, label, edit)
+        grid = grid_layout(layout, spacing=(2 * GRID, 2 * GRID))
+        fields = zip(self._labels, (*self._edits, self._place), strict=True)
+        for i, (label, edit) in enumerate(fields):
+            add_labelled(grid, label, edit, at=divmod(i, 2))
         layout.addWidget(self._buttons)
-        self.setMinimumWidth(48 * GRID)
+        self.setMinimumWidth(72 * GRID)
 
         # Connections
         for edit in self._edits:
@@ -50,20 +54,23 @@ class LaboratoryDialog(FittedWindow, Translated, QDialog):
         self._buttons.accepted.connect(self._on_accepted)
         self._buttons.rejected.connect(self.reject)
 
-        for edit, text in zip(
-            self._edits, astuple(known) if known else (), strict=False
-        ):
-            edit.setText(text)
+        if known is not None:
+            *texts, place = astuple(known)
+            for edit, text in zip(self._edits, texts, strict=True):
+                edit.setText(text)
+            self._place.setCurrentIndex(PLACES.index(place) if place in PLACES else 0)
         self._refresh()
         self._retranslate()
 
     def _refresh(self) -> None:
-        texts = [edit.text().strip() for edit in self._edits]
+        texts = [edit.text().strip() for edit in self._edits[:N_NEEDED]]
         ok = self._buttons.button(QDialogButtonBox.StandardButton.Ok)
         ok.setEnabled(all(texts) and is_country(texts[-1]))
 
     def _on_accepted(self) -> None:
-        self.given.emit(Laboratory(*(edit.text().strip() for edit in self._edits)))
+        texts = (edit.text().strip() for edit in self._edits)
+        place = PLACES[self._place.currentIndex()]
+        self.given.emit(replace(Laboratory(*texts), place=place))
         self.accept()
 
     @override
@@ -74,10 +81,22 @@ class LaboratoryDialog(FittedWindow, Translated, QDialog):
             self.tr("E-mail address"),
             self.tr("City"),
             self.tr("Country code, two capital letters such as DE"),
+            self.tr("Street (optional)"),
+            self.tr("Post code (optional)"),
+            self.tr("Procedure (optional)"),
+            self.tr("Place of calibration"),
         )
-        for label, edit, text in zip(self._labels, self._edits, words, strict=True):
+        fields = (*self._edits, self._place)
+        for label, edit, text in zip(self._labels, fields, words, strict=True):
             label.setText(text)
             edit.setAccessibleName(text)
+        places = (
+            *(self.tr("Laboratory"), self.tr("Customer")),
+            *(self.tr("Branch of the laboratory"), self.tr("Branch of the customer")),
+            self.tr("Elsewhere"),
+        )
+        for i, text in enumerate(places):
+            self._place.setItemText(i, text)
         standard = QDialogButtonBox.StandardButton
         self._buttons.button(standard.Ok).setText(self.tr("Save..."))
         self._buttons.button(standard.Cancel).setText(self.tr("Cancel"))

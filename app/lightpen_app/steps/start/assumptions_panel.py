@@ -37,15 +37,17 @@ class _AssumedNumber(NamedTuple):
     n_decimals: int
 
 
-UNMEASURED = COLDEST  # degrees C, at which the field says that nothing was measured
+# At which a field says that nothing was measured.
+UNMEASURED = {"temperature_c": COLDEST, "humidity_percent": 0.0}
 KINDS = (
     _AssumedNumber("focal_length", "%", 1e2, (0.01, 10.0), 2),
     _AssumedNumber("scale", "ppm", 1e6, (0.1, 10_000.0), 1),
     _AssumedNumber("form_error", "\N{MICRO SIGN}m", 1e3, (0.01, 100.0), 2),
     _AssumedNumber("compliance", "\N{MICRO SIGN}m", 1e3, (0.01, 1000.0), 2),
     _AssumedNumber("center_bias", "px", 1.0, (0.0001, 1.0), 4),
-    _AssumedNumber("temperature_c", "\N{DEGREE SIGN}C", 1.0, (UNMEASURED, WARMEST), 1),
+    _AssumedNumber("temperature_c", "\N{DEGREE SIGN}C", 1.0, (COLDEST, WARMEST), 1),
     _AssumedNumber("temperature", "K", 1.0, (0.01, 20.0), 2),
+    _AssumedNumber("humidity_percent", "%", 1.0, (0.0, 100.0), 0),
     _AssumedNumber("warmth", "K", 1.0, (0.01, 50.0), 2),
     _AssumedNumber("expansion", "ppm/K", 1e6, (0.0, 100.0), 1),
 )
@@ -116,7 +118,9 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
             value = getattr(assumptions, kind.name)
             field = self._fields[kind.name]
             blocked = field.blockSignals(True)
-            field.setValue(UNMEASURED if value is None else kind.times * value)
+            field.setValue(
+                UNMEASURED[kind.name] if value is None else kind.times * value
+            )
             field.blockSignals(blocked)
         self._show_which_temperature()
 
@@ -125,11 +129,15 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
             kind.name: self._fields[kind.name].value() / kind.times for kind in KINDS
         }
         focal_length = typed.pop("focal_length")
-        temperature = typed.pop("temperature_c")
-        measured = None if temperature == UNMEASURED else temperature
-        others = replace(self._value, **typed)
+        measured = {
+            name: None if (value := typed.pop(name)) == nothing else value
+            for name, nothing in UNMEASURED.items()
+        }
+        others = with_focal_length(replace(self._value, **typed), focal_length)
         self._value = replace(
-            with_focal_length(others, focal_length), temperature_c=measured
+            others,
+            temperature_c=measured["temperature_c"],
+            humidity_percent=measured["humidity_percent"],
         )
         self._show_which_temperature()
         self.value_changed.emit()
@@ -153,7 +161,8 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
                 "result marks the assumed values."
             )
         )
-        self._fields["temperature_c"].setSpecialValueText(self.tr("not measured"))
+        for name in UNMEASURED:
+            self._fields[name].setSpecialValueText(self.tr("not measured"))
         texts = {
             "focal_length": self.tr("Focal length (other intrinsics scaled with it)"),
             "scale": self.tr("Scale of the LED coordinates"),
@@ -162,6 +171,7 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
             "center_bias": self.tr("Systematic error of LED centres"),
             "temperature_c": self.tr("Pen temperature during the swing"),
             "temperature": self.tr("Uncertainty of this temperature"),
+            "humidity_percent": self.tr("Relative humidity (for the report)"),
             "warmth": self.tr(
                 "Temperature difference from LED measurement (if not measured)"
             ),

@@ -18,7 +18,7 @@ from typing_extensions import override
 
 from lightpen.arrays import FloatArray
 from lightpen.model.limits import LEAST_IMAGES, MOST_IMAGES, SwingLimits
-from lightpen.record.library.tip_library import ItemKind
+from lightpen.record.library.tip_library import SWUNG, ItemKind
 from lightpen.record.swings.names import Names
 from lightpen.swing.preparation import MissingInput
 from lightpen_app.look.layouts import (
@@ -86,7 +86,7 @@ class NamesForm(Translated, QWidget):
         self._ball.setKeyboardTracking(False)
         self._cone = _ListedEdit()
         self._nominal_tip = PointField()
-        self._lists = {kind: ItemButton() for kind in ItemKind}
+        self._lists = {kind: ItemButton() for kind in SWUNG}
         self._edits = (self._operator, self._pen, self._tip, self._cone)
         self._labels: dict[QWidget, QLabel] = {
             field: field_label(field)
@@ -106,7 +106,7 @@ class NamesForm(Translated, QWidget):
         }
         self._add(probe, self._ball, at=(1, 1))
         self._add(probe, self._nominal_tip, at=(2, 0, 1, 2))
-        for kind in ItemKind:  # the Tab key leads through all names first
+        for kind in SWUNG:  # the Tab key leads through all names first
             rows[kind].addWidget(self._lists[kind])
 
         # Connections

@@ -1,6 +1,5 @@
 """Form for an item of the tip library."""
 
-from collections.abc import Callable
 from datetime import date
 from functools import partial
 from pathlib import Path
@@ -22,12 +21,11 @@ from lightpen.record.library.library_changes import read_kept_picture, read_pict
 from lightpen.record.library.tip_library import (
     LARGEST_BALL,
     LARGEST_CHANGE,
+    LARGEST_REFERENCE,
     LONGEST_ID,
     AnyItem,
     AxisOrigin,
-    ItemKind,
-    ListedCone,
-    ListedPen,
+    ListedReference,
     ListedTip,
 )
 from lightpen_app.look.layouts import GridPlace, fill, grid_layout, horizontal_layout
@@ -42,12 +40,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 LONGEST_NOTE = 500  # characters
-PICTURE_SIZE = QSize(26 * GRID, 22 * GRID)  # px
-MADE: dict[ItemKind, Callable[..., AnyItem]] = {
-    ItemKind.PEN: ListedPen,
-    ItemKind.TIP: ListedTip,
-    ItemKind.CONE: ListedCone,
-}
+PICTURE_SIZE = QSize(26 * GRID, 20 * GRID)  # px
 
 
 class ItemForm(Translated, QWidget):
@@ -77,7 +70,10 @@ class ItemForm(Translated, QWidget):
         # Widgets
         self._id = QLineEdit()
         self._id.setMaxLength(LONGEST_ID)
-        self._due = DateField()
+        self._due, self._certified = DateField(), DateField()
+        self._certificate = QLineEdit()
+        self._certificate.setMaxLength(LONGEST_ID)
+        self._value = NumberField("mm", (0.0, LARGEST_REFERENCE), 4)
         self._ball = NumberField("mm", (0.0, LARGEST_BALL), 4)
         self._change = NumberField("mm", (0.0, LARGEST_CHANGE), 4)
         self._change.setSingleStep(0.01)
@@ -98,7 +94,8 @@ class ItemForm(Translated, QWidget):
         self._note = QLineEdit()
         self._note.setMaxLength(LONGEST_NOTE)
         own = (self._ball, self._change, self._days, self._swings)
-        fields = (self._id, self._due, *own, self._picture, self._note)
+        of_all = (self._id, self._due, self._certificate, self._certified)
+        fields = (*of_all, self._value, *own, self._picture, self._note)
         self._labels: dict[QWidget, QLabel] = {
             field: field_label(field) for field in (*fields, self._nominal)
         }
@@ -106,13 +103,18 @@ class ItemForm(Translated, QWidget):
             self._labels[field].setWordWrap(True)
 
         # Layout
-        grid = grid_layout(self, spacing=(2 * GRID, GRID))
+        grid = grid_layout(self, spacing=(2 * GRID, GRID // 2))
         self._add(grid, self._id, at=(0, 0))
         self._add(grid, self._due, at=(0, 1))
         self._add(grid, self._note, at=(0, 2, 1, 2))
         self._tip_only = QWidget()
-        grid.addWidget(self._tip_only, 1, 0, 1, 4)
-        inner = grid_layout(self._tip_only, spacing=(2 * GRID, GRID))
+        self._add(grid, self._certificate, at=(1, 0))
+        self._add(grid, self._certified, at=(1, 1))
+        self._reference_only = QWidget()
+        self._add(grid_layout(self._reference_only), self._value, at=(0, 0))
+        grid.addWidget(self._reference_only, 1, 2)
+        grid.addWidget(self._tip_only, 2, 0, 1, 4)
+        inner = grid_layout(self._tip_only, spacing=(2 * GRID, GRID // 2))
         for column, field in enumerate(own):
             self._add(inner, field, at=(0, column))
         self._add(inner, self._nominal, at=(1, 0, 1, 3))
@@ -131,7 +133,8 @@ class ItemForm(Translated, QWidget):
 
         # Connections
         self._id.textChanged.connect(self.value_edited)
-        self._due.textChanged.connect(self.value_edited)
+        for day in (self._due, self._certified):
+            day.textChanged.connect(self.value_edited)
         self._has_axis.toggled.connect(self._on_axis_toggled)
         self._spin.toggled.connect(self._on_spin_toggled)
         self._browse.clicked.connect(self._on_browse_clicked)
@@ -148,8 +151,13 @@ class ItemForm(Translated, QWidget):
             self._item,
             id=self._id.text().strip(),
             due=self._due.value(),
+            certificate=self._certificate.text().strip(),
+            certified=self._certified.value(),
             note=self._note.text().strip(),
         )
+        if isinstance(item, ListedReference):
+            self._value.interpretText()
+            return structs.replace(item, certified_mm=self._value.value() or None)
         if not isinstance(item, ListedTip):
             return item
         nominal, axis = self._nominal.value(), self._typed_axis()
@@ -196,6 +204,11 @@ class ItemForm(Translated, QWidget):
         self._id.setText(item.id)
         self._id.setReadOnly(not is_new)
         self._due.set_value(item.due)
+        self._certificate.setText(item.certificate)
+        self._certified.set_value(item.certified)
+        self._reference_only.setVisible(isinstance(item, ListedReference))
+        if isinstance(item, ListedReference):
+            self._value.setValue(item.certified_mm or 0.0)
         self._note.setText(item.note)
         self._picture.set_value("")
         self._show_picture()
@@ -220,8 +233,9 @@ class ItemForm(Translated, QWidget):
         return bool(self._id.text().strip())
 
     def has_day(self) -> bool:
-        """Return whether the field of a day is valid or empty."""
-        return not self._due.text().strip() or self._due.value() is not None
+        """Return whether the fields of days are valid or empty."""
+        days = (self._due, self._certified)
+        return all(not d.text().strip() or d.value() is not None for d in days)
 
     def _typed_axis(self) -> tuple[float, float, float] | None:
         if not self._has_axis.isChecked():
@@ -269,6 +283,9 @@ class ItemForm(Translated, QWidget):
         texts: dict[QWidget, str] = {
             self._id: self.tr("ID (as on label)"),
             self._due: self.tr("Expiry date"),
+            self._certificate: self.tr("Certificate number"),
+            self._certified: self.tr("Date of the certificate"),
+            self._value: self.tr("Certified value"),
             self._ball: self.tr("Ball diameter"),
             self._change: self.tr("Max. change since last calibration"),
             self._days: self.tr("Calibration interval (days)"),
@@ -286,7 +303,8 @@ class ItemForm(Translated, QWidget):
                 date(local_now().year + 1, 8, 14)
             )
         )
-        self._ball.setSpecialValueText(nothing)
+        for field in (self._ball, self._value):
+            field.setSpecialValueText(nothing)
         self._change.setSpecialValueText(self.tr("No limit"))
         self._change.setToolTip(
             self.tr(

@@ -15,7 +15,13 @@ from lightpen.record.library.library_changes import (
     change_item,
     keep_picture,
 )
-from lightpen.record.library.tip_library import AnyItem, ItemKind, Library, ListedTip
+from lightpen.record.library.tip_library import (
+    SWUNG,
+    AnyItem,
+    ItemKind,
+    Library,
+    ListedTip,
+)
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.words import shortened
 from lightpen_app.steps.start.barcode import BarcodeListener
@@ -85,7 +91,7 @@ class LibraryControl(QObject):
     def refresh(self) -> None:
         """Show the library for the selected pen."""
         statuses, pen = self._watch.statuses, self._selection.preparation.names.pen
-        for kind in ItemKind:
+        for kind in SWUNG:
             self._names.set_choices(kind, self._choices(kind, pen))
         if self._watch.library.tip_of_code(self._unknown) is not None:
             self._question.hide()

@@ -19,12 +19,18 @@ from typing_extensions import override
 from lightpen.local_time import local_now
 from lightpen.record.library.calibration_status import StationStatus, TipStatus
 from lightpen.record.library.supervision import Signature
-from lightpen.record.library.tip_library import AnyItem, ItemKind, ListedTip
+from lightpen.record.library.tip_library import (
+    MADE,
+    SWUNG,
+    AnyItem,
+    ItemKind,
+    ListedTip,
+)
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.words import PARTED
-from lightpen_app.steps.start.item_form import MADE, ItemForm, kept_picture
+from lightpen_app.steps.start.item_form import ItemForm, kept_picture
 from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.path_field import EnterEdit
@@ -39,7 +45,10 @@ LEAST_ROWS = 7
 WIDTHS = (12, 18, 13, 11, 14, 20)  # of the columns but the last, in GRID
 NUMBERS = (3, 4)  # columns of them
 PICTURE_SIZE = QSize(15 * GRID, 26 * GRID)  # px
-KINDS = (ItemKind.TIP, ItemKind.PEN, ItemKind.CONE)
+KINDS = (
+    *(ItemKind.TIP, ItemKind.PEN, ItemKind.CONE),
+    *(ItemKind.CAMERA, ItemKind.REFERENCE),
+)
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 LONGEST_REASON = 200  # characters
 
@@ -329,7 +338,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
 
     def _on_use_clicked(self) -> None:
         item = self.current()
-        if item is not None and not item.is_retired:
+        if item is not None and not item.is_retired and item.kind in SWUNG:
             self.accept()
             self.chosen.emit(item.kind, item.id)
 
@@ -366,6 +375,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         nothing = "" if item is not None else self.tr("Select an item in the table.")
         is_retired = item is not None and item.is_retired
         why_not = self.tr("This item is retired.") if is_retired else nothing
+        self._use.setVisible(self.kind() in SWUNG)
         self._use.set_why_not(why_not, self.tr("Use this item for calibration"))
         self._edit.set_why_not(nothing, self.tr("Edit this item"))
         self._retire.set_why_not(nothing, self.tr("Retired items stay in the archive"))
@@ -393,14 +403,16 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self.setWindowTitle(self.tr("Tip library"))
         self._lead.setText(
             self.tr(
-                "Pens, tips and cones with their limits. Each change is recorded in "
-                "the archive with name and time."
+                "Pens, tips, cones, cameras and references with their limits. Each "
+                "change is recorded in the archive with name and time."
             )
         )
         names = {
             ItemKind.TIP: self.tr("Tips"),
             ItemKind.PEN: self.tr("Pens"),
             ItemKind.CONE: self.tr("Cones"),
+            ItemKind.CAMERA: self.tr("Cameras"),
+            ItemKind.REFERENCE: self.tr("References"),
         }
         for index, kind in enumerate(KINDS):
             self._tabs.setTabText(index, names[kind])

@@ -363,7 +363,7 @@ class RigRecord(Struct, frozen=True):
 
 
 class InputsRecord(Struct, frozen=True, omit_defaults=True):
-    """The files that were read; with one camera, camera and pen file with content."""
+    """The files that were read; cameras, rig and pen with content."""
 
     camera: FileRecord
     pen: FileRecord

@@ -4,6 +4,7 @@ Both hold the same record of the calibration, and tell when they were changed si
 file alone is read; nothing that a running program knows besides comes into it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from hashlib import sha256
@@ -13,7 +14,10 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import FileError, UsageError
-from lightpen.estimation.reports.calibration_record import CalibrationRecord
+from lightpen.estimation.reports.calibration_record import (
+    CalibrationRecord,
+    FrameRecord,
+)
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import LARGEST_RECORD, printable, read_bytes
 from lightpen.formats.own_json import DamagedError, has_checksum, parse_checked
@@ -21,6 +25,7 @@ from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import message
 from lightpen.model.origin import Origin
 from lightpen.record.library.supervision import read_supervision
+from lightpen.record.library.traceability import TracedItem
 from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.result_folder import signed_heading
 from lightpen.record.results.results import TipChange, has_head, parse_result
@@ -67,6 +72,10 @@ class CalibrationFile:
         Whether pen or tip are retired or overdue, where that was looked up.
     due : date or None
         Next due date of the tip by its age, likewise.
+    supervisor : str
+        Who signed it; empty where none was needed.
+    traced : tuple of TracedItem
+        What it was measured with, likewise.
     """
 
     path: Path
@@ -85,6 +94,8 @@ class CalibrationFile:
     measured: datetime | None = None
     library_status: tuple[str, ...] = ()
     due: date | None = None
+    supervisor: str = ""
+    traced: tuple[TracedItem, ...] = ()
 
     @property
     def when(self) -> datetime:
@@ -171,9 +182,11 @@ class ShownImages:
     lamps: FloatArray
 
 
-def shown_images(record: CalibrationRecord) -> ShownImages:
-    """Return the detections in the images of a single-camera record."""
-    frames = record.frames
+def shown_images(
+    record: CalibrationRecord, frames: Sequence[FrameRecord] = ()
+) -> ShownImages:
+    """Return the detections in all images of a record, or in those of one camera."""
+    frames = frames or record.frames
     shape = len(frames), len(record.leds)
     seen, fit = np.full((*shape, 3), np.nan), np.zeros(shape, dtype=bool)
     for i, frame in enumerate(frames):
@@ -238,6 +251,7 @@ def parse_calibration(data: bytes, path: Path) -> CalibrationFile:
             change=result.change,
             restores=result.restores,
             swing=result.record,
+            supervisor=result.supervisor,
         )
     record = _parse_record(data, path)
     verdict = record.verdict

@@ -1,6 +1,6 @@
 """A calibration computed again from its record alone.
 
-The record holds the files of camera and pen, what was assumed where they say nothing,
+The record holds the files of cameras and pen, what was assumed where they say nothing,
 and the LED centres of each image with the reason why one takes no part. What the images
 showed is not judged again.
 """
@@ -15,20 +15,23 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from lightpen.detection.observations import Observations, leave_out, observe_centers
+from lightpen.detection.rig_observations import at_moments
 from lightpen.errors import UsageError
-from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen.estimation.reports.methods import Method
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import printable
-from lightpen.formats.hashes import InputFile, Inputs
+from lightpen.formats.hashes import InputFile, Inputs, RigInputs
 from lightpen.formats.json_records import FileRecord
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.own_json import DamagedError
+from lightpen.formats.pairing import NONE, Pairing
 from lightpen.formats.pen_files import read_pen
-from lightpen.model.camera import Camera
+from lightpen.formats.rig_files import read_rig
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig, rig_of
 from lightpen.record.calibrations.calibrations import (
     floats,
     read_calibration,
@@ -58,35 +61,43 @@ def recompute(path: Path) -> Recomputed:
     Raises
     ------
     UsageError
-        It is of several cameras or two cones, or does not hold the files.
+        It is of two cones, or does not hold the files.
     FileError
         It cannot be read, or is not as it was written.
     CalibrationError
         It does not determine the tip.
     """
     record = read_calibration(path).calibration
-    if record.rig is not None or record.second_cone is not None:
-        raise UsageError("recompute.more-than-one", path=printable(str(path)))
+    if record.second_cone is not None:
+        raise UsageError("recompute.two-cones", path=printable(str(path)))
     found, limits = record.inputs, record.verdict.limits
     try:
-        files = _kept(found.camera), _kept(found.pen)
+        kept_pen = _kept(found.pen)
+        kept_rig = None if found.rig is None else _kept(found.rig)
+        kept_cameras = tuple(map(_kept, found.cameras or (found.camera,)))
     except DamagedError as error:
         raise UsageError("recompute.not-enough", path=printable(str(path))) from error
     nominal = None if record.nominal_tip_mm is None else floats(record.nominal_tip_mm)
     with TemporaryDirectory(prefix="lightpen-record-") as folder:
-        camera_file, pen_file = (
-            _written(file, Path(folder, name))
-            for name, file in zip(("camera", "pen"), files, strict=True)
-        )
-        camera = read_camera(camera_file)
+        cameras = [
+            _written(file, Path(folder, f"camera-{i}"))
+            for i, file in enumerate(kept_cameras)
+        ]
+        pen_file = _written(kept_pen, Path(folder, "pen"))
+        if kept_rig is None:
+            rig = rig_of(read_camera(cameras[0]))
+        else:
+            rig = read_rig(_written(kept_rig, Path(folder, "rig")), cameras).rig
         pen = read_pen(pen_file, found.units, found.led_diameter_mm, nominal)
-    observations = _observations(path, record, camera, pen)
+    seen = [_observations(path, record, c, rig, pen) for c in range(rig.n_cameras)]
     return Recomputed(
-        calibrate(camera, pen, observations, record.assumptions),
+        calibrate_rig(rig, pen, seen, record.assumptions),
         Inputs(
-            *files,
+            kept_cameras[0],
+            kept_pen,
             tuple(InputFile(Path(f.file), f.sha256) for f in found.observations),
             nominal_tip=nominal,
+            rig=None if kept_rig is None else RigInputs(kept_rig, kept_cameras),
             origin=record.origin,
             units=found.units,
             led_diameter=found.led_diameter_mm,
@@ -118,18 +129,28 @@ def _written(file: InputFile, place: Path) -> Path:
 
 
 def _observations(
-    path: Path, record: CalibrationRecord, camera: Camera, pen: Pen
+    path: Path, record: CalibrationRecord, c: int, rig: Rig, pen: Pen
 ) -> Observations:
-    """Return the detections, with the same images excluded."""
-    shown, frames = shown_images(record), record.frames
+    """Return the detections of a camera, with the same images excluded."""
+    name = rig.names[c] if rig.names else ""
+    frames = tuple(each for each in record.frames if each.camera == name)
+    shown = shown_images(record, frames)
     pixels = np.where(shown.fit[..., None], shown.pixels, np.nan)
     numbers = np.arange(1, len(frames) + 1)
     seen = replace(
-        observe_centers(Centers(numbers, pixels, path), camera, pen),
+        observe_centers(Centers(numbers, pixels, path), rig.cameras[c], pen),
         names=tuple(frame.file for frame in frames),
         seen_pixels=shown.pixels,
         areas=shown.areas,
         lamps=shown.lamps,
         edge_widths=shown.edge_widths,
     )
-    return leave_out(seen, {i: f.reason for i, f in enumerate(frames) if f.reason})
+    seen = leave_out(seen, {i: f.reason for i, f in enumerate(frames) if f.reason})
+    if not rig.names:
+        return seen
+    n_moments = max(each.moment for each in record.frames)
+    images = np.full((n_moments, 1), NONE)
+    for i, frame in enumerate(frames):
+        images[frame.moment - 1] = i
+    (placed,) = at_moments([seen], Pairing(images))
+    return placed

@@ -18,9 +18,11 @@ from xml.etree.ElementTree import Element, SubElement
 
 from lightpen.estimation.reports.verdict import AXES
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.local_time import local_now
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.decision_rule import decision_rule
 from lightpen.record.exports.export_status import status_of
+from lightpen.record.library.traceability import TracedItem
 
 VERSION = "3.2.1"
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
@@ -29,7 +31,9 @@ INSTANCE = "http://www.w3.org/2001/XMLSchema-instance"
 PREFIXES = {"dcc": DCC, "si": SI, "xsi": INSTANCE}
 LANGUAGE = "en"
 MILLIMETRE, SQUARE_MILLIMETRE = r"\milli\metre", r"\milli\metre\tothe{2}"
+DEGREE_CELSIUS, PERCENT = r"\degreecelsius", r"\percent"
 PROBABILITY = 0.95
+PLACES = ("laboratory", "customer", "laboratoryBranch", "customerBranch", "other")
 UNSTATED = "not stated"
 NO_CERTIFICATE = (
     "Calibration record of a light pen and its tip. It is no certificate of an "
@@ -39,18 +43,28 @@ NO_CERTIFICATE = (
 
 @dataclass(frozen=True)
 class Laboratory:
-    """Who calibrates, as the schema requires it.
+    """Who calibrates and where, as the schema and reports state it.
 
     Attributes
     ----------
     country : str
         ISO 3166-1, two letters.
+    street, post_code : str
+        May be empty.
+    procedure : str
+        Name or number of the working instruction; may be empty.
+    place : str
+        Where it calibrates, one of `PLACES`.
     """
 
     name: str
     email: str
     city: str
     country: str
+    street: str = ""
+    post_code: str = ""
+    procedure: str = ""
+    place: str = "laboratory"
 
 
 def is_country(code: str) -> bool:
@@ -68,7 +82,7 @@ def dcc_text(file: CalibrationFile, laboratory: Laboratory) -> str:
     )
     _add_administrative_data(root, file, laboratory)
     results = _sub(root, "measurementResults")
-    _add_result(_sub(results, "measurementResult"), file)
+    _add_result(_sub(results, "measurementResult"), file, laboratory)
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode", xml_declaration=False)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
@@ -88,28 +102,34 @@ def _add_administrative_data(
     identified = _sub(core, "identifications")
     _identify(identified, "SHA-256 of the JSON record", file.sha256)
     _identify(identified, "JSON record", file.name)
-    calibrated = f"{file.measured or file.calibration.created:%Y-%m-%d}"
-    _value(core, "beginPerformanceDate", calibrated)
-    _value(core, "endPerformanceDate", calibrated)
-    _value(core, "performanceLocation", "laboratory")
+    begin, end = file.measured or file.calibration.created, file.calibration.created
+    _value(core, "beginPerformanceDate", f"{begin:%Y-%m-%d}")
+    _value(core, "endPerformanceDate", f"{max(begin, end):%Y-%m-%d}")
+    _value(core, "performanceLocation", laboratory.place)
+    _value(core, "issueDate", f"{local_now():%Y-%m-%d}")
     items = _sub(data, "items")
     _add_item(items, "Light pen", "Serial number", names.pen)
     _add_item(items, "Probe tip", "Identification", names.tip)
     _add_contact(_sub(_sub(data, "calibrationLaboratory"), "contact"), laboratory)
-    person = _sub(_sub(data, "respPersons"), "respPerson")
-    _text(_sub(person, "person"), "name", names.operator or UNSTATED)
-    _value(person, "role", "operator")
-    _value(person, "mainSigner", "true")
+    persons = _sub(data, "respPersons")
+    for name, role in ((names.operator, "operator"), (file.supervisor, "supervisor")):
+        if name or role == "operator":
+            person = _sub(persons, "respPerson")
+            _text(_sub(person, "person"), "name", name or UNSTATED)
+            _value(person, "role", role)
+            is_main = (role == "supervisor") == bool(file.supervisor)
+            _value(person, "mainSigner", str(is_main).lower())
     _add_contact(_sub(data, "customer"), laboratory)
     statements = _sub(data, "statements")
     said = _sub(_sub(statements, "statement"), "declaration")
     _content(said, NO_CERTIFICATE)
 
 
-def _add_result(result: Element, file: CalibrationFile) -> None:
+def _add_result(result: Element, file: CalibrationFile, laboratory: Laboratory) -> None:
     calibration, names = file.calibration, file.names
     _text(result, "name", "Position of the tip in the frame of the pen")
-    method = _sub(_sub(result, "usedMethods"), "usedMethod")
+    methods = _sub(result, "usedMethods")
+    method = _sub(methods, "usedMethod")
     _text(method, "name", "Pivot calibration by a swing about a fixed cone")
     images = calibration.images
     _rich(
@@ -121,12 +141,17 @@ def _add_result(result: Element, file: CalibrationFile) -> None:
         f"{calibration.origin or file.origin or UNSTATED}.",
         *map(str, decision_rule(calibration.verdict.limits)),
     )
+    if laboratory.procedure:
+        _text(_sub(methods, "usedMethod"), "name", laboratory.procedure)
     program = calibration.program
     _add_software(_sub(result, "usedSoftware"), program.name, program.version)
     equipment = _sub(result, "measuringEquipments")
     inputs = calibration.inputs
     for name, given in (("Camera file", inputs.camera), ("LED file", inputs.pen)):
         _add_file(equipment, name, given.file, given.sha256)
+    for each in file.traced:
+        _add_traced(equipment, each)
+    _add_conditions(result, file)
     data = _sub(_sub(result, "results"), "result")
     _text(data, "name", "Centre of the tip")
     verdict = f"Verdict: {file.grade.value}. {file.why.text}"
@@ -167,12 +192,47 @@ def _add_file(equipment: Element, what: str, name: str, sha256: str) -> None:
     _identify(identified, "SHA-256", sha256)
 
 
+def _add_traced(equipment: Element, traced: TracedItem) -> None:
+    """Add what was measured with, and its certificate."""
+    part, item = _sub(equipment, "measuringEquipment"), traced.item
+    _text(part, "name", traced.kind.value)
+    if item is not None and item.certificate:
+        dated = "" if item.certified is None else f" of {item.certified}"
+        due = "" if item.due is None else f", due {item.due}"
+        description = f"Certificate {item.certificate}{dated}{due}."
+        _rich(part, "description", description)
+    _identify(_sub(part, "identifications"), "Identification", traced.id, "owner")
+
+
+def _add_conditions(result: Element, file: CalibrationFile) -> None:
+    """Add temperature and humidity where they were measured."""
+    assumed = file.calibration.assumptions
+    measured = [
+        ("Temperature of the pen", assumed.temperature_c, DEGREE_CELSIUS),
+        ("Relative humidity", assumed.humidity_percent, PERCENT),
+    ]
+    given = [(name, value, unit) for name, value, unit in measured if value is not None]
+    if not given:
+        return
+    conditions = _sub(result, "influenceConditions")
+    for name, value, unit in given:
+        condition = _sub(conditions, "influenceCondition")
+        _text(condition, "name", name)
+        _quantity(_sub(condition, "data"), name, value, unit)
+
+
 def _add_contact(contact: Element, laboratory: Laboratory) -> None:
     _text(contact, "name", laboratory.name)
     _value(contact, "eMail", laboratory.email)
     location = _sub(contact, "location")
-    _value(location, "city", laboratory.city)
-    _value(location, "countryCode", laboratory.country)
+    for name, words in (
+        ("street", laboratory.street),
+        ("postCode", laboratory.post_code),
+        ("city", laboratory.city),
+        ("countryCode", laboratory.country),
+    ):
+        if words:
+            _value(location, name, words)
 
 
 def _identify(

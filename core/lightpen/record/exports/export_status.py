@@ -12,8 +12,10 @@ from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.library.tip_library import ItemKind
+from lightpen.record.library.traceability import traced_items
 from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.swings.header import Header
 from lightpen.record.swings.reading import open_record
 
 RETIRED, OVERDUE = "RETIRED", "OVERDUE"
@@ -44,20 +46,29 @@ def with_status(file: CalibrationFile, now: datetime) -> CalibrationFile:
         found.append(RETIRED)
     if now > due or any(item.is_overdue(today) for item in items):
         found.append(OVERDUE)
+    header = _header(data, file)
+    serials = () if header is None else _serials(header)
     return replace(
         file,
-        measured=_measured(data, file),
+        measured=None if header is None else header.created,
+        traced=traced_items(library, names, serials),
         library_status=tuple(found),
         due=local_time(due).date(),
     )
 
 
-def _measured(data: Path, file: CalibrationFile) -> datetime | None:
-    """Return when the swing of a calibration began; None where it is not there."""
+def _header(data: Path, file: CalibrationFile) -> Header | None:
+    """Return the header of the swing of a calibration; None where it is not there."""
     if file.swing is not None:
         with suppress(FileError):
-            return open_record(data / file.swing).header.created
+            return open_record(data / file.swing).header
     return None
+
+
+def _serials(header: Header) -> tuple[str, ...]:
+    """Return the serial numbers of the cameras of a swing, the first one first."""
+    names, settings = ("camera_serial", "second_camera_serial"), header.settings
+    return tuple(str(settings[name]) for name in names if name in settings)
 
 
 def status_of(file: CalibrationFile) -> tuple[str, ...]:

@@ -297,7 +297,8 @@ def _sensible(item: AnyItem) -> AnyItem:
         raise UsageError(
             "library.bad-id", id=printable(name[: 2 * LONGEST_ID]), most=LONGEST_ID
         )
-    item = structs.replace(item, id=name, note=item.note.strip())
+    words = {"note": item.note.strip(), "certificate": item.certificate.strip()}
+    item = structs.replace(item, id=name, **words)
     return _sensible_tip(item) if isinstance(item, ListedTip) else item
 
 

@@ -7,7 +7,7 @@ its history alone, and each of these files is owed an entry of the archive. An i
 retired, never removed: results name it.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
@@ -41,6 +41,7 @@ WHAT = message("file.library")
 LONGEST_ID = 200  # characters
 LARGEST_BALL = 100.0  # mm
 LARGEST_CHANGE = 10.0  # mm
+LARGEST_REFERENCE = 10_000.0  # mm
 LARGEST_EXPANSION = 1e-3  # 1/K
 
 Id: TypeAlias = Annotated[str, Meta(min_length=1, max_length=LONGEST_ID)]
@@ -53,12 +54,17 @@ class ItemKind(StrEnum):
     PEN = "pen"
     TIP = "tip"
     CONE = "cone"
+    CAMERA = "camera"
+    REFERENCE = "reference"
 
 
+SWUNG = (ItemKind.PEN, ItemKind.TIP, ItemKind.CONE)  # kinds that a swing names
 KIND_WORDS: Mapping[ItemKind, Message] = {
     ItemKind.PEN: message("library.pen"),
     ItemKind.TIP: message("library.tip"),
     ItemKind.CONE: message("library.cone"),
+    ItemKind.CAMERA: message("library.camera"),
+    ItemKind.REFERENCE: message("library.reference"),
 }
 
 
@@ -86,12 +92,18 @@ class Item(Struct, frozen=True, kw_only=True):
     due : date or None
         Last day on which it may be used before it is looked after: of a pen, when its
         LEDs are to be measured again, of a tip its ball, of a cone its seat.
+    certificate : str
+        Number of the certificate of that; empty where there is none.
+    certified : date or None
+        Date of the certificate.
     """
 
     kind: ClassVar[ItemKind]
 
     id: Id
     due: date | None = None
+    certificate: str = ""
+    certified: date | None = None
     note: str = ""
     is_retired: bool = False
 
@@ -135,6 +147,26 @@ class ListedCone(Item, frozen=True, kw_only=True, tag="cone"):
     """A cone."""
 
     kind: ClassVar[ItemKind] = ItemKind.CONE
+
+
+class ListedCamera(Item, frozen=True, kw_only=True, tag="camera"):
+    """A camera, by its serial number, with the certificate of its intrinsics."""
+
+    kind: ClassVar[ItemKind] = ItemKind.CAMERA
+
+
+class ListedReference(Item, frozen=True, kw_only=True, tag="reference"):
+    """A ring, length bar, sphere or plate of a certified value.
+
+    Attributes
+    ----------
+    certified_mm : float or None
+        The value as it is typed in a verification, by which reports find the item.
+    """
+
+    kind: ClassVar[ItemKind] = ItemKind.REFERENCE
+
+    certified_mm: Annotated[float, Meta(ge=0, le=LARGEST_REFERENCE)] | None = None
 
 
 class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
@@ -181,7 +213,12 @@ class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
         )
 
 
-AnyItem: TypeAlias = ListedPen | ListedTip | ListedCone
+AnyItem: TypeAlias = ListedPen | ListedTip | ListedCone | ListedCamera | ListedReference
+
+MADE: Mapping[ItemKind, Callable[..., AnyItem]] = {
+    each.kind: each
+    for each in (ListedPen, ListedTip, ListedCone, ListedCamera, ListedReference)
+}
 
 
 class LibraryChange(Struct, frozen=True, kw_only=True):
@@ -213,19 +250,26 @@ class Library:
 
     Attributes
     ----------
-    pens, tips, cones : mapping of str to item
+    pens, tips, cones, cameras, references : mapping of str to item
         Items by id, in order of creation.
     """
 
     pens: Mapping[str, ListedPen] = field(default_factory=dict)
     tips: Mapping[str, ListedTip] = field(default_factory=dict)
     cones: Mapping[str, ListedCone] = field(default_factory=dict)
+    cameras: Mapping[str, ListedCamera] = field(default_factory=dict)
+    references: Mapping[str, ListedReference] = field(default_factory=dict)
 
     def items(self, kind: ItemKind) -> Mapping[str, AnyItem]:
         """Return the items of a kind by their ids."""
-        if kind is ItemKind.PEN:
-            return self.pens
-        return self.tips if kind is ItemKind.TIP else self.cones
+        of_kind: dict[ItemKind, Mapping[str, AnyItem]] = {
+            ItemKind.PEN: self.pens,
+            ItemKind.TIP: self.tips,
+            ItemKind.CONE: self.cones,
+            ItemKind.CAMERA: self.cameras,
+            ItemKind.REFERENCE: self.references,
+        }
+        return of_kind[kind]
 
     def item(self, kind: ItemKind, name: str) -> AnyItem | None:
         """Return an item by its id, if it is in the library."""
@@ -269,6 +313,8 @@ def read_library(data: Path) -> Library:
         pens=dict(_of(found, ListedPen)),
         tips=dict(_of(found, ListedTip)),
         cones=dict(_of(found, ListedCone)),
+        cameras=dict(_of(found, ListedCamera)),
+        references=dict(_of(found, ListedReference)),
     )
 
 

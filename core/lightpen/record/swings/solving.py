@@ -21,7 +21,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.contact.camera_motion import steadied
 from lightpen.estimation.contact.joint import ContactModel, reduce
-from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, with_content
+from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, with_content
 from lightpen.formats.pairing import Pairing
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector
@@ -162,7 +162,8 @@ def record_inputs(source: RecordSource) -> Inputs:
     ]
     rig = None
     if source.rig_file is not None:
-        rig = RigInputs(hashed(source.rig_file), all_hashed(source.camera_files))
+        cameras = tuple(map(with_content, source.camera_files))
+        rig = RigInputs(with_content(source.rig_file), cameras)
     return Inputs(
         camera=with_content(source.camera_files[0]),
         pen=with_content(source.pen_file),

@@ -52,7 +52,13 @@ from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen.swing.preparation import Preparation
+from lightpen.verification.reports.records import verification_record
 from lightpen.verification.storage.verification_files import keep_verification
+from lightpen.verification.tasks.assessment import (
+    USE_TIP,
+    VERIFY_AGAIN,
+    VerificationAssessment,
+)
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import LIGHT, apply_theme
 from lightpen_app.print_report.preview import PrintReportWindow
@@ -626,6 +632,23 @@ def test_what_was_accepted_here_is_put_on_paper_as_its_file_has_it(
     assert "000001" in desk.notices[0]
 
 
+def test_a_verification_has_a_report_of_its_own(desk: Desk) -> None:
+    verdict = VerificationAssessment(Grade.CHECK, USE_TIP, VERIFY_AGAIN)
+    entries = {"pen": "LP-04", "tip": "T-10", "moved_mm": [0.001, 0.002, 0.003]}
+    record = verification_record("drift", entries, verdict, {"drift": 0.02}, {})
+    keep_verification(desk.workbench.folder, record, is_simulated=False)
+    desk.workbench.run.logbook.enter_owed()
+    desk.open()
+    desk.show_tab(ENTRY)
+
+    desk.click("Verification report...")
+    desk.until(lambda: desk.page.findChildren(PrintReportWindow))
+    window = desk.child(PrintReportWindow)
+    desk.until(lambda: window.n_pages() > 0)
+    window.close()
+    assert desk.notices == []
+
+
 def test_what_is_not_accepted_or_not_of_this_station_has_no_record_on_paper(
     desk: Desk, tmp_path: Path
 ) -> None:
@@ -647,7 +670,7 @@ def test_what_is_not_accepted_or_not_of_this_station_has_no_record_on_paper(
         why_not[tip] = "" if button.isEnabled() else button.toolTip()
     assert why_not == {
         "T-10": "",
-        "": "Only an accepted tip has a calibration report.",
+        "": "Only accepted tips and verifications have a report.",
         "T-11": "The result is stored at its own station.",
     }
 

@@ -20,6 +20,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
+    QComboBox,
     QFileDialog,
     QLabel,
     QLineEdit,
@@ -856,11 +857,12 @@ def test_all_formats_are_offered_and_a_certificate_asks_for_the_laboratory(
     ]
     edits = dialog.findChildren(QLineEdit)
     for edit, text in zip(
-        edits, ("Hall 2", "a@b.de", "Berlin", "Germany"), strict=True
+        edits, ("Hall 2", "a@b.de", "Berlin", "Germany", "", "", "WI 7"), strict=True
     ):
         edit.setText(text)
     assert not save_button.isEnabled()
-    edits[-1].setText("DE")
+    edits[3].setText("DE")
+    dialog.findChildren(QComboBox)[0].setCurrentIndex(1)
     save_button.click()
     (folder_dialog,) = [d for d in page.findChildren(QFileDialog) if d.isVisible()]
     with bed.qtbot.waitSignal(workbench.notifications.status_changed):
@@ -870,7 +872,9 @@ def test_all_formats_are_offered_and_a_certificate_asks_for_the_laboratory(
     (written,) = tmp_path.glob("*_dcc.xml")
     assert "<dcc:city>Berlin</dcc:city>" in written.read_text("utf-8")
     assert "LP-04" in written.read_text("utf-8")
-    laboratory = Laboratory("Hall 2", "a@b.de", "Berlin", "DE")
+    laboratory = Laboratory(
+        *("Hall 2", "a@b.de", "Berlin", "DE"), procedure="WI 7", place="customer"
+    )
     assert workbench.settings.laboratory() == laboratory
 
 

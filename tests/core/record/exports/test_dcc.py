@@ -3,11 +3,14 @@
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import replace
+from datetime import date, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import pytest
+from msgspec import structs
 
 from lightpen.formats.json_records import record_bytes
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
@@ -19,6 +22,9 @@ from lightpen.record.exports.dcc import (
     Laboratory,
     dcc_text,
 )
+from lightpen.record.library.tip_library import ItemKind, ListedCamera
+from lightpen.record.library.traceability import TracedItem
+from lightpen.record.swings.names import Names
 
 if TYPE_CHECKING:
     from xmlschema import XMLSchema
@@ -74,6 +80,51 @@ def test_one_that_is_otherwise_is_refused(
     assert old in text
 
     assert faults(schema, text.replace(old, new))
+
+
+def test_it_states_place_persons_dates_conditions_and_certificates(
+    schema: "XMLSchema", calibration_file: CalibrationFile
+) -> None:
+    camera = ListedCamera(
+        id="CAM-7", certificate="K-17", certified=date(2026, 3, 1), due=date(2027, 3, 1)
+    )
+    calibration = calibration_file.calibration
+    assumed = replace(
+        calibration.assumptions, temperature_c=21.5, humidity_percent=45.0
+    )
+    file = replace(
+        calibration_file,
+        names=Names("Hall 2", "Ann", "LP-04", "T-10", "C-1"),
+        supervisor="Eve",
+        measured=calibration.created - timedelta(days=2),
+        traced=(TracedItem(ItemKind.CAMERA, "CAM-7", camera),),
+        calibration=structs.replace(calibration, assumptions=assumed),
+    )
+    laboratory = replace(
+        LABORATORY,
+        street="Seestr. 1",
+        post_code="13353",
+        procedure="WI 7.3",
+        place="customer",
+    )
+    text = dcc_text(file, laboratory)
+
+    assert faults(schema, text) == []
+    root = ElementTree.fromstring(text)
+
+    def texts(path: str) -> list[str]:
+        return [each.text or "" for each in root.iterfind(f".//{path}", NAMES)]
+
+    begin, end = texts("dcc:beginPerformanceDate"), texts("dcc:endPerformanceDate")
+    assert date.fromisoformat(end[0]) - date.fromisoformat(begin[0]) == timedelta(2)
+    assert texts("dcc:performanceLocation") == ["customer"]
+    persons = "dcc:respPerson"
+    assert texts(f"{persons}/dcc:person/dcc:name/dcc:content") == ["Ann", "Eve"]
+    assert texts(f"{persons}/dcc:mainSigner") == ["false", "true"]
+    assert texts("dcc:calibrationLaboratory//dcc:street") == ["Seestr. 1"]
+    assert texts("dcc:influenceCondition//si:value") == ["21.5", "45.0"]
+    assert "Certificate K-17 of 2026-03-01, due 2027-03-01." in text
+    assert "WI 7.3" in text
 
 
 def test_it_holds_tip_uncertainty_and_covariance_to_the_last_digit(

@@ -1,0 +1,77 @@
+"""Both copies of a data folder were used: what docs/archive.md says to do then."""
+
+import shutil
+from collections.abc import Callable
+from contextlib import closing
+from datetime import timedelta
+from pathlib import Path
+from subprocess import CompletedProcess
+
+import pytest
+from benchmarks.postgres_server import Postgres
+from tests.core.archive.conftest import NOON
+
+from lightpen.archive.lazy_logbook import SERVER
+from lightpen.archive.logbook import Logbook
+from lightpen.record.library.library_changes import Author, add_item
+from lightpen.record.library.tip_library import ListedCone, ListedTip, read_library
+
+Run = Callable[..., CompletedProcess[str]]
+BY = Author("Hall 2", "Ann")
+HOUR = timedelta(hours=1)
+
+
+def enter(data: Path) -> None:
+    with closing(Logbook(data)) as logbook:
+        assert logbook.enter_owed() == ()
+
+
+def test_one_copy_goes_on_and_the_other_begins_a_new_folder(
+    postgres: Postgres, lightpen: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plant = postgres.new_database()
+    station, copy = tmp_path / "station", tmp_path / "copy"
+    hall_2, hall_3 = (postgres.new_role(plant, "lightpen_station") for _ in "23")
+    monkeypatch.setenv(SERVER, hall_2)
+    add_item(station, ListedTip(id="T-1"), BY, NOON)
+    enter(station)
+    shutil.copytree(station, copy)
+    for n, folder in enumerate((station, copy)):
+        add_item(folder, ListedCone(id=f"C-{n}"), BY, NOON + HOUR)
+        enter(folder)
+    assert lightpen("archive", "deliver", "--data", station).returncode == 0
+
+    # It is found, and named.
+    refused = lightpen("archive", "deliver", "--data", copy)
+    assert refused.returncode == 2
+    assert "a data folder was copied and both copies were used" in refused.stderr
+    checked = lightpen("archive", "check", "--server", "--data", copy)
+    assert checked.returncode == 1
+    assert "Entry 2 of chain" in checked.stdout
+
+    # The other copy stays as it is; its work goes on in a new folder, as a new station.
+    new, abandoned = tmp_path / "new", tmp_path / "abandoned.jsonl"
+    before = {file: file.read_bytes() for file in copy.rglob("*") if file.is_file()}
+    exported = lightpen("archive", "export", abandoned, "--data", copy)
+    assert exported.stdout.startswith("2 entries")
+    assert {f: f.read_bytes() for f in before} == before
+    monkeypatch.setenv(SERVER, hall_3)
+    shared = lightpen("tips", "share", "--data", new)
+    assert shared.returncode == 0
+    assert list(read_library(new).tips) == ["T-1"]
+    assert list(read_library(new).cones) == ["C-0"]
+    imported = lightpen("archive", "import", abandoned, "--data", new)
+    assert imported.stdout == "2 entries are new, 0 were there already.\n"
+    brought = lightpen("tips", "share", "--data", new)
+    assert "cone C-1" in brought.stdout
+    assert lightpen("archive", "deliver", "--data", new).returncode == 0
+
+    # Nobody is accused any more, and the station receives what the copy had entered.
+    monkeypatch.setenv(SERVER, hall_2)
+    there = lightpen("archive", "deliver", "--data", station)
+    assert "cone C-1" in there.stdout
+    assert set(read_library(station).cones) == {"C-0", "C-1"}
+    for data, address in ((station, hall_2), (new, hall_3)):
+        monkeypatch.setenv(SERVER, address)
+        end = lightpen("archive", "check", "--server", "--data", data)
+        assert (end.stdout.count("No change was found"), end.returncode) == (1, 0)
