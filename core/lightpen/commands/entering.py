@@ -12,6 +12,7 @@ from lightpen.local_time import local_now
 from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import NOBODY, CalibrationFile
+from lightpen.record.folder.verifications import attributed
 from lightpen.record.library.tip_library import read_library
 from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.result_folder import FolderArchive
@@ -66,15 +67,7 @@ def keep_record(
         origin = Origin.SIMULATED
     if options.operator is not None:
         names = replace(names, operator=options.operator)
-    record = {
-        **record,
-        "session": record["created"],
-        "station": names.station,
-        "operator": names.operator,
-        "pen": names.pen,
-        "tip": names.tip,
-        "origin": origin or own,
-    }
+    record = attributed(record, names, origin or own)
     if options.json is not None:
         write_record(options.json, record)
     data = options.data or (None if tip is None else data_folder_of(tip.path))

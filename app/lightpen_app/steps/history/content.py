@@ -31,6 +31,7 @@ from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.filter_bar import FilterBar
 from lightpen_app.steps.history.history_table import HistoryTable
+from lightpen_app.steps.history.kept_study import keep_study
 from lightpen_app.steps.history.reader import FirstEntries, HistoryReader
 from lightpen_app.steps.history.selection_panel import SelectionPanel
 from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
@@ -106,6 +107,7 @@ class HistoryContent(Translated, QWidget):
         self._paper.saved.connect(self._on_paper_saved)
         self._paper.failed.connect(self._tell)
         self._selection.adjust_requested.connect(self._adjust_together)
+        self._selection.report_requested.connect(self._report_study)
         self._due.rule_changed.connect(self._on_rule_changed)
         self._whole.checked.connect(self.checked)
         self._whole.imported.connect(self.read_anew)
@@ -300,6 +302,28 @@ class HistoryContent(Translated, QWidget):
             self._paper.show_verification(folder / result.place)
         else:
             self._paper.show(lambda: folder / result.place)
+
+    def _report_study(self) -> None:
+        """Keep and enter the repeatability that is shown, and show its report."""
+        found, entries = self._selection.repeatability(), self._selection.studied()
+        if found is None:
+            return
+        folder, logbook = self._folder, self._logbook
+        operator = self._chosen.preparation.names.operator
+        limit = self._selection.limits().repeatability
+
+        def keep(_: Report) -> Path:
+            file = keep_study(folder, found, entries, limit, operator)
+            logbook.enter_owed()
+            return file
+
+        job = Job(keep, self)
+
+        # Connections
+        job.succeeded.connect(self._paper.show_verification)
+        job.succeeded.connect(lambda _: self.read_anew())
+        job.failed.connect(self._tell)
+        job.start()
 
     def _on_paper_saved(self, path: Path) -> None:
         self._notices.show_status(self.tr("Saved in {0}").format(path.parent))

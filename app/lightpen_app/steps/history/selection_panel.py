@@ -18,7 +18,7 @@ from lightpen.verification.history.trend import (
 )
 from lightpen.verification.tasks.repeatability import Repeatability, RepeatedPoint
 from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.layouts import grid_layout
+from lightpen_app.look.layouts import grid_layout, horizontal_layout
 from lightpen_app.look.quantities import AXES, decimals_for, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
@@ -43,9 +43,12 @@ class SelectionPanel(Translated, QWidget):
     -------
     adjust_requested()
         LED file and camera file by all selected swings are asked for.
+    report_requested()
+        The report of the repeatability is asked for.
     """
 
     adjust_requested = Signal()
+    report_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -61,6 +64,7 @@ class SelectionPanel(Translated, QWidget):
         self._limits = VerificationLimits()
         self._study = CapabilityRow()
         self._adjust, self._adjusted = PushButton(), SignLabel()
+        self._report = PushButton()
 
         # Layout
         layout = grid_layout(
@@ -80,13 +84,14 @@ class SelectionPanel(Translated, QWidget):
             layout.setAlignment(remark, Qt.AlignmentFlag.AlignTop)
         layout.addWidget(self._touched, 3, 1)
         layout.addWidget(self._study, 4, 1)
-        layout.addWidget(self._adjust, 5, 0, Qt.AlignmentFlag.AlignLeft)
+        horizontal_layout(layout, self._adjust, self._report, 1, at=(5, 0))
         layout.addWidget(self._adjusted, 5, 1)
         layout.setRowStretch(6, 1)
 
         # Connections
         self._study.value_changed.connect(self._retranslate)
         self._adjust.clicked.connect(self.adjust_requested)
+        self._report.clicked.connect(self.report_requested)
 
         self._retranslate()
 
@@ -95,6 +100,10 @@ class SelectionPanel(Translated, QWidget):
         if limits != self._limits:
             self._limits = limits
             self._retranslate()
+
+    def limits(self) -> VerificationLimits:
+        """Return the limits by which is judged."""
+        return self._limits
 
     def set_value(self, selected: Sequence[StoredEntry], trend: Trend) -> None:
         """Show the selected entries and those of the trend."""
@@ -116,12 +125,15 @@ class SelectionPanel(Translated, QWidget):
 
     def repeatability(self) -> Repeatability | None:
         """Return the repeatability; None for fewer than two tips."""
-        trend, study = self._trend, self._study
-        entries = self._selected if len(self._selected) >= PAIR else trend.entries
+        trend, study, entries = self._trend, self._study, self.studied()
         return repeatability_of(
             *(entries, self._limits, study.tolerance(), study.reference()),
             trend.touched_with(entries),
         )
+
+    def studied(self) -> tuple[StoredEntry, ...]:
+        """Return the entries of the repeatability."""
+        return self._selected if len(self._selected) >= PAIR else self._trend.entries
 
     def words(self) -> tuple[str, ...]:
         """Return the texts on the selection."""
@@ -140,6 +152,9 @@ class SelectionPanel(Translated, QWidget):
         )
         too_few = self.tr("Select {0} or more calibrations.").format(MIN_POOLED + 1)
         self._adjust.set_why_not(too_few if len(self._selected) <= MIN_POOLED else "")
+        self._report.setText(self.tr("Repeatability report..."))
+        needed = self.tr("Repeatability needs two calibrations of one tip.")
+        self._report.set_why_not("" if self.repeatability() else needed)
         self._show_comparison(self.comparison())
         self._show_repeatability(self.repeatability())
 

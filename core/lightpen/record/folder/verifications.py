@@ -1,6 +1,8 @@
 """Reading the files of verifications."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from msgspec import Struct, field
 
@@ -19,6 +21,7 @@ from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.result_folder import SIMULATED
+from lightpen.record.swings.names import Names
 
 VERIFICATIONS = "verifications"
 TOUCHES = "touches"  # in that folder: the images of live touches, run by run
@@ -117,6 +120,21 @@ def read_verification(content: bytes, file: Path) -> StoredVerification:
             *(data, file, content), has_supervisor=bool(done.supervisor)
         )
     return done
+
+
+def attributed(
+    record: Mapping[str, Any], names: Names, origin: Origin | None
+) -> dict[str, Any]:
+    """Return the record of a verification with who made it where, of what."""
+    return {
+        **record,
+        "session": record["created"],
+        "station": names.station,
+        "operator": names.operator,
+        "pen": names.pen,
+        "tip": names.tip,
+        "origin": origin,
+    }
 
 
 def data_folder_of_verification(file: Path) -> Path | None:

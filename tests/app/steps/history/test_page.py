@@ -632,6 +632,21 @@ def test_what_was_accepted_here_is_put_on_paper_as_its_file_has_it(
     assert "000001" in desk.notices[0]
 
 
+def test_a_repeatability_is_kept_entered_and_put_on_paper(desk: Desk) -> None:
+    desk.enter(5)
+    desk.open()
+    desk.until(lambda: desk.child(SelectionPanel).repeatability() is not None)
+    desk.show_tab(SELECTION)
+
+    desk.click("Repeatability report...")
+    desk.until(lambda: desk.page.findChildren(PrintReportWindow))
+    window = desk.child(PrintReportWindow)
+    desk.until(lambda: window.n_pages() > 0)
+    window.close()
+    desk.until(lambda: len(desk.column(WHAT)) == 6)
+    assert desk.notices == []
+
+
 def test_a_verification_has_a_report_of_its_own(desk: Desk) -> None:
     verdict = VerificationAssessment(Grade.CHECK, USE_TIP, VERIFY_AGAIN)
     entries = {"pen": "LP-04", "tip": "T-10", "moved_mm": [0.001, 0.002, 0.003]}

@@ -1,0 +1,54 @@
+"""A repeatability study of archived tips, kept as the command line keeps one."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from lightpen.archive.entries import StoredEntry
+from lightpen.formats.hashes import InputFile
+from lightpen.formats.json_records import file_entry
+from lightpen.model.origin import Origin
+from lightpen.record.folder.verifications import attributed
+from lightpen.verification.reports.records import (
+    repeatability_entries,
+    verification_record,
+)
+from lightpen.verification.storage.verification_files import keep_verification
+from lightpen.verification.tasks.repeatability import Repeatability
+
+
+def keep_study(
+    data: Path,
+    found: Repeatability,
+    entries: Sequence[StoredEntry],
+    limit: float,
+    operator: str,
+) -> Path:
+    """Keep a study as a verification of a data folder, and return its file.
+
+    Parameters
+    ----------
+    entries : sequence of StoredEntry
+        Of the tips.
+    limit : float
+        Of the standard deviation of a coordinate, mm.
+
+    Raises
+    ------
+    FileError
+        It cannot be written, or not be signed.
+    """
+    events = [each.entry.event for each in entries]
+    results = [each.result for each in events if each.result is not None]
+    record = verification_record(
+        "repeatability",
+        repeatability_entries(found),
+        found.assessment,
+        {"repeatability": limit},
+        {"files": [file_entry(InputFile(Path(r.place), r.sha256)) for r in results]},
+    )
+    is_simulated = any(each.is_simulated for each in events)
+    origin = Origin.SIMULATED if is_simulated else events[-1].origin
+    names = replace(events[-1].names, operator=operator)
+    record = attributed(record, names, origin)
+    return keep_verification(data, record, is_simulated=is_simulated)
