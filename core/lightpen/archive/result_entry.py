@@ -1,11 +1,12 @@
 """The archive entry of a result; the archive is opened read-only."""
 
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lightpen.errors import FileError, NoArchiveError
 from lightpen.formats.files import printable
+from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.folder.verifications import data_folder_of_verification
 from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.result_folder import FolderArchive
@@ -26,6 +27,19 @@ class ArchivePlace:
     number: int
     sha256: str
     previous: str
+
+
+def with_entry(file: CalibrationFile) -> CalibrationFile:
+    """Return a calibration with whether it is entered, if anybody accepted it.
+
+    Raises
+    ------
+    ArchiveError, FileError
+        As of `entry_of_file`.
+    """
+    if file.accepted is None:
+        return file
+    return replace(file, is_entered=entry_of_file(file.path, file.sha256) is not None)
 
 
 def entry_of_file(result: Path, sha256: str) -> ArchivePlace | None:

@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from lightpen.archive.result_entry import with_entry
 from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
 from lightpen.formats.files import printable, write_whole
@@ -77,7 +78,7 @@ def _export(options: argparse.Namespace) -> None:
         raise UsageError("cli.export-over-result", out=str(options.out))
     written = BY_NAME[options.format]
     laboratory = _laboratory(options) if written.needs_laboratory else None
-    file = with_status(read_calibration(options.result), local_now())
+    file = with_entry(with_status(read_calibration(options.result), local_now()))
     if file.library_status and not (written.has_status or options.anyway):
         status = ", ".join(file.library_status)
         raise UsageError(

@@ -1,5 +1,6 @@
 """Where a result is entered, told by the archive beside it."""
 
+from collections.abc import Callable
 from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
@@ -86,3 +87,14 @@ def test_without_an_archive_there_is_no_entry(results: list[Path]) -> None:
     (results[0].parents[1] / ARCHIVE).unlink()
 
     assert entry_of_file(results[0], digest(results[0])) is None
+
+
+def test_an_export_says_that_a_result_has_no_entry(
+    results: list[Path], tmp_path: Path, lightpen: Callable[..., object]
+) -> None:
+    copied, out = tmp_path / "copied.json", tmp_path / "tip.txt"
+    copied.write_bytes(results[0].read_bytes())
+
+    for file, is_entered in ((results[0], True), (copied, False)):
+        lightpen("export", file, out, "--for", "text")
+        assert ("NOT ENTERED" not in out.read_text("utf-8")) is is_entered

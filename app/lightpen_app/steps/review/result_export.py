@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
+from lightpen.archive.result_entry import with_entry
 from lightpen.local_time import local_now
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.exports.dcc import Laboratory
@@ -129,7 +130,9 @@ class ResultExport(QObject):
             found = (
                 exported_solution(solution, names)
                 if result is None
-                else with_status(read_calibration(archive.file_of(result)), local_now())
+                else with_entry(
+                    with_status(read_calibration(archive.file_of(result)), local_now())
+                )
             )
             for each in export.formats:
                 save_new(folder, stem + each.suffix, each.content(found, laboratory))

@@ -76,6 +76,8 @@ class CalibrationFile:
         Who signed it; empty where none was needed.
     traced : tuple of TracedItem
         What it was measured with, likewise.
+    is_entered : bool or None
+        Whether an accepted tip has an entry in the archive, likewise.
     """
 
     path: Path
@@ -96,6 +98,7 @@ class CalibrationFile:
     due: date | None = None
     supervisor: str = ""
     traced: tuple[TracedItem, ...] = ()
+    is_entered: bool | None = None
 
     @property
     def when(self) -> datetime:

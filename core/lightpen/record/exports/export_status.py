@@ -19,6 +19,7 @@ from lightpen.record.swings.header import Header
 from lightpen.record.swings.reading import open_record
 
 RETIRED, OVERDUE = "RETIRED", "OVERDUE"
+NOT_ENTERED = "NOT ENTERED"  # in the archive
 
 
 def with_status(file: CalibrationFile, now: datetime) -> CalibrationFile:
@@ -78,4 +79,6 @@ def status_of(file: CalibrationFile) -> tuple[str, ...]:
         own.append(Origin.SIMULATED.upper())
     if file.grade is not Grade.PASS:
         own.append(file.grade.value.upper())
+    if file.is_entered is False:
+        own.append(NOT_ENTERED)
     return (*own, *file.library_status)
