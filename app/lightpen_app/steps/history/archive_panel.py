@@ -173,17 +173,25 @@ class ArchivePanel(Translated, QWidget):
     def _show_outcome(self) -> None:
         checked = self._checked
         findings = () if checked is None else checked.findings
-        texts = list(map(worded, findings[:MOST_TOLD]))
+        notes = () if checked is None else checked.notes
+        told = [
+            StatusMessage(worded(each), Sign.CROSS, Tone.BAD)
+            for each in findings[:MOST_TOLD]
+        ]
         if len(findings) > MOST_TOLD:
             n_more = len(findings) - MOST_TOLD
-            texts.append(self.tr("{0} more findings").format(n_more))
-        while len(self._findings) < len(texts):
+            text = self.tr("{0} more findings").format(n_more)
+            told.append(StatusMessage(text, Sign.CROSS, Tone.BAD))
+        told += [
+            StatusMessage(worded(each), Sign.WARNING, Tone.QUIET)
+            for each in notes[:MOST_TOLD]
+        ]
+        while len(self._findings) < len(told):
             label = SignLabel()
             self._findings.append(label)
             self._layout.insertWidget(self._layout.count() - 1, label)
         for i, label in enumerate(self._findings):
-            text = texts[i] if i < len(texts) else ""
-            label.set_value(StatusMessage(text, Sign.CROSS, Tone.BAD))
+            label.set_value(told[i] if i < len(told) else StatusMessage(""))
         self._outcome.set_value(self._outcome_of(checked))
 
     def _outcome_of(self, checked: ArchiveCheckResult | None) -> StatusMessage:

@@ -632,6 +632,20 @@ def test_what_was_accepted_here_is_put_on_paper_as_its_file_has_it(
     assert "000001" in desk.notices[0]
 
 
+def test_a_check_tells_notes_that_prove_no_change(desk: Desk) -> None:
+    desk.enter(1, first=2)
+    desk.enter(1)
+    desk.open()
+    desk.show_tab(WHOLE)
+    desk.click("Check the archive")
+    panel = desk.child(ArchivePanel)
+    desk.until(lambda: panel.checked() is not None)
+
+    told = " ".join(remark.text for remark in panel.told())
+    assert "No changes in 2 entries" in told
+    assert "the clock of the station was set back" in told
+
+
 def test_a_repeatability_is_kept_entered_and_put_on_paper(desk: Desk) -> None:
     desk.enter(5)
     desk.open()
