@@ -46,6 +46,7 @@ class Code(StrEnum):
     FILE_CONTRADICTED = "verdict.file-contradicted"
     NOT_SIMULTANEOUS = "verdict.not-simultaneous"
     CAMERA_MOVED = "verdict.camera-moved"
+    NO_TEMPERATURE = "verdict.no-temperature"
     OUT_OF_REACH = "swing.out-of-reach"
     TIP_CHANGED = "verdict.tip-changed"
     CHANGE_BEYOND_LIMIT = "verdict.change-beyond-limit"
@@ -68,6 +69,7 @@ PEN_LOST = message(Code.PEN_LOST)
 PEN_LIFTED = message(Code.PEN_LIFTED)
 PAUSED = message(Code.PAUSED)
 SOLVING = message(Code.SOLVING)
+NO_TEMPERATURE = message(Code.NO_TEMPERATURE)
 UNKNOWN = message(Code.UNKNOWN)
 
 # By the directions of the dial, as the camera sees them: against the clock from above.
@@ -180,9 +182,24 @@ def file_contradicted(why: Message) -> Message:
     return message(Code.FILE_CONTRADICTED, why=why)
 
 
-def not_simultaneous(camera: str, lag: float) -> Message:
-    """State by which part of the time between two images a camera is late."""
-    return message(Code.NOT_SIMULTANEOUS, camera=camera, lag=abs(lag))
+def time_span(intervals: float, interval_ms: float | None) -> Message:
+    """Return a time without its sign, given in image intervals: in ms if known."""
+    if interval_ms is None:
+        return message("time.intervals", value=abs(intervals))
+    return message("time.ms", value=abs(intervals) * interval_ms)
+
+
+def lateness(intervals: float, interval_ms: float | None) -> Message:
+    """Return how late something is, or early, given in image intervals."""
+    time = time_span(intervals, interval_ms)
+    if intervals < 0:
+        return message("time.early", time=time)
+    return message("time.late", time=time)
+
+
+def not_simultaneous(camera: str, lag: Message) -> Message:
+    """State how late a camera is, see `lateness`."""
+    return message(Code.NOT_SIMULTANEOUS, camera=camera, lag=lag)
 
 
 def camera_moved(distance: float) -> Message:

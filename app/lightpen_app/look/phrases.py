@@ -75,6 +75,7 @@ _SHORTS: dict[Code, str] = {
     Code.FILE_ASSUMED: QT_TRANSLATE_NOOP("phrases", "Uncertainty too large"),
     Code.FILE_CONTRADICTED: QT_TRANSLATE_NOOP("phrases", "File does not fit"),
     Code.CAMERA_MOVED: QT_TRANSLATE_NOOP("phrases", "Camera or cone moved"),
+    Code.NO_TEMPERATURE: QT_TRANSLATE_NOOP("phrases", "Temperature not measured"),
     Code.NOT_SIMULTANEOUS: QT_TRANSLATE_NOOP("phrases", "Cameras not synchronised"),
     Code.OUT_OF_REACH: QT_TRANSLATE_NOOP("phrases", "Uncertainty of files too large"),
     Code.TIP_CHANGED: QT_TRANSLATE_NOOP("phrases", "Tip has changed"),

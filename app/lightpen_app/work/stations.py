@@ -69,6 +69,8 @@ class Station:
         None where one camera is used.
     heading : float or None
         The operator's right as the camera sees it, rad.
+    temperature_day : str
+        See `Preparation`.
     """
 
     names: Names = field(default_factory=Names)
@@ -80,6 +82,7 @@ class Station:
     assumptions: Assumptions = USUAL
     verification: VerificationChoices = field(default_factory=VerificationChoices)
     heading: float | None = None
+    temperature_day: str = ""
 
 
 def preparation_of(name: str, station: Station, before: Preparation) -> Preparation:
@@ -102,6 +105,7 @@ def preparation_of(name: str, station: Station, before: Preparation) -> Preparat
         limits=station.limits,
         assumptions=station.assumptions,
         heading=station.heading,
+        temperature_day=station.temperature_day,
     )
 
 
@@ -135,6 +139,7 @@ def station_of(
         assumptions=preparation.assumptions,
         verification=choices,
         heading=preparation.heading,
+        temperature_day=preparation.temperature_day,
     )
 
 

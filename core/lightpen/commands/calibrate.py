@@ -4,7 +4,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -136,7 +136,7 @@ def _require_none_given(options: argparse.Namespace, record: Path) -> None:
     own = (
         "camera rig pen units led-diameter nominal-tip camera-sigma scale-sigma "
         "temperature temperature-sigma humidity form-error center-bias second-cone "
-        "distance distance-sigma"
+        "distance distance-sigma fps"
     )
     values = vars(options)
     given = [
@@ -225,6 +225,7 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
         _observe, options.json, camera, pen, is_centers=options.centers is not None
     )
     observations, files = observe(given)
+    observations = _timed(observations, options)
     second = None
     if separation is not None:
         others, more_files = observe([options.second_cone])
@@ -246,6 +247,12 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
         ),
         options.method,
     )
+
+
+def _timed(seen: Observations, options: argparse.Namespace) -> Observations:
+    """Return observations with the image rate, if it is given."""
+    interval_ms = None if options.fps is None else 1000 / options.fps
+    return replace(seen, interval_ms=interval_ms)
 
 
 def _origin(*files: Path) -> Origin:
@@ -292,7 +299,10 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
         _note(message("rig.paired-by-order"))
     origin = _origin(options.rig, options.pen, *rig_file.camera_files, *files[:1])
     return _Calibrated(
-        calibrate_rig(rig, pen, observations, assumptions_of(options)),
+        calibrate_rig(
+            *(rig, pen, [_timed(each, options) for each in observations]),
+            assumptions_of(options),
+        ),
         pen.nominal_tip,
         SwingLimits(),
         origin,

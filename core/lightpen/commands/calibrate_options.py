@@ -62,6 +62,11 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pen", type=Path, metavar="FILE", help="LED file of the pen")
     add_pen_options(parser)
     parser.add_argument(
+        "--fps",
+        type=number_from(0.01, 10_000.0, "image rate", "images a second"),
+        help="image rate, by which times are stated in ms",
+    )
+    parser.add_argument(
         "--camera-sigma",
         type=_share,
         metavar="SHARE",

@@ -68,6 +68,8 @@ class Observations:
         More on that, where the reason does not say all.
     advice : Message or None
         Likely problem of the whole set; None if most images with spots are labelled.
+    interval_ms : float or None
+        Time from one image to the next; None if not known.
     """
 
     names: tuple[str, ...]
@@ -82,6 +84,7 @@ class Observations:
     reasons: tuple[Reason, ...]
     details: tuple[Message | None, ...]
     advice: Message | None = None
+    interval_ms: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -202,7 +202,7 @@ class Calibration:
     @cached_property
     def effects(self) -> tuple[FoundEffect, ...]:
         """Effects of lens and mechanics that the images support."""
-        return found_effects(self.bundle)
+        return found_effects(self.bundle, self.observations.interval_ms)
 
     @cached_property
     def self_check(self) -> SelfCheck | None:

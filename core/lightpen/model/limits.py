@@ -32,6 +32,8 @@ class Limit:
     range : (least, greatest)
     choices : tuple of Message
         Of a choice, whose value is the index of one of them.
+    options : tuple
+        What each choice stands for.
     """
 
     part: str
@@ -41,6 +43,7 @@ class Limit:
     unit: str
     range: tuple[float, float]
     choices: tuple[Message, ...] = ()
+    options: tuple[Any, ...] = ()
 
     @property
     def key(self) -> str:
@@ -75,16 +78,14 @@ def rule_name(rule: DecisionRule) -> Message:
     return _RULE_NAMES[rule]
 
 
-_RULE: Any = field(
-    default=DecisionRule.SIMPLE,
-    metadata={
-        "default": 0.0,
-        "label": message("limit.rule"),
-        "unit": "",
-        "range": (0.0, len(RULES) - 1.0),
-        "choices": tuple(map(rule_name, RULES)),
-    },
-)
+def _choice(label: Message, options: tuple[Any, ...], *names: Message) -> Any:
+    """Return a choice of some options, the first by default."""
+    described = {"default": 0.0, "label": label, "unit": "", "options": options}
+    described |= {"range": (0.0, len(options) - 1.0), "choices": names}
+    return field(default=options[0], metadata=described)
+
+
+_RULE: Any = _choice(message("limit.rule"), RULES, *map(rule_name, RULES))
 
 
 @dataclass(frozen=True)
@@ -102,6 +103,8 @@ class SwingLimits:
         Images in each field of the dial.
     spacing : float
         Angle by which a kept posture differs from all others, rad.
+    requires_temperature : bool
+        Whether a tip passes only if the temperature of the pen was measured.
     """
 
     max_uncertainty: float = _limit(0.016, message("limit.max-uncertainty"))
@@ -109,6 +112,12 @@ class SwingLimits:
     max_images: int = _limit(300, message("limit.max-images"), "", IMAGES)
     min_per_field: int = 2
     spacing: float = radians(2.5)
+    requires_temperature: bool = _choice(
+        message("limit.temperature"),
+        (False, True),
+        message("temperature.optional"),
+        message("temperature.required"),
+    )
 
     def __post_init__(self) -> None:
         counts = self.min_images, self.min_per_field, self.max_images - 1
@@ -211,7 +220,7 @@ class StationLimits:
     def value(self, limit: Limit) -> float:
         """Return the value of a limit."""
         value = getattr(getattr(self, limit.part), limit.name)
-        return float(RULES.index(value) if limit.choices else value)
+        return float(limit.options.index(value) if limit.choices else value)
 
     def with_values(self, values: Mapping[str, float]) -> "StationLimits":
         """Return these limits with other values, by `Limit.key`; counts are rounded."""
@@ -219,9 +228,9 @@ class StationLimits:
         for limit in LIMITS:
             value = values.get(limit.key, self.value(limit))
             if limit.choices:
-                if not 0 <= round(value) < len(RULES):
-                    raise ValueError(f"There is no decision rule {value}.")
-                parts[limit.part][limit.name] = RULES[round(value)]
+                if not 0 <= round(value) < len(limit.options):
+                    raise ValueError(f"`{limit.key}` has no choice {value}.")
+                parts[limit.part][limit.name] = limit.options[round(value)]
             else:
                 parts[limit.part][limit.name] = value if limit.unit else round(value)
         changed = {n: replace(getattr(self, n), **new) for n, new in parts.items()}

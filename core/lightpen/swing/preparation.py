@@ -153,6 +153,9 @@ class Preparation:
     heading : float or None
         The operator's right as the camera sees it, rad; None until a swing has learnt
         it.
+    temperature_day : str
+        ISO date for which the temperature in the assumptions was stated, or stated as
+        not measured.
     """
 
     names: Names = field(default_factory=Names)
@@ -168,6 +171,38 @@ class Preparation:
     has_unsaved_leds: bool = False
     second: SecondCamera | None = None
     heading: float | None = None
+    temperature_day: str = ""
+
+    @property
+    def asks_temperature(self) -> bool:
+        """Whether nobody has said today how warm the pen is."""
+        return self.origin is Origin.LIVE and self.temperature_day != _today()
+
+    @property
+    def assumptions_today(self) -> Assumptions:
+        """The assumptions, without a temperature of another day."""
+        if self.asks_temperature:
+            return replace(self.assumptions, temperature_c=None)
+        return self.assumptions
+
+    @property
+    def lacks_temperature(self) -> bool:
+        """Whether a limit requires a temperature that is not stated."""
+        temperature = self.assumptions_today.temperature_c
+        return self.limits.requires_temperature and temperature is None
+
+    def with_temperature(self, temperature_c: float | None) -> Self:
+        """Return it with the temperature of the pen today; None if not measured."""
+        assumptions = replace(self.assumptions, temperature_c=temperature_c)
+        return replace(self, assumptions=assumptions, temperature_day=_today())
+
+    def with_assumptions(self, assumptions: Assumptions) -> Self:
+        """Return it with other assumptions; another temperature is that of today."""
+        before, temperature = self.assumptions_today, assumptions.temperature_c
+        changed = replace(self, assumptions=assumptions)
+        if temperature == before.temperature_c:
+            return changed
+        return changed.with_temperature(temperature)
 
     @property
     def camera(self) -> Camera | None:
@@ -382,7 +417,7 @@ class Preparation:
             pen,
             self.limits,
             self.mask,
-            assumptions=self.assumptions,
+            assumptions=self.assumptions_today,
             is_recording=is_recording,
             beside=None if second is None else second.rig,
             other_masks=() if second is None else (second.mask,),
@@ -396,7 +431,7 @@ class Preparation:
             and self.pen_file is other.pen_file
             and self.names == other.names
             and self.limits == other.limits
-            and self.assumptions == other.assumptions
+            and self.assumptions_today == other.assumptions_today
             and _same(self.nominal_tip, other.nominal_tip)
             and np.array_equal(self.mask, other.mask)
             and self._has_second_of(other)
@@ -447,11 +482,16 @@ class Preparation:
                 "max_images": limits.max_images,
                 "min_per_field": limits.min_per_field,
                 "spacing_rad": limits.spacing,
-                **assumption_entries(self.assumptions),
+                "requires_temperature": limits.requires_temperature,
+                **assumption_entries(self.assumptions_today),
                 **(settings or {}),
             },
             rig=None if self.second is None else _rig_copies(self.second),
         )
+
+
+def _today() -> str:
+    return local_now().date().isoformat()
 
 
 def _camera_entries(used: CameraInUse | None) -> dict[str, Plain]:

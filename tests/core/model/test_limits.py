@@ -39,6 +39,7 @@ def test_every_limit_of_a_verification_and_of_due_tips_is_listed() -> None:
         "max_uncertainty",
         "min_images",
         "max_images",
+        "requires_temperature",
     }
 
 
@@ -52,3 +53,7 @@ def test_limits_are_changed_by_their_keys_and_counts_stay_whole() -> None:
     assert changed.verification == VerificationLimits(radius=0.005)
     assert changed.swing == SwingLimits(min_images=80)
     assert isinstance(changed.swing.min_images, int)
+    strict = usual.with_values({"requires_temperature": 1.0})
+    assert strict.swing == SwingLimits(requires_temperature=True)
+    with pytest.raises(ValueError, match="requires_temperature"):
+        usual.with_values({"requires_temperature": 2.0})

@@ -280,3 +280,41 @@ def test_another_tip_forgets_ball_and_nominal_centre(prepared: Preparation) -> N
 
     given = before.renamed(replace(before.names, tip="T-2", ball_diameter=3.0))
     assert given.names.ball_diameter == 3.0
+
+
+def test_the_temperature_of_the_pen_counts_for_the_day_on_which_it_is_stated(
+    whole: Preparation,
+) -> None:
+    limits = replace(whole.limits, requires_temperature=True)
+    live = replace(
+        whole,
+        source=SourceChoice("aravis", "1"),
+        camera_file=None,
+        pen_file=None,
+        limits=limits,
+    )
+    assert live.asks_temperature
+    assert live.lacks_temperature
+
+    stated = live.with_temperature(21.5)
+    assert not stated.asks_temperature
+    assert not stated.lacks_temperature
+    assert stated.assumptions_today.temperature_c == 21.5
+    unmeasured = live.with_temperature(None)
+    assert not unmeasured.asks_temperature
+    assert unmeasured.lacks_temperature
+
+    old = replace(stated, temperature_day="2020-01-01")
+    assert old.asks_temperature
+    assert old.assumptions_today.temperature_c is None
+    assert not old.swings_like(stated)
+    finer = replace(old.assumptions_today, focal_length=0.001)
+    assert old.with_assumptions(finer).asks_temperature
+    warmer = replace(finer, temperature_c=25.0)
+    assert old.with_assumptions(warmer).assumptions_today == warmer
+
+
+def test_a_simulated_or_recorded_swing_is_not_asked_for_its_temperature(
+    whole: Preparation,
+) -> None:
+    assert not whole.asks_temperature

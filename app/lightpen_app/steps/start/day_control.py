@@ -58,6 +58,7 @@ class DayControl(QObject):
         self._live.connection_changed.connect(self.refresh_readiness)
         view.tip_chosen.connect(self._on_tip_chosen)
         view.tip_entered.connect(self._on_tip_entered)
+        view.temperature_entered.connect(self._on_temperature_entered)
         view.step_requested.connect(self.step_requested)
         view.swing_requested.connect(lambda: self.step_requested.emit("swing"))
 
@@ -85,7 +86,10 @@ class DayControl(QObject):
         names = self._selection.preparation.names
         place = PARTED.join(map(shortened, (names.station, names.operator)))
         before, items = self._view.readiness(), self._items()
-        can_swing = not self._selection.preparation.missing_inputs()
+        now = self._selection.preparation
+        can_swing = not now.missing_inputs()
+        is_asked = now.asks_temperature or now.lacks_temperature
+        self._view.set_question(now.assumptions.temperature_c, is_asked=is_asked)
         self._view.set_ready(place, items, can_swing=can_swing)
         if items != before:
             self.changed.emit()
@@ -98,6 +102,7 @@ class DayControl(QObject):
         names = {
             "camera": self.tr("Check the camera"),
             "leds": self.tr("Check the LEDs"),
+            "temperature": self.tr("Enter the temperature"),
             "verify": self.tr("Verify the tip"),
         }
         return MainAction(names[amber.step])
@@ -105,7 +110,10 @@ class DayControl(QObject):
     def run_main_action(self) -> None:
         """Do it."""
         amber = self._first_amber()
-        self.step_requested.emit("swing" if amber is None else amber.step)
+        if amber is not None and amber.step == "temperature":
+            self._view.take_temperature()
+        else:
+            self.step_requested.emit("swing" if amber is None else amber.step)
 
     def _first_amber(self) -> ReadinessItem | None:
         return next((item for item in self._items() if item.is_amber), None)
@@ -132,6 +140,10 @@ class DayControl(QObject):
         detection = shown.seen.detection
         if detection is not None and detection.has_pose:
             self._misfits.append(detection.sigma)
+
+    def _on_temperature_entered(self, temperature_c: float | None) -> None:
+        now = self._selection.preparation
+        self._selection.set_preparation(now.with_temperature(temperature_c))
 
     def _on_tip_chosen(self, pen: str, tip: str) -> None:
         now = self._selection.preparation

@@ -123,7 +123,7 @@ def readiness(
     return (
         ReadinessItem("camera", _camera_message(now, camera)),
         ReadinessItem("leds", _leds_message(now, statuses, camera, file_doubt)),
-        ReadinessItem("start", _temperature_message(now)),
+        ReadinessItem("temperature", _temperature_message(now)),
         ReadinessItem("verify", _reference_message(verification)),
     )
 
@@ -244,7 +244,10 @@ def _leds_message(
 
 
 def _temperature_message(now: Preparation) -> StatusMessage:
-    translate, measured = QCoreApplication.translate, now.assumptions.temperature_c
+    translate = QCoreApplication.translate
+    measured = now.assumptions_today.temperature_c
+    if now.lacks_temperature:
+        return _amber(translate("DayPage", "Measure the temperature of the pen."))
     if measured is None:
         text = translate("DayPage", "No temperature")
         return StatusMessage(text, Sign.RING, Tone.QUIET)

@@ -13,12 +13,14 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
+from lightpen.model.assumptions import COLDEST, WARMEST
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.steps.start.day_state import ReadinessItem, TipRow
 from lightpen_app.steps.start.readiness_line import ReadinessLine
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.keys import ENTER_KEYS
+from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.row_table import RowTable
 from lightpen_app.widgets.translated import Translated
@@ -48,6 +50,32 @@ class SearchEdit(QLineEdit):
         super().keyPressEvent(event)
 
 
+class TemperatureField(NumberField):
+    """A temperature of the pen, or the lowest value for none; Enter enters it.
+
+    Signals
+    -------
+    entered()
+    """
+
+    entered = Signal()
+
+    def __init__(self) -> None:
+        super().__init__("\N{DEGREE SIGN}C", (COLDEST, WARMEST), 1)
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in ENTER_KEYS:
+            self.interpretText()
+            self.entered.emit()
+            return
+        super().keyPressEvent(event)
+
+    def temperature(self) -> float | None:
+        """Return the temperature, degrees Celsius; None if not measured."""
+        return None if self.value() == COLDEST else self.value()
+
+
 class DayView(Translated, QWidget):
     """Shows what a day needs; what is set up once is elsewhere.
 
@@ -57,6 +85,8 @@ class DayView(Translated, QWidget):
         Pen and tip of the row that was chosen.
     tip_entered(str)
         What was typed and entered.
+    temperature_entered(object)
+        Temperature of the pen, degrees Celsius, or None if not measured.
     step_requested(str)
         Where something is put right.
     swing_requested(), setup_requested()
@@ -70,6 +100,7 @@ class DayView(Translated, QWidget):
 
     tip_chosen = Signal(str, str)
     tip_entered = Signal(str)
+    temperature_entered = Signal(object)
     step_requested = Signal(str)
     swing_requested = Signal()
     setup_requested = Signal()
@@ -82,6 +113,10 @@ class DayView(Translated, QWidget):
 
         # Widgets
         self._ready = ReadinessLine(N_ITEMS)
+        self._question = text_label(TextSize.BODY)
+        self._temperature, self._answer = TemperatureField(), PushButton()
+        self._asking = QWidget()
+        self._question.setBuddy(self._temperature)
         self._search = SearchEdit()
         self._which = ChoiceField()
         for _ in range(2):
@@ -99,7 +134,9 @@ class DayView(Translated, QWidget):
 
         # Layout
         layout = vertical_layout(self, spacing=2 * GRID)
-        layout.addWidget(self._ready)
+        fill(layout, self._ready, self._asking)
+        asked = self._question, self._temperature, self._answer
+        horizontal_layout(self._asking, *asked, 1)
         self._columns = horizontal_layout(layout, spacing=3 * GRID, stretch=1)
         left = vertical_layout(self._columns, stretch=3)
         horizontal_layout(left, (self._search, 1), self._which)
@@ -109,6 +146,8 @@ class DayView(Translated, QWidget):
 
         # Connections
         self._ready.step_requested.connect(self._on_step_requested)
+        self._temperature.entered.connect(self._on_answered)
+        self._answer.clicked.connect(self._on_answered)
         self._search.textChanged.connect(self._fill)
         self._search.entered.connect(self.tip_entered)
         self._which.activated.connect(self._fill)
@@ -125,6 +164,13 @@ class DayView(Translated, QWidget):
     def readiness(self) -> tuple[ReadinessItem, ...]:
         """Return what is said about the swing."""
         return self._ready.items()
+
+    def set_question(self, temperature_c: float | None, *, is_asked: bool) -> None:
+        """Ask for the pen's temperature; the last one is offered, or none."""
+        if is_asked and self._asking.isHidden():
+            last = COLDEST if temperature_c is None else temperature_c
+            self._temperature.setValue(last)
+        self._asking.setVisible(is_asked)
 
     def rows(self) -> tuple[TipRow, ...]:
         """Return the rows that are shown."""
@@ -200,10 +246,21 @@ class DayView(Translated, QWidget):
 
     def _on_step_requested(self, step: str) -> None:
         """Lead to a step, or to what is set up on this one."""
-        if step == "start":
-            self.setup_requested.emit()
+        if step == "temperature":
+            self.take_temperature()
         else:
             self.step_requested.emit(step)
+
+    def take_temperature(self) -> None:
+        """Lead to the question, or to where an answer is changed."""
+        if self._asking.isHidden():
+            self.setup_requested.emit()
+        else:
+            self._temperature.setFocus()
+            self._temperature.selectAll()
+
+    def _on_answered(self) -> None:
+        self.temperature_entered.emit(self._temperature.temperature())
 
     def _on_row_changed(self, now: QModelIndex) -> None:
         if now.isValid() and now.row() < len(self._shown):
@@ -213,6 +270,10 @@ class DayView(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
+        self._question.setText(self.tr("Pen temperature today"))
+        self._temperature.setSpecialValueText(self.tr("not measured"))
+        self._temperature.setAccessibleName(self._question.text())
+        self._answer.setText(self.tr("Confirm"))
         self._search.setPlaceholderText(self.tr("Scan or type a tip"))
         self._search.setAccessibleName(self.tr("Search tips"))
         self._which.setItemText(0, self.tr("All tips"))

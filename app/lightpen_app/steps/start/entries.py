@@ -141,7 +141,7 @@ class EntryPresenter(QObject):
 
     def _on_assumed_changed(self) -> None:
         now, assumed = self._selection.preparation, self._assumed.value()
-        self._selection.set_preparation(replace(now, assumptions=assumed))
+        self._selection.set_preparation(now.with_assumptions(assumed))
 
     def settle(self) -> None:
         """Apply pending input."""
@@ -168,8 +168,8 @@ class EntryPresenter(QObject):
         if now.limits != self._limits.value():
             self._limits.set_value(now.limits)
         self._limits.set_guarded(self._selection.supervision.is_guarded)
-        if now.assumptions != self._assumed.value():
-            self._assumed.set_value(now.assumptions)
+        if now.assumptions_today != self._assumed.value():
+            self._assumed.set_value(now.assumptions_today)
         if before is None or now.nominal_tip is not before.nominal_tip:
             self._names.set_nominal_tip(now.nominal_tip)
         if before is None or now.pen_file is not before.pen_file:

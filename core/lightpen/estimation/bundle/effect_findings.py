@@ -10,16 +10,25 @@ from lightpen.estimation.bundle.effects import EffectName
 from lightpen.estimation.statistics.variance_components import CERTAIN
 from lightpen.messages import Message, message
 from lightpen.model.quantiles import chi_square_quantile
+from lightpen.swing_messages import lateness, time_span
 
-_MESSAGES: Mapping[EffectName, Callable[[float], Message]] = {
+_LENGTHS: Mapping[EffectName, Callable[[float], Message]] = {
     EffectName.LENS: lambda size: message("warning.effect-lens", size=size),
     EffectName.COMPLIANCE: lambda size: message("warning.effect-compliance", size=size),
     EffectName.LOOSE: lambda size: message("warning.effect-loose-stylus", size=size),
     EffectName.SAG: lambda size: message("warning.effect-sag", size=size),
     EffectName.TILT: lambda size: message("warning.effect-camera-tilt", size=size),
-    EffectName.DELAY: lambda size: message("warning.effect-late-camera", size=size),
-    EffectName.SHUTTER: lambda size: message("warning.effect-shutter", size=size),
-    EffectName.STROBE: lambda size: message("warning.effect-strobe", size=size),
+}
+_TIMES: Mapping[EffectName, Callable[[float, float | None], Message]] = {
+    EffectName.DELAY: lambda n, ms: message(
+        "warning.effect-late-camera", time=lateness(n, ms)
+    ),
+    EffectName.SHUTTER: lambda n, ms: message(
+        "warning.effect-shutter", time=time_span(n, ms)
+    ),
+    EffectName.STROBE: lambda n, ms: message(
+        "warning.effect-strobe", time=time_span(n, ms)
+    ),
 }
 
 OF_ONE_CAMERA = (
@@ -43,6 +52,8 @@ class FoundEffect:
         Standard uncertainty of the one value.
     gain : float
         Twice the logarithm of the likelihood ratio of this effect to no effect.
+    interval_ms : float or None
+        Time from one image to the next, if known.
     """
 
     name: EffectName
@@ -50,6 +61,7 @@ class FoundEffect:
     size: float
     sigma: float | None
     gain: float
+    interval_ms: float | None = None
 
     @property
     def is_certain(self) -> bool:
@@ -59,14 +71,22 @@ class FoundEffect:
     @property
     def message(self) -> Message:
         """The message to the user: what it is, how large, what to do."""
-        told = _MESSAGES[self.name](self.size)
+        if self.name in _TIMES:
+            told = _TIMES[self.name](self.size, self.interval_ms)
+        else:
+            told = _LENGTHS[self.name](self.size)
         if not self.camera:
             return told
         return message("rig.of-camera", camera=self.camera, trouble=told)
 
 
-def found_effects(bundle: Bundle) -> tuple[FoundEffect, ...]:
-    """Return the effects that a fit supports, the likeliest first."""
+def found_effects(
+    bundle: Bundle, interval_ms: float | None = None
+) -> tuple[FoundEffect, ...]:
+    """Return the effects that a fit supports, the likeliest first.
+
+    ``interval_ms`` is the time from one image to the next, if known.
+    """
     names = bundle.state.rig.names
     found = []
     for effect, place, component in zip(
@@ -95,6 +115,7 @@ def found_effects(bundle: Bundle) -> tuple[FoundEffect, ...]:
                 size,
                 sigma,
                 component.gain,
+                interval_ms,
             )
         )
     return tuple(sorted(found, key=lambda each: -each.gain))

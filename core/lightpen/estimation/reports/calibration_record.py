@@ -72,6 +72,7 @@ class VerdictLimits(Struct, frozen=True):
     max_uncertainty_mm: float
     min_images: Count
     min_per_field: Count
+    requires_temperature: bool = False
 
 
 class VerdictRecord(StoredMessage, frozen=True):
@@ -370,6 +371,7 @@ class InputsRecord(Struct, frozen=True, omit_defaults=True):
     observations: tuple[FileRecord, ...]
     units: str | None
     led_diameter_mm: Number
+    image_interval_ms: float | None = None
     rig: FileRecord | None = None
     cameras: tuple[FileRecord, ...] = ()
 

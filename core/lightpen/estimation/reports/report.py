@@ -106,12 +106,12 @@ def calibration_record(
         tip_frames=_tip_frames(calibration.tip_frames),
         self_check=_self_check(calibration.self_check),
         rig=_rig(calibration) if several else None,
-        inputs=_inputs(inputs),
+        inputs=_inputs(inputs, calibration.observations.interval_ms),
         frames=tuple(_frames(calibration)),
     )
 
 
-def _inputs(inputs: Inputs) -> InputsRecord:
+def _inputs(inputs: Inputs, interval_ms: float | None) -> InputsRecord:
     rig = inputs.rig
     return InputsRecord(
         camera=file_entry(inputs.camera),
@@ -119,6 +119,7 @@ def _inputs(inputs: Inputs) -> InputsRecord:
         observations=tuple(map(file_entry, inputs.observations)),
         units=inputs.units,
         led_diameter_mm=inputs.led_diameter,
+        image_interval_ms=interval_ms,
         rig=None if rig is None else file_entry(rig.rig),
         cameras=() if rig is None else tuple(map(file_entry, rig.cameras)),
     )
@@ -137,6 +138,7 @@ def _verdict(calibration: Calibration, limits: SwingLimits) -> VerdictRecord:
             max_uncertainty_mm=limits.max_uncertainty,
             min_images=limits.min_images,
             min_per_field=limits.min_per_field,
+            requires_temperature=limits.requires_temperature,
         ),
     )
 

@@ -12,7 +12,7 @@ from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.messages import Message, message
 from lightpen.model.rig import of_camera
-from lightpen.swing_messages import not_simultaneous
+from lightpen.swing_messages import lateness, not_simultaneous
 
 NOISY = 2.5  # times the noise of the usual LED
 
@@ -125,11 +125,12 @@ def _seat_warnings(calibration: Calibration) -> list[Message]:
 def late_cameras(calibration: Calibration) -> list[Message]:
     """Return warnings on cameras with a time lag that is not corrected."""
     names = calibration.bundle.state.rig.names[1:]
+    interval_ms = calibration.observations.interval_ms
     corrected = [
         each.camera for each in calibration.effects if each.name is EffectName.DELAY
     ]
     return [
-        not_simultaneous(name, lag.value)
+        not_simultaneous(name, lateness(lag.value, interval_ms))
         for name, lag in zip(names, calibration.lags, strict=True)
         if lag is not None and lag.is_noticeable and name not in corrected
     ]

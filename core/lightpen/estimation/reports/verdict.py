@@ -21,6 +21,7 @@ from lightpen.messages import Message, message
 from lightpen.model.coverage import dial_counts
 from lightpen.model.limits import SwingLimits
 from lightpen.swing_messages import (
+    NO_TEMPERATURE,
     Code,
     camera_moved,
     change_beyond_limit,
@@ -161,6 +162,7 @@ _NEXT_STEPS = {
     Code.FILE_CONTRADICTED: NextStep.CHECK_FILES,
     Code.NOT_SIMULTANEOUS: NextStep.REPEAT,
     Code.CAMERA_MOVED: NextStep.CLAMP,
+    Code.NO_TEMPERATURE: NextStep.SEE_TO_CAUSE,
     Code.TIP_CHANGED: NextStep.CHECK_TIP,
     Code.CHANGE_BEYOND_LIMIT: NextStep.CHECK_TIP,
     Code.LAST_UNKNOWN: NextStep.CHECK_TIP,
@@ -333,6 +335,8 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
         )
     if uncertainty > limit:
         return Verdict(Grade.CHECK, reason)
+    if limits.requires_temperature and calibration.assumptions.temperature_c is None:
+        return Verdict(Grade.CHECK, NO_TEMPERATURE)
     if n_images < limits.min_images:
         return Verdict(Grade.CHECK, too_few_images(n_images, limits.min_images))
     bare = np.flatnonzero(dial_counts(calibration.joint.rotations)[1:].sum(axis=0) == 0)

@@ -107,6 +107,7 @@ def recompute(path: Path) -> Recomputed:
             max_uncertainty=limits.max_uncertainty_mm,
             min_images=limits.min_images,
             min_per_field=limits.min_per_field,
+            requires_temperature=limits.requires_temperature,
         ),
     )
 
@@ -144,6 +145,7 @@ def _observations(
         areas=shown.areas,
         lamps=shown.lamps,
         edge_widths=shown.edge_widths,
+        interval_ms=record.inputs.image_interval_ms,
     )
     seen = leave_out(seen, {i: f.reason for i, f in enumerate(frames) if f.reason})
     if not rig.names:

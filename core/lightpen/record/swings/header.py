@@ -239,6 +239,7 @@ def limits_in(settings: Mapping[str, Plain]) -> SwingLimits:
         max_images=int(number_in(settings, "max_images", usual.max_images)),
         min_per_field=int(number_in(settings, "min_per_field", usual.min_per_field)),
         spacing=number_in(settings, "spacing_rad", usual.spacing),
+        requires_temperature=bool(settings.get("requires_temperature", False)),
     )
 
 

@@ -151,6 +151,13 @@ class Record:
         return np.array([i.number for i in self.used_images], dtype=np.int64)
 
     @property
+    def interval_ms(self) -> float | None:
+        """Time from one image to the next, as a rule; None if not known."""
+        steps = np.diff([image.time for image in self.images])
+        usual = float(np.median(steps)) if len(steps) else 0.0
+        return 1000 * usual if usual > 0 else None
+
+    @property
     def stats(self) -> Stats:
         """Return the camera counters up to the last accepted image."""
         return self.images[-1].stats if self.images else Stats()

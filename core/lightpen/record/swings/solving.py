@@ -8,7 +8,7 @@ nothing.
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
@@ -117,7 +117,8 @@ def solve_record(
         seen = observe_rig_images(
             sources, pairing, found.rig, found.pen, report, found.masks
         )
-    return _solved(found, record.all_numbers, seen, record.taken_out)
+    timed = tuple(replace(each, interval_ms=record.interval_ms) for each in seen)
+    return _solved(found, record.all_numbers, timed, record.taken_out)
 
 
 def solve_again(solution: Solution, taken_out: Mapping[int, str]) -> Solution:

@@ -48,6 +48,7 @@ from lightpen_app.look.words import breakable
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.sidebar import subject_of
 from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.start.day_view import DayView, TemperatureField
 from lightpen_app.steps.start.interrupted_item import InterruptedItem
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.page import StartPage
@@ -1669,3 +1670,40 @@ def test_a_row_that_is_worked_on_waits_though_the_list_is_read_anew(
     )
     assert resume.toolTip() == "Discarding the swing"
     assert not resume.isEnabled()
+
+
+def test_the_temperature_is_asked_once_a_day_where_a_camera_is_live(
+    start: Opened, workbench: Workbench
+) -> None:
+    selection = workbench.selection
+    name = "Pen temperature today"
+    view = start.page.findChild(DayView)
+    asked = start.page.findChild(TemperatureField)
+    assert view is not None
+    assert asked is not None
+    start.page.show_day()
+    assert not asked.isVisible()
+
+    source = SourceChoice("aravis", "1")
+    selection.set_preparation(
+        replace(selection.preparation, source=source, camera_file=None, pen_file=None)
+    )
+    assert start.text_of(name) == "not measured"
+    start.type_into(name, "21.5", Key.Key_Return)
+    assert not asked.isVisible()
+    assert selection.preparation.assumptions_today.temperature_c == 21.5
+    told = [item.message.text for item in view.readiness()]
+    assert "Pen at 21.5 \N{DEGREE SIGN}C" in told
+
+    # The next day the last answer is offered again, and none is one, too.
+    old = replace(selection.preparation, temperature_day="2020-01-01")
+    selection.set_preparation(old)
+    assert asked.value() == 21.5
+    assert selection.preparation.assumptions_today.temperature_c is None
+    start.type_into(name, "-50", Key.Key_Return)
+    assert not asked.isVisible()
+
+    limits = SwingLimits(requires_temperature=True)
+    selection.set_preparation(replace(selection.preparation, limits=limits))
+    assert asked.isVisible()
+    assert "temperature" in [item.step for item in view.readiness() if item.is_amber]

@@ -1,6 +1,7 @@
 """What is not simultaneous is found, corrected and named, and else costs nothing."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from tests.simulated_centers import simulate_rig_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
+from lightpen.estimation.bundle.effect_findings import FoundEffect
 from lightpen.estimation.bundle.effects import EffectName
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
 from lightpen.estimation.reports.report_warnings import warnings_of
@@ -109,10 +111,21 @@ def test_a_late_camera_is_corrected_and_named() -> None:
         )
         for c, camera in enumerate(rig.cameras)
     ]
-    found = calibrate_rig(rig, PEN, observed)
+    timed = [replace(each, interval_ms=50.0) for each in observed]
+    found = calibrate_rig(rig, PEN, timed)
     effect = next(each for each in found.effects if each.name is EffectName.DELAY)
     assert effect.camera == rig.names[1]
     assert effect.size == pytest.approx(late, rel=0.05)
     error = found.joint.tip_pen - swing_at(TIMES).tip_pen
     assert (np.abs(error) < found.budget.expanded_uncertainty[:3]).all()
     assert "verdict.not-simultaneous" not in [m.code for m in warnings_of(found)]
+    told = next(str(m) for m in warnings_of(found) if " ms late" in str(m))
+    assert float(told.split(" ms late")[0].split()[-1]) == pytest.approx(3.0, rel=0.05)
+
+
+def test_a_time_is_stated_in_ms_if_the_image_rate_is_known_with_its_sign() -> None:
+    effect = FoundEffect(EffectName.DELAY, "right", -0.05, 0.001, 100.0)
+    assert "0.05 image intervals early" in str(effect.message)
+    assert "2.5 ms early" in str(replace(effect, interval_ms=50.0).message)
+    strobe = replace(effect, name=EffectName.STROBE, interval_ms=50.0)
+    assert "2.5 ms apart" in str(strobe.message)

@@ -46,6 +46,7 @@ from lightpen.simulator.swings import (
     swing_poses,
 )
 from lightpen.swing_messages import (
+    NO_TEMPERATURE,
     Code,
     camera_moved,
     change_beyond_limit,
@@ -493,3 +494,16 @@ def test_a_doubt_repeats_a_reason_of_the_same_code_and_led() -> None:
     assert not repeats(tip_is_good(0.1), displaced)
     assert repeats(warning[3], displaced)
     assert not repeats(warning[4], displaced)
+
+
+def test_a_tip_without_a_temperature_passes_unless_the_station_requires_one(
+    good: Calibration,
+) -> None:
+    limits = SwingLimits(max_uncertainty=0.016, requires_temperature=True)
+    verdict = judge(good, limits)
+    assert (verdict.grade, verdict.reason) == (Grade.CHECK, NO_TEMPERATURE)
+    assert verdict.next_step is NextStep.SEE_TO_CAUSE
+
+    assumptions = replace(good.assumptions, temperature_c=21.0)
+    measured = replace(good, assumptions=assumptions)
+    assert judge(measured, limits).grade is Grade.PASS
