@@ -117,7 +117,7 @@ NORMAL_95 = 1.959964
 FEW_IMAGES = 60
 MORE_TRIALS = 100
 FEWER_TRIALS = 40
-LEAST_TRIALS = 25  # of 300 images, which take seconds each
+LEAST_TRIALS = 60  # of 300 images, which take seconds each
 
 
 class StationCase(NamedTuple):

@@ -313,7 +313,7 @@ def test_the_verdict_is_printed_last_and_recorded_with_what_it_goes_by(
         fields["weakest_direction"]["expanded_uncertainty_mm"]
     ]
     assert verdict["limits"] == {
-        "max_uncertainty_mm": 0.016,
+        "max_uncertainty_mm": 0.02,
         "min_images": 60,
         "min_per_field": 2,
     }

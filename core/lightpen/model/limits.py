@@ -107,7 +107,7 @@ class SwingLimits:
         Whether a tip passes only if the temperature of the pen was measured.
     """
 
-    max_uncertainty: float = _limit(0.016, message("limit.max-uncertainty"))
+    max_uncertainty: float = _limit(0.02, message("limit.max-uncertainty"))
     min_images: int = _limit(60, message("limit.min-images"), "", IMAGES)
     max_images: int = _limit(300, message("limit.max-images"), "", IMAGES)
     min_per_field: int = 2

@@ -87,7 +87,7 @@ def test_the_uncertainty_during_the_swing_is_that_of_the_verdict(
     )
     assert together.uncertainty == pytest.approx(budget.weakest_uncertainty, rel=0.01)
     # What the effects of the station may be was found with the images until then.
-    assert kept.uncertainty == pytest.approx(budget.weakest_uncertainty, rel=0.03)
+    assert kept.uncertainty == pytest.approx(budget.weakest_uncertainty, rel=0.07)
     assert 0 < kept.predicted.floor < kept.uncertainty
 
 
@@ -152,7 +152,7 @@ def test_the_uncertainty_is_that_of_the_direction_known_least() -> None:
     assert kept.joint is not None
 
     along_axes = 2 * np.sqrt(np.diag(kept.joint.covariance)[:3])
-    assert along_axes.max() <= kept.uncertainty < 1.2 * np.linalg.norm(along_axes)
+    assert along_axes.max() <= kept.uncertainty < 1.3 * np.linalg.norm(along_axes)
 
 
 def test_images_from_before_an_interruption_are_from_before_any_slip() -> None:

@@ -47,6 +47,9 @@ UNEVEN = 0.5  # of a step from image to image, by which the next differs: no mot
 MOVING = 1.0  # px, least median step: pens at rest tell no time
 N_SCALES = 60  # standard deviations tried
 SMALLEST = 1e-3  # of the largest one
+# Mechanics are seldom perfect: of stylus, pen and foot of the camera the images decide
+# less, and what is assumed of their sizes decides whether U holds.
+P_NO_MECHANICS, SMALLEST_MECHANICS = 0.3, 0.03
 ROUNDING = 1e-9  # of the largest eigenvalue
 
 
@@ -63,6 +66,7 @@ class EffectName(StrEnum):
     STROBE = "leds in turn"
 
 
+MECHANICS = EffectName.LOOSE, EffectName.SAG, EffectName.TILT
 TIMING = EffectName.DELAY, EffectName.SHUTTER, EffectName.STROBE
 # Largest standard deviations, mm, px or image intervals; a larger one is another fault.
 LARGEST = {
@@ -156,8 +160,11 @@ def size_of(effect: Effect, S: FloatArray, right: FloatArray) -> EffectComponent
     """
     if effect.is_exact:
         return held(effect)
+    p_none, smallest = P_NONE, SMALLEST
+    if effect.name in MECHANICS:
+        p_none, smallest = P_NO_MECHANICS, SMALLEST_MECHANICS
     largest = LARGEST[effect.name]
-    sigmas = np.geomspace(SMALLEST * largest, largest, N_SCALES)
+    sigmas = np.geomspace(smallest * largest, largest, N_SCALES)
     spectra = [_Spectrum.of(S, right, shape) for shape in effect.shapes]
     all_costs = np.array([each.costs(sigmas) for each in spectra])
     s, i = np.unravel_index(int(np.argmin(all_costs)), all_costs.shape)
@@ -165,8 +172,8 @@ def size_of(effect: Effect, S: FloatArray, right: FloatArray) -> EffectComponent
     if effect.stated > 0:
         expected = spectra[0].second_moment(np.array([effect.stated]), np.ones(1))
     else:
-        weights = np.exp(-0.5 * (all_costs + gain)) * (1 - P_NONE) / all_costs.size
-        weights /= weights.sum() + P_NONE * np.exp(-0.5 * gain)
+        weights = np.exp(-0.5 * (all_costs + gain)) * (1 - p_none) / all_costs.size
+        weights /= weights.sum() + p_none * np.exp(-0.5 * gain)
         if effect.name in TIMING:  # well seen, so the values are known as well
             moments = zip(spectra, weights, strict=True)
             expected = np.sum([x.second_moment(sigmas, w) for x, w in moments], axis=0)

@@ -123,8 +123,8 @@ def test_the_way_of_a_camera_is_taken_out_and_told(way: FloatArray) -> None:
     assert path.is_followed
     assert calibration.used.all()
     assert errors_in_u(calibration).max() < 1.2
-    # 0.0076 mm of it are assumed for the compliance.
-    assert calibration.budget.weakest_uncertainty < 0.014
+    # 0.0143 mm of it are left to stylus, sag and foot of the camera.
+    assert calibration.budget.weakest_uncertainty < 0.02
     codes = {str(each.code) for each in warnings_of(calibration)}
     assert "warning.camera-moved" in codes
     verdict = judge(calibration, SwingLimits())

@@ -80,7 +80,7 @@ def good() -> Calibration:
 
 
 def test_a_good_calibration_passes_with_its_uncertainty(good: Calibration) -> None:
-    verdict = judge(good, SwingLimits(max_uncertainty=0.016))
+    verdict = judge(good, SwingLimits(max_uncertainty=0.02))
     assert verdict.grade is Grade.PASS
     assert verdict.reason == tip_is_good(good.budget.weakest_uncertainty)
 
@@ -92,14 +92,15 @@ def test_a_larger_uncertainty_is_checked_and_a_far_larger_one_repeated(
     limit = share * good.budget.weakest_uncertainty
     verdict = judge(good, SwingLimits(max_uncertainty=limit))
     assert verdict.grade is grade
-    # What is assumed of compliance is the largest part.
-    assert verdict.reason.code == Code.FILE_ASSUMED
+    # What the images leave open of the stylus is the largest part.
+    assert good.budget.largest_share.name is ContributionName.LOOSE
+    assert verdict.reason.code == Code.UNCERTAIN
 
 
 def test_halves_that_differ_are_checked(good: Calibration) -> None:
     uncertainty = good.halves.expanded_uncertainty
     halves = SplitHalfCheck(np.array([0.0, -1.6, 1.0]) * uncertainty, uncertainty)
-    verdict = judge(replace(good, halves=halves), SwingLimits(max_uncertainty=0.016))
+    verdict = judge(replace(good, halves=halves), SwingLimits(max_uncertainty=0.02))
     assert verdict.grade is Grade.CHECK
     assert verdict.reason.code == Code.HALVES_DIFFER
     assert verdict.reason.values == {
@@ -113,10 +114,10 @@ def test_halves_that_differ_along_any_axis_by_more_than_is_allowed_are_checked(
 ) -> None:
     """The axis that differs most certainly is not the one that differs most."""
     uncertainty = np.array([0.0005, 0.005, 0.005])
-    halves = SplitHalfCheck(np.array([0.004, 0.020, 0.0]), uncertainty)
-    limits = SwingLimits(max_uncertainty=0.016)
+    halves = SplitHalfCheck(np.array([0.004, 0.025, 0.0]), uncertainty)
+    limits = SwingLimits(max_uncertainty=0.02)
     verdict = judge(replace(good, halves=halves), limits)
-    assert verdict.reason == halves_differ(0.02, 0.005)
+    assert verdict.reason == halves_differ(0.025, 0.005)
 
     small = SplitHalfCheck(np.array([0.004, 0.006, 0.0]), uncertainty)
     assert judge(replace(good, halves=small), limits).grade is Grade.PASS
@@ -161,7 +162,7 @@ def test_an_uncertainty_by_leds_that_are_off_is_told_as_such(good: Calibration) 
     assert verdict.grade is Grade.CHECK
     assert verdict.reason == leds_off(0.1, by_leds)
     assert judge(off, SwingLimits(max_uncertainty=0.005)).grade is Grade.REPEAT
-    assert judge(off, SwingLimits(max_uncertainty=0.025)).reason.code == Code.GOOD
+    assert judge(off, SwingLimits(max_uncertainty=0.03)).reason.code == Code.GOOD
 
     small = with_led_sigma(off, 0.01)
     verdict = judge(small, SwingLimits(max_uncertainty=0.015))
@@ -284,7 +285,7 @@ def test_a_tip_far_from_its_nominal_place_is_noticed() -> None:
 def test_many_dropped_images_are_checked(good: Calibration) -> None:
     used = good.used.copy()
     used[::4] = False
-    verdict = judge(replace(good, used=used), SwingLimits(max_uncertainty=0.016))
+    verdict = judge(replace(good, used=used), SwingLimits(max_uncertainty=0.02))
     assert verdict.reason == many_dropped(38, 150)
 
 
@@ -297,7 +298,7 @@ def test_images_without_the_pen_do_not_count_however_many(good: Calibration) -> 
         for i, is_used in enumerate(used)
     )
     few = replace(good, used=used, reasons=reasons)
-    limits = SwingLimits(max_uncertainty=0.016, min_images=50)
+    limits = SwingLimits(max_uncertainty=0.02, min_images=50)
     assert judge(few, limits).grade is Grade.PASS
     verdict = judge(few, replace(limits, min_images=51))
     assert verdict.reason == too_few_images(50, 51)
@@ -310,7 +311,7 @@ def test_images_of_the_pen_that_are_left_out_count(
     used = good.used.copy()
     used[:31] = False
     reasons = (reason,) * 31 + good.reasons[31:]
-    limits = SwingLimits(max_uncertainty=0.016, min_images=150)
+    limits = SwingLimits(max_uncertainty=0.02, min_images=150)
     verdict = judge(replace(good, used=used, reasons=reasons), limits)
     is_by_user = reason is Reason.TAKEN_OUT
     told = many_excluded(31) if is_by_user else many_dropped(31, 150)
@@ -320,7 +321,7 @@ def test_images_of_the_pen_that_are_left_out_count(
 def test_fewer_images_than_asked_for_are_checked_also_if_they_suffice(
     good: Calibration,
 ) -> None:
-    limits = SwingLimits(max_uncertainty=0.016, min_images=150)
+    limits = SwingLimits(max_uncertainty=0.02, min_images=150)
     assert judge(good, limits).grade is Grade.PASS
 
     verdict = judge(good, replace(limits, min_images=151))
@@ -453,7 +454,7 @@ def test_a_fair_share_of_unchanged_tips_passes() -> None:
 def test_a_fifth_of_all_images_may_be_dropped(good: Calibration) -> None:
     used = good.used.copy()
     used[:30] = False
-    limits = SwingLimits(max_uncertainty=0.016)
+    limits = SwingLimits(max_uncertainty=0.02)
     assert judge(replace(good, used=used), limits).grade is Grade.PASS
 
     used[30] = False
@@ -463,12 +464,12 @@ def test_a_fifth_of_all_images_may_be_dropped(good: Calibration) -> None:
 def test_a_camera_that_moved_by_three_times_the_limit_is_checked(
     good: Calibration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    limits = SwingLimits(max_uncertainty=0.016)
+    limits = SwingLimits(max_uncertainty=0.02)
     monkeypatch.setattr(Calibration, "moved", 0.047)
     assert judge(good, limits).grade is Grade.PASS
 
-    monkeypatch.setattr(Calibration, "moved", 0.049)
-    assert judge(good, limits) == Verdict(Grade.CHECK, camera_moved(0.049))
+    monkeypatch.setattr(Calibration, "moved", 0.061)
+    assert judge(good, limits) == Verdict(Grade.CHECK, camera_moved(0.061))
 
 
 def test_a_change_beyond_the_limit_of_the_tip_is_checked_though_it_is_explained() -> (
