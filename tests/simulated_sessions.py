@@ -6,19 +6,26 @@ by a swing; then it may be exchanged for another one, and points are probed.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
+from msgspec import structs
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
-from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.formats.hashes import InputFile, Inputs
+from lightpen.formats.json_records import record_bytes
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
+from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
+from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
     PAPER_CONE,
@@ -153,6 +160,47 @@ def true_pen(file: Pen, rng: np.random.Generator) -> Pen:
     scale = 1 + (file.scale_sigma or 0.0) * rng.standard_normal()
     diameter = file.diameter + (file.diameter_sigma or 0.0) * rng.standard_normal()
     return replace(pen, leds=middle + scale * (pen.leds - middle), diameter=diameter)
+
+
+def recorded(found: Calibration, file: Path, created: datetime) -> CalibrationFile:
+    """Return a calibration as it is read back from its record."""
+    nothing = InputFile(Path("leds.csv"), "0" * 64)
+    inputs = Inputs(nothing, nothing, (), None)
+    record = calibration_record(found, inputs, "joint", SwingLimits())
+    file.write_bytes(record_bytes(structs.replace(record, created=created)))
+    return read_calibration(file)
+
+
+def swings_of_pen(
+    rng: np.random.Generator, n: int, folder: Path, knock: float, growth: float
+) -> tuple[list[CalibrationFile], CalibrationFile, CalibrationFile]:
+    """Return swings of a healthy pen, and one each after a fault.
+
+    Parameters
+    ----------
+    knock : float
+        By which an LED moved, mm.
+    growth : float
+        Of the pen, relative.
+    """
+    file = replace(paper_pen(), led_sigma=LED_SIGMA)
+    camera, pen = true_camera(rng), true_pen(file, rng)
+    leds = pen.leds.copy()
+    leds[rng.integers(len(leds))] += knock * any_direction(rng)
+    grown = replace(pen, leds=(1 + growth) * pen.leds)
+    pens = [*[(pen, PAPER_TIP)] * n, (replace(pen, leds=leds), PAPER_TIP)]
+    swings = []
+    for number, (each, tip) in enumerate([*pens, (grown, (1 + growth) * PAPER_TIP)]):
+        swing = swing_poses(N_IMAGES, rng, pen=each, camera=camera, tip_pen=tip)
+        seats = SEAT_SIGMA * rng.standard_normal(swing.translations.shape)
+        poses = swing.rotations, swing.translations + seats
+        pixels = simulate_centers(camera, each, *poses, SIGMA, rng)
+        centers = Centers(np.arange(1, N_IMAGES + 1), pixels, Path("simulated.csv"))
+        seen = observe_centers(centers, paper_camera(), file)
+        found = calibrate(paper_camera(), file, seen)
+        created = datetime(2026, 1, 1 + number, tzinfo=UTC)
+        swings.append(recorded(found, folder / f"swing {number + 1}.json", created))
+    return swings[:n], swings[n], swings[n + 1]
 
 
 def held(

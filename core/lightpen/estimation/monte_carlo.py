@@ -35,6 +35,7 @@ from lightpen.estimation.uncertainty.budget import (
     drift_variance,
     seat_covariance,
 )
+from lightpen.messages import Message, message
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
@@ -43,6 +44,8 @@ from lightpen.model.rig import rig_of
 
 MIN_TRIALS = 20  # fewer tell a standard deviation to worse than a sixth
 COVERED = 0.95
+BY_CHANCE = 3.0  # standard errors, that one of three axes differs by at most
+IMMATERIAL = 10.0  # percent of U: about half a unit of its only significant digit
 OF_OTHERS = {
     ContributionName.DISTANCE,
     ContributionName.EXTRINSICS,
@@ -136,6 +139,17 @@ class MonteCarlo:
     def difference(self) -> FloatArray:
         """Linear less Monte Carlo, in units of the precision, (3,)."""
         return (self.linear - self.deviation) / self.precision
+
+    @property
+    def explanation(self) -> Message:
+        """What the largest difference from the linear budget means."""
+        relative = self.linear / self.deviation - 1
+        axis = int(np.argmax(np.abs(relative)))
+        percent, own = 100 * float(relative[axis]), 100 / np.sqrt(2 * len(self.errors))
+        code = "monte-carlo.confirms"
+        if abs(self.difference[axis]) > BY_CHANCE and abs(percent) > IMMATERIAL:
+            code = "monte-carlo.less" if percent > 0 else "monte-carlo.more"
+        return message(code, percent=abs(percent), axis="xyz"[axis], own=float(own))
 
 
 def trials_of(calibration: Calibration, seed: int = 0) -> Trials:

@@ -9,19 +9,17 @@ import numpy as np
 import pytest
 from msgspec import structs
 from tests.reference import assert_as_before, text_figures
+from tests.simulated_sessions import recorded
 
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.hashes import InputFile, Inputs
-from lightpen.formats.json_records import FileRecord, record_bytes
+from lightpen.formats.json_records import FileRecord
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.pen_files import read_pen, write_pen
-from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
-from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.simulator.swings import (
     PAPER_TIP,
     paper_camera,
@@ -59,14 +57,8 @@ def swing(tmp_path: Path) -> Swing:
         )
         centers = Centers(np.arange(1, N_IMAGES + 1), pixels, Path("centers.csv"))
         found = calibrate(camera, PEN_FILE, observe_centers(centers, camera, PEN_FILE))
-        file = InputFile(Path("leds.csv"), "0" * 64)
-        record = calibration_record(
-            found, Inputs(file, file, (), None), "joint", SwingLimits()
-        )
         created = when + timedelta(days=number)
-        path = tmp_path / f"swing {number}.json"
-        path.write_bytes(record_bytes(structs.replace(record, created=created)))
-        return read_calibration(path)
+        return recorded(found, tmp_path / f"swing {number}.json", created)
 
     return swung
 
@@ -101,7 +93,8 @@ def test_a_warm_pen_is_told_from_a_knocked_one(swing: Swing) -> None:
     found = examine_pen(swings, paper_camera(), PEN_FILE.leds)
 
     assert found.moved == ()
-    assert found.growth == pytest.approx(WARMTH, rel=0.25)
+    assert found.growth is not None
+    assert found.growth.relative == pytest.approx(WARMTH, abs=found.growth.uncertainty)
     assert found.assessment.reason.code == "pen-health.grown"
 
 

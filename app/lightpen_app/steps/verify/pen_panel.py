@@ -325,6 +325,6 @@ class PenPanel(Translated, QWidget):
             lengths = np.linalg.norm(told.shifts, axis=1) * MICROMETRES
             moves = (number_text(x, 0) if np.isfinite(x) else "" for x in lengths)
             growth = told.growth
-            size = "" if growth is None else number_text(PPM * growth, 0)
+            size = "" if growth is None else number_text(PPM * growth.relative, 0)
             cells.append((*moves, size))
         return Figures(heads, tuple(names), tuple(cells))

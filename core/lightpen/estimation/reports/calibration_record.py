@@ -112,6 +112,9 @@ class UncertaintyRecord(Struct, frozen=True):
         Variance between these blocks over that of independent noise and seat jitter.
     led_sigma_mm
         Standard deviation of the errors of the LED file, estimated from the images.
+    distance_repeatability
+        Relative standard deviation of the distance of the cone by what differs from
+        swing to swing: noise, seat and drift.
     halves_difference_mm
         Difference of the tips from the odd and from the even images.
     """
@@ -142,6 +145,7 @@ class UncertaintyRecord(Struct, frozen=True):
     correlation_factor: float
     lag1_autocorrelation: Number
     led_sigma_mm: Number
+    distance_repeatability: float
     halves_difference_mm: Triple
     halves_expanded_uncertainty_mm: Triple
 

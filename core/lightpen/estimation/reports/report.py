@@ -43,6 +43,7 @@ from lightpen.estimation.reports.verdict import judge
 from lightpen.estimation.self_check import SelfCheck
 from lightpen.estimation.tip_frames import TipFrames
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR, ContributionName
+from lightpen.estimation.uncertainty.distance import distance_repeatability
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.estimation.uncertainty.second_cone import SecondCone
 from lightpen.formats.hashes import Inputs
@@ -189,6 +190,9 @@ def _uncertainty(calibration: Calibration) -> UncertaintyRecord:
         correlation_factor=plain(budget.correlation_factor),
         lag1_autocorrelation=plain(budget.autocorrelation),
         led_sigma_mm=plain(calibration.led_sigma),
+        distance_repeatability=distance_repeatability(
+            calibration.bundle, budget, calibration.priors
+        ),
         halves_difference_mm=plain(halves.difference),
         halves_expanded_uncertainty_mm=plain(halves.expanded_uncertainty),
     )

@@ -6,19 +6,24 @@ swing on is stated by LED after the best move and scale of all are removed.
 
 The scale shows elsewhere. With a pen that grew by e since its LEDs were measured all
 distances come out smaller by e: a cone that stayed where it was seems to come nearer
-along its line of sight, ``w / f`` smaller, at the same place in the image.
+along its line of sight, ``w / f`` smaller, at the same place in the image. How well
+that repeats from swing to swing, their records state; a pen grew if the difference is
+more than chance and matters.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError, UsageError
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.formats.files import printable
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
+from lightpen.model.quantiles import normal_quantile
 from lightpen.model.rigid import skew
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.verification.tasks.assessment import (
@@ -31,13 +36,21 @@ from lightpen.verification.tasks.assessment import (
 MIN_SWINGS = 2
 MOVED = 0.02  # mm, from which on an LED has moved
 STANDS_OUT = 5.0  # times the median change of all LEDs
-GROWN = 6e-5  # relative; two swings with 0.03 px of noise differ by up to half of it
+GROWN = 6e-5  # relative, from which on it matters: 0.006 mm of a tip 100 mm away
+BY_CHANCE = 0.01  # that a pen seems to have grown that did not
 SAME_PLACE = 0.5  # px, in which a cone stays that did not move
 ALUMINIUM = 23e-6  # relative growth per K
 ROUNDS = 20
 MEASURE_AGAIN = message("pen-health.measure-again")
 MEASURE_LENGTH = message("pen-health.measure-length")
 KEEP_FILE = message("pen-health.keep-file")
+
+
+class Growth(NamedTuple):
+    """A change of the pen's size, and U (k = 2) of it, relative."""
+
+    relative: float
+    uncertainty: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,14 +61,15 @@ class SwingOfPen:
     ----------
     shifts : (L, 3) array
         Of the LEDs since the first swing, pen frame, mm; NaN where not seen.
-    growth : float or None
-        Relative growth of the pen since the first swing; None if the cone or the camera
-        was moved in between.
+    growth : Growth or None
+        Of the pen since the first swing that tells its size. None of that swing, if the
+        cone or the camera was moved in between, if the images contradict a file, and of
+        several cameras, which see the size itself.
     """
 
     name: str
     shifts: FloatArray
-    growth: float | None
+    growth: Growth | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,13 +80,13 @@ class PenHealth:
     ----------
     moved : tuple of int
         Numbers of the LEDs that moved, from 1.
-    growth : float or None
-        Largest change of the pen's size, relative; None where it is not determined.
+    growth : Growth or None
+        Most significant change of the pen's size; None where it is not determined.
     """
 
     swings: tuple[SwingOfPen, ...]
     moved: tuple[int, ...]
-    growth: float | None
+    growth: Growth | None
     assessment: VerificationAssessment
 
 
@@ -98,12 +112,12 @@ def examine_pen(
     require_one_pen(calibrations)
     if len(calibrations) < MIN_SWINGS:
         raise CalibrationError("pen-health.too-few")
-    first = calibrations[0]
+    first, sized = calibrations[0], next(filter(_tells_size, calibrations), None)
     swings = [
         SwingOfPen(
             name=each.path.name,
             shifts=_without_move(leds, each.displacements - first.displacements),
-            growth=None if camera is None else _growth(first, each, camera),
+            growth=_growth(sized, each, camera) if camera and sized else None,
         )
         for each in calibrations
     ]
@@ -111,13 +125,13 @@ def examine_pen(
     usual = np.nanmedian(lengths[1:], axis=1, keepdims=True)
     stands_out = np.nan_to_num(lengths[1:]) > np.maximum(STANDS_OUT * usual, MOVED)
     moved = tuple((np.flatnonzero(stands_out.any(axis=0)) + 1).tolist())
-    growths = [each.growth for each in swings[1:] if each.growth is not None]
-    growth = max(growths, key=abs) if growths else None
+    growths = [each.growth for each in swings if each.growth is not None]
+    growth = max(growths, key=lambda g: abs(g.relative) / g.uncertainty, default=None)
     return PenHealth(
         swings=tuple(swings),
         moved=moved,
         growth=growth,
-        assessment=_assessment(swings, moved, growth),
+        assessment=_assessment(swings, moved, growth, len(growths)),
     )
 
 
@@ -163,15 +177,23 @@ def _without_move(leds: FloatArray, changes: FloatArray) -> FloatArray:
 
 def _growth(
     first: CalibrationFile, now: CalibrationFile, camera: Camera
-) -> float | None:
-    if now.camera_sha256 != first.camera_sha256:
+) -> Growth | None:
+    is_other = now.camera_sha256 != first.camera_sha256
+    if now is first or is_other or not _tells_size(now):
         return None
     one, other = _cone_seen(first, camera), _cone_seen(now, camera)
     if one is None or other is None:
         return None
     if np.linalg.norm(one[:2] - other[:2]) > SAME_PLACE:
         return None
-    return float(np.log(one[2] / other[2]))
+    deviations = [c.calibration.uncertainty.distance_repeatability for c in (first, now)]
+    spread = COVERAGE_FACTOR * float(np.hypot(*deviations))
+    return Growth(float(np.log(one[2] / other[2])), spread)
+
+
+def _tells_size(swing: CalibrationFile) -> bool:
+    """Return whether its distance is that of the files, which then cancel."""
+    return not (swing.is_of_rig or swing.calibration.adjusted.contradictions)
 
 
 def _cone_seen(calibration: CalibrationFile, camera: Camera) -> FloatArray | None:
@@ -185,7 +207,10 @@ def _cone_seen(calibration: CalibrationFile, camera: Camera) -> FloatArray | Non
 
 
 def _assessment(
-    swings: Sequence[SwingOfPen], moved: tuple[int, ...], growth: float | None
+    swings: Sequence[SwingOfPen],
+    moved: tuple[int, ...],
+    growth: Growth | None,
+    n_growths: int,
 ) -> VerificationAssessment:
     if moved:
         lengths = np.array([np.linalg.norm(each.shifts, axis=1) for each in swings])
@@ -200,10 +225,18 @@ def _assessment(
             ),
             MEASURE_AGAIN,
         )
-    if growth is not None and abs(growth) > GROWN:
-        return check(_grown(growth), MEASURE_LENGTH)
+    if growth is not None:
+        # The most significant of several changes is larger by chance.
+        chance = normal_quantile(BY_CHANCE / (2 * n_growths)) / COVERAGE_FACTOR
+        if abs(growth.relative) > max(GROWN, chance * growth.uncertainty):
+            return check(_grown(growth), MEASURE_LENGTH)
     return accepted(message("pen-health.good", n_swings=len(swings)), KEEP_FILE)
 
 
-def _grown(growth: float) -> Message:
-    return message("pen-health.grown", growth=1e6 * growth, kelvin=growth / ALUMINIUM)
+def _grown(growth: Growth) -> Message:
+    return message(
+        "pen-health.grown",
+        growth=1e6 * growth.relative,
+        uncertainty=1e6 * growth.uncertainty,
+        kelvin=growth.relative / ALUMINIUM,
+    )

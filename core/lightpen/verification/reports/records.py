@@ -8,7 +8,7 @@ from lightpen.formats.json_records import plain, record_heading
 from lightpen.local_time import local_now
 from lightpen.messages import Message
 from lightpen.model.limits import VerificationLimits, rule_in_words
-from lightpen.verification.history.pen_health import PenHealth
+from lightpen.verification.history.pen_health import Growth, PenHealth
 from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.repeatability import Repeatability
 
@@ -101,9 +101,18 @@ def pen_health_entries(found: PenHealth) -> dict[str, Any]:
     """Return the entries of a pen's history."""
     return {
         "moved_leds": found.moved,
-        "growth": found.growth,
+        **_growth_entries(found.growth),
         "swings": [
-            {"name": swing.name, "shifts_mm": swing.shifts, "growth": swing.growth}
+            {
+                "name": swing.name,
+                "shifts_mm": swing.shifts,
+                **_growth_entries(swing.growth),
+            }
             for swing in found.swings
         ],
     }
+
+
+def _growth_entries(found: Growth | None) -> dict[str, float | None]:
+    relative, uncertainty = found or (None, None)
+    return {"growth": relative, "growth_expanded_uncertainty": uncertainty}
