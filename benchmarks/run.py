@@ -40,7 +40,7 @@ from benchmarks.station import station_rows
 from benchmarks.tips import repeat_rows, tip_rows
 from benchmarks.tracker import tracker_rows
 from benchmarks.verification import verification_rows
-from benchmarks.verification_sessions import session_rows
+from benchmarks.verification_sessions import pen_rows, session_rows
 from benchmarks.whole_program import program_rows
 from benchmarks.wizard import event_rows, idle_rows, link_rows, soak_rows, start_rows
 from benchmarks.workers import Workers, one_core_workers
@@ -65,6 +65,7 @@ SECTIONS: dict[str, Section] = {
     "verify": verification_rows,
     "measure": lambda workers, data: part_rows(workers),
     "power": lambda workers, data: session_rows(workers),
+    "pens": lambda workers, data: pen_rows(workers),
     "speed": lambda workers, data: speed_rows(workers),
     "program": lambda workers, data: program_rows(data),
     "guided": lambda workers, data: guided_rows(workers),

@@ -80,7 +80,7 @@ def session_rows(workers: Workers) -> list[Row]:
             met=bool(np.all((low <= within) & (within <= high))),
         )
     )
-    return rows + _pen_rows(workers.map(_pens, list(range(N_STATIONS))))
+    return rows
 
 
 def _task_row(name: str, outcomes: list[_Outcome]) -> Row:
@@ -103,7 +103,9 @@ def _task_row(name: str, outcomes: list[_Outcome]) -> Row:
     )
 
 
-def _pen_rows(outcomes: list[_PenOutcome]) -> list[Row]:
+def pen_rows(workers: Workers) -> list[Row]:
+    """Return what ``verify pen`` and ``repeatability`` find of swings of a pen."""
+    outcomes = workers.map(_pens, list(range(N_STATIONS)))
     shares = {
         f"pens of {N_SWINGS} swings: healthy ones pass": [o.passed for o in outcomes],
         "pens with an LED knocked by 0.05 mm: found": [o.knocked for o in outcomes],

@@ -264,9 +264,9 @@ def ring_session(
 
 
 def length_session(station: SimulatedStation, rng: np.random.Generator) -> Found:
-    """Verify by a length at three places, the pen upright."""
+    """Verify by a length at seven places, the pen upright."""
     runs = []
-    for i in range(3):
+    for i in range(7):
         places = PAPER_CONE + SIMULATED_ENDS + [0.0, 15.0 * i, 0.0]
         points = station.probe(places, held(np.zeros(2), np.zeros(2), rng), rng)
         runs.append((str(i), points))

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpen.arrays import FloatArray
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
-from lightpen.simulator.swings import simulate_centers, swing_poses
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.swings import PAPER_CONE, simulate_centers, swing_poses
 
 Run = Callable[..., CompletedProcess[str]]
 N_RUNS = 8
@@ -141,8 +143,27 @@ def write_touches(path: Path, files: list[str | Path], moved: float) -> None:
     camera, pen = read_camera(Path(files[1])), read_pen(Path(files[3]))
     tip = np.array(read(Path(files[5]))["tip_pen_mm"]) + np.array([moved, 0, 0])
     swing = swing_poses(15, rng, pen=pen, camera=camera, tip_pen=tip)
-    R = np.repeat(swing.rotations, 8, axis=0)
-    t = np.repeat(swing.translations, 8, axis=0)
+    write_centers(path, files, swing.rotations, swing.translations)
+
+
+def write_ends(path: Path, files: list[str | Path], length: float, i: int) -> None:
+    """Write LED centres of the ends of a length, mm, at the i-th place."""
+    rng = np.random.default_rng(i)
+    camera, pen = read_camera(Path(files[1])), read_pen(Path(files[3]))
+    tip = np.array(read(Path(files[5]))["tip_pen_mm"])
+    held = swing_poses(1, rng, pen=pen, camera=camera).rotations[0]
+    along = rotation_from_vector(np.array([0.0, 0.0, 0.4 * i]))[:, 0]
+    ends = PAPER_CONE + np.outer([-length / 2, length / 2], along)
+    write_centers(path, files, np.array([held, held]), ends - held @ tip)
+
+
+def write_centers(
+    path: Path, files: list[str | Path], rotations: FloatArray, translations: FloatArray
+) -> None:
+    """Write LED centres of a pen held still in each pose through 8 images."""
+    rng = np.random.default_rng(1)
+    camera, pen = read_camera(Path(files[1])), read_pen(Path(files[3]))
+    R, t = np.repeat(rotations, 8, axis=0), np.repeat(translations, 8, axis=0)
     images = simulate_centers(camera, pen, R, t, 0.02, rng)
     lines = ["frame,led,x_px,y_px"]
     for i, centers in enumerate(images, start=1):
@@ -170,6 +191,34 @@ def test_led_centres_are_verified_and_the_exit_status_tells_the_verdict(
     assert {len(each["images"]) for each in record["touches"]} == {5}
     assert record["tip_change_mm"][0] == pytest.approx(moved, abs=0.015)
     assert record["inputs"]["images"][0]["file"] == "touches.csv"
+
+
+def test_lengths_at_seven_places_are_one_command_with_their_permissible_errors(
+    lightpen: Run, files: list[str | Path], tmp_path: Path
+) -> None:
+    lengths = [60.0, 60.0, 90.0, 90.0, 120.0, 120.0, 150.0]
+    places = [tmp_path / f"place_{i}.csv" for i in range(len(lengths))]
+    for i, (place, length) in enumerate(zip(places, lengths, strict=True)):
+        write_ends(place, files, length * (1 + 4 * 11.5e-6), i)
+    verify = ("verify", "length", "--centers", *places, *files)
+    warm = ("--temperature", "24", "--expansion", "11.5", "--limit-length-per-m", "0.1")
+
+    outcome = lightpen(
+        *(*verify, *warm, "--length", *map(str, lengths)),
+        *("--json", tmp_path / "length.json"),
+    )
+    of_two = lightpen(*verify, "--length", "60", "90")
+
+    assert "PASS" in outcome.stdout, outcome.stdout + outcome.stderr
+    assert "Places: 7" in outcome.stdout
+    runs = read(tmp_path / "length.json")["runs"]
+    for run, length in zip(runs, lengths, strict=True):
+        warmer = length * (1 + 4 * 11.5e-6)
+        assert run["certified_length_mm"] == pytest.approx(warmer)
+        assert run["limit_mm"] == pytest.approx(0.03 + 1e-4 * warmer)
+        assert abs(run["error_mm"]) < run["expanded_uncertainty_mm"]
+    assert of_two.returncode == 2
+    assert "2 values for 7 runs" in of_two.stderr
 
 
 def test_a_verification_needs_images_or_led_centres(
@@ -302,6 +351,13 @@ def test_points_are_told_with_the_ball_compensated_along_the_axis(
         for name in ("centre.json", "surface.json")
     )
     np.testing.assert_allclose(np.linalg.norm(other - one, axis=1), 2.0, atol=1e-9)
+    centres, surfaces = (
+        read(tmp_path / name)["touches"] for name in ("centre.json", "surface.json")
+    )
+    # U of the ball is 0.001 mm unless stated; it is common to all points.
+    more = np.array(surfaces[0]["covariance"]) - np.array(centres[0]["covariance"])
+    assert np.trace(more) == pytest.approx((0.001 / 4) ** 2, rel=1e-3)
+    assert surfaces[0]["noise_covariance"] == centres[0]["noise_covariance"]
     assert read(tmp_path / "centre.json")["verdict"] is None
 
 
@@ -381,6 +437,7 @@ def test_calibrations_are_solved_again_and_their_uncertainty_checked(
 
     assert outcome.returncode == 0, outcome.stderr
     assert "U (k = 2), Monte Carlo" in outcome.stdout
+    assert "Monte Carlo confirms U: the largest difference" in outcome.stdout
     (again,) = read(tmp_path / "again.json")["calibrations"]
     assert max(map(abs, again["change_mm"])) < 1e-6
     assert again["monte_carlo"]["trials"] + again["monte_carlo"]["failed"] == 20

@@ -55,6 +55,7 @@ MESSAGES = {
     "limit.tip": "Tip error",
     "limit.form": "Ring, plate: form and out-of-plane deviation",
     "limit.length": "Length: error",
+    "limit.length-per-m": "Length: additional error per metre",
     "limit.location": "Location error",
     "limit.repeatability": "Repeatability: std. deviation of the tip",
     "limit.drift": "Drift of reference point",

@@ -109,8 +109,8 @@ def add_limits(parser: argparse.ArgumentParser, *names: str) -> None:
     for limit in LIMITS:
         if limit.part == "verification" and limit.name in names:
             parser.add_argument(
-                f"--limit-{limit.name}",
-                type=above_zero,
+                f"--limit-{limit.name.replace('_', '-')}",
+                type=above_zero if limit.range[0] else not_negative,
                 default=limit.default,
                 metavar=limit.unit.upper(),
                 help=f"{limit.label} ({limit.default:g})",

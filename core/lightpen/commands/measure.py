@@ -28,8 +28,9 @@ from lightpen.verification.probing.drift_reference import (
 from lightpen.verification.reports.records import verification_record
 from lightpen.verification.reports.summaries import found_text
 from lightpen.verification.tasks.part import PART
-from lightpen.verification.tasks.part_course import BALL_UNCERTAINTY, PartOptions
+from lightpen.verification.tasks.part_course import PartOptions
 from lightpen.verification.tasks.probed_point import rejected_entries
+from lightpen.verification.tasks.task import BALL_OPTION
 
 
 def add_measure(parser: argparse.ArgumentParser) -> None:
@@ -53,11 +54,11 @@ def add_measure(parser: argparse.ArgumentParser) -> None:
         help="default: that of the calibrated tip, if known; 0: no compensation",
     )
     parser.add_argument(
-        "--ball-uncertainty",
+        BALL_OPTION.argument,
         type=not_negative,
-        default=BALL_UNCERTAINTY,
+        default=PartOptions().ball_uncertainty,
         metavar="MM",
-        help=f"U (k = 2) of the ball diameter ({BALL_UNCERTAINTY:g})",
+        help=BALL_OPTION.help,
     )
     parser.add_argument(
         "--drift",

@@ -166,6 +166,7 @@ def _text(solved: list[Recalculated], trials: dict[str, MonteCarlo]) -> str:
                 _row("    known to", 2 * found.precision),
                 _row("    difference / that", found.difference),
                 f"  {len(found.errors)} trials, {found.n_failed} without a tip",
+                f"  {found.explanation}",
             ]
     return "\n".join(lines)
 
@@ -197,6 +198,7 @@ def _record(
                         "precision_mm": found.precision,
                         "difference_in_precisions": found.difference,
                         "interval_95_mm": np.asarray(found.interval),
+                        "explanation": str(found.explanation),
                     }
                 ),
             }

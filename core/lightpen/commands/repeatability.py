@@ -1,6 +1,7 @@
 """``lightpen repeatability``: one tip calibrated several times."""
 
 import argparse
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -8,10 +9,11 @@ import numpy as np
 
 from lightpen.commands.arguments import (
     above_zero,
-    add_exit_by_verdict,
     add_json,
     add_pen_options,
+    add_verdict,
     finite,
+    limits_by,
 )
 from lightpen.commands.console import (
     printing,
@@ -31,7 +33,7 @@ from lightpen.formats.hashes import all_hashed
 from lightpen.formats.json_records import file_entry
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
-from lightpen.model.limits import VerificationLimits
+from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.verification.history.pen_health import require_one_pen
 from lightpen.verification.history.recorded_tasks import read_fixed_point
@@ -99,7 +101,7 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--chart", type=Path, metavar="FILE", help="control chart, .csv or .svg"
     )
-    add_exit_by_verdict(parser)
+    add_verdict(parser)
     add_json(parser)
     add_entering(parser)
 
@@ -109,11 +111,14 @@ def _repeatability(options: argparse.Namespace) -> int:
     inputs = [*options.results, options.fixed_point, options.camera, options.pen]
     require_other_file(options.json, *inputs)
     require_other_file(options.chart, *inputs)
+    if options.reference is not None and options.tolerance is None:
+        raise UsageError("repeatability.reference-alone")
     tips, first = _tips(options)
     for one, other in combinations(tips, 2):
         if np.array_equal(one.tip_pen, other.tip_pen):
             raise UsageError("repeatability.twice", one=one.name, other=other.name)
-    limits = VerificationLimits(repeatability=options.limit)
+    limits = replace(limits_by(options), repeatability=options.limit)
+    rule = rule_in_words(limits)
     found = measure_repeatability(
         tips,
         limits,
@@ -125,7 +130,7 @@ def _repeatability(options: argparse.Namespace) -> int:
             else read_fixed_point(options.fixed_point)
         ),
     )
-    print(shown(repeatability_text(found)))
+    print(shown(repeatability_text(found, rule)))
     if options.chart is not None:
         write_chart(found, options.chart)
     files = [each for each in inputs if each is not None]
@@ -135,6 +140,7 @@ def _repeatability(options: argparse.Namespace) -> int:
         found.assessment,
         {"repeatability": limits.repeatability},
         {"files": [file_entry(file) for file in all_hashed(files)]},
+        rule,
     )
     keep_record(options, record, first)
     return verdict_status(options, found.assessment.grade)

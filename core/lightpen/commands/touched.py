@@ -178,7 +178,6 @@ def measure_runs(
             instrument=instrument,
             limits=limits,
             ball_diameter=options.ball_diameter,
-            ball_uncertainty=getattr(options, "ball_uncertainty", 0.0),
             nominal_tip=None if nominal is None else np.array(nominal, dtype=float),
             cone_cam=cone_before(calibration, viewers),
             drift=moved if lamp_drift is None else np.maximum(moved, lamp_drift.share),

@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lightpen.commands.arguments import (
     above_zero,
     add_json,
@@ -20,6 +22,7 @@ from lightpen.commands.entering import add_entering, keep_record
 from lightpen.commands.pen_health import add_verify_pen
 from lightpen.commands.touched import MeasuredRuns, add_touch_inputs, measure_runs
 from lightpen.errors import UsageError
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.model.limits import rule_in_words
 from lightpen.verification.probing.drift_reference import (
     judged_with,
@@ -29,12 +32,20 @@ from lightpen.verification.reports.records import verification_record
 from lightpen.verification.reports.summaries import found_text, touches_text
 from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.probed_point import (
+    ProbedPoint,
     on_surface,
     point_entries,
     rejected_entries,
 )
 from lightpen.verification.tasks.registry import TASKS, AnyTask
-from lightpen.verification.tasks.task import NumberOption, SurfaceOption, TaskOptions
+from lightpen.verification.tasks.task import (
+    BALL_OPTION,
+    BALL_UNCERTAINTY,
+    NumberOption,
+    SurfaceOption,
+    TaskOptions,
+)
+from lightpen.verification.tasks.tip_evidence import block_diagonal
 
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
@@ -59,13 +70,19 @@ def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
                     argument,
                     dest=option.name,
                     type=above_zero if is_needed else not_negative,
+                    nargs="+" if option.of_each_run else None,
                     required=is_needed,
-                    default=0.0,
-                    metavar="MM",
+                    default=getattr(task.options(), option.name),
+                    metavar=option.unit.upper(),
                     help=option.help,
                 )
             case SurfaceOption():
-                _add_ball(parser, option.ball_help)
+                parser.add_argument(
+                    "--ball-diameter",
+                    type=above_zero,
+                    metavar="MM",
+                    help=option.ball_help,
+                )
                 parser.add_argument(
                     option.argument,
                     dest=option.name,
@@ -94,22 +111,21 @@ def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
     add_entering(parser)
 
 
-def _add_ball(parser: argparse.ArgumentParser, what: str) -> None:
-    parser.add_argument("--ball-diameter", type=above_zero, metavar="MM", help=what)
-    parser.add_argument(
-        "--ball-uncertainty",
-        type=not_negative,
-        default=0.0,
-        metavar="MM",
-        help="U (k = 2) of the diameter of the ball",
-    )
-
-
 def _add_touches(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_touches, decision_rule="simple", max_risk=5.0)
     _add_runs(parser, "points that were touched")
-    _add_ball(
-        parser, "ball diameter; the points are then on the surface, not ball centres"
+    parser.add_argument(
+        "--ball-diameter",
+        type=above_zero,
+        metavar="MM",
+        help="ball diameter; the points are then on the surface, not ball centres",
+    )
+    parser.add_argument(
+        BALL_OPTION.argument,
+        type=not_negative,
+        default=BALL_UNCERTAINTY,
+        metavar="MM",
+        help=BALL_OPTION.help,
     )
     parser.add_argument(
         "--along",
@@ -170,6 +186,18 @@ def _task_options(task: AnyTask, given: argparse.Namespace) -> TaskOptions:
     values = {}
     for option in task.fields:
         match option:
+            case NumberOption() if option.of_each_run:
+                each = tuple(getattr(given, option.name))
+                n_runs = len(given.centers) + len(given.runs)
+                if len(each) not in (1, n_runs):
+                    raise UsageError(
+                        "cli.number-of-each-run",
+                        option=option.argument,
+                        n_given=len(each),
+                        n_runs=n_runs,
+                    )
+                values[option.name] = each[0]
+                values[option.of_each_run] = each if len(each) > 1 else ()
             case NumberOption() if option.argument:
                 values[option.name] = getattr(given, option.name)
             case SurfaceOption() if given.ball_diameter:
@@ -182,16 +210,27 @@ def _task_options(task: AnyTask, given: argparse.Namespace) -> TaskOptions:
 def _touches(options: argparse.Namespace) -> None:
     measured = _measure(options, [(run,) for run in options.runs])
     touches = [touch for run in measured.runs for touch in run.touches]
+    instrument = measured.instrument
     if options.ball_diameter is not None:
         if options.along == "axis":
             touches = [replace(touch, approach_cam=None) for touch in touches]
         radius = options.ball_diameter / 2
-        touches = [on_surface(touch, radius) for touch in touches]
-    print(shown(touches_text(touches, measured.instrument, measured.rejected)))
+        touches = [_on_surface(touch, radius) for touch in touches]
+        of_ball = np.array([[(options.ball_uncertainty / 2 / COVERAGE_FACTOR) ** 2]])
+        both = block_diagonal([instrument.covariance, of_ball])
+        instrument = replace(instrument, covariance=both)
+    print(shown(touches_text(touches, instrument, measured.rejected)))
     _print_lamp_drift(measured)
     if options.json is not None:
-        entries = {"touches": point_entries(touches, measured.instrument)}
+        entries = {"touches": point_entries(touches, instrument)}
         write_record(options.json, _record(options, measured, "touches", entries, None))
+
+
+def _on_surface(touch: ProbedPoint, radius: float) -> ProbedPoint:
+    """Return a touch on the surface, with the ball radius as a further parameter."""
+    on = on_surface(touch, radius)
+    by_radius = (on.point_cam - touch.point_cam) / radius
+    return replace(on, sensitivity=np.column_stack([on.sensitivity, by_radius]))
 
 
 def _measure(

@@ -15,6 +15,7 @@ from lightpen.model.decision_rules import Decision, DecisionRule, decide
 
 IMAGES = LEAST_IMAGES, MOST_IMAGES = 10, 2000
 MOST_DAYS, MOST_SWINGS = 3650, 10_000
+SMALLEST = 1e-12  # mm, above 0
 
 
 @dataclass(frozen=True)
@@ -140,8 +141,8 @@ class VerificationLimits:
         Error of the mean radius of a circle.
     form : float
         Roundness of a circle and its deviation from a plane; excess of a flatness.
-    length : float
-        Error of a length.
+    length, length_per_m : float
+        Error of a length: a constant, and what each metre adds to it.
     location : float
         Diameter of the sphere about one point probed in several postures.
     repeatability : float
@@ -160,6 +161,7 @@ class VerificationLimits:
     radius: float = _limit(0.02, message("limit.radius"))
     form: float = _limit(0.1, message("limit.form"))
     length: float = _limit(0.03, message("limit.length"))
+    length_per_m: float = _limit(0.0, message("limit.length-per-m"), "mm", (0.0, 10.0))
     location: float = _limit(0.1, message("limit.location"))
     repeatability: float = _limit(0.01, message("limit.repeatability"))
     drift: float = _limit(0.02, message("limit.drift"))
@@ -169,8 +171,13 @@ class VerificationLimits:
     def __post_init__(self) -> None:
         for item in fields(self):
             value = getattr(self, item.name)
-            if item.name != "rule" and not (isfinite(value) and value > 0):
+            least = 0.0 if item.name == "length_per_m" else SMALLEST
+            if item.name != "rule" and not (isfinite(value) and value >= least):
                 raise ValueError(f"`{item.name}` must be above 0, got {value}.")
+
+    def length_error(self, length: float) -> float:
+        """Return the maximum permissible error of a length, mm."""
+        return self.length + self.length_per_m * length / 1000
 
     def decision(self, value: float, uncertainty: float, limit: float) -> Decision:
         """Return whether a value with its U (k = 2) keeps a limit either way, mm."""

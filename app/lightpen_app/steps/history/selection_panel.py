@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.entries import StoredEntry
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.model.limits import VerificationLimits
+from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.verification.history.led_file import MIN_POOLED
 from lightpen.verification.history.trend import (
     Comparison,
@@ -218,6 +218,7 @@ class SelectionPanel(Translated, QWidget):
         told = worded(assessment.reason)
         if not assessment.is_accepted:
             told += " " + worded(assessment.next_step)
+        told += " " + worded(rule_in_words(self._limits))
         mark = GRADE_MARKS[Grade(assessment.grade)]
         self._verdict.set_value(StatusMessage(told, *mark))
 

@@ -11,6 +11,7 @@ from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.record.swings.solving import Solution
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.focus import give_focus
@@ -166,7 +167,8 @@ class MonteCarloRow(Translated, QWidget):
             return StatusMessage()
         text = self.tr("{0} trials successful, {1} failed.")
         n_solved = len(self._found.errors)
-        return StatusMessage(text.format(n_solved, self._found.n_failed), Sign.RING)
+        told = text.format(n_solved, self._found.n_failed)
+        return StatusMessage(f"{told} {worded(self._found.explanation)}", Sign.RING)
 
     def _figures(self, found: MonteCarlo) -> Figures:
         """Return U by both, and their difference by what so many trials know."""

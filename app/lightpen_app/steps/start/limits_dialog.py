@@ -153,9 +153,10 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
             if isinstance(field, _RuleField):
                 usually = field.retranslate()
             else:
-                if not limit.range[0]:
+                is_absent = not limit.range[0] and not limit.unit
+                if is_absent:
                     field.setSpecialValueText(no_limit)
-                usually = f"{limit.default:g}" if limit.default else no_limit
+                usually = no_limit if is_absent else f"{limit.default:g}"
             field.setToolTip(self.tr("Default: {0}.").format(usually))
 
 

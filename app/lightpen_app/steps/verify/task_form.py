@@ -1,5 +1,6 @@
 """Form of a task: its selection and options, derived from the task."""
 
+from msgspec import structs
 from PySide6.QtCore import QSize, Signal
 from PySide6.QtWidgets import QCheckBox, QWidget
 from typing_extensions import override
@@ -11,7 +12,6 @@ from lightpen.verification.tasks.task import (
     Option,
     Surface,
     SurfaceOption,
-    TaskOptions,
 )
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
@@ -96,7 +96,8 @@ class TaskForm(Translated, QWidget):
 
         # Widgets
         self._is_chosen = QCheckBox()
-        self._fields = {option.name: _field_of(option) for option in task.fields}
+        self._options = [each for each in task.fields if each.label is not None]
+        self._fields = {each.name: _field_of(each) for each in self._options}
         self._labels = tuple(
             text_label(TextSize.SMALL, Tone.QUIET) for _ in self._fields
         )
@@ -127,7 +128,7 @@ class TaskForm(Translated, QWidget):
         is_chosen = self._is_chosen.isChecked()
         choices = self._value.with_task(self._task, is_chosen=is_chosen)
         values = {name: field.chosen() for name, field in self._fields.items()}
-        options: TaskOptions = self._task.options(**values)
+        options = structs.replace(choices.options_of(self._task), **values)
         return choices.with_options(options)
 
     def set_value(self, choices: VerificationChoices) -> None:
@@ -149,7 +150,7 @@ class TaskForm(Translated, QWidget):
         self._is_chosen.setText(worded(self._task.purpose))
         fields = self._fields.values()
         for option, label, field in zip(
-            self._task.fields, self._labels, fields, strict=True
+            self._options, self._labels, fields, strict=True
         ):
             label.setText(worded(option.label))
             field.setAccessibleName(worded(option.label))

@@ -43,7 +43,9 @@ def distance_repeatability(bundle: Bundle, budget: Budget, priors: Priors) -> fl
         np.sqrt(
             gain @ information @ gain
             + _of_moves(bundle, gain, at.whole_seat, seat_covariance(bundle))
-            + _of_moves(bundle, gain, at.drift, drift_variance(bundle) * np.eye(n_drift))
+            + _of_moves(
+                bundle, gain, at.drift, drift_variance(bundle) * np.eye(n_drift)
+            )
         )
     )
 

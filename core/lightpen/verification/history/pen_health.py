@@ -186,7 +186,9 @@ def _growth(
         return None
     if np.linalg.norm(one[:2] - other[:2]) > SAME_PLACE:
         return None
-    deviations = [c.calibration.uncertainty.distance_repeatability for c in (first, now)]
+    deviations = [
+        c.calibration.uncertainty.distance_repeatability for c in (first, now)
+    ]
     spread = COVERAGE_FACTOR * float(np.hypot(*deviations))
     return Growth(float(np.log(one[2] / other[2])), spread)
 

@@ -14,6 +14,7 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.verification.history.led_file import ImprovedPen
 from lightpen.verification.history.pen_health import PenHealth
+from lightpen.verification.reports.records import BY_SIMPLE_ACCEPTANCE
 from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.probed_point import ProbedPoint, RejectedFrame
 from lightpen.verification.tasks.repeatability import (
@@ -82,17 +83,17 @@ def _left_out(rejected: Sequence[RejectedFrame]) -> list[str]:
     return [f"{len(rejected)} images left out: {named}{more}"]
 
 
-def _verdict(
-    assessment: VerificationAssessment, rule: Message | None = None
-) -> list[str]:
-    lines = [
+def _verdict(assessment: VerificationAssessment, rule: Message) -> list[str]:
+    return [
         f"Verdict      {assessment.grade.upper()}: {assessment.reason}",
         f"             {assessment.next_step}",
+        f"             {rule}",
     ]
-    return lines if rule is None else [*lines, f"             {rule}"]
 
 
-def repeatability_text(found: Repeatability) -> str:
+def repeatability_text(
+    found: Repeatability, rule: Message = BY_SIMPLE_ACCEPTANCE
+) -> str:
     """Return calibrations of one tip as text: the paper's Table 1."""
 
     def row(title: str, values: FloatArray, digits: int = 4) -> str:
@@ -125,7 +126,7 @@ def repeatability_text(found: Repeatability) -> str:
         ]
     if found.capability is not None:
         lines += _capability_lines(found.capability, len(found.tips), row)
-    return "\n".join([*lines, "", *_verdict(found.assessment)])
+    return "\n".join([*lines, "", *_verdict(found.assessment, rule)])
 
 
 def _capability_lines(
@@ -150,7 +151,7 @@ def pen_health_text(found: PenHealth) -> str:
         "LEDs since the first swing, mm, and size of the pen, ppm",
         f"{'Swing':<{TITLE}}"
         + "".join(f"{f'LED {j + 1}':>{COLUMN}}" for j in range(n_leds))
-        + f"{'size':>{COLUMN}}",
+        + f"{'size':>{COLUMN}}{'U':>{COLUMN}}",
     ]
     for swing in found.swings:
         lengths = np.linalg.norm(swing.shifts, axis=1)
@@ -158,9 +159,13 @@ def pen_health_text(found: PenHealth) -> str:
             f"{x:{COLUMN}.3f}" if np.isfinite(x) else f"{'-':>{COLUMN}}"
             for x in lengths
         )
-        size = "-" if swing.growth is None else f"{1e6 * swing.growth:+.0f}"
-        lines.append(f"{swing.name[:TITLE]:<{TITLE}}{cells}{size:>{COLUMN}}")
-    return "\n".join([*lines, "", *_verdict(found.assessment)])
+        size = "".join(
+            f"{'-' if ppm is None else format(1e6 * ppm, '+.0f'):>{COLUMN}}"
+            for ppm in swing.growth or (None, None)
+        )
+        lines.append(f"{swing.name[:TITLE]:<{TITLE}}{cells}{size}")
+    by_rule = _verdict(found.assessment, BY_SIMPLE_ACCEPTANCE)
+    return "\n".join([*lines, "", *by_rule])
 
 
 def improved_pen_text(found: ImprovedPen) -> str:

@@ -44,6 +44,8 @@ from lightpen.verification.tasks.probed_point import (
 )
 from lightpen.verification.tasks.task import (
     ANY,
+    BALL_OPTION,
+    BALL_UNCERTAINTY,
     MOST_RUNS,
     Conditions,
     Found,
@@ -163,6 +165,7 @@ class CircleOptions(TaskOptions, frozen=True, tag="circle"):
     radius: Annotated[float, Meta(ge=0)] = 0.0
     radius_uncertainty: Annotated[float, Meta(ge=0)] = 0.0
     surface: Surface = Surface.GROOVE
+    ball_uncertainty: Annotated[float, Meta(ge=0)] = BALL_UNCERTAINTY
     n_runs: Annotated[int, Meta(ge=1, le=MOST_RUNS)] = 1
 
 
@@ -195,9 +198,7 @@ def measure_circle(
     variance = float(row @ instrument.covariance @ row) + noise / len(runs) ** 2
     variance += float(drift.max()) ** 2
     uncertainty = float(
-        np.hypot(
-            COVERAGE_FACTOR * np.sqrt(variance), _known_uncertainty(conditions, options)
-        )
+        np.hypot(COVERAGE_FACTOR * np.sqrt(variance), _known_uncertainty(options))
     )
     tip = _tip_evidence(measured, conditions, options)
     return Circle(
@@ -211,10 +212,10 @@ def measure_circle(
     )
 
 
-def _known_uncertainty(conditions: Conditions, options: CircleOptions) -> float:
+def _known_uncertainty(options: CircleOptions) -> float:
     """Return U (k = 2) of the radius by certificate and ball, mm."""
     is_groove = options.surface is Surface.GROOVE
-    ball = 0.0 if is_groove else conditions.ball_uncertainty / 2
+    ball = 0.0 if is_groove else options.ball_uncertainty / 2
     return float(np.hypot(options.radius_uncertainty, ball))
 
 
@@ -229,7 +230,7 @@ def _tip_evidence(
         for run in runs
     ]
     is_radial = [np.repeat([1.0, 0.0], len(run.touches)) for run in runs]
-    known = _known_uncertainty(conditions, options)
+    known = _known_uncertainty(options)
     by_radius = np.concatenate(is_radial) * known / COVERAGE_FACTOR
     by_points = block_diagonal([ring.by_points for ring in rings])
     drift = np.diag(np.tile(conditions.drift**2, len(points)))
@@ -541,6 +542,7 @@ CIRCLE = VerificationTask(
             words={"bore": Surface.BORE, "boss": Surface.BOSS},
             ball_help="ball diameter, if a bore or a boss was touched, not a groove",
         ),
+        BALL_OPTION,
         count_option("n_runs", message("option.runs"), 1, MOST_RUNS),
     ),
     measure=measure_circle,

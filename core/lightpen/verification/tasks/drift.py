@@ -22,6 +22,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
+from lightpen.model.decision_rules import Decision
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.posture import angles_between
 from lightpen.model.quantiles import chi_square_quantile
@@ -135,15 +136,15 @@ def _assessment(
     is_significant = deviations > chi_square_quantile(3, BY_CHANCE)
     move, limit = float(np.linalg.norm(moves[worst])), limits.drift
     grade = graded(distance, uncertainty, limits.drift, limits)
+    moved = message(
+        "drift.moved",
+        first=names[0],
+        visit=names[worst],
+        distance=move,
+        uncertainty=uncertainty,
+        limit=limit,
+    )
     if is_significant and grade is not Grade.PASS:
-        moved = message(
-            "drift.moved",
-            first=names[0],
-            visit=names[worst],
-            distance=move,
-            uncertainty=uncertainty,
-            limit=limit,
-        )
         return VerificationAssessment(grade, moved, VERIFY_AGAIN)
     variances = np.diagonal(spreads, axis1=1, axis2=2)
     largest = COVERAGE_FACTOR * float(np.sqrt(variances.max()))
@@ -152,6 +153,8 @@ def _assessment(
             "drift.uncertain", distance=move, uncertainty=largest, limit=limit
         )
         return check(doubt, TOUCH_LONGER)
+    if limits.decision(distance, uncertainty, limit) is not Decision.ACCEPTED:
+        return check(moved, TOUCH_LONGER)
     good = message("drift.good", distance=move, uncertainty=uncertainty, limit=limit)
     return accepted(good, USE_TOUCHES)
 

@@ -1,11 +1,19 @@
 """A certified length between two cones, or of a bar, at several places.
 
+ISO 10360-12 measures lengths in seven places and compares each error with its maximum
+permissible error, a constant and what each metre adds [1]_. A length is certified for
+20 degrees Celsius and grows with the temperature of its artefact.
+
 An error of the pen's scale leaves no residual and moves nothing that stands still; a
 length shows it. So the lengths, with their covariance, determine the scale.
+
+References
+----------
+.. [1] ISO 10360-12:2016, length measurement error of articulated arm CMMs.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
@@ -22,6 +30,7 @@ from lightpen.verification.tasks.assessment import (
     CHECK_FILES,
     VERIFY_AGAIN,
     VerificationAssessment,
+    accepted,
     check,
     graded,
 )
@@ -32,6 +41,8 @@ from lightpen.verification.tasks.probed_point import (
 )
 from lightpen.verification.tasks.task import (
     ANY,
+    BALL_OPTION,
+    BALL_UNCERTAINTY,
     MOST_RUNS,
     Conditions,
     Found,
@@ -66,6 +77,9 @@ MIN_APART = 0.1  # of the certified length, between two ends
 MAX_WIDE = 0.1  # of the distance of the ends, that touches of one end may scatter
 ANOTHER = 0.1  # of the certified length: the ends are those of another one
 OTHER_END = 10.0  # mm from the first
+REFERENCE = 20.0  # degrees Celsius, for which a length is certified
+KNOWN_EXPANSION = 0.1  # U (k = 2) of an expansion coefficient, relative
+STANDARD_PLACES = 7
 # The bar of the simulated operator, from the bottom of its cone, mm
 SIMULATED_ENDS = np.array([[-75.0, -20.0, 0.0], [75.0, -20.0, 0.0]])
 SIMULATED_LENGTH = 150.0
@@ -80,8 +94,12 @@ class LengthRun:
     ----------
     measured : float
         mm.
+    certified : float
+        At the temperature of the artefact, mm.
     uncertainty : float
-        U (k = 2) of it, mm.
+        U (k = 2) of the error, mm.
+    limit : float
+        Maximum permissible error, mm.
     along_view : float
         Cosine between the length and the line of sight, 0 to 1: 1 measures depth.
     """
@@ -89,8 +107,20 @@ class LengthRun:
     name: str
     ends: Ends
     measured: float
+    certified: float
     uncertainty: float
+    limit: float
     along_view: float
+
+    @property
+    def error(self) -> float:
+        """Measured less certified, mm."""
+        return self.measured - self.certified
+
+    @property
+    def share(self) -> float:
+        """Size of the error in units of its limit."""
+        return abs(self.error) / self.limit
 
 
 @dataclass(frozen=True)
@@ -116,34 +146,70 @@ class Length(Found):
 
     Attributes
     ----------
-    certified, certified_uncertainty : float
-        The length and U (k = 2) of it, mm.
-    uncertainties : (N,) array
-        U (k = 2) of each error, mm.
+    certified_uncertainties : (N,) array
+        U (k = 2) of the certified lengths, of their temperature and of the ball, mm.
     tip : TipEvidence
         The evidence of the lengths on the tip.
     """
 
     runs: tuple[LengthRun, ...]
-    certified: float
-    certified_uncertainty: float
-    uncertainties: FloatArray
+    certified_uncertainties: FloatArray
     scale: Scale
     tip: TipEvidence
 
     @property
     def errors(self) -> FloatArray:
         """Measured less certified, of each place, mm."""
-        return np.array([run.measured for run in self.runs]) - self.certified
+        return np.array([run.error for run in self.runs])
+
+    @property
+    def uncertainties(self) -> FloatArray:
+        """U (k = 2) of each error, mm."""
+        return np.array([run.uncertainty for run in self.runs])
+
+    @property
+    def worst(self) -> LengthRun:
+        """The place with the largest error for its limit."""
+        return max(self.runs, key=lambda run: run.share)
 
 
 class LengthOptions(TaskOptions, frozen=True, tag="length"):
-    """A length; one of 0 is not known."""
+    """A length and its artefact.
+
+    Attributes
+    ----------
+    length : float
+        At 20 degrees Celsius, mm; 0 if not known.
+    lengths : tuple of float
+        Of each place, mm, where they differ.
+    temperature, temperature_uncertainty : float
+        Of the artefact, degrees Celsius, and U (k = 2) of it, K.
+    expansion : float
+        Coefficient of thermal expansion, ppm/K; 0 if it does not expand.
+    """
 
     length: Annotated[float, Meta(ge=0)] = 0.0
     length_uncertainty: Annotated[float, Meta(ge=0)] = 0.0
     surface: Surface = Surface.GROOVE
     n_places: Annotated[int, Meta(ge=1, le=MOST_RUNS)] = 1
+    lengths: tuple[Annotated[float, Meta(gt=0)], ...] = ()
+    temperature: float = REFERENCE
+    temperature_uncertainty: Annotated[float, Meta(ge=0)] = 1.0
+    expansion: Annotated[float, Meta(ge=0)] = 0.0
+    ball_uncertainty: Annotated[float, Meta(ge=0)] = BALL_UNCERTAINTY
+
+    def certified(self, n_places: int) -> tuple[FloatArray, FloatArray]:
+        """Return the certified lengths at their temperature and U (k = 2), (N,), mm."""
+        lengths = np.array(self.lengths or [self.length] * n_places)
+        per_kelvin = 1e-6 * self.expansion * lengths
+        warmer = self.temperature - REFERENCE
+        # Inner and outer faces are off by the radius of the ball at both ends.
+        ball = self.ball_uncertainty * (self.surface is not Surface.GROOVE)
+        known = np.hypot(self.length_uncertainty, ball)
+        by_heat = per_kelvin * np.hypot(
+            self.temperature_uncertainty, warmer * KNOWN_EXPANSION
+        )
+        return lengths + per_kelvin * warmer, np.hypot(known, by_heat)
 
 
 def measure_length(
@@ -160,18 +226,15 @@ def measure_length(
         The points of a place are not of two ends.
     """
     instrument, drift = conditions.instrument, conditions.drift
-    # Inner and outer faces are off by the radius of the ball at both ends.
-    ball = conditions.ball_uncertainty * (options.surface is not Surface.GROOVE)
-    certified = options.length
-    certified_uncertainty = float(np.hypot(options.length_uncertainty, ball))
+    certified, known = options.certified(len(runs))
     offset = ball_offset(options.surface, conditions.ball_diameter)
     measured, rows, noises, ways, by_points = [], [], [], [], []
-    for name, touches in runs:
-        ends = _on_faces(_two_ends(name, touches, certified), offset)
+    for (name, touches), length, u in zip(runs, certified, known, strict=True):
+        ends = _on_faces(_two_ends(name, touches, length), offset)
         middles = [np.mean([t.point_cam for t in end], axis=0) for end in ends]
         span = middles[1] - middles[0]
-        length = float(np.linalg.norm(span))
-        along = span / length
+        apart = float(np.linalg.norm(span))
+        along = span / apart
         row, noise = np.zeros(len(instrument.covariance)), float(along**2 @ drift**2)
         signed = tuple(zip(ends, (-1.0, 1.0), strict=True))
         for end, sign in signed:
@@ -184,8 +247,10 @@ def measure_length(
             LengthRun(
                 name=name,
                 ends=ends,
-                measured=length,
-                uncertainty=COVERAGE_FACTOR * float(np.sqrt(variance)),
+                measured=apart,
+                certified=float(length),
+                uncertainty=float(np.hypot(COVERAGE_FACTOR * np.sqrt(variance), u)),
+                limit=conditions.limits.length_error(float(length)),
                 along_view=float(abs(along @ view)),
             )
         )
@@ -197,11 +262,8 @@ def measure_length(
                 None
             ]
         )
-    uncertainties = np.hypot(
-        [run.uncertainty for run in measured], certified_uncertainty
-    )
-    errors = np.array([run.measured for run in measured]) - certified
-    certificate = (certified_uncertainty / COVERAGE_FACTOR) ** 2
+    errors = np.array([run.error for run in measured])
+    certificate = np.outer(known, known) / COVERAGE_FACTOR**2
     own = np.diag([float(along**2 @ drift**2) for along in ways]) + certificate
     tip = tip_evidence(
         [touch for run in measured for end in run.ends for touch in end],
@@ -211,15 +273,14 @@ def measure_length(
         np.zeros((len(errors), 0)),
         own,
     )
-    return Length(
+    found = Length(
         runs=tuple(measured),
-        certified=certified,
-        certified_uncertainty=certified_uncertainty,
-        uncertainties=uncertainties,
+        certified_uncertainties=known,
         scale=_scale(instrument, np.array(rows), np.diag(noises) + certificate, errors),
         tip=tip,
-        assessment=_assessment(measured, errors, uncertainties, tip, conditions.limits),
+        assessment=accepted(_good(max(measured, key=lambda run: run.share))),
     )
+    return replace(found, assessment=_assessment(found, conditions.limits))
 
 
 def _two_ends(name: str, touches: Sequence[ProbedPoint], certified: float) -> Ends:
@@ -280,17 +341,18 @@ def _scale(
     )
 
 
-def _assessment(
-    runs: Sequence[LengthRun],
-    errors: FloatArray,
-    uncertainties: FloatArray,
-    tip: TipEvidence,
-    limits: VerificationLimits,
-) -> VerificationAssessment:
-    worst = int(np.argmax(np.abs(errors)))
-    error, uncertainty = float(errors[worst]), float(uncertainties[worst])
-    grade = graded(error, uncertainty, limits.length, limits)
-    against = judged_tip(tip, limits)
+def _good(worst: LengthRun) -> Message:
+    return message(
+        "length.good",
+        error=worst.error,
+        uncertainty=worst.uncertainty,
+        limit=worst.limit,
+    )
+
+
+def _assessment(found: Length, limits: VerificationLimits) -> VerificationAssessment:
+    worst, against = found.worst, judged_tip(found.tip, limits)
+    grade = graded(worst.error, worst.uncertainty, worst.limit, limits)
     if against is not None and against.grade is Grade.REPEAT:
         return against
     if grade is not Grade.PASS:
@@ -298,32 +360,27 @@ def _assessment(
             grade,
             message(
                 "length.off",
-                run=runs[worst].name,
-                error=error,
-                uncertainty=uncertainty,
-                limit=limits.length,
+                run=worst.name,
+                error=worst.error,
+                uncertainty=worst.uncertainty,
+                limit=worst.limit,
             ),
             CHECK_FILES,
         )
     if against is not None:
         return against
-    if uncertainty > limits.length:
+    least = max(found.runs, key=lambda run: run.uncertainty / run.limit)
+    if least.uncertainty > least.limit:
         return check(
             message(
                 "length.uncertain",
-                run=runs[worst].name,
-                uncertainty=uncertainty,
-                limit=limits.length,
+                run=least.name,
+                uncertainty=least.uncertainty,
+                limit=least.limit,
             ),
             VERIFY_AGAIN,
         )
-    return with_power(
-        message(
-            "length.good", error=error, uncertainty=uncertainty, limit=limits.length
-        ),
-        tip,
-        limits,
-    )
+    return with_power(_good(worst), found.tip, limits)
 
 
 def _screen(
@@ -354,8 +411,6 @@ def _missing(options: LengthOptions, ball_diameter: float | None) -> Message | N
 
 def _entries(found: Length, instrument: Instrument) -> dict[str, Any]:
     return {
-        "certified_length_mm": found.certified,
-        "certified_expanded_uncertainty_mm": found.certified_uncertainty,
         "scale": {
             "factor": found.scale.factor,
             "expanded_uncertainty": found.scale.uncertainty,
@@ -366,38 +421,43 @@ def _entries(found: Length, instrument: Instrument) -> dict[str, Any]:
             {
                 "name": run.name,
                 "length_mm": run.measured,
-                "error_mm": error,
-                "expanded_uncertainty_mm": uncertainty,
+                "certified_length_mm": run.certified,
+                "certified_expanded_uncertainty_mm": known,
+                "error_mm": run.error,
+                "expanded_uncertainty_mm": run.uncertainty,
+                "limit_mm": run.limit,
                 "along_view": run.along_view,
                 "ends": [point_entries(end, instrument) for end in run.ends],
             }
-            for run, error, uncertainty in _places(found)
+            for run, known in zip(
+                found.runs, found.certified_uncertainties.tolist(), strict=True
+            )
         ],
     }
 
 
-def _places(found: Length) -> list[tuple[LengthRun, float, float]]:
-    """Return each place with its error and the uncertainty of it."""
-    figures = found.errors.tolist(), found.uncertainties.tolist()
-    return list(zip(found.runs, *figures, strict=True))
-
-
 def _tables(found: Length, conditions: Conditions) -> tuple[ResultTable, ...]:
-    limit, scale = conditions.limits.length, found.scale
-    title = message(
-        "length.table",
-        certified=found.certified,
-        uncertainty=found.certified_uncertainty,
-    )
+    scale, worst = found.scale, found.worst
     columns = (
         message("length.measured"),
+        message("plane.certified"),
         message("table.error"),
         message("table.uncertainty"),
         message("table.limit"),
     )
     rows = (
-        ResultRow(run.name, [run.measured, error, uncertainty, limit])
-        for run, error, uncertainty in _places(found)
+        ResultRow(
+            run.name,
+            [run.measured, run.certified, run.error, run.uncertainty, run.limit],
+        )
+        for run in found.runs
+    )
+    places = message(
+        "length.places",
+        share=100 * worst.share,
+        run=worst.name,
+        n_places=len(found.runs),
+        needed=STANDARD_PLACES,
     )
     note = message(
         "length.scale",
@@ -405,7 +465,8 @@ def _tables(found: Length, conditions: Conditions) -> tuple[ResultTable, ...]:
         uncertainty=1e6 * scale.uncertainty,
         before=1e6 * scale.uncertainty_before,
     )
-    return (ResultTable(title, columns, tuple(rows), (note,)),)
+    title = message("length.table")
+    return (ResultTable(title, columns, tuple(rows), (places, note)),)
 
 
 LENGTH = VerificationTask(
@@ -417,7 +478,7 @@ LENGTH = VerificationTask(
     first=message("length.first"),
     another=message("length.another"),
     known=message("session.same-end"),
-    limits=("length", "tip"),
+    limits=("length", "length_per_m", "tip"),
     options=LengthOptions,
     fields=(
         NumberOption(
@@ -425,7 +486,8 @@ LENGTH = VerificationTask(
             message("length.certified"),
             unknown=message("option.unknown"),
             argument="--length",
-            help="certified length",
+            help="certified length at 20 degrees Celsius, one for all runs or for each",
+            of_each_run="lengths",
         ),
         certificate_option("length_uncertainty"),
         SurfaceOption(
@@ -441,6 +503,33 @@ LENGTH = VerificationTask(
             ball_help="ball diameter, if faces were touched, not cones",
         ),
         count_option("n_places", message("option.places"), 1, MOST_RUNS),
+        NumberOption(
+            "temperature",
+            message("length.temperature"),
+            most=60.0,
+            unit="\xb0C",
+            decimals=1,
+            argument="--temperature",
+            help=f"temperature of the artefact ({REFERENCE:g})",
+        ),
+        NumberOption(
+            "temperature_uncertainty",
+            None,
+            unit="K",
+            argument="--temperature-uncertainty",
+            help="U (k = 2) of the temperature (1)",
+        ),
+        NumberOption(
+            "expansion",
+            message("length.expansion"),
+            most=100.0,
+            unit="ppm/K",
+            decimals=1,
+            argument="--expansion",
+            help="coefficient of thermal expansion of the artefact, such as 11.5 for "
+            "steel (0: none)",
+        ),
+        BALL_OPTION,
     ),
     measure=measure_length,
     entries=_entries,

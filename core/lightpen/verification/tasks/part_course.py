@@ -27,6 +27,7 @@ from lightpen.measuring.touches import PartTouches, at_position
 from lightpen.model.posture import UPRIGHT_AXIS
 from lightpen.verification.tasks.probed_point import ProbedPoint, joint_covariance
 from lightpen.verification.tasks.task import (
+    BALL_UNCERTAINTY,
     Conditions,
     HandGoal,
     Points,
@@ -34,7 +35,6 @@ from lightpen.verification.tasks.task import (
     TaskProgress,
 )
 
-BALL_UNCERTAINTY = 0.001  # mm, U (k = 2)
 N_KEPT = 64  # fits of runs
 
 # The simulated part: its origin from the bottom of the cone, and its axes x to the

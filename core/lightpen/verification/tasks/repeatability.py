@@ -16,6 +16,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.messages import Message, message
+from lightpen.model.decision_rules import COVERAGE_FACTOR, Decision
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.quantiles import normal_quantile
 from lightpen.verification.tasks.assessment import (
@@ -267,19 +268,21 @@ def _assessment(
     stated = np.mean([tip.uncertainty for tip in tips], axis=0) / 2
     ridden = "repeatability.rode-with-pen"
     has_ridden = points_to is not None and points_to.code == ridden
-    if deviation[axis] > limits.repeatability:
-        return refused(
-            points_to
-            if points_to is not None and has_ridden
-            else message(
-                "repeatability.scatters",
-                deviation=float(deviation[axis]),
-                axis="xyz"[axis],
-                limit=limits.repeatability,
-                stated=float(stated[axis]),
-            ),
-            CALIBRATE_AGAIN,
-        )
+    scatters = message(
+        "repeatability.scatters",
+        deviation=float(deviation[axis]),
+        axis="xyz"[axis],
+        limit=limits.repeatability,
+        stated=float(stated[axis]),
+    )
+    # Of a standard deviation by n values, whose scatter is normal.
+    uncertainty = COVERAGE_FACTOR * deviation[axis] / np.sqrt(2 * (len(tips) - 1))
+    decision = limits.decision(
+        float(deviation[axis]), float(uncertainty), limits.repeatability
+    )
+    if decision is Decision.REJECTED:
+        why = points_to if points_to is not None and has_ridden else scatters
+        return refused(why, CALIBRATE_AGAIN)
     if points_to is not None:
         return check(points_to, TIGHTEN if has_ridden else VERIFY_AGAIN)
     if study is not None and not study.is_capable:
@@ -292,6 +295,8 @@ def _assessment(
             ),
             WIDEN,
         )
+    if decision is Decision.OPEN:
+        return check(scatters, REPEAT_MORE)
     return accepted(
         message(
             "repeatability.good",

@@ -45,6 +45,8 @@ from lightpen.verification.tasks.probed_point import (
 )
 from lightpen.verification.tasks.task import (
     ANY,
+    BALL_OPTION,
+    BALL_UNCERTAINTY,
     Conditions,
     Found,
     HandGoal,
@@ -169,6 +171,7 @@ class SphereOptions(TaskOptions, frozen=True, tag="sphere"):
     diameter: Annotated[float, Meta(ge=0)] = 0.0
     diameter_uncertainty: Annotated[float, Meta(ge=0)] = 0.0
     surface: Surface = Surface.GROOVE
+    ball_uncertainty: Annotated[float, Meta(ge=0)] = BALL_UNCERTAINTY
     n_points: Annotated[int, Meta(ge=MIN_POINTS, le=MAX_POINTS)] = USUAL_POINTS
 
 
@@ -198,7 +201,7 @@ def measure_sphere(
     diameter = 2 * (fit.radius + ball_offset(options.surface, conditions.ball_diameter))
     known = options.diameter_uncertainty
     if options.surface is not Surface.GROOVE:
-        known = float(np.hypot(known, conditions.ball_uncertainty))
+        known = float(np.hypot(known, options.ball_uncertainty))
     n = len(kept)
     covariance = joint_covariance(kept, conditions.instrument)
     covariance += np.diag(np.tile(conditions.drift**2, n))
@@ -441,6 +444,7 @@ SPHERE = VerificationTask(
             ball_help="ball diameter; without it, --diameter is that of the sphere of "
             "the ball centres",
         ),
+        BALL_OPTION,
         count_option("n_points", message("option.points"), MIN_POINTS, MAX_POINTS),
     ),
     measure=measure_sphere,

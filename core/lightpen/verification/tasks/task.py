@@ -20,6 +20,7 @@ from lightpen.verification.tasks.probed_point import NO_DRIFT, ProbedPoint
 
 ANY = 1e6  # mm or rad: no other place, no other posture makes a point a new one
 LONGEST, LARGEST_U = 10_000.0, 1.0  # mm, that a station may enter
+BALL_UNCERTAINTY = 0.001  # mm, U (k = 2) of a ball with a certificate
 MOST_RUNS = 20
 
 Points: TypeAlias = tuple[ProbedPoint, ...]
@@ -56,18 +57,22 @@ class NumberOption:
     ----------
     name : str
         Attribute of the options.
+    label : Message or None
+        None of one that the window does not show.
     unknown : Message or None
         Shown in place of 0, which then stands for a number that must be entered.
     is_optional : bool
         Whether the command line takes 0 for one that is not stated.
     argument, help : str
         Option of the command line; empty where it has none.
+    of_each_run : str
+        Attribute with the numbers of all runs; empty where they share one.
     is_of_artefact : bool
         Whether a task must be done again when it changes.
     """
 
     name: str
-    label: Message
+    label: Message | None
     least: float = 0.0
     most: float = LONGEST
     unit: str = "mm"
@@ -76,6 +81,7 @@ class NumberOption:
     is_optional: bool = False
     argument: str = ""
     help: str = ""
+    of_each_run: str = ""
     is_of_artefact: bool = True
 
 
@@ -126,6 +132,14 @@ def certificate_option(name: str) -> NumberOption:
     )
 
 
+BALL_OPTION = NumberOption(
+    "ball_uncertainty",
+    None,
+    argument="--ball-uncertainty",
+    help=f"U (k = 2) of the ball diameter ({BALL_UNCERTAINTY:g})",
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Conditions:
     """Under which points are measured and judged.
@@ -140,8 +154,6 @@ class Conditions:
         Where the calibration had the same cone before the same camera, mm.
     drift : (3,) array
         Standard uncertainty of a point by a camera that moved meanwhile, mm.
-    ball_uncertainty : float
-        U (k = 2) of the diameter of the ball, mm.
     """
 
     instrument: Instrument
@@ -150,7 +162,6 @@ class Conditions:
     nominal_tip: FloatArray | None = None
     cone_cam: FloatArray | None = None
     drift: FloatArray = field(default_factory=NO_DRIFT.copy)
-    ball_uncertainty: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

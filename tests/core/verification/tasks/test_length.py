@@ -168,16 +168,62 @@ def test_u_of_the_ball_counts_where_faces_are_touched(
     instrument: Instrument, touching: Touching
 ) -> None:
     touches = touching(np.array([START, END]))
-    known = Conditions(instrument, LIMITS, ball_diameter=3.0)
+    conditions = Conditions(instrument, LIMITS, ball_diameter=3.0)
 
-    def uncertainty(surface: Surface, conditions: Conditions) -> float:
+    def uncertainty(surface: Surface, of_ball: float) -> float:
         beyond = 3.0 * (surface is Surface.BORE)
-        options = LengthOptions(length=LENGTH + beyond, surface=surface)
+        options = LengthOptions(
+            length=LENGTH + beyond, surface=surface, ball_uncertainty=of_ball
+        )
         found = measure_length([("here", touches)], conditions, options)
         return float(found.uncertainties[0])
 
-    by_ball = replace(known, ball_uncertainty=0.02)
-    assert uncertainty(Surface.BORE, by_ball) == pytest.approx(
-        np.hypot(uncertainty(Surface.BORE, known), 0.02)
+    assert uncertainty(Surface.BORE, 0.02) == pytest.approx(
+        np.hypot(uncertainty(Surface.BORE, 0.0), 0.02)
     )
-    assert uncertainty(Surface.GROOVE, by_ball) == uncertainty(Surface.GROOVE, known)
+    assert uncertainty(Surface.GROOVE, 0.02) == uncertainty(Surface.GROOVE, 0.0)
+
+
+def test_a_length_grows_with_the_temperature_of_its_artefact(
+    instrument: Instrument, touching: Touching
+) -> None:
+    runs = [("here", touching(np.array([START, END])))]
+    steel = LengthOptions(
+        LENGTH, temperature=28.0, temperature_uncertainty=0.5, expansion=11.5
+    )
+
+    cold = measure_length(runs, Conditions(instrument, LIMITS), OPTIONS)
+    warm = measure_length(runs, Conditions(instrument, LIMITS), steel)
+
+    growth = 11.5e-6 * LENGTH
+    assert warm.errors[0] == pytest.approx(cold.errors[0] - 8 * growth)
+    # U of the temperature, and a tenth of the coefficient over 8 K.
+    known = growth * np.hypot(0.5, 0.8)
+    assert warm.certified_uncertainties[0] == pytest.approx(known)
+    assert warm.uncertainties[0] == pytest.approx(
+        np.hypot(cold.uncertainties[0], known)
+    )
+
+
+def test_each_of_seven_places_has_its_length_and_permissible_error(
+    instrument: Instrument, touching: Touching
+) -> None:
+    middle, along = (START + END) / 2, (END - START) / 2
+    sizes = np.array([0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0])
+    runs = [
+        (str(i), touching(np.array([middle - s * along, middle + s * along]), seed=i))
+        for i, s in enumerate(sizes)
+    ]
+    options = LengthOptions(LENGTH, lengths=tuple(sizes * LENGTH))
+    limits = VerificationLimits(length=0.02, length_per_m=0.1)
+
+    found = measure_length(runs, Conditions(instrument, limits), options)
+
+    np.testing.assert_allclose(
+        [run.limit for run in found.runs], 0.02 + 1e-4 * sizes * LENGTH
+    )
+    np.testing.assert_array_less(np.abs(found.errors), found.uncertainties)
+    # The verdict is by the place with the largest error for its limit.
+    shares = np.abs(found.errors) / [run.limit for run in found.runs]
+    assert found.worst is found.runs[int(np.argmax(shares))]
+    assert found.assessment.grade is Grade.PASS

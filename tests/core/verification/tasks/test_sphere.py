@@ -45,12 +45,9 @@ def measure(instrument: Instrument, touching: Touching) -> Measure:
     ) -> Sphere:
         points = touching(points_on(radius) + moved, n_frames=2)
         conditions = Conditions(
-            instrument,
-            limits or VerificationLimits(),
-            ball_diameter=BALL,
-            ball_uncertainty=u_ball,
+            instrument, limits or VerificationLimits(), ball_diameter=BALL
         )
-        options = SphereOptions(DIAMETER, 0.001, surface)
+        options = SphereOptions(DIAMETER, 0.001, surface, u_ball)
         return measure_sphere([("", points)], conditions, options)
 
     return run
