@@ -52,6 +52,7 @@ SMALL: Mapping[str, Any] = {
         "correlation_factor": 1.0,
         "lag1_autocorrelation": 0.0,
         "led_sigma_mm": 0.0,
+        "distance_repeatability": 1e-5,
         "halves_difference_mm": ZERO,
         "halves_expanded_uncertainty_mm": ZERO,
     },

@@ -18,6 +18,7 @@ from lightpen.verification.history.pen_over_time import (
     improve_led_file,
     read_pen_over_time,
 )
+from lightpen.verification.reports.records import BY_SIMPLE_ACCEPTANCE
 from lightpen.verification.tasks.length import LENGTH, Scale
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
@@ -266,7 +267,8 @@ class PenPanel(Translated, QWidget):
             return StatusMessage(self._unread, Sign.CROSS, Tone.BAD)
         if health is not None:
             told = health.assessment
-            return StatusMessage(worded(told.reason), *GRADE_MARKS[told.grade])
+            words = f"{worded(told.reason)} {worded(BY_SIMPLE_ACCEPTANCE)}"
+            return StatusMessage(words, *GRADE_MARKS[told.grade])
         if self._shown is None and self._reading is None:
             return StatusMessage()
         if self._shown is None:

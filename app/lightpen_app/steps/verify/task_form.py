@@ -20,6 +20,8 @@ from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.translated import Translated
 
+MOST_BESIDE = 4  # fields beside each other
+
 
 class NumberOptionField(NumberField):
     """A number among the options of a task."""
@@ -105,12 +107,14 @@ class TaskForm(Translated, QWidget):
         # Layout
         rows = vertical_layout(self)
         horizontal_layout(rows, self._is_chosen, 1, *beside)
-        layout = horizontal_layout(rows, spacing=2 * GRID)
-        for label, field in zip(self._labels, self._fields.values(), strict=True):
-            label.setWordWrap(False)
-            label.setBuddy(field)
-            vertical_layout(layout, label, field, spacing=GRID // 2)
-        layout.addStretch(1)
+        pairs = list(zip(self._labels, self._fields.values(), strict=True))
+        for first in range(0, len(pairs), MOST_BESIDE):
+            layout = horizontal_layout(rows, spacing=2 * GRID)
+            for label, field in pairs[first : first + MOST_BESIDE]:
+                label.setWordWrap(False)
+                label.setBuddy(field)
+                vertical_layout(layout, label, field, spacing=GRID // 2)
+            layout.addStretch(1)
 
         # Connections
         self._is_chosen.toggled.connect(self._on_changed)

@@ -186,10 +186,9 @@ def _growth(
         return None
     if np.linalg.norm(one[:2] - other[:2]) > SAME_PLACE:
         return None
-    deviations = [
-        c.calibration.uncertainty.distance_repeatability for c in (first, now)
-    ]
-    spread = COVERAGE_FACTOR * float(np.hypot(*deviations))
+    own, of_first = (c.calibration.uncertainty for c in (now, first))
+    deviation = np.hypot(own.distance_repeatability, of_first.distance_repeatability)
+    spread = COVERAGE_FACTOR * float(deviation)
     return Growth(float(np.log(one[2] / other[2])), spread)
 
 
