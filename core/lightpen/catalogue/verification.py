@@ -225,7 +225,6 @@ MESSAGES = {
     "repeatability.rode-with-pen": "The tip scatters by {of_tip:.4f} mm over the calibrations, a fixed point probed with it by only {of_point:.4f} mm. A calibration error would shift both alike, so something moved with the pen between the calibrations. Look for a tip that is not screwed in firmly, a loose or knocked LED, or LEDs that were measured too coarsely.",
     "repeatability.point-moved": "A fixed point scatters by {of_point:.4f} mm, the tip by only {of_tip:.4f} mm over the calibrations. The tip is stable: the cone or the camera moved between the points, or the tip did not rest in the cone.",
     "repeatability.good": "The tip repeats within {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm.",
-    "repeatability.reference-alone": "--reference is compared with a tolerance only. Add --tolerance MM.",
     "repeatability.too-few": "{n_tips} calibration does not show repeatability; give at least two, usually ten.",
     "repeatability.few": "{n_tips} calibrations do not suffice for a verdict on repeatability: {needed} are needed, and ten for control limits.",
     "repeatability.repeat-more": "Next: repeat the calibration, with the tip seated anew each time.",

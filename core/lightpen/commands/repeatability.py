@@ -112,7 +112,7 @@ def _repeatability(options: argparse.Namespace) -> int:
     require_other_file(options.json, *inputs)
     require_other_file(options.chart, *inputs)
     if options.reference is not None and options.tolerance is None:
-        raise UsageError("repeatability.reference-alone")
+        raise UsageError("cli.reference-alone")
     tips, first = _tips(options)
     for one, other in combinations(tips, 2):
         if np.array_equal(one.tip_pen, other.tip_pen):

@@ -145,11 +145,13 @@ class MonteCarlo:
         """What the largest difference from the linear budget means."""
         relative = self.linear / self.deviation - 1
         axis = int(np.argmax(np.abs(relative)))
-        percent, own = 100 * float(relative[axis]), 100 / np.sqrt(2 * len(self.errors))
-        code = "monte-carlo.confirms"
-        if abs(self.difference[axis]) > BY_CHANCE and abs(percent) > IMMATERIAL:
-            code = "monte-carlo.less" if percent > 0 else "monte-carlo.more"
-        return message(code, percent=abs(percent), axis="xyz"[axis], own=float(own))
+        percent, name = 100 * abs(float(relative[axis])), "xyz"[axis]
+        own = 100 / float(np.sqrt(2 * len(self.errors)))
+        if abs(self.difference[axis]) <= BY_CHANCE or percent <= IMMATERIAL:
+            return message("monte-carlo.confirms", percent=percent, axis=name, own=own)
+        if relative[axis] > 0:
+            return message("monte-carlo.less", percent=percent, axis=name, own=own)
+        return message("monte-carlo.more", percent=percent, axis=name, own=own)
 
 
 def trials_of(calibration: Calibration, seed: int = 0) -> Trials:

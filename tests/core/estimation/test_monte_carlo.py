@@ -10,7 +10,12 @@ import pytest
 
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.monte_carlo import run_monte_carlo, run_trial, trials_of
+from lightpen.estimation.monte_carlo import (
+    MonteCarlo,
+    run_monte_carlo,
+    run_trial,
+    trials_of,
+)
 from lightpen.formats.observation_files import Centers
 from lightpen.simulator.swings import (
     paper_camera,
@@ -106,3 +111,26 @@ def test_trials_of_a_seat_that_jitters_differ_by_it(calibration: Calibration) ->
     assert len(differences) >= 3
     # 25 images with 0.02 mm of jitter move the tip by some hundredths.
     assert 0.003 < np.std(differences) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("n_trials", "ratio", "code"),
+    [
+        (400, 1.05, "monte-carlo.confirms"),  # is immaterial
+        (20, 1.3, "monte-carlo.confirms"),  # is chance
+        (400, 1.3, "monte-carlo.less"),
+        (400, 0.7, "monte-carlo.more"),
+    ],
+)
+def test_a_difference_from_the_budget_is_explained_if_it_is_real_and_matters(
+    n_trials: int, ratio: float, code: str
+) -> None:
+    signs = np.where(np.arange(n_trials) % 2, 1.0, -1.0)
+    errors = 0.001 * np.repeat(signs[:, None], 3, axis=1)
+    linear = np.array([0.001, ratio * 0.001, 0.001])
+
+    told = MonteCarlo(errors, linear, 0).explanation
+
+    assert told.code == code
+    assert told.values["percent"] == pytest.approx(100 * abs(ratio - 1))
+    assert told.values["axis"] == "y"

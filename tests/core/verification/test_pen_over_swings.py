@@ -14,6 +14,7 @@ from tests.simulated_sessions import recorded
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.reports.calibration_record import ContradictionRecord
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.json_records import FileRecord
 from lightpen.formats.observation_files import Centers
@@ -96,6 +97,35 @@ def test_a_warm_pen_is_told_from_a_knocked_one(swing: Swing) -> None:
     assert found.growth is not None
     assert found.growth.relative == pytest.approx(WARMTH, abs=found.growth.uncertainty)
     assert found.assessment.reason.code == "pen-health.grown"
+
+
+def test_a_growth_within_its_uncertainty_is_not_called_one(swing: Swing) -> None:
+    pen = true_pen()
+    warm = swing(pen, 3, growth=WARMTH)
+    unsure = structs.replace(warm.calibration.uncertainty, distance_repeatability=1e-4)
+    record = structs.replace(warm.calibration, uncertainty=unsure)
+    swings = [swing(pen, 1), replace(warm, calibration=record)]
+
+    found = examine_pen(swings, paper_camera(), PEN_FILE.leds)
+
+    assert found.growth is not None
+    assert found.growth.uncertainty == pytest.approx(2e-4, rel=0.05)
+    assert found.assessment.grade is Grade.PASS
+
+
+def test_a_swing_that_contradicts_its_files_tells_no_growth(swing: Swing) -> None:
+    pen = true_pen()
+    sound, warm = swing(pen, 1), swing(pen, 2, growth=WARMTH)
+    contradiction = ContradictionRecord("focal length", "px", *[1.0] * 5)
+    adjusted = structs.replace(
+        sound.calibration.adjusted, contradictions=(contradiction,)
+    )
+    record = structs.replace(sound.calibration, adjusted=adjusted)
+    swings = [replace(sound, calibration=record), warm]
+
+    found = examine_pen(swings, paper_camera(), PEN_FILE.leds)
+
+    assert found.growth is None
 
 
 def test_a_sound_pen_is_left_alone(swing: Swing) -> None:

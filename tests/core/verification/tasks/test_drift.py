@@ -8,6 +8,7 @@ import pytest
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.swings import PAPER_CONE
 from lightpen.verification.tasks.drift import measure_drift
@@ -87,3 +88,18 @@ def test_along_the_view_u_may_be_three_times_the_limit(
         limits = VerificationLimits(drift=limit)
         found = measure_drift(visits, Conditions(instrument, limits))
         assert found.assessment.grade is grade
+
+
+def test_a_move_that_a_guard_band_leaves_open_is_checked(
+    instrument: Instrument, touching: Touching
+) -> None:
+    places, moved = np.tile(PAPER_CONE, (4, 1)), np.array([0.019, 0.0, 0.0])
+    visits = [
+        ("before", touching(places, seed=1, n_frames=5)),
+        ("after", touching(places + moved, seed=2, n_frames=5)),
+    ]
+    limits = VerificationLimits(rule=DecisionRule.GUARD_BAND)
+
+    found = measure_drift(visits, Conditions(instrument, limits))
+
+    assert found.assessment.grade is Grade.CHECK

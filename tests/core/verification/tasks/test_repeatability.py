@@ -1,5 +1,6 @@
 """Tests of `lightpen.verification.tasks.repeatability` and its control chart."""
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from xml.etree import ElementTree
@@ -9,6 +10,7 @@ import pytest
 
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
 from lightpen.verification.reports.charts import write_chart
@@ -151,6 +153,21 @@ def test_capability_is_that_of_a_type_1_study() -> None:
     assert study.cg[0] == pytest.approx(0.2 * 0.1 / (6 * s))
     assert study.cgk[0] == pytest.approx((0.1 * 0.1 - bias) / (3 * s))
     assert study.is_capable
+
+
+def test_by_a_guard_band_few_calibrations_near_the_limit_prove_nothing() -> None:
+    rng = np.random.default_rng(3)
+    draws = rng.standard_normal((10, 3))
+    values = PAPER_TIP + 0.008 * draws / draws.std(axis=0, ddof=1)
+    rules = (
+        (DecisionRule.SIMPLE, Grade.PASS),
+        (DecisionRule.GUARD_BAND, Grade.CHECK),
+        (DecisionRule.RISK, Grade.CHECK),
+    )
+
+    for rule, grade in rules:
+        found = measure_repeatability(estimates(values), replace(LIMITS, rule=rule))
+        assert found.assessment.grade is grade
 
 
 def test_what_is_not_capable_never_passes() -> None:
