@@ -116,7 +116,7 @@ def test_a_growth_within_its_uncertainty_is_not_called_one(swing: Swing) -> None
 def test_a_swing_that_contradicts_its_files_tells_no_growth(swing: Swing) -> None:
     pen = true_pen()
     sound, warm = swing(pen, 1), swing(pen, 2, growth=WARMTH)
-    contradiction = ContradictionRecord("focal length", "px", *[1.0] * 5)
+    contradiction = ContradictionRecord("focal length", "px", 1.0, 0.1, 2.0, 0.1, 9.0)
     adjusted = structs.replace(
         sound.calibration.adjusted, contradictions=(contradiction,)
     )
