@@ -310,10 +310,10 @@ class HistoryContent(Translated, QWidget):
             return
         folder, logbook = self._folder, self._logbook
         operator = self._chosen.preparation.names.operator
-        limit = self._selection.limits().repeatability
+        limits = self._selection.limits()
 
         def keep(_: Report) -> Path:
-            file = keep_study(folder, found, entries, limit, operator)
+            file = keep_study(folder, found, entries, limits, operator)
             logbook.enter_owed()
             return file
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from lightpen.archive.entries import StoredEntry
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import file_entry
+from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.model.origin import Origin
 from lightpen.record.folder.verifications import attributed
 from lightpen.verification.reports.records import (
@@ -21,7 +22,7 @@ def keep_study(
     data: Path,
     found: Repeatability,
     entries: Sequence[StoredEntry],
-    limit: float,
+    limits: VerificationLimits,
     operator: str,
 ) -> Path:
     """Keep a study as a verification of a data folder, and return its file.
@@ -30,8 +31,6 @@ def keep_study(
     ----------
     entries : sequence of StoredEntry
         Of the tips.
-    limit : float
-        Of the standard deviation of a coordinate, mm.
 
     Raises
     ------
@@ -44,8 +43,9 @@ def keep_study(
         "repeatability",
         repeatability_entries(found),
         found.assessment,
-        {"repeatability": limit},
+        {"repeatability": limits.repeatability},
         {"files": [file_entry(InputFile(Path(r.place), r.sha256)) for r in results]},
+        rule_in_words(limits),
     )
     is_simulated = any(each.is_simulated for each in events)
     origin = Origin.SIMULATED if is_simulated else events[-1].origin
