@@ -45,8 +45,7 @@ def main() -> int:
         )
         settings.set_last_station(NAMES.station)
         wizard = Wizard(application, make_pages, settings, Path(folder))
-        wizard.window.show()
-        wizard.workbench.start()
+        wizard.show()
         _until(
             lambda: not wizard.workbench.selection.preparation.camera_missing_inputs()
         )

@@ -55,8 +55,7 @@ def main() -> int:
         wizard = Wizard(
             application, make_pages, _settings(Path(folder), scene), Path(folder)
         )
-        wizard.window.show()
-        wizard.workbench.start()
+        wizard.show()
         _until(lambda: not wizard.workbench.selection.preparation.missing_inputs())
         while wizard.window.page().key != "swing":
             wizard.window.press_main()

@@ -150,8 +150,7 @@ def main() -> int:
         settings.set_preferences(Preferences(muted=True))
         wizard = Wizard(application, make_pages, settings, Path(folder))
         wizard.window.resize(1920, 1080)
-        wizard.window.show()
-        wizard.workbench.start()
+        wizard.show()
         workbench = wizard.workbench
         workbench.selection.set_preparation(
             replace(workbench.selection.preparation, names=NAMES, limits=LIMITS)

@@ -1,12 +1,13 @@
 """Start the wizard, print the seconds from the start of the process, and end.
 
-The window counts as usable when it is painted, its timers run, and it has answered a
-key.
+The window counts as usable when its first page is painted, its timers run, and it has
+answered the Enter key. The second figure is the time of a processor until then.
 """
 
 import os
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -20,29 +21,37 @@ def main() -> int:
     from PySide6.QtCore import QEvent, QObject, Qt, QTimer
     from PySide6.QtGui import QKeyEvent
     from PySide6.QtWidgets import QApplication
+    from typing_extensions import override
 
     from lightpen_app.application import Wizard, make_application
     from lightpen_app.wizard_pages import make_pages
     from lightpen_app.work.settings import Settings
 
+    class Paint(QObject):
+        """Answers a key once the first page is painted."""
+
+        @override
+        def eventFilter(self, page: QObject, event: QEvent) -> bool:
+            if event.type() == QEvent.Type.Paint:
+                page.removeEventFilter(self)
+                QTimer.singleShot(0, self.answer)
+            return False
+
+        def answer(self) -> None:
+            for kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+                none = Qt.KeyboardModifier.NoModifier
+                event = QKeyEvent(kind, Qt.Key.Key_Return, none)
+                QApplication.sendEvent(wizard.window, event)
+            print(_age_s(), time.process_time())
+            wizard.window.close()
+
     application = make_application(sys.argv[:1])
     with tempfile.TemporaryDirectory() as folder:
         settings = Settings(Path(folder) / "lightpen.json")
         wizard = Wizard(application, make_pages, settings, Path(folder))
-        wizard.window.show()
-        wizard.workbench.start()
-
-        def answer(window: QObject) -> None:
-            for kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
-                none = Qt.KeyboardModifier.NoModifier
-                QApplication.sendEvent(window, QKeyEvent(kind, Qt.Key.Key_Tab, none))
-            print(_age_s())
-            wizard.window.close()
-
-        def settle() -> None:
-            QTimer.singleShot(0, lambda: answer(wizard.window))
-
-        QTimer.singleShot(0, settle)
+        paint = Paint()
+        wizard.window.page().installEventFilter(paint)
+        wizard.show()
         application.exec()
     return 0
 

@@ -4,7 +4,7 @@ import gc
 import logging
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from PySide6.QtCore import (
     QObject,
     QTimer,
     QtMsgType,
+    Signal,
     qInstallMessageHandler,
 )
 from PySide6.QtGui import QGuiApplication
@@ -56,7 +57,7 @@ SETTLED_MS = 5000  # from the start until all is made and loaded
 
 UNSEEN_FRAME_RATE = 8.0  # 1/s; of a demo that nobody watches, enough to swing by
 
-MakePages: TypeAlias = Callable[[Workbench, Sounds], Sequence[Page]]
+MakePages: TypeAlias = Callable[[Workbench, Sounds], Iterable[Page]]
 
 _logger = logging.getLogger(__name__)
 
@@ -72,7 +73,14 @@ class Wizard(QObject):
         Data folder.
     around : SourceEnvironment, optional
         Environment of simulated and recorded sources.
+
+    Signals
+    -------
+    started()
+        The pages are made, and the workbench has started.
     """
+
+    started = Signal()
 
     def __init__(
         self,
@@ -93,9 +101,10 @@ class Wizard(QObject):
             find_sounds(folder / "sounds"), muted=self._preferences.muted
         )
         self.workbench = Workbench(settings, folder, around, self)
-        pages = make_pages(self.workbench, self._sounds)
+        pages = iter(make_pages(self.workbench, self._sounds))
         self.window = MainWindow(
-            pages, settings, self._preferences, self.workbench.notifications
+            *((next(pages),), settings, self._preferences),
+            *(self.workbench.notifications, pages),
         )
         self.window.setMinimumSize(LEAST_SIZE)
         # Last: under a style sheet Qt styles all of a widget whenever it gets a parent,
@@ -108,8 +117,7 @@ class Wizard(QObject):
         # Connections
         self.window.closing.connect(self._close_discovery)
         self.window.closing.connect(self.workbench.shut_down)
-        for page in pages:
-            page.discovery_requested.connect(self._show_discovery)
+        self.window.discovery_requested.connect(self._show_discovery)
         self.window.attention_changed.connect(self.workbench.live.set_watched)
         self.workbench.folder_watch.counted.connect(self._on_others_counted)
         self.workbench.folder_watch.doubted.connect(self._on_folder_doubted)
@@ -123,6 +131,15 @@ class Wizard(QObject):
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
 
         self._stream()
+
+    def show(self) -> None:
+        """Show the window; once it is painted, start the workbench."""
+        self.window.completed.connect(self._start)
+        self.window.show()
+
+    def _start(self) -> None:
+        self.workbench.start()
+        self.started.emit()
 
     def _show_discovery(self) -> None:
         """Show the window in which pen and camera are found without files."""
@@ -234,7 +251,7 @@ def run(make_pages: MakePages, swing: Path | None = None) -> int:
         QTimer.singleShot(SETTLED_MS, log_versions.start)
         if swing is not None:
             open_swing = partial(wizard.workbench.run.open_requested.emit, swing)
-            QTimer.singleShot(0, open_swing)
+            wizard.started.connect(open_swing)
         status = _shown(application, wizard, signals)
     return ended(wizard, status)
 
@@ -272,7 +289,7 @@ def run_demo(make_pages: MakePages) -> int:
             demo.told.connect(partial(print, flush=True))
             demo.ended.connect(partial(_print_tip, wizard.workbench.run))
             demo.ended.connect(wizard.window.close_unasked)
-        QTimer.singleShot(0, demo.start)
+        wizard.started.connect(demo.start)
         status = _shown(application, wizard, signals)
         if not is_seen and not demo.is_accepted:
             status = status or 1
@@ -290,8 +307,7 @@ def has_display() -> bool:
 def _shown(application: QApplication, wizard: Wizard, signals: EndSignals) -> int:
     signals.came.connect(partial(_end, application, wizard))
     wizard.crash_hook.install()
-    wizard.window.show()
-    wizard.workbench.start()
+    wizard.show()
     QTimer.singleShot(SETTLED_MS, gc.freeze)  # no search goes through the window again
     try:
         return application.exec()

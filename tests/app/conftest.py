@@ -269,9 +269,9 @@ class Walker:
         self.window = wizard.window
         self.n_inputs = 0
         self.window.resize(1280, 800)
-        self.window.show()
+        with qtbot.waitSignal(wizard.started):
+            wizard.show()
         self.take_window()
-        self.workbench.start()
 
     def take_window(self) -> None:
         """Turn to the window, as its user does who has closed another one."""

@@ -42,6 +42,29 @@ sys.exit(run(pages))
 """
 
 
+BEFORE_THE_PAINT = """
+import sys
+from PySide6.QtWidgets import QApplication
+from lightpen_app.application import run
+from lightpen_app.wizard_pages import make_pages
+
+def pages(workbench, sounds):
+    made = make_pages(workbench, sounds)
+    yield next(made)  # the others are wanted once the window is painted
+    print(*sorted(sys.modules))
+    print(any(w.isVisible() for w in QApplication.topLevelWidgets()))
+    QApplication.quit()
+
+sys.exit(run(pages))
+"""
+LATER = {
+    *("pyqtgraph", "scipy", "sqlalchemy", "asyncio", "harvesters", "pypylon"),
+    *("lightpen_app.demo", "lightpen_app.discovery.discovery_window"),
+    *(f"lightpen_app.steps.{step}.page" for step in ("camera", "leds", "swing")),
+    *(f"lightpen_app.steps.{step}.page" for step in ("review", "verify", "history")),
+}
+
+
 class Only(Page):
     """The least that a page can be."""
 
@@ -149,6 +172,31 @@ def test_a_first_start_needs_no_folder(
     wizard.setParent(None)
 
 
+def printed_by(program: str, home: Path, **variables: str) -> str:
+    """Return what a Python program prints whose user has nothing in the home yet."""
+    homes = ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "HOME", "APPDATA", "LOCALAPPDATA")
+    outcome = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=home,
+        env=os.environ | dict.fromkeys(homes, str(home)) | variables,
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
+    assert outcome.returncode == 0, outcome.stderr
+    return outcome.stdout
+
+
+@pytest.mark.slow
+def test_nothing_that_only_later_steps_need_is_imported_before_the_first_paint(
+    tmp_path: Path,
+) -> None:
+    modules, is_shown = printed_by(BEFORE_THE_PAINT, tmp_path).splitlines()
+
+    assert is_shown == "True"
+    assert LATER.isdisjoint(modules.split())
+
+
 @pytest.mark.slow
 def test_on_a_screen_of_twice_the_scale_the_main_button_can_be_seen(
     tmp_path: Path,
@@ -156,23 +204,14 @@ def test_on_a_screen_of_twice_the_scale_the_main_button_can_be_seen(
     names = ("name", "x", "y", "width", "height", "logicalDpi", "dpr")
     screen = dict(zip(names, ("screen", 0, 0, 1920, 1080, 96, 1), strict=True))
     (tmp_path / "screens.json").write_text(json.dumps({"screens": [screen]}))
-    homes = ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "HOME", "APPDATA", "LOCALAPPDATA")
-    outcome = subprocess.run(
-        [sys.executable, "-c", OPENING],
-        cwd=tmp_path,
-        env=os.environ
-        | dict.fromkeys(homes, str(tmp_path))
-        | {
-            "QT_QPA_PLATFORM": "offscreen:configfile=screens.json",
-            "QT_SCALE_FACTOR": "2",
-        },
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
+    printed = printed_by(
+        OPENING,
+        tmp_path,
+        QT_QPA_PLATFORM="offscreen:configfile=screens.json",
+        QT_SCALE_FACTOR="2",
     )
 
-    assert outcome.returncode == 0, outcome.stderr
-    width, height, right, bottom = map(int, outcome.stdout.split())
+    width, height, right, bottom = map(int, printed.split())
     assert width >= LEAST_SIZE.width()
     assert height >= LEAST_SIZE.height()
     assert right <= 1920 // 2

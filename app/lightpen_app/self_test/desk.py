@@ -240,9 +240,8 @@ class Desk:
         wizard.workbench.notifications.raised.connect(
             lambda text, _: faults.append(text)
         )
-        wizard.window.show()
-        wizard.workbench.start()
-        QTimer.singleShot(0, walk.start)
+        wizard.show()
+        wizard.started.connect(walk.start)
         try:
             self._application.exec()
         finally:

@@ -1,10 +1,10 @@
 """The window of the wizard: steps at the left, one page, one main button."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from PySide6.QtCore import QEvent, QPoint, QSize, Qt, Signal
-from PySide6.QtGui import QAction, QCloseEvent, QIcon, QKeyEvent
+from PySide6.QtCore import QEvent, QPoint, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QAction, QCloseEvent, QIcon, QKeyEvent, QPaintEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
@@ -26,9 +26,9 @@ from lightpen_app.shell.help_window import HelpWindow
 from lightpen_app.shell.options_menu import OptionsMenu
 from lightpen_app.shell.page_area import PageArea
 from lightpen_app.shell.sidebar import Sidebar, Subject
-from lightpen_app.shell.step_list import Status, Step, list_steps
+from lightpen_app.shell.step_list import Status, Step, StepButton, list_steps
 from lightpen_app.shell.stream_dialog import StreamDialog, StreamState
-from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.page import MainAction, Page, step_titles
 from lightpen_app.widgets.fitted_window import FRAME, fit_screen
 from lightpen_app.widgets.keys import ENTER_KEYS, PAGE_KEYS
 from lightpen_app.widgets.operator_view import OperatorView
@@ -39,6 +39,7 @@ from lightpen_app.work.settings import Preferences, Settings, data_folder
 
 LEAST_SIZE = QSize(104 * GRID, 60 * GRID)  # for the wizard; fits 1280 x 800 at 150 %
 FIRST_SIZE = QSize(160 * GRID, 100 * GRID)
+PAINTED_MS = 50  # from the first paint, which comes in parts, to what takes time
 OPTIONS = "options"  # cause of a notification
 KEYS_THAT_LEAD_ON = (*ENTER_KEYS, *PAGE_KEYS)
 
@@ -60,9 +61,15 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         Current preferences.
     notifications : Notifications
         Notifications; those of a page, by its key, are removed with the page.
+    later : iterator of Page, optional
+        More pages, made one by one once the window is painted.
 
     Signals
     -------
+    completed()
+        The window was painted, and all pages are made.
+    discovery_requested()
+        As of `Page`.
     preferences_changed(Preferences)
         The user chose otherwise.
     attention_changed(bool)
@@ -74,6 +81,8 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     # Less is what a screen of 1920 x 1080 drawn at 200 % has.
     narrow_below, low_below = 150 * GRID, 80 * GRID  # px
+    completed = Signal()
+    discovery_requested = Signal()
     preferences_changed = Signal(object)
     attention_changed = Signal(bool)
     closing = Signal()
@@ -84,6 +93,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         settings: Settings,
         preferences: Preferences,
         notifications: Notifications,
+        later: Iterator[Page] | None = None,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -91,7 +101,10 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             raise ValueError("`pages` must hold at least one page.")
         self.setObjectName("main")
         self.setWindowIcon(QIcon(str(RESOURCES / "icons" / "lightpen.svg")))
-        self._pages = tuple(pages)
+        self._pages: list[Page] = []
+        self._questions: list[list[AskingBar]] = []
+        self._later = later
+        self._is_painted = False
         self._settings = settings
         self._notifications = notifications
         self._now = 0
@@ -99,7 +112,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
         # Widgets: the order of making them is the order of the Tab key
         self._sidebar = Sidebar()
-        self._area = PageArea(self._pages)
+        self._area = PageArea(pages[0])
         self._notice = self._area.notice()
         self._action_bar = ActionBar()
         self._operator_view = OperatorView()
@@ -133,9 +146,8 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         notifications.withdrawn.connect(self._notice.drop)
         notifications.status_changed.connect(self._action_bar.set_status)
         self._sidebar.subject_told.connect(self._operator_view.set_subject)
-        self._questions = [page.findChildren(AskingBar) for page in self._pages]
-        for page, questions in zip(self._pages, self._questions, strict=True):
-            self._connect_page(page, questions)
+        for page in pages:
+            self._add_page(page)
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         application.focusChanged.connect(self._on_focus_changed)
@@ -152,8 +164,10 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._focus_page()
 
     def pages(self) -> tuple[Page, ...]:
-        """Return the pages in the order of the steps."""
-        return self._pages
+        """Return the pages in the order of the steps; make what is not made yet."""
+        while self._make_page():
+            pass
+        return tuple(self._pages)
 
     def page(self) -> Page:
         """Return the page that is shown."""
@@ -163,9 +177,9 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         """Show a page, or say why it is locked."""
         if index == self._now:
             return
-        why_closed = self._pages[index].why_closed()
+        asked = self.pages()[index]
+        why_closed = asked.why_closed()
         if why_closed:
-            asked = self._pages[index]
             self._action_bar.set_status(
                 why_closed, lambda: asked.why_closed() == why_closed
             )
@@ -183,7 +197,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     def show_step(self, key: str) -> None:
         """Show the page of a step by its key, or say why it is locked."""
-        self.go_to([page.key for page in self._pages].index(key))
+        self.go_to([page.key for page in self.pages()].index(key))
 
     def go_back(self) -> None:
         """Show the page before this one."""
@@ -192,7 +206,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     def advance(self) -> None:
         """Show the page after this one."""
-        if self._now + 1 < len(self._pages):
+        if self._now + 1 < len(self.pages()):
             self.go_to(self._now + 1)
 
     def press_main(self) -> None:
@@ -284,6 +298,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         if self._asks and questions and not self._confirmed("\n\n".join(questions)):
             event.ignore()
             return
+        self._later = None
         self._settings.save_geometry(self)
         self.hide()  # what is under way may take its time to end
         self._operator_view.close()
@@ -304,7 +319,51 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             self._refresh()
             self._help_window.set_language(self._options.value().language)
 
-    def _connect_page(self, page: Page, questions: Sequence[AskingBar]) -> None:
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if not self._is_painted:
+            self._is_painted = True
+            QTimer.singleShot(PAINTED_MS, self._make_more)
+
+    def _make_more(self) -> None:
+        """Make the pages while the window answers between them."""
+        if self._make_page():
+            QTimer.singleShot(0, self._make_more)
+        elif self.isVisible():
+            self.completed.emit()
+
+    def _make_page(self) -> bool:
+        """Make the next page, and return whether there was one."""
+        if self._later is None:
+            return False
+        page = next(self._later, None)
+        if page is None:
+            self._later = None
+            self._end_tab_order()
+        else:
+            self._add_page(page)
+        self._refresh()
+        return page is not None
+
+    def _end_tab_order(self) -> None:
+        """Have the Tab key reach the main button after the pages, then the steps."""
+        last: QWidget = self.previousInFocusChain()
+        while last.focusPolicy() is Qt.FocusPolicy.NoFocus:
+            last = last.previousInFocusChain()
+        buttons = self._action_bar.findChildren(QAbstractButton)
+        for each in (*buttons, *self._sidebar.findChildren(StepButton)):
+            self.setTabOrder(last, each)
+            last = each
+
+    def _add_page(self, page: Page) -> None:
+        self._pages.append(page)
+        if len(self._pages) > 1:
+            self._area.add_page(page)
+        questions = page.findChildren(AskingBar)
+        self._questions.append(questions)
+
+        # Connections
         page.changed.connect(self._refresh)
         for question in questions:
             question.asking_changed.connect(self._refresh)
@@ -312,6 +371,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         page.step_requested.connect(self.show_step)
         page.operator_value_changed.connect(self._operator_view.set_value)
         page.data_folder_requested.connect(self._on_data_folder_asked)
+        page.discovery_requested.connect(self.discovery_requested)
 
     def _make_actions(self) -> None:
         """Create the actions with application-wide keys."""
@@ -373,6 +433,11 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             )
             for each in self._pages
         ]
+        if self._later is not None:
+            titles = list(step_titles().values())[len(statuses) :]
+            statuses += [
+                Status(title, complete=False, why_closed="") for title in titles
+            ]
         self._sidebar.set_steps(list_steps(statuses, self._now))
         self._area.set_heading(page.heading(), page.lead(), page.lead_tone())
         self._action_bar.set_action(self._main_action(), can_go_back=self._now > 0)

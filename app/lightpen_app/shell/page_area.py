@@ -1,7 +1,5 @@
 """The page area: notice, title, lead and page."""
 
-from collections.abc import Sequence
-
 from PySide6.QtCore import QCoreApplication, Qt, Signal
 from PySide6.QtWidgets import QBoxLayout, QFrame, QSizePolicy, QStackedWidget, QWidget
 
@@ -107,14 +105,13 @@ class PageArea(QFrame):
 
     Parameters
     ----------
-    pages : sequence of QWidget
-        Pages, at least one; the first is shown.
+    page : QWidget
+        Its first page, which is shown.
     """
 
-    def __init__(self, pages: Sequence[QWidget], parent: QWidget | None = None) -> None:
+    def __init__(self, page: QWidget, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("page_area")
-        self._pages = tuple(pages)
 
         # Widgets: the order of making them is the order of the Tab key
         self._notice = NoticeBar()
@@ -123,8 +120,7 @@ class PageArea(QFrame):
         self._lead = text_label(TextSize.BODY, Tone.QUIET)
         self._stack = QStackedWidget()
         self._stack.setMinimumSize(1, 1)  # the pages ask for none: they scroll
-        for page in self._pages:
-            self._stack.addWidget(page)
+        self._stack.addWidget(page)
 
         # Layout
         self._layout = layout = vertical_layout(self, self._notice, margins=None)
@@ -135,8 +131,6 @@ class PageArea(QFrame):
         layout.addSpacing(GRID)
         layout.addWidget(self._stack, 1)
 
-        self.show_page(self._pages[0])
-
     def notice(self) -> NoticeBar:
         """Return the bar of the notice."""
         return self._notice
@@ -145,12 +139,17 @@ class PageArea(QFrame):
         """Return the texts about the page."""
         return self._notice.text(), self._title.text(), self._lead.text()
 
+    def add_page(self, page: QWidget) -> None:
+        """Keep a page that is shown later."""
+        _let_ask(page, False)
+        self._stack.addWidget(page)
+
     def show_page(self, page: QWidget) -> None:
         """Show a page; only that one may ask for room."""
-        for each in self._pages:
-            policy = QSizePolicy.Policy
-            wish = policy.Preferred if each is page else policy.Ignored
-            each.setSizePolicy(wish, wish)
+        before = self._stack.currentWidget()
+        if before is not None:
+            _let_ask(before, False)
+        _let_ask(page, True)
         self._stack.setCurrentWidget(page)
 
     def set_heading(self, title: str, lead: str, tone: Tone = Tone.QUIET) -> None:
@@ -171,3 +170,10 @@ class PageArea(QFrame):
             self._layout.setContentsMargins(side, 2 * GRID, side, 3 * GRID)
             self._heading.setDirection(QBoxLayout.Direction.TopToBottom)
             self._heading.setSpacing(GRID)
+
+
+def _let_ask(page: QWidget, asks: bool) -> None:
+    """Have a page ask for room, or not."""
+    policy = QSizePolicy.Policy
+    wish = policy.Preferred if asks else policy.Ignored
+    page.setSizePolicy(wish, wish)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QCoreApplication, Signal
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
@@ -28,6 +28,24 @@ class MainAction:
     text: str
     why_not: str = ""
     at_screen: bool = False
+
+
+def step_titles() -> dict[str, str]:
+    """Return the names of the steps by their keys, one to three words each, in order.
+
+    They are shown before the pages are made.
+    """
+    translate = QCoreApplication.translate
+    return {
+        "start": translate("StartPage", "Start"),
+        "camera": translate("CameraPage", "Camera"),
+        "leds": translate("LedsPage", "LEDs"),
+        "swing": translate("SwingPage", "Swing"),
+        "review": translate("ReviewPage", "Review"),
+        "verify": translate("VerifyPage", "Verify"),
+        "measure": translate("MeasurePage", "Measure"),
+        "history": translate("HistoryPage", "History"),
+    }
 
 
 class Page(Translated, QWidget):
@@ -72,8 +90,8 @@ class Page(Translated, QWidget):
     discovery_requested = Signal()
 
     def title(self) -> str:
-        """Return the name of the step, one to three words."""
-        raise NotImplementedError
+        """Return the name of the step."""
+        return step_titles()[self.key]
 
     def heading(self) -> str:
         """Return the heading of the page; by default, the name of the step."""

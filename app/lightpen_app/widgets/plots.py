@@ -46,6 +46,7 @@ LEFT_WIDTH = 7 * GRID  # px, the same for all traces so that they line up
 TITLE_MARGIN = LEFT_WIDTH + 2 * GRID  # px that a title leaves free
 LEAST_TITLE = 9  # px
 LABEL_ROOM = 3.0  # times a limit, for the words above it where y is logarithmic
+SIDE = 0.045  # of many numbered items, beside the first and the last
 N_LEAST = 10  # a trace has room for whole multiples, so that its numbers are whole
 MARGIN = 0.06  # of the range, left free around the data
 TONES = (Tone.ACTIVE, Tone.WARN, Tone.GOOD, Tone.BAD, Tone.PLAIN)
@@ -253,8 +254,10 @@ class Plot(QWidget):
         )
 
     def _fit_numbered(self, n: int, y: FloatArray) -> None:
-        """Fit the range to items numbered 1 to n."""
-        self._fit(np.array([0.5, max(n, N_LEAST) + 0.5]), y)
+        """Fit the range to items numbered 1 to n, and to their marks."""
+        n = max(n, N_LEAST)
+        side = max(0.5, SIDE * n)
+        self._fit(np.array([1 - side, n + side]), y)
 
 
 def title_with_names(title: str, names: Sequence[str], colors: Colors) -> str:

@@ -45,13 +45,16 @@ class Resumable:
     state: SwingState
 
     @property
-    def source_choice(self) -> SourceChoice | None:
-        """Where its images came from; None where this version does not know that."""
-        settings = self.record.header.settings
-        kind, place = settings.get("source"), settings.get("source_place")
-        if not isinstance(kind, str) or source_named(kind) is None:
-            return None
-        return SourceChoice(kind, place if isinstance(place, str) else "")
+    def source_choices(self) -> tuple[SourceChoice, ...]:
+        """The source of each camera; none where this version does not know one."""
+        settings, choices = self.record.header.settings, []
+        for which in ("", "second_")[: self.setup.rig.n_cameras]:
+            kind = settings.get(f"{which}source")
+            place = settings.get(f"{which}source_place")
+            if not isinstance(kind, str) or source_named(kind) is None:
+                return ()
+            choices.append(SourceChoice(kind, place if isinstance(place, str) else ""))
+        return tuple(choices)
 
     def is_of(self, sources: Sequence[SourceChoice]) -> bool:
         """Return whether images of these sources can continue it."""

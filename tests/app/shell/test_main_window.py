@@ -1,6 +1,6 @@
 """The shell leads from step to step, by mouse and by keys alone."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt
@@ -24,12 +24,13 @@ from lightpen.model.origin import Origin
 from lightpen.record.swings.names import Names
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Appearance
+from lightpen_app.shell.action_bar import ActionBar
 from lightpen_app.shell.help_window import HelpWindow
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.page_area import NoticeBar
 from lightpen_app.shell.sidebar import Subject
 from lightpen_app.shell.step_list import StepButton, StepState
-from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.page import MainAction, Page, step_titles
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.fitted_window import fitted_place
 from lightpen_app.widgets.operator_view import OperatorValue
@@ -750,6 +751,56 @@ def test_the_present_step_is_always_in_view(qtbot: QtBot, settings: Settings) ->
         buttons = window.findChildren(StepButton)
         (present,) = (b for b in buttons if b.value().title == names[i])
         assert present.visibleRegion().boundingRect().height() == present.height()
+
+
+def test_later_pages_are_made_after_the_paint_and_named_before(
+    qtbot: QtBot, settings: Settings
+) -> None:
+    made = [Leaf("Start")]
+
+    def more() -> Iterator[Page]:
+        for name in list(step_titles().values())[1:]:
+            made.append(Leaf(name))
+            yield made[-1]
+
+    window = MainWindow(
+        made[:1], settings, Preferences(), Notifications(), later=more()
+    )
+    qtbot.addWidget(window)
+    assert [step.title for step in window.steps()] == [*step_titles().values()]
+    assert len(made) == 1
+
+    with qtbot.waitSignal(window.completed):
+        window.show()
+
+    assert list(window.pages()) == made
+    assert [step.title for step in window.steps()] == [*step_titles().values()]
+    assert [step.state for step in window.steps()].count(StepState.NOW) == 1
+
+
+def test_pages_made_later_come_before_the_main_button_for_the_tab_key(
+    qtbot: QtBot, settings: Settings, press: Callable[[Key], None]
+) -> None:
+    first, second = Leaf("Start"), Leaf("Camera")
+    window = MainWindow(
+        [first], settings, Preferences(), Notifications(), later=iter([second])
+    )
+    qtbot.addWidget(window)
+    with qtbot.waitSignal(window.completed):
+        window.show()
+    qtbot.waitActive(window).__enter__()
+    window.go_to(1)
+    order = [second.field, second.button]
+
+    for each in order:
+        assert each.hasFocus()
+        press(Qt.Key.Key_Tab)
+
+    back, main = window.findChild(ActionBar).findChildren(QPushButton)
+    assert (back.text(), main.objectName()) == ("Back", "main_button")
+    assert back.hasFocus()
+    press(Qt.Key.Key_Tab)
+    assert main.hasFocus()
 
 
 def test_a_notice_pushes_the_page_down_and_covers_nothing(shell: Shell) -> None:

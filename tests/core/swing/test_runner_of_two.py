@@ -153,6 +153,7 @@ def test_an_interrupted_swing_goes_on_with_both_cameras(
     swing = read_resumable(by_two)
     one = SourceChoice(SourceKind.SIMULATED)
     assert swing.is_of([one, one])
+    assert swing.source_choices == (one, one)
     assert not swing.is_of([one])
 
     capture_more(station, by_two, 1)

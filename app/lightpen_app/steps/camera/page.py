@@ -73,10 +73,6 @@ class CameraPage(Page):
         self._on_workbench_changed()
 
     @override
-    def title(self) -> str:
-        return self.tr("Camera")
-
-    @override
     def lead(self) -> str:
         return self.tr(
             "Check that the LEDs are bright and in focus, that the intrinsics match "

@@ -37,10 +37,6 @@ class HistoryPage(Page):
         self._retranslate()
 
     @override
-    def title(self) -> str:
-        return self.tr("History")
-
-    @override
     def lead(self) -> str:
         return self.tr("Complete, tamper-evident history of every tip")
 

@@ -95,10 +95,6 @@ class LedsPage(ResponsiveLayout, Page):
         self._on_selection_changed()
 
     @override
-    def title(self) -> str:
-        return self.tr("LEDs")
-
-    @override
     def lead(self) -> str:
         if self._selection.preparation.source.kind == SourceKind.RECORDED:
             return self.tr(

@@ -84,10 +84,6 @@ class ReviewPage(Page):
         self._retranslate()
 
     @override
-    def title(self) -> str:
-        return self.tr("Review")
-
-    @override
     def lead(self) -> str:
         return next_step_text(self._run.status)
 

@@ -230,15 +230,18 @@ class InterruptedControl(QObject):
             self._run.runner.go_on(swing)
 
     def _take_over(self, swing: Resumable) -> None:
-        """Select the item of the swing and the camera of its station."""
+        """Select the item of the swing and the cameras of its station and its own."""
         selection, header = self._selection, swing.record.header
         station = selection.preparation.names.station
         self._go_to_station(header.station)
         names = recorded_names(swing.record)
         names = replace(names, station=names.station or station)
-        selection.set_preparation(
-            replace(selection.preparation, names=names, nominal_tip=header.nominal_tip)
+        now = replace(
+            selection.preparation, names=names, nominal_tip=header.nominal_tip
         )
+        if not swing.is_of(now.sources):
+            now = now.with_second(next(iter(swing.source_choices[1:]), None))
+        selection.set_preparation(now)
 
     def _go_to_station(self, name: str) -> None:
         """Restore the last selection of a known station."""
@@ -340,9 +343,9 @@ class Interrupted:
 
 
 def _source_text(swing: Resumable) -> str:
-    """Return the source of a swing's images and their location."""
-    choice = swing.source_choice
-    if choice is None:
+    """Return the sources of a swing's images and their locations."""
+    choices = swing.source_choices
+    if not choices:
         return origin_text(recorded_origin(swing.record))
-    name = worded(choice.source.name)
-    return listed(filter(None, (name, printable(choice.place))))
+    said = [(worded(each.source.name), printable(each.place)) for each in choices]
+    return listed(text for each in said for text in each if text)

@@ -103,10 +103,6 @@ class StartPage(ResponsiveLayout, Page):
         return self._views.currentIndex() == 0
 
     @override
-    def title(self) -> str:
-        return self.tr("Start")
-
-    @override
     def heading(self) -> str:
         return self.title() if self.is_day else self.tr("Set up station")
 

@@ -81,10 +81,6 @@ class SwingPage(Page):
         self._retranslate()
 
     @override
-    def title(self) -> str:
-        return self.tr("Swing")
-
-    @override
     def is_complete(self) -> bool:
         return self._run.status.solution is not None
 

@@ -34,10 +34,6 @@ class MeasurePage(ProbingPage):
         self._retranslate()
 
     @override
-    def title(self) -> str:
-        return self.tr("Measure")
-
-    @override
     def _show(self) -> None:
         super()._show()
         self._plan.set_status(self._run.status)

@@ -38,10 +38,6 @@ class VerifyPage(ProbingPage):
         self._retranslate()
 
     @override
-    def title(self) -> str:
-        return self.tr("Verify")
-
-    @override
     def shut_down(self) -> None:
         super().shut_down()
         pen = self._pen.content_so_far()

@@ -1031,6 +1031,28 @@ def test_a_swing_of_another_source_names_the_source_that_it_wants(
     assert start.steps == []
 
 
+@pytest.mark.slow
+def test_a_swing_of_two_cameras_takes_up_the_second_again(
+    show: Callable[[Workbench], Opened],
+    workbench: Workbench,
+    qtbot: QtBot,
+    swung: Callable[..., Path],
+) -> None:
+    shutil.copytree(swung(14, by_two=True), workbench.run.records_folder / "two")
+    workbench.camera.open()
+    assert workbench.live.n_cameras == 1
+    start = show(workbench)
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: bool(start.steps or start.notices))
+
+    assert start.notices == []
+    assert start.steps == ["swing"]
+    assert workbench.live.n_cameras == 2
+    simulated = SourceChoice(SourceKind.SIMULATED)
+    assert workbench.selection.preparation.sources == (simulated, simulated)
+
+
 def test_a_swing_does_not_go_on_with_images_of_another_size(
     show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
 ) -> None:
