@@ -212,6 +212,7 @@ class Stage:
         FolderArchive(DATA).store(_earlier_result())
         around = SourceEnvironment(self._scene, SkippingClock(), lambda: NOW)
         self.wizard = Wizard(application, make_pages, settings, DATA, around)
+        self.wizard.window.pages()  # they follow what is chosen below
         workbench = self._workbench = self.wizard.workbench
         files = sample_files(around, DATA / SIMULATED)
         workbench.selection.set_preparation(

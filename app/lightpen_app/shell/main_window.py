@@ -348,9 +348,9 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     def _end_tab_order(self) -> None:
         """Have the Tab key reach the main button after the pages, then the steps."""
-        last: QWidget = self.previousInFocusChain()
+        last = self.previousInFocusChain() or self
         while last.focusPolicy() is Qt.FocusPolicy.NoFocus:
-            last = last.previousInFocusChain()
+            last = last.previousInFocusChain() or self
         buttons = self._action_bar.findChildren(QAbstractButton)
         for each in (*buttons, *self._sidebar.findChildren(StepButton)):
             self.setTabOrder(last, each)

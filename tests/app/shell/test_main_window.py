@@ -796,7 +796,8 @@ def test_pages_made_later_come_before_the_main_button_for_the_tab_key(
         assert each.hasFocus()
         press(Qt.Key.Key_Tab)
 
-    back, main = window.findChild(ActionBar).findChildren(QPushButton)
+    (bar,) = window.findChildren(ActionBar)
+    back, main = bar.findChildren(QPushButton)
     assert (back.text(), main.objectName()) == ("Back", "main_button")
     assert back.hasFocus()
     press(Qt.Key.Key_Tab)
