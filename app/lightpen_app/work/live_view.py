@@ -76,7 +76,7 @@ class Mailbox(QObject):
         return value
 
 
-WITHOUT_IMAGES, SKIPPING = "without-images", "skipping"  # causes of notifications
+WITHOUT_IMAGES = "without-images"  # cause of a notification
 CLOSING_TIME = 10.0  # s for all that is under way; a dead camera may take 8
 
 
@@ -207,7 +207,7 @@ class LiveView(QObject):
             return
         listener.blockSignals(True)
         for c in range(self.n_cameras):
-            self._withdraw(c, WITHOUT_IMAGES, SKIPPING)
+            self._withdraw(c)
         self.set_following(False)
         self.set_touching(False)
         self._operator, self._simulated = None, []
@@ -395,7 +395,7 @@ class LiveView(QObject):
             return
         state.connection = connection
         if connection is Connection.STREAMING:
-            self._withdraw(camera, WITHOUT_IMAGES)
+            self._withdraw(camera)
         if camera == self._chosen:
             self.connection_changed.emit(connection)
         else:
@@ -404,15 +404,20 @@ class LiveView(QObject):
     def _on_closing_failed(self, sentence: str) -> None:
         self._notifications.tell((self, "closing"), sentence)
 
-    def _tell(self, camera: int, cause: str, error: LightpenError) -> None:
-        """Report a camera fault, with the camera's number if there are two."""
+    def _tell(self, camera: int, error: LightpenError) -> None:
+        """Report a camera fault."""
+        words = self._words_of(camera, error)
+        self._notifications.tell((self, camera, WITHOUT_IMAGES), words)
+
+    def _words_of(self, camera: int, error: LightpenError) -> str:
+        """Return the sentence of a fault, with the camera's number if there are two."""
         words = worded(error.message)
         if self.n_cameras > 1:
             words = self.tr("Camera {0}: {1}").format(camera + 1, words)
-        self._notifications.tell((self, camera, cause), words)
+        return words
 
-    def _withdraw(self, camera: int, *causes: str) -> None:
-        self._notifications.withdraw(*((self, camera, cause) for cause in causes))
+    def _withdraw(self, camera: int) -> None:
+        self._notifications.withdraw((self, camera, WITHOUT_IMAGES))
 
     def _on_told(self, what: WorkerEvent, camera: int) -> None:
         state = self._states[camera]
@@ -425,14 +430,14 @@ class LiveView(QObject):
                 if camera == self._chosen:
                     self.settings_applied.emit(settings)
             case Failed(error):
-                self._tell(camera, WITHOUT_IMAGES, error)
+                self._tell(camera, error)
                 self.failed.emit()
             case FaultRaised(FramesSkipped() as fault):
-                self._tell(camera, SKIPPING, fault)
+                self._notifications.show_status(self._words_of(camera, fault))
             case FaultRaised(fault):
-                self._tell(camera, WITHOUT_IMAGES, fault)
+                self._tell(camera, fault)
             case ProcessingKeepsUp():
-                self._withdraw(camera, SKIPPING)
+                self._notifications.show_status("")
 
 
 @dataclass

@@ -13,9 +13,9 @@ from pytestqt.qtbot import QtBot
 from tests.faulty_camera import FaultyCamera
 from typing_extensions import override
 
-from lightpen.cameras.protocol import CameraSettings, Frame
+from lightpen.cameras.protocol import CameraSettings, Frame, FramesSkipped
 from lightpen.cameras.replay import ReplayCamera
-from lightpen.cameras.worker_events import Connection
+from lightpen.cameras.worker_events import Connection, FaultRaised, ProcessingKeepsUp
 from lightpen.formats.decoding import encode_png
 from lightpen.live.sources import SourceEnvironment
 from lightpen.record.swings.reading import open_record
@@ -201,6 +201,23 @@ def test_a_camera_that_is_not_there_is_told_and_another_can_be_opened(
 
     with qtbot.waitSignal(view.image_shown):
         stage.open()
+
+
+def test_images_that_are_skipped_are_counted_in_the_status_line_alone(
+    view: LiveView, stage: Stage, notifications: Notifications, qtbot: QtBot
+) -> None:
+    with qtbot.waitSignal(view.image_shown):
+        stage.open(stage.camera())
+    skipped = FramesSkipped("camera.too-slow", n_missed=7, n_offered=20)
+    shown: list[str] = []
+    notifications.status_changed.connect(shown.append)
+    notifications.raised.connect(lambda text, _: pytest.fail(text))
+
+    view._on_told(FaultRaised(skipped), 0)
+    view._on_told(ProcessingKeepsUp(), 0)
+
+    assert shown[0].startswith("Processing cannot keep up: 7 of 20 images skipped.")
+    assert shown[1:] == [""]
 
 
 def test_a_lost_camera_is_told_and_comes_back(
