@@ -44,5 +44,5 @@ def test_a_displaced_led_leaves_two_frames() -> None:
     assert (np.abs(frames.of_all - (R @ swing.tip_pen + t)) < U).all()
     assert np.linalg.norm(frames.of_all - frames.of_file) > 0.015
     text = calibration_text(found, "joint", None, judge(found, SwingLimits()))
-    assert "by the file but LED 9" in text
-    assert "refer to the frame by the file but LED 9" in text
+    assert "Result and U refer to the former." in text
+    assert " ".join(f"{value:.4f}" for value in frames.of_all) in text

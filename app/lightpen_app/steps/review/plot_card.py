@@ -57,6 +57,8 @@ class PlotCard(Translated, QFrame):
         self._place: SavePlace | None = None
         self.setProperty("area", "panel")
 
+        self._is_needed = True
+
         # Widgets
         self._menu = QMenu(self)
         self._enlarge = QAction(self)
@@ -87,6 +89,17 @@ class PlotCard(Translated, QFrame):
     def plot(self) -> Plot:
         """Return the plot."""
         return self._plot
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether there is something to show."""
+        return self._is_needed
+
+    def set_needed(self, needed: bool) -> None:
+        """Show the plot, or hide it where there is nothing to show."""
+        if needed is not self._is_needed:
+            self._is_needed = needed
+            self.setVisible(needed)
 
     def set_place(self, place: SavePlace) -> None:
         """Set the folder for saving."""
@@ -177,4 +190,5 @@ class PlotGrid(QWidget):
 
     def _on_enlarge_toggled(self, enlarged: bool) -> None:
         for card in self._cards:
-            card.setVisible(card is self.sender() or not enlarged)
+            shown = card.is_needed and not enlarged
+            card.setVisible(card is self.sender() or shown)

@@ -91,6 +91,7 @@ class ResidualsPanel(PlotsPanel):
     def __init__(self, parent: QWidget | None = None) -> None:
         # Widgets
         self._arrows = ArrowPlot(Axes(""))
+        self._lens = ArrowPlot(Axes(""))
         self._dots = DotPlot(Axes(""), ("residual_x_px", "residual_y_px"))
         self._leds = BarPlot(
             Axes(""), [Curve("rms_px"), Curve("mean_x_px"), Curve("mean_y_px")], "led"
@@ -102,9 +103,12 @@ class ResidualsPanel(PlotsPanel):
                 PlotCard(self._leds, "residuals-of-leds"),
                 PlotCard(self._dots, "residuals-by-axis"),
                 PlotCard(self._histogram, "residuals-histogram"),
+                PlotCard(self._lens, "lens-field"),
             ],
             parent,
         )
+        self._lens_card = self.cards()[-1]
+        self._lens_card.set_needed(False)
         self._advice = text_label(TextSize.SMALL, Tone.QUIET)
         self._switch = CameraSwitch()
         self._failed: tuple[FailedSwing, Rig] | None = None
@@ -152,6 +156,15 @@ class ResidualsPanel(PlotsPanel):
         points = images.observations.seen_pixels[used]
         residuals = solution.residuals[:, c][used]
         leds = calibration.leds
+        shifts = calibration.bundle.lens_shifts(c)
+        self._lens_card.set_needed(shifts is not None)
+        if shifts is not None:
+            in_joint: BoolArray = np.any(calibration.joint.used, axis=1)
+            in_fit = images.leds_used[calibration.used]
+            found = shifts[: len(in_joint)][in_joint][in_fit]
+            if camera.lens_field is not None:
+                found = found + camera.lens_field.at(points)
+            self._lens.set_data(camera.image_size, points, found)
         self._draw(camera, points, residuals, leds.rms, leds.mean)
 
     def _draw(
@@ -176,6 +189,8 @@ class ResidualsPanel(PlotsPanel):
         x, y = self.tr("x / px"), self.tr("y / px")
         scale = f"{self._arrows.scale():g}"
         self._arrows.set_axes(Axes(enlarged.format(scale), x, y))
+        lens = self.tr("Lens field \xd7 {0}").format(f"{self._lens.scale():g}")
+        self._lens.set_axes(Axes(lens, x, y))
         self._dots.set_axes(Axes(self.tr("Residuals by axis / px"), x, y))
         self._leds.set_axes(Axes(self.tr("Residuals by LED / px"), self.tr("LED")))
         self._leds.set_names([self.tr("RMS"), self.tr("mean x"), self.tr("mean y")])

@@ -28,7 +28,7 @@ from lightpen.detection.pose import NOISE_FLOOR, robust_sigma
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.components import NO_COMPONENTS, Components
-from lightpen.estimation.bundle.effects import Effect
+from lightpen.estimation.bundle.effects import Effect, EffectName
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     N_TURN,
@@ -142,6 +142,13 @@ class Bundle:
             return 0.0
         at = self.layout.effects
         return np.asarray(columns @ self.values[at[0].start : at[-1].stop])
+
+    def lens_shifts(self, camera: int) -> FloatArray | None:
+        """Return the lens field fitted at each LED, (N, L, 2), px; None if none."""
+        for effect, at in zip(self.unknowns.effects, self.layout.effects, strict=True):
+            if (effect.name, effect.camera) == (EffectName.LENS, camera):
+                return np.asarray(effect.columns[:, camera] @ self.values[at])
+        return None
 
     @property
     def cone_moves(self) -> FloatArray:

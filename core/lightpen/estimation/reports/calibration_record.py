@@ -66,7 +66,7 @@ class MethodRecord(Struct, frozen=True, omit_defaults=True):
     convergence: Convergence | None = None
 
 
-class VerdictLimits(Struct, frozen=True):
+class VerdictLimits(Struct, frozen=True, omit_defaults=True):
     """The limits of the verdict."""
 
     max_uncertainty_mm: float

@@ -45,6 +45,7 @@ def warnings_of(calibration: Calibration) -> list[Message]:
         *_copy_warnings(calibration),
         *_noise_warnings(calibration),
         *_self_check_warnings(calibration),
+        *_frame_warnings(calibration),
     ]
     warnings += [
         message("warning.led-unseen", led=int(led) + 1)
@@ -93,6 +94,23 @@ def _self_check_warnings(calibration: Calibration) -> list[Message]:
     if check is None or check.is_passed:
         return []
     return [message("warning.self-check", value=check.value, limit=check.limit)]
+
+
+def _frame_warnings(calibration: Calibration) -> list[Message]:
+    """Return in which frame the tip is, where displaced LEDs leave it open."""
+    frames = calibration.tip_frames
+    if frames is None:
+        return []
+    leds = ", ".join(map(str, calibration.leds.displaced))
+    by_file, by_all = (
+        " ".join(f"{value:.4f}" for value in tip)
+        for tip in (frames.of_file, frames.of_all)
+    )
+    if frames.is_of_file:
+        return [
+            message("warning.frame-of-file", leds=leds, by_file=by_file, by_all=by_all)
+        ]
+    return [message("warning.frame-of-all", leds=leds, by_file=by_file, by_all=by_all)]
 
 
 def _seat_warnings(calibration: Calibration) -> list[Message]:

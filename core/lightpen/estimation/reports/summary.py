@@ -42,7 +42,6 @@ def calibration_text(
     if nominal_tip is not None:
         lines.append(_numbers("nominal", nominal_tip))
         lines.append(_numbers("change from nominal", chosen.tip_pen - nominal_tip))
-    lines += _frame_lines(calibration)
     names = calibration.bundle.state.rig.names
     frame = f"frame of {names[0]}" if names else "camera frame"
     lines += ["", _heading(f"Cone in the {frame}, mm", "uvw")]
@@ -187,22 +186,6 @@ def _pen_lines(calibration: Calibration) -> list[str]:
             _numbers("  U with it", second.uncertainty_with),
         ]
     return lines
-
-
-def _frame_lines(calibration: Calibration) -> list[str]:
-    """Return lines on the frame of the tip, where the LEDs leave it open."""
-    frames = calibration.tip_frames
-    if frames is None:
-        return []
-    leds = ", ".join(map(str, calibration.leds.displaced))
-    used = f"the file but LED {leds}" if frames.is_of_file else "all LEDs"
-    return [
-        _numbers(f"by the file but LED {leds}", frames.of_file),
-        _numbers("by all LEDs as they are", frames.of_all),
-        f"  Result and U refer to the frame by {used}. Measure with this result, which",
-        "  contains the LEDs as they are; to measure with the LED file, use the tip by",
-        f"  the file and leave out LED {leds}.",
-    ]
 
 
 def _heading(title: str, axes: str) -> str:

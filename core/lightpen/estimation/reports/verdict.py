@@ -281,8 +281,8 @@ def halves_agree(halves: SplitHalfCheck) -> bool:
 def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     """Judge a calibration by what its tip is worth, not by its residuals alone.
 
-    Only images that show the pen count. What else there is depends on how long a
-    camera ran before and after, and a swing that is captured does not keep it.
+    Only images that show the pen count, copies once. What else there is depends on how
+    long a camera ran before and after, and a swing that is captured does not keep it.
     """
     uncertainty = calibration.budget.weakest_uncertainty
     limit = limits.max_uncertainty
@@ -290,7 +290,7 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     largest = budget.largest_share
     by_largest = budget.weakest_share(largest)
     reasons = list(calibration.reasons)
-    n_images = sum(reason.shows_pen for reason in reasons)
+    n_images = sum(each.shows_pen and each is not Reason.COPY for each in reasons)
     n_used = int(calibration.used.sum())
     is_same_in_more = largest.name is ContributionName.CENTERS and n_used >= POSTURES
     if largest.name in IMAGES_SHRINK and not is_same_in_more:

@@ -83,6 +83,15 @@ def test_a_lens_field_is_found_and_corrected() -> None:
     assert field.is_certain
     assert 0.05 < field.size < 0.11  # px, rms over u and v
     assert field.message.code == "warning.effect-lens"
+    shifts = found.bundle.lens_shifts(0)
+    assert shifts is not None
+    used = found.bundle.used[:, 0]
+    fitted, true_field = shifts[used], lens(exact, 0.08)[used]
+    # A constant and a linear part are a turn of the camera and its focal length.
+    columns = np.column_stack([np.ones(len(fitted)), exact[used]])
+    off = fitted - true_field
+    left = off - columns @ np.linalg.lstsq(columns, off, rcond=None)[0]
+    assert np.sqrt(np.mean(left**2)) < 0.4 * np.sqrt(np.mean(true_field**2))
     # What is left of it in the images is hardly more than the noise.
     assert found.joint.sigma < 1.15 * SIGMA
     assert (np.abs(error) < 1.2 * found.budget.expanded_uncertainty[:3]).all()

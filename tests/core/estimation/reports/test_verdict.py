@@ -500,7 +500,7 @@ def test_a_doubt_repeats_a_reason_of_the_same_code_and_led() -> None:
 def test_a_tip_without_a_temperature_passes_unless_the_station_requires_one(
     good: Calibration,
 ) -> None:
-    limits = SwingLimits(max_uncertainty=0.016, requires_temperature=True)
+    limits = SwingLimits(max_uncertainty=0.02, requires_temperature=True)
     verdict = judge(good, limits)
     assert (verdict.grade, verdict.reason) == (Grade.CHECK, NO_TEMPERATURE)
     assert verdict.next_step is NextStep.SEE_TO_CAUSE
@@ -508,3 +508,15 @@ def test_a_tip_without_a_temperature_passes_unless_the_station_requires_one(
     assumptions = replace(good.assumptions, temperature_c=21.0)
     measured = replace(good, assumptions=assumptions)
     assert judge(measured, limits).grade is Grade.PASS
+
+
+def test_copies_of_images_count_once(good: Calibration) -> None:
+    """Given twice, they are neither as many as asked for nor lost."""
+    doubled = replace(
+        good,
+        reasons=good.reasons + (Reason.COPY,) * 150,
+        used=np.concatenate([good.used, np.zeros(150, dtype=bool)]),
+    )
+    assert judge(doubled, SwingLimits(max_uncertainty=0.02)).grade is Grade.PASS
+    limits = SwingLimits(max_uncertainty=0.02, min_images=200)
+    assert judge(doubled, limits).reason == too_few_images(150, 200)

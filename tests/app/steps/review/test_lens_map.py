@@ -1,0 +1,61 @@
+"""The field of the lens that the images support is shown as a map."""
+
+from pathlib import Path
+
+import numpy as np
+from pytestqt.qtbot import QtBot
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.calibrate import calibrate
+from lightpen.formats.images import ImageSource
+from lightpen.formats.observation_files import Centers
+from lightpen.record.swings.recorded_source import RecordSource
+from lightpen.record.swings.solving import Solution
+from lightpen.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+from lightpen_app.steps.review.plots_panel import ResidualsPanel
+from lightpen_app.steps.review.residual_plots import ArrowPlot
+
+N_IMAGES = 32
+
+
+def solution_with_lens(amplitude: float) -> Solution:
+    """Return a solution whose images have waves of an amplitude, px."""
+    camera, pen, rng = paper_camera(), paper_pen(), np.random.default_rng(26)
+    swing = swing_poses(N_IMAGES, rng)
+    exact = simulate_centers(
+        camera, pen, swing.rotations, swing.translations, 0.03, rng
+    )
+    waves: FloatArray = np.sin(exact[..., ::-1] / 280.0)
+    centers = Centers(np.arange(N_IMAGES), exact + amplitude * waves, Path("simulated"))
+    seen = observe_centers(centers, camera, pen)
+    found = calibrate(camera, pen, seen)
+    nothing = ImageSource((), (), lambda: iter(()))
+    source = RecordSource(Path(), nothing, camera, pen, (), (), Path())
+    residuals = found.joint.residuals.reshape(-1, 1, pen.n_leds, 2)
+    numbers = np.arange(1, N_IMAGES + 1)
+    return Solution(source, numbers, seen, {}, found, residuals)
+
+
+def test_the_lens_field_is_mapped_where_the_images_support_one(qtbot: QtBot) -> None:
+    panel = ResidualsPanel()
+    qtbot.addWidget(panel)
+    panel.resize(1100, 900)
+    panel.show()
+    first, *_, card = panel.cards()
+    assert not card.isVisible()
+    panel.set_value(solution_with_lens(0.15))
+    assert card.isVisible()
+    plot = card.plot()
+    assert isinstance(plot, ArrowPlot)
+    assert plot.accessibleName().startswith("Lens field")
+    assert len(plot.lines()[0]) > 6
+    for is_enlarged in (True, False):
+        card.actions_offered()[0].toggle()
+        assert first.isVisible() is not is_enlarged
+        assert card.isVisible()
