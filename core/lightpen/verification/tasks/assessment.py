@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import Message, message
-from lightpen.model.decision_rules import Decision
+from lightpen.model.decision_rules import COVERAGE_FACTOR, Decision
 from lightpen.model.limits import VerificationLimits
+from lightpen.model.quantiles import normal_quantile
 
 USE_TIP = message("verification.use-tip")
 CALIBRATE_AGAIN = message("verification.calibrate-again")
@@ -16,7 +17,7 @@ BETTER_POSTURES = message("verification.better-postures")
 MORE_POINTS = message("verification.more-points")
 
 
-SIGNIFICANT = 1.3  # times U (k = 2): 99 % of a normal distribution lies within
+BY_CHANCE = 0.01  # that an error of none looks significant: beyond 1.3 U
 RELEVANT = 0.25  # of a limit: a smaller difference does not matter, however certain
 
 WORST = (Grade.PASS, Grade.CHECK, Grade.REPEAT)  # last
@@ -65,9 +66,13 @@ def refused(reason: Message, next_step: Message) -> VerificationAssessment:
 
 
 def graded(
-    value: float, uncertainty: float, limit: float, limits: VerificationLimits
+    value: float,
+    uncertainty: float,
+    limit: float,
+    limits: VerificationLimits,
+    n_values: int = 1,
 ) -> Grade:
-    """Return the grade of an error with its U (k = 2), mm.
+    """Return the grade of an error with its U (k = 2), mm, the worst of several.
 
     Rejected by the rule is to be repeated. Open by the rule is to be checked, and so is
     an error that is more than chance and relevant for the limit.
@@ -75,5 +80,6 @@ def graded(
     decision = limits.decision(value, uncertainty, limit)
     if decision is Decision.REJECTED:
         return Grade.REPEAT
-    is_significant = abs(value) > max(SIGNIFICANT * uncertainty, RELEVANT * limit)
+    by_chance = normal_quantile(BY_CHANCE / (2 * n_values)) / COVERAGE_FACTOR
+    is_significant = abs(value) > max(by_chance * uncertainty, RELEVANT * limit)
     return Grade.CHECK if is_significant or decision is Decision.OPEN else Grade.PASS

@@ -352,7 +352,8 @@ def _good(worst: LengthRun) -> Message:
 
 def _assessment(found: Length, limits: VerificationLimits) -> VerificationAssessment:
     worst, against = found.worst, judged_tip(found.tip, limits)
-    grade = graded(worst.error, worst.uncertainty, worst.limit, limits)
+    n_places = len(found.runs)
+    grade = graded(worst.error, worst.uncertainty, worst.limit, limits, n_places)
     if against is not None and against.grade is Grade.REPEAT:
         return against
     if grade is not Grade.PASS:
