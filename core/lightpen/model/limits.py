@@ -99,7 +99,7 @@ class SwingLimits:
         U (k = 2) of the tip along its weakest direction, mm. A station with a camera
         calibrated on 24 views of a board, LEDs measured to 2 um and a pen of carbon
         fibre reaches it with 60 images. An aluminium pen needs its temperature stated:
-        the 3 K that are assumed otherwise alone make 0.025 mm.
+        the 3 K that are assumed otherwise alone make 0.013 mm.
     min_per_field : int
         Images in each field of the dial.
     spacing : float
