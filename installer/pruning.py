@@ -35,7 +35,7 @@ DROPPED = (
     "pyqtgraph/flowchart/*", "pyqtgraph/icons/peegee/*.png",
     "sqlalchemy/dialects/mssql/*", "sqlalchemy/dialects/mysql/*",
     "sqlalchemy/dialects/oracle/*", "sqlalchemy/orm/*",
-    "scipy/optimize/cython_optimize*", "scipy/special/cython_special*",
+    "scipy/special/cython_special*",
     "cffi/*", "pycparser/*",  # compile bindings; those here are compiled
     "PySide6/plugins/imageformats/qgif.dll", "PySide6/plugins/imageformats/qicns.dll",
     "PySide6/plugins/imageformats/qtga.dll", "PySide6/plugins/imageformats/qwbmp.dll",
@@ -56,7 +56,6 @@ SCIPY = {
         "constants",
         "fft",
         "linalg",
-        "optimize",
         "sparse",
         "spatial",
         "special",

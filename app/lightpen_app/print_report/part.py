@@ -8,8 +8,7 @@ from PySide6.QtCore import QCoreApplication, QPointF, QRectF
 from PySide6.QtGui import QColor, QPainter
 
 from lightpen.arrays import FloatArray
-from lightpen.measuring.compensation import ROUND, Evidence
-from lightpen.measuring.surfaces import FeatureKind
+from lightpen.measuring.compensation import Evidence
 from lightpen.measuring.touches import at_position
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import LIGHT
@@ -25,6 +24,8 @@ from lightpen_app.print_report.blocks import (
     line_pen,
     paragraph,
     table,
+    text_height,
+    text_width,
 )
 
 translate = QCoreApplication.translate
@@ -136,9 +137,9 @@ def _features(entries: list[dict[str, Any]]) -> Iterator[Block]:
 
 
 def _kind(feature: Mapping[str, Any]) -> str:
-    """Return the kind of a feature, with the side of a round one and its evidence."""
+    """Return the kind of a feature, with the side of the ball and its evidence."""
     kind, by = feature["kind"], feature["side_by"]
-    if FeatureKind(kind) not in ROUND or by == Evidence.NONE:
+    if by == Evidence.NONE:
         return str(kind)
     return f"{kind}, {feature['side']} ({by})"
 
@@ -243,11 +244,30 @@ def _draw(
     for dot in dots:
         painter.drawEllipse(dot, DOT, DOT)
     names = [each["feature"] for each in touches]
+    taken = [QRectF(dot.x() - DOT, dot.y() - DOT, 2 * DOT, 2 * DOT) for dot in dots]
     for name in dict.fromkeys(names):
         own = np.array([each == name for each in names])
         (place,) = placed(flat[own].mean(axis=0, keepdims=True))
-        area = QRectF(place.x() + DOT, place.y() + DOT, WIDTH / 4, 2 * PrintSize.SMALL)
+        area = _free_area(place, name, taken)
+        taken.append(area)
         draw_text(painter, area, name, PrintSize.SMALL, LIGHT.muted)
+
+
+def _free_area(place: QPointF, text: str, taken: list[QRectF]) -> QRectF:
+    """Return where a text covers least, as near to a place as possible."""
+    width = text_width(text, PrintSize.SMALL) + DOT
+    height = text_height(text, PrintSize.SMALL, width)
+    areas = [
+        QRectF(place.x() + across * width, place.y() + up * height, width, height)
+        for up in sorted(np.arange(-4, 4, 0.5).tolist(), key=lambda x: abs(x + 0.5))
+        for across in (-0.5, 0.1, -1.1)
+    ]
+
+    def covered(area: QRectF) -> float:
+        shared = [area.intersected(each) for each in taken]
+        return sum(each.width() * each.height() for each in shared)
+
+    return min(areas, key=covered)
 
 
 def _plan(plan: dict[str, Any]) -> Iterator[Block]:

@@ -21,6 +21,8 @@ MESSAGES = {
     "measuring.circumscribed": "minimum circumscribed feature",
     "measuring.too-few": "{n_points} points do not determine a {kind}; at least {needed} are needed. Probe more points.",
     "measuring.undetermined": "The points do not determine a {kind}. Distribute them over more of its surface.",
+    "measuring.other-kind": "The points are up to {off:.3g} mm off a {kind}. Check the kind in the plan, and whether a point lies elsewhere.",
+    "measuring.of-feature": "Feature {name}: {said}",
     "measuring.no-criterion": "The criterion {criterion} is not defined for a {kind}. Use least squares.",
     "measuring.datums-parallel": "The line of the alignment is perpendicular to its plane and defines no direction in it. Choose another line.",
     "measuring.few-datums": "{n_points} datum points are given; an alignment needs at least {needed}, each with its nominal position.",

@@ -19,6 +19,7 @@ from typing import TypeAlias
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.model.assignment import assigned_columns
 
 REACH = 0.06  # of the image width: farthest step beside the one before
 NEAR = 0.006  # of the image width: farthest from the prediction by the others
@@ -241,15 +242,11 @@ def assign(predicted: FloatArray, spots: FloatArray, gate: float) -> IntArray:
 
     The sum of distances is least; none exceeds the gate, px.
     """
-    from scipy.optimize import linear_sum_assignment
-
-    match = np.full(len(predicted), -1)
     if not len(predicted) or not len(spots):
-        return match
+        return np.full(len(predicted), -1)
     cost = np.linalg.norm(predicted[:, None] - spots, axis=2)
-    rows, columns = linear_sum_assignment(np.minimum(cost, gate))
-    good = cost[rows, columns] < gate
-    match[rows[good]] = columns[good]
+    match = assigned_columns(np.minimum(cost, gate))
+    match[cost[np.arange(len(cost)), match] >= gate] = -1
     return match
 
 

@@ -29,7 +29,7 @@ from lightpen.model.rigid import rotation_from_vector, skew
 MAX_STEPS = 200
 ROUGHLY, CONVERGED = 1e-7, 1e-15  # of the extent of the points
 SHRINKS = 0.5  # a step before rounding by this at least
-LARGEST_DAMPING = 1e8
+LEAST_DAMPING, LARGEST_DAMPING = 1e-14, 1e8  # the least keeps a system regular
 ROUNDING = 1e-12  # relative, of a sum of squares: within it, no step is worse
 UNDETERMINED = 1e-7  # of the largest singular value, columns scaled
 FRAMED = {FeatureKind.POINT, FeatureKind.SPHERE}  # their axes mean nothing
@@ -170,7 +170,7 @@ def _solve(
         before = length
         if cost_after <= cost * (1 + ROUNDING):
             at, values, J = after, values_after, J_after
-            cost, damping = cost_after, damping / 10
+            cost, damping = cost_after, max(damping / 10, LEAST_DAMPING)
         else:
             damping *= 10
         if small or damping > LARGEST_DAMPING:

@@ -43,6 +43,10 @@ from lightpen.measuring.touches import PartTouches, at_position
 from lightpen.measuring.zones import Criterion, fit_zone
 from lightpen.model.decision_rules import Decision, conformity_probability, decide
 
+OTHER_KIND = 0.05  # of the extent of points: farther off they show another kind
+FLAT_POINTS = 0.005  # of that extent: points as flat do not determine solids
+SOLID = {FeatureKind.SPHERE, FeatureKind.CYLINDER, FeatureKind.CONE}
+OUTLYING = 6.0  # of their noise, which is added to both
 MAX_SPREAD = 0.1  # rad of an axis, or of a size: more is not determined
 
 
@@ -251,25 +255,36 @@ def _fitted(planned: PlannedFeature, touches: PartTouches) -> Feature:
             n_touches=len(at),
             needed=planned.touches or 1,
         )
-    points = touches.points_cam[at]
-    assert planned.kind is not None
-    feature = fit_feature(planned.kind, points)
+    try:
+        return _determined(planned, touches, at)
+    except CalibrationError as error:
+        raise CalibrationError(
+            "measuring.of-feature", name=planned.name, said=error.message
+        ) from error
+
+
+def _determined(planned: PlannedFeature, touches: PartTouches, at: IntArray) -> Feature:
+    """Return the fit to touches that lie on a feature of its kind and determine it."""
+    kind, points = planned.kind, touches.points_cam[at]
+    assert kind is not None
+    feature = fit_feature(kind, points)
+    off = float(np.linalg.norm(feature.distances, axis=1).max())
+    extent = float(np.ptp(points, axis=0).max())
+    noise = OUTLYING * touches.noise(at)
+    limit = OTHER_KIND * extent + noise
+    is_other = off > limit and kind is not FeatureKind.POINT
+    if is_other and planned.known is None:
+        raise CalibrationError("measuring.other-kind", kind=NAMES[kind], off=off)
+    if kind in SOLID:
+        height = fit_feature(FeatureKind.PLANE, points).form_error
+        if height < FLAT_POINTS * extent + noise:
+            raise CalibrationError("measuring.undetermined", kind=NAMES[kind])
     _require_determined(feature, touches, at)
     if planned.criterion == NEVER:
         return feature
     # The points that touch the zone carry it; its U is that of least squares.
-    criterion = Criterion(planned.criterion)
-    origin, axes, sizes, _ = fit_zone(planned.kind, points, criterion)
-    return Feature(
-        planned.kind,
-        origin,
-        axes,
-        sizes,
-        feature.distances,
-        feature.by_points,
-        feature.distances_by_points,
-        feature.offsets,
-    )
+    origin, axes, sizes, _ = fit_zone(kind, points, Criterion(planned.criterion))
+    return replace(feature, origin=origin, axes=axes, sizes=sizes)
 
 
 def _require_determined(feature: Feature, touches: PartTouches, at: IntArray) -> None:

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from lightpen.measuring.characteristics import IS_ANGLE, Measured
-from lightpen.measuring.compensation import ROUND, Evidence
+from lightpen.measuring.compensation import Evidence
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
 from lightpen.measuring.plan import Nominal, Side
 from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind
@@ -63,12 +63,12 @@ def feature_rows(part: MeasuredPart) -> Iterator[PartRow]:
 
 
 def _kind_and_side(one: Measured) -> Message:
-    """Return the kind of a feature; of a round one its side, and what decided it.
+    """Return the kind of a feature, the side of the ball, and what decided it.
 
     What the plan states needs no evidence.
     """
     kind, side, evidence = NAMES[one.kind], one.surface.side, one.surface.evidence
-    if one.kind not in ROUND or evidence is Evidence.NONE:
+    if evidence is Evidence.NONE:
         return kind
     if evidence is Evidence.PLAN:
         return message("measuring.sided", kind=kind, side=SIDES[side])

@@ -8,6 +8,8 @@ References
 .. [1] ISO 1101:2017, ISO 12180, 12181, 12780, 12781 (definitions).
 .. [2] G. T. Anthony et al., "Reference software for finding Chebyshev best-fit
    geometric elements", Precision Engineering 19 (1996) 28-36.
+.. [3] C. E. Lemke, "The dual method of solving the linear programming problem", Naval
+   Research Logistics Quarterly 1 (1954) 36-47.
 """
 
 from dataclasses import replace
@@ -18,12 +20,15 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.measuring.features import fit_feature
+from lightpen.measuring.starts import Start
 from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind
 from lightpen.messages import message
 from lightpen.model.rigid import rotation_from_vector
 
 MAX_STEPS = 100
 CONVERGED = 1e-13  # of the extent of the points
+MAX_EXCHANGES = 200  # of a linear program; then a shorter step is tried
+ROUNDING, TINY = 1e-15, 1e-12
 
 
 class Criterion(Enum):
@@ -101,82 +106,72 @@ def fit_zone(
     extent = float(np.ptp(points, axis=0).max())
     reach = 0.1 * extent
 
-    def merit_of(d: FloatArray, sizes: FloatArray) -> float:
-        radius = float(sizes[0]) if len(sizes) else 0.0
-        match criterion:
-            case Criterion.MINIMUM_ZONE:
-                return float(np.abs(d).max())
-            case Criterion.CIRCUMSCRIBED:
-                return radius + float(d.max())
-            case Criterion.INSCRIBED:
-                return -radius - float(d.min())
+    # Each criterion lowers the highest of some heights, functions of motions and sizes.
+    sign = -1.0 if criterion is Criterion.INSCRIBED else 1.0
 
-    def evaluated(
-        origin: FloatArray, axes: FloatArray, sizes: FloatArray
-    ) -> tuple[FloatArray, FloatArray, float]:
+    def heights(at: Start) -> tuple[FloatArray, FloatArray]:
+        origin, axes, sizes = at
         (values, *_), J = surface.derivatives((points - origin) @ axes, sizes)
-        return values[:, 0], J[:, 0], merit_of(values[:, 0], sizes)
+        d, A = values[:, 0], J[:, 0]
+        if criterion is Criterion.MINIMUM_ZONE:
+            return np.concatenate([d, -d]), np.concatenate([A, -A])
+        return sign * (d + sizes[0]), sign * A[:, : len(free)]  # free of the radius
 
-    d, J, merit = evaluated(origin, axes, sizes)
+    at = origin, axes, sizes
+    h, A = heights(at)
     for _ in range(MAX_STEPS):
-        step = _best_step(d, J, len(free), criterion, reach)
-        resized = sizes + step[len(free) :]
-        if merit - merit_of(d + J @ step, resized) <= CONVERGED * extent:
+        step = _lowering_step(h, A, reach)
+        if h.max() - (h + A @ step).max() <= CONVERGED * extent:
             break
-        motion = np.zeros(6)
+        motion, resized = np.zeros(6), at[2].copy()
         motion[free] = step[: len(free)]
+        resized[: len(step) - len(free)] += step[len(free) :]
         after = (
-            origin + axes @ motion[:3],
-            axes @ rotation_from_vector(motion[3:]),
+            at[0] + at[1] @ motion[:3],
+            at[1] @ rotation_from_vector(motion[3:]),
             resized,
         )
-        d_after, J_after, merit_after = evaluated(*after)
-        if merit_after < merit:
-            gain = merit - merit_after
-            (origin, axes, sizes), d, J, merit = after, d_after, J_after, merit_after
-            reach *= 2
-            if gain <= CONVERGED * extent:
-                break
-        else:
-            reach /= 4
-            if reach <= CONVERGED * extent:
-                break
-    if criterion is Criterion.CIRCUMSCRIBED:
-        sizes = np.array([merit])
-    elif criterion is Criterion.INSCRIBED:
-        sizes = np.array([-merit])
+        h_after, A_after = heights(after)
+        gain = float(h.max() - h_after.max())
+        if gain > 0:
+            at, h, A = after, h_after, A_after
+        reach *= 2 if gain > 0 else 0.25
+        if 0 < gain <= CONVERGED * extent or reach <= CONVERGED * extent:
+            break
+    (origin, axes, sizes), highest = at, float(h.max())
     if kind is FeatureKind.LINE:
-        return origin, axes, np.zeros(0), 2 * merit
-    d = evaluated(origin, axes, sizes)[0]
+        return origin, axes, np.zeros(0), 2 * highest
+    if criterion is Criterion.INSCRIBED and -highest > extent:
+        raise CalibrationError("measuring.undetermined", kind=NAMES[kind])
+    if criterion is not Criterion.MINIMUM_ZONE:
+        sizes = np.array([sign * highest])
+    d = surface.distances((points - origin) @ axes, sizes).values
     return origin, axes, sizes, float(np.ptp(d))
 
 
-def _best_step(
-    d: FloatArray, J: FloatArray, n_motions: int, criterion: Criterion, reach: float
-) -> FloatArray:
-    """Return the step of a linear program within a reach, (U,)."""
-    from scipy.optimize import linprog  # 0.4 s
+def _lowering_step(h: FloatArray, A: FloatArray, reach: float) -> FloatArray:
+    """Return the step (U,) within a reach for which the highest of h + A step is least.
 
-    n, n_unknowns = J.shape
-    scale = np.maximum(np.abs(J).max(axis=0), 1e-12)
-    A = J / scale
-    bounds: list[tuple[float | None, float | None]] = [(-reach, reach)] * n_unknowns
-    if criterion is Criterion.MINIMUM_ZONE:
-        # Least t with -t <= d + A s <= t.
-        rows = np.vstack(
-            [np.column_stack([A, -np.ones(n)]), np.column_stack([-A, -np.ones(n)])]
-        )
-        right = np.concatenate([-d, d])
-        goal = np.append(np.zeros(n_unknowns), 1.0)
-        bounds.append((0, None))
-    else:
-        sign = 1.0 if criterion is Criterion.CIRCUMSCRIBED else -1.0
-        # Least (greatest) radius with all points inside (outside).
-        rows, right = sign * A, -sign * d
-        goal = np.zeros(n_unknowns)
-        goal[n_motions] = sign / scale[n_motions]
-        bounds[n_motions] = (None, None)
-    found = linprog(goal, A_ub=rows, b_ub=right, bounds=bounds, method="highs")
-    if found.x is None:
-        return np.zeros(n_unknowns)
-    return np.asarray(found.x[:n_unknowns] / scale)
+    The dual simplex method [3]_ exchanges constraints ``G x <= b``, of which as many as
+    unknowns hold exactly; at the start the highest point and one bound of each unknown.
+    """
+    n, n_steps = A.shape
+    scale = np.maximum(np.abs(A).max(axis=0), TINY)
+    scaled, box = A / scale, np.eye(n_steps, n_steps + 1)
+    G = np.concatenate([np.column_stack([scaled, -np.ones(n)]), box, -box])
+    b = np.concatenate([-h, np.full(2 * n_steps, reach)])
+    first = int(np.argmax(h))
+    upper = n + np.arange(n_steps)
+    held = np.append(np.where(scaled[first] < 0, upper, upper + n_steps), first)
+    x = np.zeros(n_steps + 1)
+    for _ in range(MAX_EXCHANGES):
+        inverse = np.linalg.inv(G[held])
+        x = inverse @ b[held]
+        new = int(np.argmax(G @ x - b))
+        if new in held or G[new] @ x - b[new] <= ROUNDING * reach:
+            break
+        prices, shares = inverse[-1].clip(max=0), G[new] @ inverse
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = np.where(shares > TINY, -prices / shares, np.inf)
+        held[int(np.argmin(ratios))] = new
+    return x[:-1] / scale

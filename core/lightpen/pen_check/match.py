@@ -33,6 +33,7 @@ from lightpen.detection.pose import (
 from lightpen.detection.spots import Spots
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.messages import Message
+from lightpen.model.assignment import assigned_columns
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen
@@ -324,14 +325,9 @@ def _owners(leds: FloatArray, points: FloatArray) -> list[int]:
     """
     if not len(leds) or not len(points):
         return [-1] * len(leds)
-    from scipy.optimize import linear_sum_assignment  # takes 0.3 s
-
     gaps = np.abs(leds[:, None] - points)
     costs = (gaps > SAME).sum(axis=2) + 1e-6 * gaps.sum(axis=2)
-    owners = np.full(len(leds), -1)
-    missing, found = linear_sum_assignment(costs)
-    owners[missing] = found
-    return owners.tolist()
+    return assigned_columns(costs).tolist()
 
 
 def _residuals(camera: Camera, pen: Pen, located: _Located, start: Poses) -> FloatArray:

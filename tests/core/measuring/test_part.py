@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.measuring.part import MeasuredPart, measure_part
 from lightpen.measuring.plan import Plan, Side, parse_plan
 from lightpen.measuring.report import feature_rows
+from lightpen.measuring.surfaces import FeatureKind
 from lightpen.measuring.touches import PartTouches
 from lightpen.model.decision_rules import Decision
 from lightpen.model.rigid import rotation_from_vector
@@ -211,6 +213,23 @@ def test_touches_from_both_sides_are_refused(plan: Plan) -> None:
 def test_missing_touches_are_named(plan: Plan) -> None:
     with pytest.raises(CalibrationError, match="front has 0 touches"):
         measure_part(plan, only(touched(), "top"))
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        ("line", "Feature {}: The points are up to .* mm off a line."),
+        ("cone", "Feature {}: The points do not determine a cone."),
+        ("cylinder", "Feature {}: The points do not determine a cylinder."),
+    ],
+)
+def test_touches_of_another_kind_are_refused(plan: Plan, kind: str, told: str) -> None:
+    flat = next(each for each in plan.features if each.kind is FeatureKind.CIRCLE)
+    wrong = structs.replace(flat, kind=FeatureKind(kind), touches=None)
+    plan = Plan("Wrong", (wrong,))
+
+    with pytest.raises(CalibrationError, match=told.format(flat.name)):
+        measure_part(plan, touched())
 
 
 def only(touches: PartTouches, name: str) -> PartTouches:

@@ -143,3 +143,10 @@ def test_a_circumscribed_circle_is_that_of_another_program() -> None:
 def test_a_plane_has_no_inscribed_fit() -> None:
     with pytest.raises(CalibrationError, match="Use least squares"):
         fit_zone(FeatureKind.PLANE, placed(RNG.normal(size=(9, 3))), INSIDE)
+
+
+def test_an_inscribed_circle_needs_points_all_around() -> None:
+    arc = 25 * np.column_stack([np.cos(TURN[:11]), np.sin(TURN[:11])])
+
+    with pytest.raises(CalibrationError, match="do not determine"):
+        fit_zone(FeatureKind.CIRCLE, placed(np.insert(arc, 2, 0, axis=1)), INSIDE)

@@ -147,6 +147,7 @@ class TaskFinding(ResponsiveLayout, QWidget):
         if task is PART:
             self.narrow_below = 125 * GRID
         self._room = NO_ROOM  # so that its least size at first widens no window
+        self._is_found = False
 
         # Widgets
         usual = POSTURES if task.shows_postures else None
@@ -166,6 +167,10 @@ class TaskFinding(ResponsiveLayout, QWidget):
     def set_value(self, setup: SessionSetup | None, state: SessionState | None) -> None:
         """Show a session, or that there is none."""
         tables: tuple[ResultTable, ...] = ()
+        is_found = state is not None and self._task.kind in state.found
+        if is_found is not self._is_found:
+            self._is_found = is_found
+            self._use_room()
         if setup is not None and state is not None:
             tables = self._figures(setup, state)
             if self._pictured is not None and self._picture is not None:
@@ -194,7 +199,11 @@ class TaskFinding(ResponsiveLayout, QWidget):
             direction.TopToBottom if is_stacked else direction.LeftToRight
         )
         self._columns.setDirection(
-            direction.BottomToTop if is_narrow and is_part else direction.LeftToRight
+            direction.LeftToRight
+            if not (is_narrow and is_part)
+            else direction.BottomToTop  # results first
+            if self._is_found
+            else direction.TopToBottom  # the next point first
         )
         self._side.setStretch(0, 0 if is_stacked else 1)
         self._side.setStretch(1, 1)

@@ -341,7 +341,7 @@ def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
         _rows(characteristic_rows(part)),
         (message("part.u-alone-note"),) if part.results else (),
     )
-    return characteristics, features
+    return tuple(each for each in (characteristics, features) if each.rows)
 
 
 def _notes(found: Part, conditions: Conditions) -> Iterator[Message]:
