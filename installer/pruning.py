@@ -50,16 +50,7 @@ DROPPED = (
 )  # fmt: skip
 # Sub-packages of scipy that are imported, and those that they import.
 SCIPY = {
-    *(
-        "_external",
-        "_lib",
-        "constants",
-        "fft",
-        "linalg",
-        "sparse",
-        "spatial",
-        "special",
-    )
+    *("_external", "_lib", "constants", "fft", "linalg", "sparse", "spatial", "special")
 }
 KEPT = ("numpy/testing/*",)
 

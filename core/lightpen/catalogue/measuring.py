@@ -46,6 +46,7 @@ MESSAGES = {
     "part.no-plan": "No measuring plan is chosen. Open a plan, or measure without one.",
     "part.nothing-probed": "No feature of the plan was probed. Probe at least one.",
     "part.instruction": "Probe the {kind} {name}: {n_points} of {needed} points.",
+    "part.slide": "Slide along the {kind} {name}: {n_points} of {needed} points.",
     "part.feature": "feature",
     "part.unknown-kind": "not recognised yet",
     "part.touches": "Points of {name} ({kind}), camera frame / mm",

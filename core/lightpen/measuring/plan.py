@@ -127,6 +127,8 @@ class PlannedFeature(_Entry, frozen=True):
     known : float or None
         U (k = 2) of the nominal diameter, mm, of a feature of known form, whose touches
         refine the tip; None to measure the feature.
+    scan : bool
+        Whether the pen slides along the surface after its first touch.
     """
 
     name: Name
@@ -137,6 +139,7 @@ class PlannedFeature(_Entry, frozen=True):
     nominal: Nominal | None = None
     air: Vector | None = None
     known: Annotated[float, Meta(ge=0)] | None = None
+    scan: bool = False
 
     @property
     def n_touches(self) -> int:

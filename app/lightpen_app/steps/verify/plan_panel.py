@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from msgspec import structs
-from PySide6.QtWidgets import QBoxLayout, QFileDialog, QWidget
+from PySide6.QtWidgets import QBoxLayout, QCheckBox, QFileDialog, QWidget
 from typing_extensions import override
 
 from lightpen.formats.file_format import FileFormat
@@ -59,6 +59,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._kind_label.setBuddy(self._kind)
         for kind in (None, *FeatureKind):
             self._kind.addItem("", None if kind is None else kind.value)
+        self._scan = QCheckBox()
         self._moved, self._save_plan, self._export, self._report = (
             PushButton() for _ in range(4)
         )
@@ -66,7 +67,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
 
         # Layout
         cells = (self._open, self._free, self._plate, (self._name, 1))
-        of_feature = self._kind_label, self._kind
+        of_feature = self._kind_label, self._kind, self._scan
         of_part = self._moved, self._save_plan, self._export, self._report
         self._rows = horizontal_layout(self)
         horizontal_layout(self._rows, *cells, stretch=1)
@@ -78,6 +79,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._free.clicked.connect(self._on_free_clicked)
         self._plate.clicked.connect(self._on_plate_clicked)
         self._kind.activated.connect(self._on_kind_chosen)
+        self._scan.clicked.connect(self._on_scan_clicked)
         self._moved.clicked.connect(self._on_moved_clicked)
         self._save_plan.clicked.connect(self._on_save_plan_clicked)
         self._export.clicked.connect(self._on_export_clicked)
@@ -93,11 +95,12 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         plan = self._plan()
         self._name.setText("" if plan is None else plan.name)
         planned = self._planned()
-        for each in (self._kind_label, self._kind, self._moved):
+        for each in (self._kind_label, self._kind, self._scan, self._moved):
             each.setVisible(planned is not None)
         self._moved.setEnabled(status.state is not None and bool(status.state.runs))
         kind = None if planned is None else planned.kind
         self._kind.setCurrentIndex(self._kind.findData(kind and kind.value))
+        self._scan.setChecked(planned is not None and planned.scan)
         self._plate.setVisible(self._live.operator is not None)
         for button in (self._save_plan, self._export):
             button.setVisible(self._part() is not None)
@@ -156,6 +159,10 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._kind.setItemText(0, self.tr("Recognise"))
         for index, kind in enumerate(FeatureKind, start=1):
             self._kind.setItemText(index, worded(NAMES[kind]))
+        self._scan.setText(self.tr("Scan"))
+        self._scan.setToolTip(
+            self.tr("Hold still on the feature, then slide along it.")
+        )
         self._moved.setText(self.tr("Part moved"))
         self._moved.setToolTip(
             self.tr(
@@ -201,15 +208,22 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self.choose(plate_plan())
 
     def _on_kind_chosen(self) -> None:
+        word = self._kind.currentData()
+        kind = None if word is None else FeatureKind(word)
+        self._change(lambda each: structs.replace(each, kind=kind))
+
+    def _on_scan_clicked(self) -> None:
+        scan = self._scan.isChecked()
+        self._change(lambda each: structs.replace(each, scan=scan))
+
+    def _change(self, changed: Callable[[PlannedFeature], PlannedFeature]) -> None:
+        """Change the feature at hand in the plan."""
         plan, planned = self._plan(), self._planned()
         if plan is None or planned is None:
             return
-        word = self._kind.currentData()
-        kind = None if word is None else FeatureKind(word)
         name = base_name(planned.name)
         features = tuple(
-            structs.replace(each, kind=kind) if each.name == name else each
-            for each in plan.features
+            changed(each) if each.name == name else each for each in plan.features
         )
         choices = self._selection.choices
         options = structs.replace(

@@ -264,7 +264,7 @@ class VerifyPresenter(QObject):
         if touching.phase is ProbingPhase.KNOWN:
             return State(self.tr("PROBED BEFORE"), "", Sign.WARNING, Tone.WARN)
         if is_held(state):
-            fraction = touching.progress(rules_of(setup, task))
+            fraction = touching.progress(rules_of(setup, state, task))
             return State(self.tr("STEADY"), "", Sign.RECORD, Tone.ACTIVE, fraction)
         if state.trouble is not None:
             return State(self.tr("NOT RECORDED"), "", Sign.WARNING, Tone.WARN)

@@ -169,7 +169,7 @@ def advance_touch(
     if state.phase is ProbingPhase.AT_REST and not _has_left(state.held, seen):
         rest = (*state.held[:1], seen)
         return ProbingTransition(replace(state, held=rest, doubted=None))
-    if not state.held:
+    if not state.held or rules.n_frames == 1:
         return _moved_to(rules, state, (seen,))
     if _agrees(state.held, seen):
         rejected = state.rejected
@@ -322,11 +322,13 @@ def _held(rules: ProbingRules, state: ProbingState) -> ProbingTransition:
         return ProbingTransition(state)
     used = state.held[rules.n_settling :]
     if not _is_new(rules, state, used[0]):
+        if rules.n_frames == 1:  # the pen slides on
+            return ProbingTransition(replace(_let_go(state).state, path=()))
         return ProbingTransition(replace(state, phase=ProbingPhase.KNOWN))
     still = StillFrames(
         frames=tuple(each.frame for each in used),
         rejected=state.rejected,
-        approach_cam=approach_of(state, used[0].tip_cam),
+        approach_cam=approach_of(rules, state, used[0].tip_cam),
     )
     taken = replace(
         state,
@@ -345,8 +347,15 @@ def _is_new(rules: ProbingRules, state: ProbingState, seen: TipObservation) -> b
     return all(_differs(seen, before, *least) for before in state.places)
 
 
-def approach_of(state: ProbingState, tip_cam: FloatArray) -> FloatArray | None:
-    """Return the direction in which the tip came, if it came from far enough."""
+def approach_of(
+    rules: ProbingRules, state: ProbingState, tip_cam: FloatArray
+) -> FloatArray | None:
+    """Return the direction in which the tip came, if it came from far enough.
+
+    A pen that slides from one point to the next does not show it.
+    """
+    if rules.n_frames == 1:
+        return None
     for before in reversed(state.path):
         way = tip_cam - before
         distance = float(np.linalg.norm(way))

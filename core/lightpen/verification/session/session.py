@@ -77,7 +77,7 @@ def advance_session(
     task = state.task(setup)
     if task is None:
         return SessionTransition(state)
-    rules = rules_of(setup, task)
+    rules = rules_of(setup, state, task)
     touched = advance_touch(setup.instrument, rules, state.touching, name, detection)
     events = tuple(each for each in touched.events if _is_worth_telling(rules, each))
     happened = {event.what for event in events}
@@ -149,8 +149,8 @@ def touch_again(
     task = state.task(setup)
     if task is None:
         return state
-    rules = rules_of(setup, task)
     for still in held:
+        rules = rules_of(setup, state, task)
         touching = taken_again(setup.instrument, rules, state.touching, still)
         if touching is state.touching:
             continue
@@ -301,10 +301,14 @@ def _measured_by(choices: VerificationChoices, state: SessionState) -> SessionSt
     return state
 
 
-def rules_of(setup: SessionSetup, task: AnyTask) -> ProbingRules:
-    """Return which points count as new in a task."""
-    turn, distance = task.newness(setup.choices.options_of(task))
-    return ProbingRules(setup.choices.n_frames, min_turn=turn, min_distance=distance)
+def rules_of(setup: SessionSetup, state: SessionState, task: AnyTask) -> ProbingRules:
+    """Return how the next point of a task is taken, and which one counts as new."""
+    options = setup.choices.options_of(task)
+    turn, distance = task.newness(options)
+    rules = ProbingRules(setup.choices.n_frames, min_turn=turn, min_distance=distance)
+    if state.touches and task.scans(options, len(state.runs)):
+        return replace(rules, n_frames=1, n_settling=0)
+    return rules
 
 
 def with_touch(setup: SessionSetup, state: SessionState, task: AnyTask) -> SessionState:

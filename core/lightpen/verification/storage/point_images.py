@@ -305,7 +305,7 @@ class LivePoints:
         task = state.task(setup)
         if task is None:
             return setup
-        rules = rules_of(setup, task)
+        rules = rules_of(setup, state, task)
         if len(state.touching.held) + 1 < rules.n_settling + rules.n_frames:
             return setup
         return with_drift(setup, self.lamp_drift(setup))
@@ -317,9 +317,9 @@ class LivePoints:
         task = state.task(setup)
         if task is None or not seen.has_pose or seen.is_blurred:
             return str(frame.seq)
-        if not is_held_on(rules_of(setup, task), state):
+        rules = rules_of(setup, state, task)
+        if not is_held_on(rules, state):
             return str(frame.seq)
         tip_cam = seen.rotation @ setup.instrument.tip_pen + seen.translation
-        return self._images.keep(
-            frame, seen, task, approach_of(state.touching, tip_cam)
-        )
+        approach = approach_of(rules, state.touching, tip_cam)
+        return self._images.keep(frame, seen, task, approach)

@@ -123,7 +123,9 @@ def resume_verification(
     lamps, cameras = LampObservations(), setup.instrument.rig.cameras
     for n, run in enumerate(under_way.runs, start=1 + len(under_way.read)):
         record = open_record(root / TOUCHES / run.folder)
-        held = _held_in(record, under_way.choices.n_frames)
+        task = task_of(run.task)
+        scans = task.scans(under_way.choices.options_of(task), len(state.runs))
+        held = _held_in(record, under_way.choices.n_frames, scans=scans)
         lamps = lamps.then(_lamps_in(record, setup))
         drifted = with_drift(setup, lamps.lamp_drift(cameras, setup.choices.limits))
         if record.verdict == CONCLUDED:
@@ -204,12 +206,19 @@ def _lamps_in(record: Record, setup: SessionSetup) -> LampObservations:
     return LampObservations()
 
 
-def _held_in(record: Record, n_frames: int) -> tuple[StillFrames, ...]:
-    """Return the touches in a record that are complete."""
+def _held_in(record: Record, n_frames: int, *, scans: bool) -> tuple[StillFrames, ...]:
+    """Return the touches in a record that are complete.
+
+    Where the pen slides after the first one, an image is a touch.
+    """
     by_touch: dict[int, list[RecordedImage]] = {}
     for image in record.used_images:
         by_touch.setdefault(image.touch, []).append(image)
-    whole = (images for images in by_touch.values() if len(images) >= n_frames)
+    whole = (
+        images
+        for touch, images in by_touch.items()
+        if len(images) >= n_frames or (scans and touch > 1)
+    )
     return tuple(
         StillFrames(tuple(map(_frame, images)), approach_cam=images[0].approach_cam)
         for images in whole

@@ -395,13 +395,19 @@ def _instruction(options: PartOptions, progress: TaskProgress) -> Message:
     if planned is None:
         return message("part.no-plan")
     kind = message("part.feature") if planned.kind is None else NAMES[planned.kind]
+    is_sliding = planned.scan and progress.points
     return message(
-        "part.instruction",
+        "part.slide" if is_sliding else "part.instruction",
         kind=kind,
         name=planned.name,
         n_points=len(progress.points),
         needed=planned.n_touches,
     )
+
+
+def _scans(options: PartOptions, run: int) -> bool:
+    planned = planned_at(options, run)
+    return planned is not None and planned.scan
 
 
 def _missing(options: PartOptions, ball_diameter: float | None) -> Message | None:
@@ -438,6 +444,7 @@ PART = VerificationTask(
     count=_count,
     instruction=_instruction,
     newness=lambda options: (ANY, NEW_PLACE),
+    scans=_scans,
     missing=_missing,
     rule_of=_rule,
 )

@@ -334,6 +334,8 @@ class VerificationTask(Generic[OptionsT, FoundT]):
         Whether all images that are given to the command are one run.
     counts_drift : bool
         Whether U counts how far the camera moved.
+    scans : callable
+        Whether the pen slides along a surface in a run, from 0, after its first point.
     compares_nominal_tip : bool
         Whether the nominal tip is of use.
     shows_postures : bool
@@ -372,6 +374,7 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     rule_of: Callable[[OptionsT, VerificationLimits], Message] = (
         lambda options, limits: rule_in_words(limits)
     )
+    scans: Callable[[OptionsT, int], bool] = lambda options, run: False
     is_each_run_measured: bool = True
     check: Callable[[Runs, Conditions, OptionsT], object] | None = None
     is_pooled: bool = False

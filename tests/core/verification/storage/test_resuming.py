@@ -284,6 +284,36 @@ def test_a_moved_part_goes_on_after_a_kill_in_its_new_position(
     assert len(record["positions"]) == 1
 
 
+def test_a_scanned_feature_goes_on_after_a_kill(
+    in_force: Path, verifying: Verifying, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    edge = PlannedFeature("edge", FeatureKind.LINE, touches=8, scan=True)
+    options = PartOptions(Plan("Edge", (edge,)))
+    places = [Hold((3.0 * i, -30.0, 0.0), tilt=0.1) for i in range(12)]
+
+    def slide(verifier: Verifier, holds: list[Hold]) -> None:
+        for hold in holds:
+            verifier.see(verifier.holder.still(hold, 1))
+
+    first = verifying()
+    first.come(VerificationChoices((PART.kind,), (options,), n_frames=2))
+    first.touch(places[0])
+    slide(first, places[1:5])
+    copy = tmp_path_factory.mktemp("killed") / "data"
+    shutil.copytree(in_force, copy)
+    holder = deepcopy(first.holder)
+    slide(first, places[5:])
+    (record,) = first.records
+    assert len(record["touches"]) == 8
+
+    second = verifying(copy)
+    assert len(go_on(second).touches) == 5
+    second.holder = holder
+    slide(second, places[5:])
+    (again,) = second.records
+    assert again["features"] == record["features"]
+
+
 def batched(holds: list[Hold]) -> Iterator[tuple[Hold, Hold]]:
     """Return where the ball is above a place, and on it."""
     return zip(holds[::2], holds[1::2], strict=True)

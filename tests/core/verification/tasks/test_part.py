@@ -35,7 +35,13 @@ from lightpen.verification.session.session import (
 )
 from lightpen.verification.session.session_state import SessionSetup, SessionState
 from lightpen.verification.tasks.part import PART, Part
-from lightpen.verification.tasks.part_course import PartOptions, course, feature_so_far
+from lightpen.verification.tasks.part_course import (
+    SIMULATED_AXES,
+    SIMULATED_ORIGIN,
+    PartOptions,
+    course,
+    feature_so_far,
+)
 from lightpen.verification.tasks.probed_point import ProbedPoint
 
 BALL = 10.0  # mm
@@ -422,3 +428,30 @@ def test_a_moved_part_is_tied_by_datum_points_probed_again(
     few.append(("top@2", runs[0][1]))
     with pytest.raises(CalibrationError, match="Position 2 shares 1 datum points"):
         PART.measure(few, at_it.setup.conditions, at_it.options)
+
+
+def test_a_scanned_feature_needs_one_point_held_still(instrument: Instrument) -> None:
+    hole = structs.replace(plate_plan().features[2], scan=True, touches=12)
+    plan = structs.replace(
+        plate_plan(), features=(hole,), alignment=None, characteristics=()
+    )
+    at_it = station(instrument, plan)
+    at_it.probe(1)
+    assert len(at_it.state.touches) == 1
+    assert hole.nominal is not None
+    middle = SIMULATED_ORIGIN + SIMULATED_AXES @ np.array(hole.nominal.origin)
+    radius = 12.0 - BALL / 2
+    for turn in np.radians(np.arange(0.0, 360.0, 2.5)):  # 0.3 mm each
+        place = middle + radius * np.array([np.cos(turn), 0.0, np.sin(turn)])
+        (seen,) = at_it.holder.still(Hold(tuple(place.tolist()), 0.1), 1)
+        at_it.state = advance_session(at_it.setup, at_it.state, "image", seen).state
+        if at_it.state.assessment is not None:
+            break
+
+    part = at_it.found.part
+    assert len(part.touches.points_cam) == 12
+    away = np.linalg.norm(np.diff(part.touches.points_cam[1:], axis=0), axis=1)
+    assert away.min() > 0.4
+    assert np.isnan(part.touches.approaches_cam[1:]).all()
+    diameter = 2 * part.features[hole.name].in_part.values[6]
+    assert abs(diameter - 24) < 2 * part.uncertainty(hole.name)[6] + 0.02
