@@ -154,12 +154,11 @@ _SIZES: dict[Of, Callable[[FloatArray], float]] = {
 
 def _angle(first: Quantity, second: Quantity) -> Quantity:
     """Return the angle between two directions without their signs, 0 to 90 degrees."""
-    sign = 1.0 if first.values[AXIS] @ second.values[AXIS] >= 0 else -1.0
+    is_obtuse = first.values[AXIS] @ second.values[AXIS] < 0
 
     def angle(a: FloatArray, b: FloatArray) -> float:
-        way, other = a[AXIS], sign * b[AXIS]
-        sine = np.linalg.norm(np.cross(way, other))
-        return float(np.rad2deg(np.arctan2(sine, way @ other)))
+        found = float(np.rad2deg(constructions.angle(a, b)))
+        return 180 - found if is_obtuse else found
 
     return derive(angle, first, second)
 

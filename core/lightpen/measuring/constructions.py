@@ -36,6 +36,12 @@ def distance_of_lines(first: FloatArray, second: FloatArray) -> float:
     return abs(float((second[PLACE] - first[PLACE]) @ normal))
 
 
+def angle(first: FloatArray, second: FloatArray) -> float:
+    """Return the angle between two axes or normals as they point, 0 to pi, rad."""
+    a, b = first[AXIS], second[AXIS]
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+
+
 def midpoint(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the point halfway between two origins, (3,)."""
     return np.asarray((first[PLACE] + second[PLACE]) / 2)

@@ -174,4 +174,4 @@ def _lowering_step(h: FloatArray, A: FloatArray, reach: float) -> FloatArray:
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios = np.where(shares > TINY, -prices / shares, np.inf)
         held[int(np.argmin(ratios))] = new
-    return x[:-1] / scale
+    return np.asarray(x[:-1] / scale)

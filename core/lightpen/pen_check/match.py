@@ -327,7 +327,7 @@ def _owners(leds: FloatArray, points: FloatArray) -> list[int]:
         return [-1] * len(leds)
     gaps = np.abs(leds[:, None] - points)
     costs = (gaps > SAME).sum(axis=2) + 1e-6 * gaps.sum(axis=2)
-    return assigned_columns(costs).tolist()
+    return [int(column) for column in assigned_columns(costs)]
 
 
 def _residuals(camera: Camera, pen: Pen, located: _Located, start: Poses) -> FloatArray:

@@ -395,13 +395,13 @@ def _instruction(options: PartOptions, progress: TaskProgress) -> Message:
     if planned is None:
         return message("part.no-plan")
     kind = message("part.feature") if planned.kind is None else NAMES[planned.kind]
-    is_sliding = planned.scan and progress.points
+    name, n_points, needed = planned.name, len(progress.points), planned.n_touches
+    if planned.scan and n_points:
+        return message(
+            "part.slide", kind=kind, name=name, n_points=n_points, needed=needed
+        )
     return message(
-        "part.slide" if is_sliding else "part.instruction",
-        kind=kind,
-        name=planned.name,
-        n_points=len(progress.points),
-        needed=planned.n_touches,
+        "part.instruction", kind=kind, name=name, n_points=n_points, needed=needed
     )
 
 
