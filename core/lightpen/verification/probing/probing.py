@@ -119,6 +119,8 @@ class ProbingState:
         Points probed so far.
     places : tuple of TipObservation
         One image of each.
+    is_sliding : bool
+        Whether the pen was seen without a break since a point was taken.
     """
 
     phase: ProbingPhase = ProbingPhase.MOVING
@@ -129,6 +131,7 @@ class ProbingState:
     path: tuple[FloatArray, ...] = ()
     taken: tuple[StillFrames, ...] = ()
     places: tuple[TipObservation, ...] = ()
+    is_sliding: bool = False
 
     def progress(self, rules: ProbingRules) -> float:
         """Return the completed fraction of a touch, 0 to 1."""
@@ -187,7 +190,8 @@ def advance_touch(
 
 def at_rest(state: ProbingState) -> ProbingState:
     """Return the touches so far; the pen must leave where it is before the next."""
-    return replace(_let_go(state).state, phase=ProbingPhase.AT_REST, path=())
+    state = replace(_let_go(state).state, phase=ProbingPhase.AT_REST, path=())
+    return replace(state, is_sliding=False)
 
 
 def take_all(
@@ -282,7 +286,7 @@ def _without_pose(state: ProbingState, rejected: RejectedFrame) -> ProbingTransi
     if state.n_lost > MAX_LOST and state.phase is ProbingPhase.AT_REST:
         return ProbingTransition(replace(state, held=()))
     if state.n_lost > MAX_LOST:
-        return _let_go(state)
+        return _let_go(replace(state, is_sliding=False))
     if state.phase is ProbingPhase.HOLDING:
         state = replace(state, rejected=(*state.rejected, rejected))
     return ProbingTransition(state)
@@ -337,6 +341,7 @@ def _held(rules: ProbingRules, state: ProbingState) -> ProbingTransition:
         path=(),
         taken=(*state.taken, still),
         places=(*state.places, used[0]),
+        is_sliding=True,
     )
     event = ProbingEvent(ProbingEventKind.RECORDED, tuple(map(_name, used)))
     return ProbingTransition(taken, (event,))

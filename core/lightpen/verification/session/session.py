@@ -232,6 +232,7 @@ def without_last_touch(state: SessionState) -> SessionState:
         state.touching,
         taken=state.touching.taken[:-1],
         places=state.touching.places[:-1],
+        is_sliding=False,
     )
     return replace(state, touching=touching, touches=state.touches[:-1], trouble=None)
 
@@ -306,7 +307,8 @@ def rules_of(setup: SessionSetup, state: SessionState, task: AnyTask) -> Probing
     options = setup.choices.options_of(task)
     turn, distance = task.newness(options)
     rules = ProbingRules(setup.choices.n_frames, min_turn=turn, min_distance=distance)
-    if state.touches and task.scans(options, len(state.runs)):
+    is_sliding = bool(state.touches) and state.touching.is_sliding
+    if is_sliding and task.scans(options, len(state.runs)):
         return replace(rules, n_frames=1, n_settling=0)
     return rules
 

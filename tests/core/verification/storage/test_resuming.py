@@ -309,9 +309,13 @@ def test_a_scanned_feature_goes_on_after_a_kill(
     second = verifying(copy)
     assert len(go_on(second).touches) == 5
     second.holder = holder
-    slide(second, places[5:])
+    slide(second, places[5:8])  # nothing counts before the pen is held again
+    second.touch(places[8])
+    slide(second, places[9:])
     (again,) = second.records
-    assert again["features"] == record["features"]
+    images = [[each["images"] for each in r["touches"]] for r in (record, again)]
+    assert images[0][:5] == images[1][:5]
+    assert [len(each) for each in images[1]] == [2, 1, 1, 1, 1, 2, 1, 1]
 
 
 def batched(holds: list[Hold]) -> Iterator[tuple[Hold, Hold]]:

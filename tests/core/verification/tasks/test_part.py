@@ -436,15 +436,14 @@ def test_a_scanned_feature_needs_one_point_held_still(instrument: Instrument) ->
         plate_plan(), features=(hole,), alignment=None, characteristics=()
     )
     at_it = station(instrument, plan)
-    at_it.probe(1)
-    assert len(at_it.state.touches) == 1
     assert hole.nominal is not None
     middle = SIMULATED_ORIGIN + SIMULATED_AXES @ np.array(hole.nominal.origin)
     radius = 12.0 - BALL / 2
     for turn in np.radians(np.arange(0.0, 360.0, 2.5)):  # 0.3 mm each
         place = middle + radius * np.array([np.cos(turn), 0.0, np.sin(turn)])
-        (seen,) = at_it.holder.still(Hold(tuple(place.tolist()), 0.1), 1)
-        at_it.state = advance_session(at_it.setup, at_it.state, "image", seen).state
+        n_images = 1 if at_it.state.touches else 5
+        for seen in at_it.holder.still(Hold(tuple(place.tolist()), 0.1), n_images):
+            at_it.state = advance_session(at_it.setup, at_it.state, "image", seen).state
         if at_it.state.assessment is not None:
             break
 
