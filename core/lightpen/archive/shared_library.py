@@ -62,17 +62,19 @@ class TakenOver:
     def message(self) -> Message:
         """Whose change counts now, and whose it replaces."""
         item, before = self.change.item, self.replaced
-        told: dict[str, Message | str] = {
-            "kind": KIND_WORDS[item.kind],
-            "id": printable(item.id),
-            "by": _author_of(self.change),
-        }
-        if before is not None:
-            told["before"] = _author_of(before)
+        kind, item_id = KIND_WORDS[item.kind], printable(item.id)
+        by = _author_of(self.change)
         if item.is_retired:
-            return message("library.shared-retired", **told)
-        code = "library.shared" if before is None else "library.shared-replacing"
-        return message(code, **told)
+            return message("library.shared-retired", kind=kind, id=item_id, by=by)
+        if before is None:
+            return message("library.shared", kind=kind, id=item_id, by=by)
+        return message(
+            "library.shared-replacing",
+            kind=kind,
+            id=item_id,
+            by=by,
+            before=_author_of(before),
+        )
 
 
 def newer_elsewhere(
