@@ -45,6 +45,8 @@ class ArchiveCheckResult:
         What may be honest and is to be known, see `lightpen.archive.check_notes`.
     n_tips : int
         Tips computed again, see `lightpen.archive.recompute_check`.
+    n_timestamps : int
+        Timestamps found right, see `lightpen.archive.timestamps`.
     """
 
     n_entries: int
@@ -52,6 +54,7 @@ class ArchiveCheckResult:
     findings: tuple[Message, ...]
     notes: tuple[Message, ...] = ()
     n_tips: int = 0
+    n_timestamps: int = 0
 
 
 def check_archive(

@@ -1,4 +1,4 @@
-"""``lightpen archive``: check, list, deliver, fetch and exchange entries."""
+"""``lightpen archive``: check, list, deliver, fetch, exchange and timestamp entries."""
 
 import argparse
 from collections.abc import Callable
@@ -65,6 +65,23 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         metavar="NAME",
         help="start of the chain to restore, where the server has several",
     )
+    stamped = actions.add_parser(
+        "timestamp", help="have the newest entry timestamped by an authority (RFC 3161)"
+    )
+    stamped.add_argument(
+        "--tsa",
+        default="",
+        metavar="URL",
+        help="time stamping authority (default: that set for the computer, else none)",
+    )
+    for action in (check, stamped):
+        action.add_argument(
+            "--certificate",
+            type=Path,
+            metavar="FILE",
+            help="PEM file with the root certificate of the time stamping authority, "
+            "and optionally its own",
+        )
     renewed = actions.add_parser(
         "new-key", help="introduce another station key, if the present one was lost"
     )
@@ -74,7 +91,7 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         help="supervisor who approves it, if the data folder has a supervisor "
         "password; the password is requested, or read from LIGHTPEN_PASSWORD",
     )
-    for action in (check, listed, export, taken, delivered, fetched, renewed):
+    for action in (check, listed, export, taken, delivered, fetched, stamped, renewed):
         action.add_argument(
             "--data",
             type=Path,

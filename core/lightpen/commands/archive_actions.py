@@ -22,6 +22,7 @@ from lightpen.archive.recompute_check import with_recomputed
 from lightpen.archive.seal import close_sealed
 from lightpen.archive.server import open_server
 from lightpen.archive.server_setup import server_sql
+from lightpen.archive.timestamps import authority, request_timestamp, with_timestamps
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
 from lightpen.errors import UsageError
@@ -46,6 +47,7 @@ def _check(options: argparse.Namespace) -> int:
             checked = with_recomputed(
                 checked, database, data, options.recompute, report
             )
+            checked = with_timestamps(checked, database, data, options.certificate)
         findings, told = checked.findings, ""
         if options.server:
             with _looked_into(data) as database, _server() as server:
@@ -61,6 +63,8 @@ def _check(options: argparse.Namespace) -> int:
         outcome = "Something was changed" if has_findings else "No change was found"
         n_files = checked.n_files
         n_tips = f", tips recomputed: {checked.n_tips}" if checked.n_tips else ""
+        if checked.n_timestamps:
+            n_tips += f", timestamps: {checked.n_timestamps}"
         print(f"{outcome}: {checked.n_entries} entries, {n_files} files{n_tips}.{told}")
 
     return run(options) or (CHANGED if has_findings else 0)
@@ -134,6 +138,16 @@ def _server_sql(options: argparse.Namespace) -> None:
 
 
 @printing
+def _timestamp(options: argparse.Namespace) -> None:
+    by, data = authority(options.tsa, options.certificate), _data(options)
+    if not by.address or by.certificate is None:
+        raise UsageError("timestamp.no-authority")
+    with _looked_into(data) as database:
+        found = request_timestamp(database, data, by)
+    print(shown(f"Entry {found.number} existed at {found.at}: {found.file}"))
+
+
+@printing
 def _new_key(options: argparse.Namespace) -> None:
     data = _data(options)
     with closing(Logbook(data)) as logbook:
@@ -153,6 +167,7 @@ ACTIONS: dict[str, Command] = {
     "deliver": _deliver,
     "new-key": _new_key,
     "fetch": _fetch,
+    "timestamp": _timestamp,
     "server-sql": _server_sql,
 }
 

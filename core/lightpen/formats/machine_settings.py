@@ -32,6 +32,10 @@ class MachineSettings:
         Address of the archive's server; empty for none.
     update_file : str
         File that names the newest version; empty to tell of none.
+    timestamp_authority : str
+        Address of a time stamping authority; empty for none.
+    timestamp_certificate : str
+        File with its certificate.
     limits : mapping of str to float
         Limits of new stations, by `lightpen.model.limits.Limit.key`.
     """
@@ -39,6 +43,8 @@ class MachineSettings:
     language: str = ""
     archive_server: str = ""
     update_file: str = ""
+    timestamp_authority: str = ""
+    timestamp_certificate: str = ""
     limits: Mapping[str, float] = field(default_factory=dict)
 
     def station_limits(self) -> StationLimits:

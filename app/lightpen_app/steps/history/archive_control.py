@@ -13,6 +13,7 @@ from lightpen.archive.check import ArchiveCheckResult, check_archive
 from lightpen.archive.exchange import export_entries, import_entries
 from lightpen.archive.listing import save_entries
 from lightpen.archive.recompute_check import with_recomputed
+from lightpen.archive.timestamps import with_timestamps
 from lightpen_app.steps.history.archive_panel import ArchivePanel, SaveFormat
 from lightpen_app.steps.history.filter_bar import FilterBar
 from lightpen_app.widgets.save_dialog import ask_file
@@ -64,7 +65,8 @@ class ArchiveControl(QObject):
         def check(report: Report) -> ArchiveCheckResult:
             database = logbook.opened().database
             checked = check_archive(database, folder, report)
-            return with_recomputed(checked, database, folder)
+            checked = with_recomputed(checked, database, folder)
+            return with_timestamps(checked, database, folder)
 
         self._do(check, self._on_checked)
 
