@@ -4,7 +4,8 @@ Usage: python benchmarks/idle_wizard.py SECONDS
 
 One line of JSON: by the name of each page, and of those that are minimised, the share
 of one core that the process takes while the pen rests and nobody touches anything. The
-swing has begun by then; what is verified is the tip of another, swung in between.
+swing has begun by then; what is verified is the tip of another, swung in between. While
+that one captures, the share is taken with the window shown, then minimised.
 """
 
 import json
@@ -20,6 +21,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the program does
 
 from PySide6.QtCore import QEventLoop, QTimer
 
+from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.names import Names
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.wizard_pages import make_pages
@@ -32,6 +34,8 @@ LATER_PAGES = ("verify", "history")  # with a tip in force
 MINIMISED = ("camera", "verify")
 # Until all that was begun has ended, and the pen rests for long.
 SETTLING_S = 15.0
+MANY = SwingLimits(min_images=290, max_images=300)  # so that the capture lasts
+CAPTURING_S = 12.0
 
 
 def main() -> int:
@@ -41,7 +45,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         settings = Settings(Path(folder) / "lightpen.json")
         settings.set_station(
-            NAMES.station, Station(Names("", "Ann", "SIM-1", "T-1", "C-1"))
+            NAMES.station, Station(Names("", "Ann", "SIM-1", "T-1", "C-1"), limits=MANY)
         )
         settings.set_last_station(NAMES.station)
         wizard = Wizard(application, make_pages, settings, Path(folder))
@@ -50,7 +54,7 @@ def main() -> int:
             lambda: not wizard.workbench.selection.preparation.camera_missing_inputs()
         )
         shares = {name: _share_of(wizard, name, seconds) for name in PAGES}
-        _put_in_force(wizard)
+        shares |= _put_in_force(wizard)
         shares |= {name: _share_of(wizard, name, seconds) for name in LATER_PAGES}
         for name in MINIMISED:
             wizard.window.showNormal()
@@ -62,14 +66,23 @@ def main() -> int:
     return 0
 
 
-def _put_in_force(wizard: Wizard) -> None:
-    """Let the simulated operator swing, and accept the tip."""
+def _put_in_force(wizard: Wizard) -> dict[str, float]:
+    """Let the simulated operator swing, accept the tip, return shares of capturing."""
     run, live = wizard.workbench.run, wizard.workbench.live
+    assert live.operator is not None
+    live.operator.seat()
     live.set_following(True)
+    _until(lambda: run.status.state is not None and run.status.state.n_kept > 0)
+    shares = {"swing, capturing": _share(CAPTURING_S, 1.0)}
+    wizard.window.showMinimized()
+    shares["swing, capturing, minimised"] = _share(CAPTURING_S, 1.0)
+    assert run.status.assessment is None  # it still captures
+    wizard.window.showNormal()
     _until(lambda: run.status.assessment is not None)
     live.set_following(False)
     run.runner.accept("It is measured how idle the wizard is.")
     _until(lambda: run.status.result is not None)
+    return shares
 
 
 def _share_of(wizard: Wizard, name: str, seconds: float) -> float:
@@ -86,9 +99,9 @@ def _index(wizard: Wizard, key: str) -> int:
     return [page.key for page in pages].index(key)
 
 
-def _share(seconds: float) -> float:
+def _share(seconds: float, settling: float = SETTLING_S) -> float:
     """Return the share of a core that is taken while events are waited for."""
-    _run(SETTLING_S)
+    _run(settling)
     before = time.process_time()
     _run(seconds)
     return (time.process_time() - before) / seconds

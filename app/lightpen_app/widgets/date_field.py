@@ -15,6 +15,11 @@ EXAMPLE = date(2025, 8, 14)  # of a day that is over
 class DateField(Translated, EnterEdit):
     """A date such as 2026-08-14; an invalid one is marked and ignored.
 
+    Parameters
+    ----------
+    example : date
+        Shown while it is empty.
+
     Signals
     -------
     value_changed()
@@ -23,10 +28,11 @@ class DateField(Translated, EnterEdit):
 
     value_changed = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, example: date = EXAMPLE, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._value: date | None = None
-        self.setPlaceholderText(f"{EXAMPLE}")
+        self._example = example
+        self.setPlaceholderText(f"{example}")
 
         # Connections
         self.textChanged.connect(self._on_text_changed)
@@ -54,5 +60,5 @@ class DateField(Translated, EnterEdit):
 
     def _retranslate(self) -> None:
         self.setToolTip(
-            self.tr("Date, for example {0}; empty for any date").format(EXAMPLE)
+            self.tr("Date, for example {0}; empty for any date").format(self._example)
         )

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, QSizeF, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QImage,
@@ -27,6 +27,9 @@ MAX_ZOOM = 16.0
 ZOOM_STEP = 1.25
 PAN_STEP = 0.1  # of what is seen
 CLICK_SLACK = 4  # px that a mouse may move while it clicks
+LEAST_RING = 6.0  # px, radius
+LABEL_DISTANCES = (3.0, 12.0)  # px from a ring to its label
+LABEL_TURNS = tuple(math.radians(15 * k) for k in sorted(range(-11, 13), key=abs))
 
 
 @dataclass(frozen=True)
@@ -195,8 +198,12 @@ class ImageView(Translated, QWidget):
             QRectF(target.topLeft(), self._shown.size() * 2 * scale), self._shown
         )
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        taken = [self._ring_box(marker, scale) for marker in self._markers]
         for marker in self._markers:
             self._draw_marker(painter, marker, scale)
+        for marker in self._markers:  # over the rings
+            if marker.label:
+                self._draw_label(painter, marker, scale, taken)
         if self._draws_circles and self._pressed is not None:
             painter.setPen(QPen(QColor(DARK.accent), 2))
             painter.setBrush(Qt.BrushStyle.NoBrush)
@@ -205,7 +212,7 @@ class ImageView(Translated, QWidget):
 
     def _draw_marker(self, painter: QPainter, marker: Marker, scale: float) -> None:
         place = self.place_of(marker.x, marker.y)
-        radius = max(marker.radius * scale, 6.0)
+        radius = max(marker.radius * scale, LEAST_RING)
         pen = QPen(DARK.tone(marker.tone), 2)
         if marker.tone in (Tone.WARN, Tone.BAD):
             pen.setCapStyle(Qt.PenCapStyle.FlatCap)
@@ -217,21 +224,30 @@ class ImageView(Translated, QWidget):
             arm = radius / 2**0.5
             painter.drawLine(place - QPointF(arm, arm), place + QPointF(arm, arm))
             painter.drawLine(place - QPointF(arm, -arm), place + QPointF(arm, -arm))
-        if marker.label:
-            self._draw_label(painter, marker, place, radius)
+
+    def _ring_box(self, marker: Marker, scale: float) -> QRectF:
+        radius = max(marker.radius * scale, LEAST_RING)
+        place = self.place_of(marker.x, marker.y)
+        return QRectF(place.x() - radius, place.y() - radius, 2 * radius, 2 * radius)
 
     def _draw_label(
-        self, painter: QPainter, marker: Marker, place: QPointF, radius: float
+        self, painter: QPainter, marker: Marker, scale: float, taken: list[QRectF]
     ) -> None:
+        """Write a label where it covers no ring and no label, if there is room."""
         painter.setFont(font(TextSize.SMALL, bold=True))
         metrics = painter.fontMetrics()
         width = metrics.horizontalAdvance(marker.label) + 2.0
         height = float(metrics.capHeight())
-        across, down = math.cos(marker.label_angle), math.sin(marker.label_angle)
-        middle = place + QPointF(
-            across * (radius + 3 + width / 2), down * (radius + 3 + height / 2)
-        )
-        corner = middle + QPointF(-width / 2, height / 2)
+        ring = self._ring_box(marker, scale)
+        boxes = [
+            _label_box(ring, marker.label_angle + turn, QSizeF(width, height), away)
+            for away in LABEL_DISTANCES
+            for turn in LABEL_TURNS
+        ]
+        free = (b for b in boxes if not any(b.intersects(each) for each in taken))
+        box = next(free, boxes[0])
+        taken.append(box)
+        corner = box.bottomLeft()
         painter.setPen(QColor(DARK.window))
         painter.drawText(corner + QPointF(1, 1), marker.label)
         painter.setPen(DARK.tone(marker.tone))
@@ -337,3 +353,11 @@ class ImageView(Translated, QWidget):
             min(max(x, half_x), 1 - half_x), min(max(y, half_y), 1 - half_y)
         )
         self.update()
+
+
+def _label_box(ring: QRectF, angle: float, size: QSizeF, away: float) -> QRectF:
+    """Return where a label stands beside a ring, px."""
+    reach, width, height = ring.width() / 2 + away, size.width(), size.height()
+    x = ring.center().x() + math.cos(angle) * (reach + width / 2)
+    y = ring.center().y() + math.sin(angle) * (reach + height / 2)
+    return QRectF(x - width / 2, y - height / 2, width, height)

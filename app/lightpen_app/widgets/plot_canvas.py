@@ -8,6 +8,8 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from typing_extensions import override
 
+from lightpen_app.look.theme import GRID
+
 LABELLED = (1, 2, 5)  # of each decade
 
 # As pyqtgraph hands them to `drawPicture`: line, ticks, and place, flags and text.
@@ -42,6 +44,38 @@ class ReadableAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         numbers = (10 ** float(value) for value in values)
         leading = ((number, float(f"{number:e}"[:3])) for number in numbers)
         return [f"{number:g}" if digit in LABELLED else "" for number, digit in leading]
+
+
+class LabelAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
+    """A bottom axis whose labels can be written upwards, where they lack width.
+
+    Attributes
+    ----------
+    upright : sequence of str
+        Labels written upwards at 0, 1, 2, ... instead of the usual ones.
+    """
+
+    upright: Sequence[str] = ()
+
+    @override
+    def drawPicture(
+        self,
+        p: QPainter,
+        axisSpec: object,
+        tickSpecs: object,
+        textSpecs: list[TextSpec],
+    ) -> None:
+        super().drawPicture(p, axisSpec, tickSpecs, [] if self.upright else textSpecs)
+        left, right = self.range
+        p.setClipping(False)
+        room, line = self.height(), p.fontMetrics().lineSpacing()
+        flags = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        for place, text in enumerate(self.upright):
+            p.save()
+            p.translate((place - left) / (right - left) * self.width(), 0.0)
+            p.rotate(-90.0)  # to the right is upwards
+            p.drawText(QRectF(-room, -line / 2, room - GRID // 2, line), flags, text)
+            p.restore()
 
 
 def _is_between_decades(spec: TextSpec) -> bool:

@@ -38,12 +38,12 @@ from lightpen_app.look.theme import (
     font,
     scaled,
 )
-from lightpen_app.widgets.plot_canvas import Canvas, ReadableAxis
+from lightpen_app.widgets.plot_canvas import Canvas, LabelAxis, ReadableAxis
 
 PNG_SCALE = 2
 MARK_HEIGHT = 3 * GRID  # px, below a saved plot
 LEFT_WIDTH = 7 * GRID  # px, the same for all traces so that they line up
-TITLE_MARGIN = LEFT_WIDTH + 2 * GRID  # px that a title leaves free
+TITLE_MARGIN = 6 * GRID  # px that a title leaves free, as for a button
 LEAST_TITLE = 9  # px
 LABEL_ROOM = 3.0  # times a limit, for the words above it where y is logarithmic
 SIDE = 0.045  # of many numbered items, beside the first and the last
@@ -94,10 +94,13 @@ class Plot(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
         # Widgets
-        left = ReadableAxis("left")
-        self._graphics = Canvas(parent=self, axisItems={"left": left}, enableMenu=False)
+        axes_of_sides = {"left": ReadableAxis("left"), "bottom": LabelAxis("bottom")}
+        self._graphics = Canvas(parent=self, axisItems=axes_of_sides, enableMenu=False)
         self._item = self._graphics.getPlotItem()
         self._item.hideButtons()
+        title = self._item.titleLabel  # above the left axis, too, which gives it room
+        self._item.layout.removeItem(title)
+        self._item.layout.addItem(title, 0, 0, 1, 3)
         self._item.setMouseEnabled(x=False, y=False)
         self._graphics.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._graphics.viewport().setFocusPolicy(Qt.FocusPolicy.NoFocus)

@@ -174,9 +174,10 @@ class PostureDial(Translated, QWidget):
 
     def _drawn_ground(self, colors: Colors) -> QPixmap:
         """Return camera and fields, which change less often than the posture."""
-        value, scale, camera = self._value, self.devicePixelRatio(), self.tr("camera")
+        value, scale = self._value, self.devicePixelRatio()
+        camera, legend = self.tr("camera"), self.tr("images\nneeded")
         shows = (
-            *(self.size().toTuple(), scale, colors, camera, value.heading),
+            *(self.size().toTuple(), scale, colors, camera, legend, value.heading),
             *(value.counts.tobytes(), value.needed.tobytes()),
             *(value.n_upright, value.n_upright_needed),
         )
@@ -197,6 +198,11 @@ class PostureDial(Translated, QWidget):
         )
         for place in _fields():
             self._draw_field(painter, middle, rim, place, colors)
+        if value.n_full < value.n_fields:
+            painter.setPen(QColor(colors.muted))
+            painter.setFont(font(TextSize.SMALL))
+            corner = QRectF(middle.x() - rim, middle.y() - rim, 2 * rim, 2 * rim)
+            painter.drawText(corner, Qt.AlignmentFlag.AlignLeft, legend)
         painter.end()
         self._ground, self._ground_shows = ground, shows
         return ground

@@ -114,6 +114,17 @@ def test_a_label_stands_where_it_is_told(
     assert sum(lit) > 10
 
 
+def test_a_label_covers_no_other_ring(view: ImageView) -> None:
+    beside = Marker(1256, 1000, 16)  # where the label would stand
+
+    view.set_image(dark_image(), [Marker(1200, 1000, 1, "8", label_angle=0), beside])
+
+    drawn = view.grab().toImage()
+    middle = view.place_of(1256, 1000).toPoint()
+    inside = [QPoint(x, y) for x in range(-2, 3) for y in range(-2, 3)]
+    assert all(drawn.pixelColor(middle + each).lightness() < 30 for each in inside)
+
+
 def test_pixels_and_places_agree_at_every_enlargement(view: ImageView) -> None:
     view.set_image(dark_image())
     for zoom in (1.0, 3.0, MAX_ZOOM):

@@ -289,6 +289,20 @@ def test_labels_that_have_no_room_beside_each_other_stand_on_lines(
     assert plot.labels() == ("noise", "\nball, cone *", "warmth *", "\ncamera", "all")
 
 
+def test_labels_of_many_bars_are_written_upwards(qtbot: QtBot) -> None:
+    plot = BarPlot(Axes("Parts"), [Curve("x_um", "x")], "part")
+    show(qtbot, plot)
+    plot.resize(260, 300)
+    labels = ("form of ball, cone *",) * 14
+
+    plot.set_data(labels, np.ones(14))
+
+    qtbot.waitUntil(lambda: plot.labels() == labels)  # none on a second line
+    shown = plot.grab().toImage()
+    plot.set_data((*labels[:-1], ""), np.ones(14))
+    qtbot.waitUntil(lambda: plot.grab().toImage() != shown)  # the last one was drawn
+
+
 def test_series_are_renamed_with_the_language(qtbot: QtBot) -> None:
     plot = LinePlot(Axes("Tip"), [Curve("x_um", "x"), Curve("y_um", "y")], "iteration")
     show(qtbot, plot)

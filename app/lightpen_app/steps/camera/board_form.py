@@ -3,7 +3,7 @@
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QSpinBox, QWidget
+from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.errors import UsageError
@@ -113,9 +113,9 @@ class BoardForm(Translated, QWidget):
         self._kind = ChoiceField()
         for kind in BoardKind:
             self._kind.addItem("", kind)
-        self._columns, self._rows = QSpinBox(), QSpinBox()
-        for count in (self._columns, self._rows):
-            count.setRange(MIN_SIDE, MAX_SIDE)
+        self._columns, self._rows = (
+            NumberField("", (MIN_SIDE, MAX_SIDE), 0) for _ in range(2)
+        )
         self._pitch = NumberField("mm", (0.0, MAX_LENGTH), 3)
         self._detail = NumberField("mm", (0.0, MAX_LENGTH), 3)
         self._dictionary = ChoiceField()
@@ -162,8 +162,8 @@ class BoardForm(Translated, QWidget):
         kind = BoardKind(self._kind.currentData())
         entered = Board(
             kind=kind,
-            columns=self._columns.value(),
-            rows=self._rows.value(),
+            columns=round(self._columns.value()),
+            rows=round(self._rows.value()),
             pitch=self._pitch.value(),
             detail=0.0 if kind is BoardKind.CHESSBOARD else self._detail.value(),
             dictionary=self._dictionary.currentText() if kind.has_markers else "",

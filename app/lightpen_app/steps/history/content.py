@@ -164,7 +164,9 @@ class HistoryContent(Translated, QWidget):
         self._table.set_lines(opening.n_lines, opening.first)
         if self._followed is None:
             self._on_trend_read(Trend())
-        self._notices.show_status(self.tr("{0} entries").format(opening.n_lines))
+        n_lines = opening.n_lines
+        words = self.tr("1 entry") if n_lines == 1 else self.tr("{0} entries")
+        self._notices.show_status(words.format(n_lines))
         # Later than what is seen at once.
         self._reader.read_due(self._due.rule(), self._tips.library)
 

@@ -16,7 +16,7 @@ from lightpen_app.look.theme import GRID, TextSize, colors_of, font
 from lightpen_app.steps.review.residual_plots import SquarePlot
 from lightpen_app.widgets.plots import TONES, Axes, Column, Curve, Plot
 
-MOST_LINES = 4  # of labels below the bars
+MOST_LINES = 2  # of labels below the bars; where more are needed, they stand upright
 GROUP = 0.8  # of the room for a label, that its bars fill
 SYMBOLS = ("o", "s", "t")  # so that curves differ by more than their colour
 FARTHEST = 36.0  # degrees of tilt that are always shown
@@ -102,20 +102,26 @@ class BarPlot(NamedPlot):
         self._fit(edges, np.concatenate(values), y_zero=True)
 
     def _show_labels(self) -> None:
-        """Write the labels on as many lines as keep them clear of each other."""
+        """Write the labels on lines that keep them clear of each other, or upwards."""
         metrics = QFontMetricsF(font(TextSize.SMALL))
         widest = max(map(metrics.horizontalAdvance, self._labels), default=0.0)
         self._graphics.fit()
         slot = self._item.vb.width() / max(len(self._labels), 1)
-        n_lines = min(ceil((widest + GRID) / max(slot, 1.0)), MOST_LINES)
+        n_lines = ceil((widest + GRID) / max(slot, 1.0))
+        axis = self._item.getAxis("bottom")
+        axis.upright = self._labels if n_lines > MOST_LINES else ()
+        if axis.upright:
+            n_lines = 1
         self._labels_on_lines = tuple(
             "\n" * (i % n_lines) + label for i, label in enumerate(self._labels)
         )
-        axis = self._item.getAxis("bottom")
         axis.setTicks([list(enumerate(self._labels_on_lines))])
         # pyqtgraph gives lines of text four fifths of the height that they take.
         height = n_lines * metrics.lineSpacing() + GRID
-        axis.setHeight(height if n_lines > 1 and not self._axes.x else None)
+        if axis.upright:
+            height = widest + 2 * GRID
+        is_fixed = axis.upright or (n_lines > 1 and not self._axes.x)
+        axis.setHeight(height if is_fixed else None)
 
     @override
     def _restyle(self) -> None:

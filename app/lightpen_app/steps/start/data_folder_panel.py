@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QGroupBox, QWidget
 
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import TextSize, Tone, text_label
 from lightpen_app.look.words import breakable
 from lightpen_app.widgets.opened_folder import open_folder
 from lightpen_app.widgets.push_button import PushButton
@@ -51,9 +51,8 @@ class DataFolderPanel(Translated, QGroupBox):
 
         # Layout
         layout = vertical_layout(self)
-        horizontal_layout(
-            layout, (self._path, 1), self._open, self._change, spacing=2 * GRID
-        )
+        fill(layout, self._path)
+        horizontal_layout(layout, self._open, self._change, 1)
         fill(layout, self._doubt, self._others)
 
         # Connections

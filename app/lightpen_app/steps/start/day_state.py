@@ -141,7 +141,7 @@ def tip_details(now: Preparation, statuses: StationStatus) -> str:
         parts.append(translate("DayPage", "cone {0}").format(names.cone))
     if point is not None:
         x, y, z = (f"{each:g}" for each in point.tolist())
-        parts.append(translate("DayPage", "nominal {0} {1} {2}").format(x, y, z))
+        parts.append(translate("DayPage", "nominal {0} {1} {2} mm").format(x, y, z))
     limit = now.limits.max_uncertainty
     parts.append(translate("DayPage", "limit of U {0:g} mm").format(limit))
     if tip is not None and tip.note:

@@ -70,7 +70,8 @@ class ItemForm(Translated, QWidget):
         # Widgets
         self._id = QLineEdit()
         self._id.setMaxLength(LONGEST_ID)
-        self._due, self._certified = DateField(), DateField()
+        to_come = date(local_now().year + 1, 8, 14)
+        self._due, self._certified = DateField(to_come), DateField()
         self._certificate = QLineEdit()
         self._certificate.setMaxLength(LONGEST_ID)
         self._value = NumberField("mm", (0.0, LARGEST_REFERENCE), 4)

@@ -72,6 +72,7 @@ class VerifyPresenter(QObject):
             can_be_accepted=headline.is_doubtful
             and status.is_done
             and not status.accepted_by,
+            has_report=status.is_done and bool(status.files),
             can_undo=status.state is not None and bool(status.state.touches),
         )
 

@@ -1,5 +1,8 @@
 """Instruction, progress and buttons of a verification."""
 
+from functools import partial
+from pathlib import Path
+
 from PySide6.QtGui import QKeySequence
 from PySide6.QtWidgets import QProgressBar, QWidget
 from typing_extensions import override
@@ -13,6 +16,7 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize
+from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.steps.verify.view_state import VerifyView
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.push_button import PushButton
@@ -63,6 +67,8 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._instruction = FittedText(TextSize.TITLE)
         self._instruction.setMinimumHeight(4 * GRID)
         self._act, self._start_over, self._accept = (PushButton() for _ in range(3))
+        self._report = PushButton()
+        self._paper = PrintReportControl(workbench.save_place, self)
         self._undo = PushButton()
         self._undo.setShortcut(QKeySequence.StandardKey.Undo)
         self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
@@ -82,7 +88,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
             self._state, (self._banner, 3), (self._numbers, 2), spacing=2 * GRID
         )
         vertical_layout(self._numbers, self._count, self._progress, spacing=GRID // 2)
-        buttons = self._accept, self._act, self._undo, self._start_over
+        buttons = self._accept, self._report, self._act, self._undo, self._start_over
         horizontal_layout(self._buttons, 1, *buttons)
         fill(layout, self._lamps)
         self._use_room()
@@ -94,6 +100,9 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._start_over.clicked.connect(self._on_start_over_clicked)
         self._question.agreed.connect(self._begin_anew)
         self._accept.clicked.connect(self._ask_reason)
+        self._report.clicked.connect(self._on_report_clicked)
+        self._paper.failed.connect(partial(workbench.notifications.tell, self))
+        self._paper.saved.connect(self._on_saved)
         self._reason.given.connect(self._on_reason_given)
         self._reason.declined.connect(self._accept.setFocus)
 
@@ -113,6 +122,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._act.setEnabled(view.task is not None)
         self._undo.setEnabled(view.can_undo)
         self._accept.setVisible(view.can_be_accepted)
+        self._report.setVisible(view.has_report)
         if not view.can_be_accepted:
             self._reason.hide()
 
@@ -148,6 +158,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         )
         self._accept.setText(self.tr("Accept..."))
         self._accept.setToolTip(self.tr("Use the tip with a reason"))
+        self._report.setText(self.tr("Report..."))
         self._undo.setText(self.tr("Undo point"))
         self._undo.setToolTip(self.tr("Discard the last point of the current task."))
         self._start_over.setText(self.tr("Start over"))
@@ -168,6 +179,15 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
 
     def _on_undo_clicked(self) -> None:
         self._runner.ask(lambda workflow: workflow.undo())
+
+    def _on_report_clicked(self) -> None:
+        """Show the report of the only task, or of the conclusion of several."""
+        *tasks, conclusion = self._run.status.files
+        self._paper.show_verification(tasks[0] if len(tasks) == 1 else conclusion)
+
+    def _on_saved(self, path: Path) -> None:
+        words = self.tr("Saved: {0}").format(path)
+        self._workbench.notifications.show_status(words)
 
     def _ask_reason(self) -> None:
         found = self._run.status.assessment

@@ -67,8 +67,8 @@ class ProbingSimulatorControls(SimulatorControls):
             self._lift, self.tr("Lift"), self.tr("Take the tip away for a moment.")
         )
         sizes = self.tr(
-            "Its ring has a radius of {0} mm, its bar a length of {1} mm, its sphere a "
-            "diameter of {2} mm by the ball centres."
+            "Simulated artefacts: ring radius {0} mm, bar length {1} mm, sphere "
+            "diameter {2} mm (ball centres)."
         )
         found = SIMULATED_RADIUS, SIMULATED_LENGTH, 2 * SPHERE_RADIUS
         words = sizes.format(*(f"{each:g}" for each in found))

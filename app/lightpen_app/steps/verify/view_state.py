@@ -58,6 +58,7 @@ class VerifyView:
     pause: str = ""
     can_be_accepted: bool = False
     can_undo: bool = False
+    has_report: bool = False
 
 
 def is_held(state: SessionState) -> bool:
