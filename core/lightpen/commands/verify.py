@@ -20,6 +20,7 @@ from lightpen.commands.arguments import (
 from lightpen.commands.console import printing, shown, verdict_status, write_record
 from lightpen.commands.entering import add_entering, keep_record
 from lightpen.commands.pen_health import add_verify_pen
+from lightpen.commands.press_test import add_verify_press
 from lightpen.commands.touched import MeasuredRuns, add_touch_inputs, measure_runs
 from lightpen.errors import UsageError
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
@@ -57,6 +58,9 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         kinds.add_parser("touches", help="probed points with uncertainty; no verdict")
     )
     add_verify_pen(kinds.add_parser("pen", help="LED stability over several swings"))
+    add_verify_press(
+        kinds.add_parser("press", help="a swing with firm pressure against a usual one")
+    )
 
 
 def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:

@@ -14,6 +14,7 @@ from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.reading import (
     Record,
     is_of_recording,
+    is_press_test,
     open_record,
     recorded_limits,
 )
@@ -164,4 +165,5 @@ def recorded_setup(record: Record) -> SwingSetup:
         is_recording=is_of_recording(record),
         beside=found.rig,
         other_masks=found.masks[1:],
+        is_press_test=is_press_test(record),
     )

@@ -130,6 +130,10 @@ class SwingRunner:
         """Capture more images after the verdict."""
         self._queue.ask(self._workflow.capture_more)
 
+    def press(self) -> None:
+        """Swing again with firm pressure, to be compared with this swing."""
+        self._queue.ask(self._workflow.press)
+
     def accept(self, reason: str = "", signature: Signature | None = None) -> None:
         """Accept the tip; the previous one stays in force if it cannot be stored.
 

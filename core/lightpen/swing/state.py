@@ -108,6 +108,8 @@ class SwingSetup:
     is_recording : bool
         Whether its images were recorded before: all are read, once and in their order,
         and nobody is asked to lean the pen.
+    is_press_test : bool
+        Whether it is swung with firm pressure, to be compared with another swing.
     """
 
     camera: Camera
@@ -118,6 +120,7 @@ class SwingSetup:
     is_recording: bool = False
     beside: Rig | None = None
     other_masks: tuple[FloatArray, ...] = ()
+    is_press_test: bool = False
 
     @property
     def rig(self) -> Rig:

@@ -45,6 +45,8 @@ class SwingStatus:
         Origin of the images.
     assessment : SwingAssessment or None
         Assessment of the solution, compared with the current result.
+    pressed : Solution or None
+        The same tip swung with firm pressure, for the press test.
     failed : FailedSwing or None
         The result of the images that gave no tip; None where they gave one.
     result : Result or None
@@ -67,6 +69,7 @@ class SwingStatus:
     origin: Origin | None = None
     solution: Solution | None = None
     assessment: SwingAssessment | None = None
+    pressed: Solution | None = None
     failed: FailedSwing | None = None
     result: Result | None = None
     revoked: Result | None = None

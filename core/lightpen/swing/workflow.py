@@ -23,8 +23,10 @@ from lightpen.record.results.acceptance import accept
 from lightpen.record.results.assessment import SwingAssessment, assess
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
+from lightpen.record.swings.assumed import Plain
 from lightpen.record.swings.interrupted import discard_swing
 from lightpen.record.swings.reading import (
+    PRESS_TEST,
     Record,
     open_record,
     recorded_names,
@@ -66,6 +68,8 @@ from lightpen.swing.swing_recorder import SwingRecorder
 from lightpen.swing_messages import no_tip
 
 T = TypeVar("T")
+PRESS_IMAGES = 60  # at least, with firm pressure
+PRESS_UNCERTAINTY = 1.0  # mm: U of that tip ends no swing
 
 _logger = logging.getLogger(__name__)
 
@@ -104,6 +108,7 @@ class SwingWorkflow:
         self._presence = OperatorPresence()
         self._recorder: SwingRecorder | None = None
         self._record: Record | None = None  # as it was when it was entered
+        self._first: tuple[SwingStatus, Record] | None = None  # during a press test
         self._wanted: Mapping[int, str] = {}  # images that are to be taken out
         self._tried: Mapping[int, str] = {}  # of them, those being computed without
         self._task = BackgroundTask(start, self.cancel, listener.on_progress)
@@ -193,11 +198,13 @@ class SwingWorkflow:
 
     # Capture
 
-    def begin(self, preparation: Preparation) -> None:
+    def begin(
+        self, preparation: Preparation, settings: dict[str, Plain] | None = None
+    ) -> None:
         """Begin a new swing, or report why it cannot begin."""
         try:
             folder = make_record_folder(self._records, preparation.names, self._now())
-            RecordWriter.create(folder, preparation.header()).close()
+            RecordWriter.create(folder, preparation.header(settings)).close()
             self._enter(read_resumable(folder))  # so with the files as recorded
         except LightpenError as error:
             self._presence = replace(self._presence, refusal=error.message)
@@ -213,6 +220,7 @@ class SwingWorkflow:
         recorder = SwingRecorder(record)
         self._task.drop()
         self._close_record()
+        self._first = None
         self._recorder, self._record = recorder, record
         if record.folder != status.record_folder:
             self._presence = self._presence.begun()
@@ -229,6 +237,36 @@ class SwingWorkflow:
         self._hold_back()
         if not swing.setup.is_recording and has_enough(swing.setup, swing.state):
             self.finish()  # it was interrupted after its last image
+
+    def press(self) -> None:
+        """Begin a short swing with firm pressure, to be compared with this one."""
+        first, record, choices = self._status, self._record, self._presence.choices
+        if first.solution is None or self._task.is_there or first.is_recording:
+            return
+        if record is None or choices is None:
+            return
+        if self._presence.has_other_choices:
+            self._faults.tell(message("press-test.other-choices"))
+            return
+        limits = replace(
+            choices.limits, min_images=PRESS_IMAGES, max_uncertainty=PRESS_UNCERTAINTY
+        )
+        self.begin(replace(choices, limits=limits), {PRESS_TEST: True})
+        if self._status.record_folder != first.record_folder:
+            self._first = replace(first, pressed=None), record
+
+    def _end_press(self, pressed: Solution | None) -> None:
+        """Set the swing with firm pressure aside, and return to the one before."""
+        folder = self._status.record_folder
+        assert self._first is not None
+        assert folder is not None
+        (first, self._record), self._first = self._first, None
+        assert first.solution is not None
+        self._task.drop()
+        self._close_record()
+        self._faults.trying(lambda: discard_swing(folder))
+        self._wanted = first.solution.taken_out
+        self._publish(replace(first, pressed=pressed), SwingEvent(SwingEventKind.DONE))
 
     def _heading_for(self, swing: Resumable) -> float | None:
         """Return where the operator stands, as this swing or the station knows it."""
@@ -332,6 +370,8 @@ class SwingWorkflow:
 
     def abandon(self) -> None:
         """Leave the swing as it is on disk."""
+        if self._first is not None:
+            self._end_press(None)
         self._task.drop()
         self._close_record()
         self._publish(SwingStatus(setup=self._status.setup))
@@ -341,6 +381,9 @@ class SwingWorkflow:
         self._faults.trying(self._discard)
 
     def _discard(self) -> None:
+        if self._first is not None:
+            self._end_press(None)
+            return
         status = self._status
         if status.record_folder is None or status.result is not None:
             return
@@ -460,6 +503,9 @@ class SwingWorkflow:
 
     def _on_solved(self, solved: "_Solved") -> None:
         solution = solved.solution
+        if self._first is not None:
+            self._end_press(solution)
+            return
         status = self._status
         before, folder, state = status.solution, status.record_folder, status.state
         assert folder is not None
@@ -489,6 +535,10 @@ class SwingWorkflow:
             self._solve_again(solution)
 
     def _on_unsolved(self, why: Message) -> None:
+        if self._first is not None:
+            self._faults.tell(message("press-test.unsolved", why=why))
+            self._end_press(None)
+            return
         solution = self._status.solution
         if solution is None:
             state, setup = self._status.state, self._status.setup

@@ -33,6 +33,7 @@ from lightpen.record.signing.keys import SigningKey
 from lightpen.record.swings.interrupted import InterruptedSwings
 from lightpen.record.swings.reading import (
     Record,
+    is_press_test,
     open_record,
     recorded_names,
     recorded_origin,
@@ -81,6 +82,8 @@ def accept(
         result cannot be stored; what was in force before stays so.
     """
     record = open_record(solution.source.folder)
+    if is_press_test(record):
+        raise AcceptanceError("press-test.not-accepted")
     with RecordWriter.resume(record) as writer:
         _require_same_images(record, solution)
         result = _stored_result(archive, record)

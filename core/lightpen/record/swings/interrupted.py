@@ -10,7 +10,13 @@ from lightpen.messages import Message, message
 from lightpen.record.swings.header import HEADER
 from lightpen.record.swings.journal import JOURNAL, last_verdict
 from lightpen.record.swings.lock import is_locked
-from lightpen.record.swings.reading import DISCARDED, IMAGES, Record, open_record
+from lightpen.record.swings.reading import (
+    DISCARDED,
+    IMAGES,
+    Record,
+    is_press_test,
+    open_record,
+)
 from lightpen.record.swings.writing import RecordWriter
 
 
@@ -141,7 +147,8 @@ def _read_unfinished(folder: Path) -> Record | None:
             journal=printable(str(journal)),
             n_images=n_images,
         )
-    return record if record.images and record.verdict is None else None
+    is_over = record.verdict is not None or is_press_test(record)
+    return record if record.images and not is_over else None
 
 
 def _newest_first(records: list[Record]) -> tuple[Record, ...]:

@@ -64,6 +64,7 @@ from lightpen.record.swings.names import Names
 IMAGES = "images"
 OPENER = "swing.lightpen"  # by its suffix the system knows the program
 DISCARDED = "discarded"
+PRESS_TEST = "press_test"  # among the settings: made to be compared with another
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,6 +327,11 @@ def recorded_origin(record: Record) -> Origin | None:
 def is_of_recording(record: Record) -> bool:
     """Return whether the images of a record were recorded before its swing."""
     return record.header.settings.get("source") == Origin.RECORDED
+
+
+def is_press_test(record: Record) -> bool:
+    """Return whether a swing was made to be compared with another alone."""
+    return record.header.settings.get(PRESS_TEST) is True
 
 
 def recorded_limits(record: Record) -> SwingLimits:

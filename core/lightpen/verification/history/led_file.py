@@ -23,7 +23,7 @@ from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contact.camera_motion import steadied
-from lightpen.estimation.contact.joint import JointFit, fit_joint
+from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_contact
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.formats.files import printable
 from lightpen.formats.observation_files import Centers
@@ -31,6 +31,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.information import inverse
 from lightpen.model.pen import Pen
 from lightpen.model.quantiles import normal_quantile
+from lightpen.model.rig import Rig
 from lightpen.record.calibrations.calibrations import CalibrationFile, shown_images
 from lightpen.verification.history.pen_health import MOVED, examine_pen, require_one_pen
 from lightpen.verification.tasks.length import Scale
@@ -131,7 +132,8 @@ def improve_pen(
         again.append(calibrate_again(calibration, camera, pen))
         report(n / len(calibrations))
     (improved, refined), confirming = _pooled(again[:-1], camera, pen, scale), again[-1]
-    before, after = (_fit_held(confirming, each) for each in (pen, improved))
+    rig = confirming.instrument.rig
+    before, after = (fit_held(confirming, rig, each) for each in (pen, improved))
     if not _is_better(before, after):
         raise CalibrationError(
             "led-file.not-confirmed",
@@ -235,18 +237,21 @@ def _of_images(bundle: Bundle) -> tuple[FloatArray, FloatArray]:
     return 0.5 * (information + information.T), right[common] - gain @ right[own]
 
 
-def _fit_held(calibration: Calibration, pen: Pen) -> JointFit:
-    """Fit tip and cone of a swing with LEDs held as they are."""
-    joint, camera = calibration.joint, calibration.instrument.camera
-    path = calibration.cameras[0].path
-    seen = steadied(camera, calibration.observations, path)
-    return fit_joint(
-        camera,
-        pen,
-        seen.pixels[calibration.used],
-        joint.rotations[joint.used.any(axis=1)],
-        joint.tip_pen,
-        joint.cone_cam,
+def fit_held(calibration: Calibration, rig: Rig, pen: Pen) -> JointFit:
+    """Fit tip and cone of a swing with cameras and LEDs held as they are."""
+    joint = calibration.joint
+    views = [
+        np.where(
+            each.used[:, None, None],
+            steadied(camera, each.observations, each.path).pixels,
+            np.nan,
+        )
+        for camera, each in zip(rig.cameras, calibration.cameras, strict=True)
+    ]
+    model = ContactModel(rig, pen, np.stack(views, axis=1)[calibration.used])
+    return fit_contact(
+        *(model, joint.rotations[joint.used.any(axis=1)]),
+        *(joint.tip_pen, joint.cone_cam),
     )
 
 

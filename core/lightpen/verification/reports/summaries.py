@@ -14,6 +14,7 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.verification.history.led_file import ImprovedPen
 from lightpen.verification.history.pen_health import PenHealth
+from lightpen.verification.history.press_test import PressTest
 from lightpen.verification.reports.records import BY_SIMPLE_ACCEPTANCE
 from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.probed_point import ProbedPoint, RejectedFrame
@@ -166,6 +167,15 @@ def pen_health_text(found: PenHealth) -> str:
         lines.append(f"{swing.name[:TITLE]:<{TITLE}}{cells}{size}")
     by_rule = _verdict(found.assessment, BY_SIMPLE_ACCEPTANCE)
     return "\n".join([*lines, "", *by_rule])
+
+
+def press_test_text(found: PressTest) -> str:
+    """Return what firm pressure changed as text."""
+    names = ("Tip x", "Tip y (along pen)", "Tip z", "Cone u", "Cone v", "Cone w")
+    lines = [f"{'Firm less usual, mm':<{TITLE}}{'change':>{COLUMN}}{'U':>{COLUMN}}"]
+    for name, *values in zip(names, found.change, found.uncertainty, strict=True):
+        lines.append(f"{name:<{TITLE}}" + "".join(f"{x:{COLUMN}.4f}" for x in values))
+    return "\n".join([*lines, "", *_verdict(found.assessment, BY_SIMPLE_ACCEPTANCE)])
 
 
 def improved_pen_text(found: ImprovedPen) -> str:

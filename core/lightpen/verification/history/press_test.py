@@ -1,0 +1,158 @@
+"""Press test: a swing with usual pressure against one with firm pressure.
+
+Same tip, cone, pen and camera. Both swings are fitted with one instrument held as it
+is, once that of the one swing and once that of the other, and the differences of tip
+and cone are averaged: the errors of camera, LEDs and scale cancel. What does not, as
+the postures differ, is about as large as the two differences disagree.
+
+A stylus, ball thread or seat that gives way by ``c`` times the sine of the lean
+(`lightpen.estimation.bundle.effects`) moves the tip of a fit along the pen, and its
+cone along the cone's axis. What is left of the cone's move is a move of cone or camera.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import UsageError
+from lightpen.estimation.bundle.effects import cone_moves
+from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.contact.joint import JointFit
+from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.messages import Message, message
+from lightpen.model.quantiles import chi_square_quantile
+from lightpen.verification.history.led_file import fit_held
+from lightpen.verification.tasks.assessment import (
+    BY_CHANCE,
+    VerificationAssessment,
+    accepted,
+    check,
+)
+
+PRESS_TEST = "press"  # kind of its record
+ALONG_PEN = 1  # axis of the pen frame
+CONE = slice(3, 6)  # of (tip, cone)
+RESOLVED = 0.02  # mm, U of the move along the pen above which the test shows little
+STIFFEN = message("press-test.stiffen")
+CLAMP = message("press-test.clamp")
+KEEP = message("press-test.keep")
+MORE_IMAGES = message("press-test.more-images")
+
+
+@dataclass(frozen=True, eq=False)
+class PressTest:
+    """What firm pressure changed.
+
+    Attributes
+    ----------
+    change : (6,) array
+        Tip in the pen frame and cone in the camera frame, firm less usual, mm; the cone
+        without the move that comes with that of the tip along the pen.
+    uncertainty : (6,) array
+        U (k = 2) of it, mm.
+    """
+
+    change: FloatArray
+    uncertainty: FloatArray
+    assessment: VerificationAssessment
+
+    @property
+    def along(self) -> float:
+        """Move of the tip along the pen, mm."""
+        return float(self.change[ALONG_PEN])
+
+    @property
+    def words(self) -> tuple[Message, Message]:
+        """Verdict and next step."""
+        return self.assessment.reason, self.assessment.next_step
+
+    @property
+    def entries(self) -> dict[str, Any]:
+        """Entries of a record."""
+        return {
+            "tip_change_mm": self.change[:3],
+            "tip_change_expanded_uncertainty_mm": self.uncertainty[:3],
+            "cone_change_mm": self.change[CONE],
+            "cone_change_expanded_uncertainty_mm": self.uncertainty[CONE],
+        }
+
+
+def press_test(usual: Calibration, firm: Calibration) -> PressTest:
+    """Compare a swing with firm pressure with the usual one.
+
+    Raises
+    ------
+    UsageError
+        They are of different cameras or LEDs.
+    CalibrationError
+        The images of one do not fit the instrument of the other.
+    """
+    one, other = usual.instrument, firm.instrument
+    if one.rig.n_cameras != other.rig.n_cameras or one.pen.n_leds != other.pen.n_leds:
+        raise UsageError("press-test.another-station")
+    (first, noise, by_pressure), (second, _, _) = (
+        _difference(usual, firm, each) for each in (one, other)
+    )
+    uneven = 0.5 * (second - first)
+    change = 0.5 * (first + second)
+    covariance = noise + np.outer(uneven, uneven)
+    # The cone without the move that comes with that of the tip along the pen.
+    taken = np.eye(6)
+    taken[CONE, ALONG_PEN] = -by_pressure[CONE] / by_pressure[ALONG_PEN]
+    change = taken @ change
+    covariance = taken @ covariance @ taken.T
+    uncertainty = COVERAGE_FACTOR * np.sqrt(np.diag(covariance))
+    return PressTest(change, uncertainty, _assessment(change, covariance))
+
+
+def _difference(
+    usual: Calibration, firm: Calibration, instrument: Instrument
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the change of (tip, cone), its covariance, and that by compliance."""
+    fits = [fit_held(each, instrument.rig, instrument.pen) for each in (usual, firm)]
+    before, after = (np.r_[fit.tip_pen, fit.cone_cam] for fit in fits)
+    # What a move of the cone does to tip and cone, where the fit knows of none.
+    moves = cone_moves(fits[1].rotations).compliance
+    pulls = np.einsum("nij,njk->i", fits[1].information[..., CONE], moves)
+    noise = _scatter(fits[0]) + _scatter(fits[1])
+    return after - before, noise, fits[1].covariance @ pulls
+
+
+def _scatter(fit: JointFit) -> FloatArray:
+    """Return the covariance by noise, or by the scatter of the images if larger.
+
+    With seat and jitter in them, the images scatter by more than their noise.
+    """
+    scores = fit.gradients - fit.gradients.mean(axis=0)
+    n_images, noise = len(scores), fit.covariance
+    scatter = scores.T @ scores * n_images / (n_images - 1)
+    is_larger = float(np.trace(noise @ scatter)) > len(noise)
+    return np.asarray(noise @ scatter @ noise) if is_larger else noise
+
+
+def _assessment(change: FloatArray, covariance: FloatArray) -> VerificationAssessment:
+    along, variance = change[ALONG_PEN], covariance[ALONG_PEN, ALONG_PEN]
+    uncertainty = COVERAGE_FACTOR * float(np.sqrt(variance))
+    if along**2 > chi_square_quantile(1, BY_CHANCE) * variance:
+        told = message(
+            "press-test.gives-way", change=abs(float(along)), uncertainty=uncertainty
+        )
+        return check(told, STIFFEN)
+    moved, spread = change[CONE], covariance[CONE, CONE]
+    known = np.linalg.solve(spread, moved)
+    if float(moved @ known) > chi_square_quantile(3, BY_CHANCE):
+        distance = float(np.linalg.norm(moved))
+        across = moved / distance
+        told = message(
+            "press-test.cone-moved",
+            distance=distance,
+            uncertainty=COVERAGE_FACTOR * float(np.sqrt(across @ spread @ across)),
+        )
+        return check(told, CLAMP)
+    if uncertainty > RESOLVED:
+        return check(message("press-test.coarse", uncertainty=uncertainty), MORE_IMAGES)
+    told = message("press-test.steady", change=float(along), uncertainty=uncertainty)
+    return accepted(told, KEEP)

@@ -1,0 +1,87 @@
+"""The press test: a stylus that gives way is found, and a stiff one is left alone."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from benchmarks.station import GOOD, _drawn_pen, drawn_rig
+
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.calibrate import Calibration, calibrate_rig
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.observation_files import Centers
+from lightpen.model.rig import rig_of
+from lightpen.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+from lightpen.verification.history.press_test import press_test
+
+N_IMAGES, NOISE, SEAT = 60, 0.03, 0.002  # px, mm
+GIVES_WAY = 0.02  # mm by the sine of the lean
+SEEDS = (0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3)))
+
+
+@cache
+def swung(
+    seed: int, number: int, compliance: float = 0.0, cone: float = 0.0
+) -> Calibration:
+    """Return a swing at the station of a seed, whose files are off as they state.
+
+    The tip moves by the compliance, mm by the sine of the lean, the cone sideways.
+    """
+    of_station = np.random.default_rng([26, seed])
+    file = drawn_rig(rig_of(paper_camera()), of_station)
+    pen_file = _drawn_pen(GOOD, paper_pen(), of_station)
+    rng = np.random.default_rng([26, seed, number])
+    poses = swing_poses(N_IMAGES, rng)
+    axes = poses.rotations[:, :, 1]
+    up = axes.mean(axis=0) / np.linalg.norm(axes.mean(axis=0))
+    across = axes - (axes @ up)[:, None] * up
+    places = poses.translations - compliance * across
+    places[:, 0] += cone
+    places += SEAT * rng.standard_normal(places.shape)
+    pixels = simulate_centers(
+        paper_camera(), paper_pen(), poses.rotations, places, NOISE, rng
+    )
+    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
+    seen = observe_centers(centers, file.cameras[0], pen_file)
+    return calibrate_rig(file, pen_file, [seen])
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_stylus_that_gives_way_is_found_along_the_pen(seed: int) -> None:
+    found = press_test(swung(seed, 1), swung(seed, 2, GIVES_WAY))
+
+    assert found.assessment.grade is Grade.CHECK
+    assert found.assessment.reason.code == "press-test.gives-way"
+    assert abs(found.along - GIVES_WAY) < 1.5 * found.uncertainty[1]
+    # Its cone seems to move, too, but that belongs to the move of the tip.
+    assert (np.abs(found.change[3:]) < 1.5 * found.uncertainty[3:]).all()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_stiff_stylus_is_left_alone(seed: int) -> None:
+    found = press_test(swung(seed, 1), swung(seed, 3))
+
+    assert found.assessment.grade is Grade.PASS
+    assert (np.abs(found.change) < 1.5 * found.uncertainty).all()
+    assert found.uncertainty[1] < GIVES_WAY
+
+
+def test_the_swings_exchanged_change_the_sign() -> None:
+    usual, firm = swung(0, 1), swung(0, 2, GIVES_WAY)
+
+    there, back = press_test(usual, firm), press_test(firm, usual)
+
+    np.testing.assert_allclose(back.change[:3], -there.change[:3], rtol=1e-6, atol=1e-9)
+
+
+def test_a_cone_that_was_moved_is_told_from_a_stylus() -> None:
+    found = press_test(swung(0, 1), swung(0, 4, cone=0.05))
+
+    assert found.assessment.reason.code == "press-test.cone-moved"
+    assert found.change[3] == pytest.approx(0.05, abs=0.01)
