@@ -133,7 +133,7 @@ MESSAGES = {
     "press-test.more-images": "Next: repeat the press test with more images, tilted farther to all sides.",
     "press-test.not-accepted": "A swing with firm pressure is compared only and cannot be accepted.",
     "press-test.unsolved": "Press test without result: {why}",
-    "press-test.other-choices": "Settings were changed since the swing. Restore them, then repeat the press test.",
+    "press-test.other-choices": "The selected files or names are not those of the swing. Select them, then repeat the press test.",
     "press-test.another-station": "A press test compares two swings with the same cameras and LEDs. Give two calibrations of one station and pen.",
     "press-test.another-camera": "{other} was calibrated with another camera file than {first}. Give two swings with one camera file.",
     "pen-health.measure-again": "Next: inspect the pen, fix the LED, and measure the LEDs again.",

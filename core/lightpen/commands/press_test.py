@@ -12,7 +12,6 @@ from lightpen.commands.console import (
 )
 from lightpen.commands.entering import add_entering, keep_record
 from lightpen.errors import UsageError
-from lightpen.formats.files import printable
 from lightpen.formats.hashes import all_hashed
 from lightpen.formats.json_records import file_entry
 from lightpen.record.calibrations.calibrations import read_calibration
@@ -46,13 +45,10 @@ def _verify_press(options: argparse.Namespace) -> int:
     require_other_file(options.json, *files)
     usual, firm = both = [read_calibration(path) for path in files]
     require_one_pen(both)
-    names = {"one": printable(usual.path.name), "other": printable(firm.path.name)}
     if usual.camera_hashes != firm.camera_hashes:
-        raise UsageError(
-            "press-test.another-camera", first=names["one"], other=names["other"]
-        )
+        raise UsageError("press-test.another-camera", first=usual.name, other=firm.name)
     if (usual.tip_pen == firm.tip_pen).all():
-        raise UsageError("repeatability.twice", **names)
+        raise UsageError("repeatability.twice", one=usual.name, other=firm.name)
     found = press_test(*(recompute(path).calibration for path in files))
     print(shown(press_test_text(found)))
     record = verification_record(

@@ -245,7 +245,8 @@ class SwingWorkflow:
             return
         if record is None or choices is None:
             return
-        if self._presence.has_other_choices:
+        is_other = self._presence.has_other_choices or choices.names != first.names
+        if is_other or choices.missing_inputs():
             self._faults.tell(message("press-test.other-choices"))
             return
         limits = replace(

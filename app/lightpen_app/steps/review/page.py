@@ -15,6 +15,7 @@ from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.review.acceptance_control import AcceptanceControl
 from lightpen_app.steps.review.next_tips import NextTipsControl
+from lightpen_app.steps.review.press_control import PressTestControl
 from lightpen_app.steps.review.result_export import ResultExport
 from lightpen_app.steps.review.result_panel import ReviewedResult
 from lightpen_app.steps.review.view import ReviewView
@@ -60,6 +61,7 @@ class ReviewPage(Page):
             self._selection, self._run, workbench.library, view.next_tips
         )
         self._acceptance = AcceptanceControl(self._selection, self._run, view)
+        self._press = PressTestControl(self._run, view, workbench.notifications)
         self._along = ResultExport(self._run, place, view.tabs.pictures, self)
 
         # Layout
@@ -164,6 +166,7 @@ class ReviewPage(Page):
     @override
     def shut_down(self) -> None:
         self._next.shut_down()
+        self._press.shut_down()
         self._along.shut_down()
         self._view.tabs.shut_down()
 
@@ -183,6 +186,7 @@ class ReviewPage(Page):
         if (now.result, now.assessment) != (before.result, before.assessment):
             self._view.end_questions()
         self._view.set_solving(now.is_solving)
+        self._press.follow(now)
         if now.assessment is not before.assessment:
             self._show_result(now)  # seen or not, so that all is known when it is
         if self.isVisible():

@@ -1,6 +1,7 @@
 """The result of a swing: the tip, its uncertainty, and the change."""
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PySide6.QtWidgets import QFrame, QSizePolicy, QWidget
@@ -13,8 +14,10 @@ from lightpen.model.coverage import Coverage
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.solving import Solution
+from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.look.words import shortened
@@ -23,6 +26,9 @@ from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
+
+if TYPE_CHECKING:
+    from lightpen.verification.history.press_test import PressTest
 
 DIAL_HEIGHT = 22 * GRID  # px
 
@@ -68,6 +74,8 @@ class ResultPanel(Translated, QFrame):
         self._as_found = SignLabel()
         self._halves = SignLabel()
         self._self_check = SignLabel()
+        self._pressed = SignLabel()
+        self._pressed_value: PressTest | None = None
         self._images = SignLabel()
         self._postures = text_label(TextSize.LEAD, Tone.QUIET)
         self._dial = PostureDial()
@@ -84,7 +92,8 @@ class ResultPanel(Translated, QFrame):
         layout.addSpacing(GRID)
         fill(layout, self._comparison, self._table)
         layout.addSpacing(GRID // 2)
-        fill(layout, self._as_found, self._halves, self._self_check, self._images)
+        fill(layout, self._as_found, self._halves, self._self_check, self._pressed)
+        fill(layout, self._images)
         layout.addSpacing(GRID)
         fill(layout, self._postures, (self._dial, 100), 1)
 
@@ -109,10 +118,24 @@ class ResultPanel(Translated, QFrame):
         self._value = value
         self._refresh()
 
+    def set_pressed(self, found: "PressTest | None") -> None:
+        """Show another press test, or none."""
+        self._pressed_value = found
+        self._show_pressed()
+
+    def _show_pressed(self) -> None:
+        found = self._pressed_value
+        self._pressed.setVisible(found is not None)
+        if found is not None:
+            text = " ".join(map(worded, found.words))
+            mark = GRADE_MARKS[found.assessment.grade]
+            self._pressed.set_value(StatusMessage(text, *mark))
+
     def _retranslate(self) -> None:
         self._comparison.setText(self.tr("Odd and even images / \xb5m"))
         self._table.setAccessibleName(self.tr("Odd and even images"))
         self._postures.setText(self.tr("Postures of the included images"))
+        self._show_pressed()
         self._refresh()
 
     def _refresh(self) -> None:

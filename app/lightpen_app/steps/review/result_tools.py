@@ -1,4 +1,4 @@
-"""Buttons for the result: open its folder, copy the tip, save it."""
+"""Buttons for the result: open its folder, copy the tip, save it, press test."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ EXPORTS = (ALL, *(Export((each,)) for each in FORMATS), PLOTS)
 
 
 class ResultTools(Translated, QWidget):
-    """Three buttons; that to save has a menu.
+    """Four buttons; that to save has a menu.
 
     Signals
     -------
@@ -37,12 +37,15 @@ class ResultTools(Translated, QWidget):
     save_requested(Export)
     paper_requested()
         The record on paper is to be shown.
+    press_requested()
+        The tip is to be swung with firm pressure.
     """
 
     folder_requested = Signal()
     copy_requested = Signal()
     save_requested = Signal(object)
     paper_requested = Signal()
+    press_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -59,9 +62,11 @@ class ResultTools(Translated, QWidget):
         self._paper = menu.addAction("")
         self._save.setMenu(menu)
         self._buttons = (self._folder, self._copy, self._save)
+        self._press = PushButton()
 
         # Layout
-        horizontal_layout(self, *((button, 1) for button in self._buttons))
+        buttons = (*self._buttons, self._press)
+        horizontal_layout(self, *((button, 1) for button in buttons))
 
         # Connections
         self._folder.clicked.connect(self.folder_requested)
@@ -71,6 +76,7 @@ class ResultTools(Translated, QWidget):
                 lambda _=False, export=export: self.save_requested.emit(export)
             )
         self._paper.triggered.connect(self.paper_requested)
+        self._press.clicked.connect(self.press_requested)
 
         self._retranslate()
 
@@ -90,7 +96,15 @@ class ResultTools(Translated, QWidget):
         told = self.tr("Preview, save as PDF, or print")
         self._paper.setToolTip(why_not or told)
 
+    def set_press_why_not(self, why_not: str) -> None:
+        """Disable the press test with a reason, or enable it."""
+        told = self.tr(
+            "Swing again with firm pressure and compare: shows a stylus that gives way"
+        )
+        self._press.set_why_not(why_not, told)
+
     def _retranslate(self) -> None:
+        self._press.setText(self.tr("Press test..."))
         self._paper.setText(self.tr("Calibration report..."))
         self._folder.setText(self.tr("Open folder"))
         self._copy.setText(self.tr("Copy tip"))

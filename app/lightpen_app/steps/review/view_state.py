@@ -56,6 +56,7 @@ class ReviewPageState:
     why_not_accepted: str
     why_not_saved: str
     why_not_printed: str
+    why_not_pressed: str
 
 
 def review_page_state(
@@ -97,6 +98,7 @@ def review_page_state(
         why_not_accepted=why_not_accepted(status),
         why_not_saved=not_swung,
         why_not_printed=not_accepted,
+        why_not_pressed=not_swung or why_not_now(status) or all_read,
     )
 
 
@@ -104,10 +106,10 @@ def differs(before: SwingStatus, now: SwingStatus) -> bool:
     """Return whether the review shows something else by another status."""
     return (
         *(before.solution, before.failure, before.assessment, before.result),
-        *(before.activity, before.is_capturing),
+        *(before.activity, before.is_capturing, before.pressed),
     ) != (
         *(now.solution, now.failure, now.assessment, now.result),
-        *(now.activity, now.is_capturing),
+        *(now.activity, now.is_capturing, now.pressed),
     )
 
 

@@ -40,6 +40,10 @@ from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.state_banner import State
 
 ENDED = (Phase.SOLVING, Phase.VERDICT)
+PRESSED = (  # told where the tip is to be pressed into the cone
+    *(Code.SEAT_TIP, Code.SWING_TO_SEAT, Code.HOLD_STILL),
+    *(Code.STARTS_IN, Code.FOLLOW_ARROW),
+)
 FLAWS = (Code.FEW_LEDS, Code.TOO_FAST, Code.BAD_FIT)  # images that are not kept
 UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
 PACE_S, N_PACING = 15.0, 6  # last seconds and images for the remaining time
@@ -272,7 +276,10 @@ class SwingWords(QObject):
             )
             return Instruction(told.short, hint)
         if message.code == Code.FOLLOW_ARROW and state.target and heading is not None:
-            return lean_phrase(state.target, _posture(moment), heading)
+            told = lean_phrase(state.target, _posture(moment), heading)
+        if moment.setup.is_press_test and message.code in PRESSED:
+            hint = self.tr("Press test: press the tip firmly into the cone.")
+            return replace(told, hint=hint)
         return told
 
     def _next_step(self, moment: SwingViewState, verdict: Verdict) -> Instruction:

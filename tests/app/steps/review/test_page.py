@@ -280,6 +280,11 @@ def the(parent: QWidget, kind: type[W]) -> W:
     return found
 
 
+def texts_of(panel: ResultPanel) -> list[str]:
+    labels = panel.findChildren(SignLabel)
+    return [each.value().text for each in labels if not each.isHidden()]
+
+
 def banner(page: ReviewPage) -> State:
     return the(page, StateBanner).value()
 
@@ -1431,6 +1436,43 @@ def test_the_record_on_paper_is_of_the_result_on_the_disk(
     window = the(page, PrintReportWindow)
     qtbot.waitUntil(lambda: window.n_pages() > 2)
     window.close()
+
+
+def test_a_press_test_begins_a_swing_and_stands_below_the_tip(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    run = workbench.run
+    first = run.status
+    assert first.solution is not None
+    firm = solve_again(first.solution, {2: str(Reason.TAKEN_OUT)})
+    panel = the(page, ResultPanel)
+    assert not any("Press test" in each for each in texts_of(panel))
+
+    run.tell(replace(first, pressed=firm), ())
+    qtbot.waitUntil(lambda: any("no significant" in each for each in texts_of(panel)))
+    shown = panel.value()
+    assert shown is not None
+    assert shown.solution is first.solution
+    folder, setup = first.record_folder, first.setup
+    assert folder is not None
+    assert setup is not None
+    run.runner.choose(
+        replace(
+            workbench.selection.preparation,
+            names=first.names,
+            camera_file=CameraFile.read(next(folder.glob("camera.*"))),
+            pen_file=PenFile.read(next(folder.glob("pen.*"))),
+            image_size=setup.camera.image_size,
+        )
+    )
+    run.runner.keep_choices()
+    with qtbot.waitSignal(page.step_requested, timeout=20000) as asked:
+        click(page, "Press test...")
+
+    assert asked.args == ["swing"]
+    assert run.status.setup is not None
+    assert run.status.setup.is_press_test
+    assert not any("Press test" in each for each in texts_of(panel))
 
 
 def test_a_result_that_is_gone_is_not_put_on_paper(

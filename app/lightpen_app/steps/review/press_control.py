@@ -1,0 +1,57 @@
+"""The press test in Review: begun by a button, compared off the GUI thread."""
+
+from PySide6.QtCore import QObject
+
+from lightpen.swing.status import SwingStatus
+from lightpen_app.steps.review.view import ReviewView
+from lightpen_app.work.job import Job, Report
+from lightpen_app.work.notifications import Notifications
+from lightpen_app.work.swing_run import SwingRun
+
+
+class PressTestControl(QObject):
+    """Begins a swing with firm pressure, and shows how it differs from the first."""
+
+    def __init__(
+        self, run: SwingRun, view: ReviewView, notifications: Notifications
+    ) -> None:
+        super().__init__(view)
+        self._result, self._notices = view.result, notifications
+        self._compared: tuple[object, object] = None, None
+        self._job: Job | None = None
+
+        # Connections
+        view.tools.press_requested.connect(run.runner.press)
+
+    def follow(self, status: SwingStatus) -> None:
+        """Compare the swings of a status, if there are two."""
+        usual, firm = status.solution, status.pressed
+        if self._compared == (usual, firm):
+            return
+        self._compared = usual, firm
+        self.shut_down()
+        self._result.set_pressed(None)
+        if usual is None or firm is None:
+            return
+        one, other = usual.calibration, firm.calibration
+
+        def compared(_: Report) -> object:
+            from lightpen.verification.history.press_test import press_test
+
+            return press_test(one, other)
+
+        self._job = job = Job(compared, self)
+
+        # Connections
+        job.succeeded.connect(self._result.set_pressed)
+        job.failed.connect(self._on_failed)
+        job.start()
+
+    def shut_down(self) -> None:
+        """Compare no more."""
+        if self._job is not None:
+            self._job.cancel()
+            self._job = None
+
+    def _on_failed(self, why: str) -> None:
+        self._notices.tell(self, why)
