@@ -42,7 +42,8 @@ def open_server(address: str) -> Database:
     ----------
     address : str
         ``postgresql://user@host/database``, with options of libpq as
-        ``?sslrootcert=FILE&passfile=FILE``.
+        ``?sslrootcert=FILE&passfile=FILE``. ``keyring=SERVICE`` names the service under
+        which the system keyring has the password of the user.
 
     Raises
     ------
@@ -72,7 +73,29 @@ def _url(address: str) -> URL:
     except (ArgumentError, ValueError) as error:
         raise ArchiveError("archive.no-address") from error
     query = {"sslmode": TLS, **url.query}
+    service = query.pop("keyring", None)
+    if isinstance(service, str):
+        url = url.set(password=_kept_password(service, url.username or ""))
     return url.set(drivername="postgresql+psycopg", query=query)
+
+
+def _kept_password(service: str, user: str) -> str:
+    """Return the password that the system keyring has for a user of a service."""
+    try:
+        import keyring
+        from keyring.errors import KeyringError
+    except ModuleNotFoundError as error:
+        raise ArchiveError("archive.no-keyring") from error
+    try:
+        password = keyring.get_password(service, user)
+    except KeyringError as error:
+        reason = printable(str(error))
+        raise ArchiveError("archive.keyring-closed", reason=reason) from error
+    if password is None:
+        raise ArchiveError(
+            "archive.no-password", service=printable(service), user=printable(user)
+        )
+    return password
 
 
 def _without_password(url: URL) -> str:
