@@ -201,7 +201,8 @@ class PostureDial(Translated, QWidget):
         if value.n_full < value.n_fields:
             painter.setPen(QColor(colors.muted))
             painter.setFont(font(TextSize.SMALL))
-            corner = QRectF(middle.x() - rim, middle.y() - rim, 2 * rim, 2 * rim)
+            left = max(middle.x() - 1.15 * rim, 0.0)  # of the rim
+            corner = QRectF(left, middle.y() - rim, rim, rim)
             painter.drawText(corner, Qt.AlignmentFlag.AlignLeft, legend)
         painter.end()
         self._ground, self._ground_shows = ground, shows

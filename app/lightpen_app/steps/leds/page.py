@@ -212,10 +212,13 @@ class LedsPage(ResponsiveLayout, Page):
         self._leds.edit(mended(self._leds.state.draft, finding))
 
     def _doubting(self) -> tuple[str, str]:
-        """Return the question whether to swing with LEDs that do not fit."""
-        misfit = self._matching.doubt()
-        words = self.tr("The swing will probably fail.") if misfit else ""
-        parts = self._pens.doubt(), misfit, words
+        """Return the question whether to swing with LEDs that do not fit.
+
+        The match says what does not fit.
+        """
+        is_doubted = bool(self._matching.doubt())
+        words = self.tr("The swing will probably fail.") if is_doubted else ""
+        parts = self._pens.doubt(), words
         return " ".join(filter(None, parts)), self.tr("Swing anyway")
 
     def _on_match_changed(self, match: PenMatch | None) -> None:

@@ -44,6 +44,7 @@ from lightpen_app.widgets.translated import Translated
 LEAST_ROWS = 7
 WIDTHS = (12, 18, 13, 11, 14, 20)  # of the columns but the last, in GRID
 NUMBERS = (3, 4)  # columns of them
+LIST_HEIGHT = 47 * GRID  # px, at least: its lead may take two lines
 PICTURE_SIZE = QSize(15 * GRID, 26 * GRID)  # px
 KINDS = (
     *(ItemKind.TIP, ItemKind.PEN, ItemKind.CONE),
@@ -137,6 +138,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
 
         # Layout
         self._list = QWidget()
+        self._list.setMinimumHeight(LIST_HEIGHT)
         margins = (2 * GRID, GRID, 2 * GRID, GRID)
         vertical_layout(
             *(self, (self._list, 1), self._panel), spacing=-1, margins=margins
