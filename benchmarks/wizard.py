@@ -20,6 +20,7 @@ N_STARTS = 5
 IDLE_SECONDS = 20
 QUIET_LIMIT, WATCHED_LIMIT = 0.05, 0.10  # of one core, without and with a live image
 QUIET = ("start", "minimised")
+CAPTURING = "swing, capturing"  # of `idle_wizard.py`
 START_LIMIT = 1.0  # s
 LINK_SECONDS = 20
 LEAST_LINK_RATE = 20.0  # images/s
@@ -77,6 +78,10 @@ def idle_rows(seconds: float = IDLE_SECONDS) -> list[Row]:
         shares = json.loads(_shown(platform, command))
         for page, share in shares.items():
             limit = QUIET_LIMIT if page in QUIET else WATCHED_LIMIT
+            if page == CAPTURING:
+                limit = 1.0
+            elif page.startswith(CAPTURING):  # nobody looks at it
+                limit = 0.5 * shares[CAPTURING]
             rows.append(
                 Row(
                     f"{what}, {page}, {platform}",
