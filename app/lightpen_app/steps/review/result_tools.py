@@ -6,7 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QMenu, QWidget
 
 from lightpen.record.exports.formats import FORMATS, ExportFormat
-from lightpen_app.look.layouts import horizontal_layout
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
@@ -65,8 +65,9 @@ class ResultTools(Translated, QWidget):
         self._press = PushButton()
 
         # Layout
-        buttons = (*self._buttons, self._press)
-        horizontal_layout(self, *((button, 1) for button in buttons))
+        layout = vertical_layout(self)
+        horizontal_layout(layout, *((button, 1) for button in self._buttons))
+        layout.addWidget(self._press)
 
         # Connections
         self._folder.clicked.connect(self.folder_requested)
@@ -104,7 +105,7 @@ class ResultTools(Translated, QWidget):
         self._press.set_why_not(why_not, told)
 
     def _retranslate(self) -> None:
-        self._press.setText(self.tr("Press test..."))
+        self._press.setText(self.tr("Press test"))
         self._paper.setText(self.tr("Calibration report..."))
         self._folder.setText(self.tr("Open folder"))
         self._copy.setText(self.tr("Copy tip"))

@@ -1467,7 +1467,7 @@ def test_a_press_test_begins_a_swing_and_stands_below_the_tip(
     )
     run.runner.keep_choices()
     with qtbot.waitSignal(page.step_requested, timeout=20000) as asked:
-        click(page, "Press test...")
+        click(page, "Press test")
 
     assert asked.args == ["swing"]
     assert run.status.setup is not None
