@@ -314,7 +314,7 @@ class _OnDisk(_Trial):
         self.stop()
         victim.signal(signal.SIGCONT)
         time.sleep(WITHOUT_DISK_S)
-        told += [line for line in victim.killed() if line.startswith("trouble")]
+        told += [line for line in victim.killed() if line.startswith("fault")]
         _run("umount", str(self.place.folder))
         self._mount()
         return told
@@ -375,7 +375,7 @@ def _note(counters: FrameCounters, told: list[str], place: Place) -> None:
     """Note what is there of what was told."""
     of = Counter(line.partition(" ")[0] for line in told)
     counters.n_cuts += 1
-    counters.n_faults += of["trouble"]
+    counters.n_faults += of["fault"]
     entries = {line.removeprefix("entry ") for line in told if line.startswith("entry")}
     files = {line.removeprefix("file ") for line in told if line.startswith("file")}
     faults = [line.removeprefix("fault ") for line in told if line.startswith("fault")]

@@ -187,7 +187,7 @@ def _taken_back_is_one_step(data: Path, told: list[str]) -> bool:
 
 def _settings_are_one(data: Path, told: list[str]) -> bool:
     loaded = load(data / "lightpen.json")
-    if loaded.trouble is not None:
+    if loaded.fault is not None:
         return False
     numbers = {loaded.content["last"].get(name, 0) for name in ("a", "b")}
     return len(numbers) == 1 and (not told or max(numbers) >= int(told[-1]))

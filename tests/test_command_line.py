@@ -876,10 +876,10 @@ def test_simulating_onto_a_file_is_refused(lightpen: Run, tmp_path: Path) -> Non
 class WitnessingDesktop:
     """Notes what is opened, or raises what goes wrong with it."""
 
-    def __init__(self, trouble: OSError | None = None) -> None:
+    def __init__(self, fault: OSError | None = None) -> None:
         self.opened: list[Path | None] = []
         self.papers: list[tuple[Path, Path | None, str]] = []
-        self._fault = trouble
+        self._fault = fault
 
     def show_window(self, swing: Path | None) -> int:
         if self._fault is not None:

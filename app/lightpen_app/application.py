@@ -163,10 +163,10 @@ class Wizard(QObject):
             subject_of(now, chosen, self.workbench.library.statuses)
         )
 
-    def _on_folder_doubted(self, trouble: str) -> None:
+    def _on_folder_doubted(self, fault: str) -> None:
         """Advise another data folder while this one cannot be written."""
         folder = str(self.workbench.folder)
-        self.window.set_unwritable(folder if trouble else "", trouble)
+        self.window.set_unwritable(folder if fault else "", fault)
 
     def _on_others_counted(self, n_others: int) -> None:
         """Say that other windows use the same data folder, while they do."""
@@ -199,12 +199,12 @@ class Wizard(QObject):
 
     def _on_streaming_changed(self) -> None:
         streaming, notices = self.workbench.streaming, self.workbench.notifications
-        if not streaming.trouble:
+        if not streaming.fault:
             notices.withdraw(streaming)
-        elif streaming.trouble != notices.text(streaming):
-            notices.tell(streaming, streaming.trouble)
+        elif streaming.fault != notices.text(streaming):
+            notices.tell(streaming, streaming.fault)
         self.window.set_stream(
-            StreamState(streaming.status, streaming.has_tip, streaming.trouble)
+            StreamState(streaming.status, streaming.has_tip, streaming.fault)
         )
 
     def _apply_appearance(self) -> None:

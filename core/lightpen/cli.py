@@ -155,11 +155,11 @@ def _run(options: argparse.Namespace) -> int:
         return BAD_INPUT
 
 
-def _complain(trouble: Message) -> None:
+def _complain(fault: Message) -> None:
     """Print an error, with advice for the command line."""
-    advice = [ADVICE[each.code] for each in trouble.parts() if each.code in ADVICE]
-    print(shown(" ".join(map(str, ["lightpen:", trouble, *advice]))), file=sys.stderr)
-    _logger.error("%s: %s", trouble.code, trouble)
+    advice = [ADVICE[each.code] for each in fault.parts() if each.code in ADVICE]
+    print(shown(" ".join(map(str, ["lightpen:", fault, *advice]))), file=sys.stderr)
+    _logger.error("%s: %s", fault.code, fault)
 
 
 class _Parser(argparse.ArgumentParser):

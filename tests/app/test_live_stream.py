@@ -79,13 +79,13 @@ def test_a_taken_port_is_told_until_another_place_is_chosen(
     with socket.create_server((LOOPBACK, 0)) as other:
         port = other.getsockname()[1]
         streaming.want(StreamPlace(port=port))
-        qtbot.waitUntil(lambda: bool(streaming.trouble))
-    assert re.match(f"Port {port} is in use already", streaming.trouble)
+        qtbot.waitUntil(lambda: bool(streaming.fault))
+    assert re.match(f"Port {port} is in use already", streaming.fault)
 
     streaming.want(ANY)
 
     qtbot.waitUntil(lambda: streaming.status.place is not None)
-    assert streaming.trouble == ""
+    assert streaming.fault == ""
 
 
 def test_a_stream_that_is_wanted_no_more_ends(

@@ -55,7 +55,7 @@ class DiscoveryState:
         Of the pen in the last image.
     progress : float or None
         Of the final computation; None while there is none.
-    trouble : str
+    fault : str
         Why the last trial found nothing.
     is_saved : bool
         Whether its files are in use, and the images are being opened.
@@ -67,7 +67,7 @@ class DiscoveryState:
     guide: Guide | None = None
     posture: Posture | None = None
     progress: float | None = None
-    trouble: str = ""
+    fault: str = ""
     is_saved: bool = False
 
     @property
@@ -164,7 +164,7 @@ class DiscoveryRun(QObject):
     def solve(self, request: Request) -> None:
         """Find pen and camera to scale, by all images."""
         self.stop()
-        self._become(progress=0.0, trouble="", is_saved=False)
+        self._become(progress=0.0, fault="", is_saved=False)
         self._try(request)
         if self._job is not None:
             self._job.progressed.connect(lambda done: self._become(progress=done))
@@ -269,7 +269,7 @@ class DiscoveryRun(QObject):
     def _on_unwritten(self, why: Message) -> None:
         if self._state.is_capturing:
             self.stop()
-            self._become(trouble=worded(why))
+            self._become(fault=worded(why))
 
     def _try(self, request: Request) -> None:
         recording = self._recording
@@ -291,17 +291,17 @@ class DiscoveryRun(QObject):
         guide = guide_of(found)
         mask = self._workbench.selection.preparation.mask
         self._live.set_region(RegionOfInterest(found.camera, found.pen, mask))
-        self._become(found=found, guide=guide, trouble="", progress=None)
+        self._become(found=found, guide=guide, fault="", progress=None)
 
     def _on_failed(self, sentence: str) -> None:
         self._job = None
-        self._become(trouble=sentence, progress=None)
+        self._become(fault=sentence, progress=None)
 
     def _on_saved(self, opened: OpenedFiles) -> None:
         """Use the files with the camera, then with the images."""
         recording, selection = self._recording, self._workbench.selection
         if opened.faults:
-            self._become(trouble=worded(opened.faults[0]))
+            self._become(fault=worded(opened.faults[0]))
         if recording is None or opened.camera_file is None or opened.pen_file is None:
             return
         files = {"camera_file": opened.camera_file, "pen_file": opened.pen_file}

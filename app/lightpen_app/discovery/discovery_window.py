@@ -215,8 +215,8 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         if state.progress is not None:
             words = self.tr("Computing: {0:.0%}").format(state.progress)
             return StatusMessage(words, Sign.WAIT, Tone.QUIET)
-        if state.trouble:
-            return StatusMessage(state.trouble, Sign.WARNING, Tone.WARN)
+        if state.fault:
+            return StatusMessage(state.fault, Sign.WARNING, Tone.WARN)
         if state.is_final:
             words = self.tr(
                 "Pen and camera found. The image shows the projection uncertainty / px."

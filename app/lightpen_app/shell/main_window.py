@@ -213,9 +213,9 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         """Press the main button, if it can be pressed."""
         self._action_bar.press_main()
 
-    def set_unwritable(self, folder: str, trouble: str) -> None:
+    def set_unwritable(self, folder: str, fault: str) -> None:
         """Show why the data folder cannot be written; an empty text ends it."""
-        self._notice.set_unwritable(folder, trouble)
+        self._notice.set_unwritable(folder, fault)
 
     def show_crash_report(self, path: str) -> None:
         """Report an internal error; path "" if no report was written."""

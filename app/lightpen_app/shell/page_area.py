@@ -69,11 +69,11 @@ class NoticeBar(Translated, QFrame):
         if self.text() in (text, self._with_way(text)):
             self.clear()
 
-    def set_unwritable(self, folder: str, trouble: str) -> None:
+    def set_unwritable(self, folder: str, fault: str) -> None:
         """Show why the data folder cannot be written; an empty text ends it."""
-        if trouble:
-            self._unwritable, self._fault = folder, trouble
-            self.show_text(trouble)
+        if fault:
+            self._unwritable, self._fault = folder, fault
+            self.show_text(fault)
         else:
             self.drop(self._fault)
             self._unwritable = self._fault = ""

@@ -28,13 +28,13 @@ class StreamState:
     ----------
     has_tip : bool
         Whether the place of a tip is streamed, and not the pose alone.
-    trouble : str
+    fault : str
         Why nobody can listen, though somebody should.
     """
 
     status: StreamStatus = field(default_factory=StreamStatus)
     has_tip: bool = False
-    trouble: str = ""
+    fault: str = ""
 
 
 class StreamDialog(FittedWindow, Translated, QDialog):
@@ -123,8 +123,8 @@ class StreamDialog(FittedWindow, Translated, QDialog):
 
     def _state_message(self) -> StatusMessage:
         state = self._state
-        if state.trouble:
-            return StatusMessage(state.trouble, Sign.CROSS, Tone.BAD)
+        if state.fault:
+            return StatusMessage(state.fault, Sign.CROSS, Tone.BAD)
         if state.status.place is None:
             return StatusMessage()
         text = self.tr("Active at {0}. Clients: {1}").format(

@@ -70,10 +70,10 @@ class FolderWatch(QObject):
     def _on_writable(self, _: None) -> None:
         self._doubt("")
 
-    def _doubt(self, trouble: str) -> None:
-        if trouble != self._fault:
-            self._fault = trouble
-            self.doubted.emit(trouble)
+    def _doubt(self, fault: str) -> None:
+        if fault != self._fault:
+            self._fault = fault
+            self.doubted.emit(fault)
 
     def _count(self) -> None:
         presence = self._presence

@@ -91,7 +91,7 @@ class RunView(QObject, Generic[S, E]):
         self._fault_told.emit(message)
 
     def on_fault_cleared(self, message: Message) -> None:
-        """Hand on that the cause of the last trouble is gone."""
+        """Hand on that the cause of the last fault is gone."""
         self._fault_cleared_told.emit()
 
     # On the thread of the GUI

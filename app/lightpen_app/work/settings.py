@@ -90,7 +90,7 @@ class Settings(QObject):
         loaded = load(file)
         self._content: Content = loaded.content
         self._machine, fault = load_of_machine()
-        self._fault = loaded.trouble or fault
+        self._fault = loaded.fault or fault
         self._changes: Changes = {}  # that wait to be written
         self._is_writing = False
         self._why_unwritten: Message | None = None
@@ -106,7 +106,7 @@ class Settings(QObject):
         return self._file
 
     @property
-    def trouble(self) -> Message | None:
+    def fault(self) -> Message | None:
         """Why they could not be read at the start."""
         return self._fault
 
@@ -260,22 +260,22 @@ class Settings(QObject):
         unwritten: Changes = {}
         while changes := self._taken_changes(unwritten):
             try:
-                trouble, unwritten = save(self._file, self._content, changes), {}
+                fault, unwritten = save(self._file, self._content, changes), {}
             except LightpenError as error:
-                trouble, unwritten = error.message, changes
-            if trouble is not None or self._why_unwritten is not None:
-                self._written.emit(trouble, not unwritten)
+                fault, unwritten = error.message, changes
+            if fault is not None or self._why_unwritten is not None:
+                self._written.emit(fault, not unwritten)
 
-    def _on_written(self, trouble: Message | None, is_written: bool) -> None:
+    def _on_written(self, fault: Message | None, is_written: bool) -> None:
         """Report a failure once, and its end; retry until then."""
         before = self._why_unwritten
-        self._why_unwritten = None if is_written else trouble
+        self._why_unwritten = None if is_written else fault
         if not is_written:
             QTimer.singleShot(AGAIN_MS, self._write_soon)
-        if before is not None and before != trouble:
+        if before is not None and before != fault:
             self.relieved.emit(before)
-        if trouble is not None and before != trouble:
-            self.troubled.emit(trouble)
+        if fault is not None and before != fault:
+            self.troubled.emit(fault)
 
     def _taken_changes(self, unwritten: Changes) -> Changes:
         """Return the entries to write next; empty without changes."""

@@ -39,7 +39,7 @@ class LoadedSettings:
     """What a file holds, and why it is not all, if anything was wrong."""
 
     content: Content
-    trouble: Message | None = None
+    fault: Message | None = None
 
 
 def load(file: Path) -> LoadedSettings:
@@ -87,17 +87,17 @@ def save(file: Path, content: Content, changes: Changes) -> Message | None:
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         with folder_locked(file.parent, PATIENCE) as is_alone:
-            trouble = None if is_alone else _held(file)
+            fault = None if is_alone else _held(file)
             if file.exists():
                 try:
                     content = with_changes(_read(file), changes)
                 except DamagedError:
-                    trouble = _set_aside(file)
+                    fault = _set_aside(file)
             write_whole(file, json.dumps(content, ensure_ascii=True, indent=1).encode())
             sync_folder(file.parent)
     except OSError as error:
         raise _cannot_be_saved(file, error) from error
-    return trouble
+    return fault
 
 
 def _read(file: Path) -> Content:

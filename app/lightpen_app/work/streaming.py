@@ -32,7 +32,7 @@ class Streaming(QObject):
     Signals
     -------
     changed()
-        `status`, `has_tip` or `trouble` is different.
+        `status`, `has_tip` or `fault` is different.
     """
 
     changed = Signal()
@@ -66,7 +66,7 @@ class Streaming(QObject):
         return self._has_tip
 
     @property
-    def trouble(self) -> str:
+    def fault(self) -> str:
         """Why the stream is unavailable; empty if it runs or is off."""
         return self._fault
 
@@ -123,8 +123,8 @@ class Streaming(QObject):
         job.ended.connect(self._on_opening_ended)
         job.start()
 
-    def _tell(self, trouble: str) -> None:
-        self._fault = trouble
+    def _tell(self, fault: str) -> None:
+        self._fault = fault
         self.changed.emit()
 
     def _on_opening_ended(self) -> None:

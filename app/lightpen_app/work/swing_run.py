@@ -59,7 +59,7 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
         super().__init__(SwingStatus(), notifications, parent)
         self._folder = folder
         address = ""
-        with suppress(FileError):  # which `Settings.trouble` reports
+        with suppress(FileError):  # which `Settings.fault` reports
             address = server_address()
         self.logbook = LazyLogbook(folder, address)
         self._archive = FolderArchive(folder, self.logbook.confirm)

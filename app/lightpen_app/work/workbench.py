@@ -132,8 +132,8 @@ class Workbench(QObject):
 
     def start(self) -> None:
         """Restore the last selection and open the camera."""
-        if self.settings.trouble is not None:
-            self._on_settings_troubled(self.settings.trouble)
+        if self.settings.fault is not None:
+            self._on_settings_troubled(self.settings.fault)
         folder = self.folder  # a job that knew its parent would outlive it
         Job(lambda _: sweep_leftovers(folder), self).start()
         self._look_for_update()

@@ -92,12 +92,12 @@ class ReplicationState:
     ----------
     n_waiting : int or None
         Entries that it does not have; None as long as it did not answer.
-    trouble : Message or None
+    fault : Message or None
         Why the last attempt failed.
     """
 
     n_waiting: int | None
-    trouble: Message | None
+    fault: Message | None
 
 
 class Logbook:
@@ -284,11 +284,11 @@ class Logbook:
         """
         if self._replicator is None:
             return None
-        n_delivered, trouble = self._replicator.n_delivered, self._replicator.trouble
+        n_delivered, fault = self._replicator.n_delivered, self._replicator.fault
         if n_delivered is None:
-            return ReplicationState(None, trouble)
+            return ReplicationState(None, fault)
         ends = {head.chain: head.number for head in heads(self.database)}
-        return ReplicationState(max(0, ends.get(self.chain, 0) - n_delivered), trouble)
+        return ReplicationState(max(0, ends.get(self.chain, 0) - n_delivered), fault)
 
     def share_library(self, server: Database) -> None:
         """Take over what other stations changed later in their libraries.

@@ -41,7 +41,7 @@ class Replicator:
     ----------
     n_delivered : int or None
         Entries that the server has; None until it answered first.
-    trouble : Message or None
+    fault : Message or None
         Why the last attempt failed.
     """
 
@@ -58,7 +58,7 @@ class Replicator:
         self._share = share
         self._is_due, self._is_ending = Event(), Event()
         self.n_delivered: int | None = None
-        self.trouble: Message | None = None
+        self.fault: Message | None = None
         self._thread = Thread(target=self._run, name="delivery", daemon=True)
         self._is_due.set()
         self._thread.start()
@@ -75,7 +75,7 @@ class Replicator:
 
     def _run(self) -> None:
         while True:
-            self._is_due.wait(LOOK_S if self.trouble is None else AGAIN_S)
+            self._is_due.wait(LOOK_S if self.fault is None else AGAIN_S)
             self._is_due.clear()
             try:
                 with closing(open_server(self._address)) as server:
@@ -85,8 +85,8 @@ class Replicator:
                     if not self._is_ending.is_set():
                         self._share(server)
                 self.n_delivered = copied.n_known + copied.n_new
-                self.trouble = None
+                self.fault = None
             except ArchiveError as error:
-                self.trouble = error.message
+                self.fault = error.message
             if self._is_ending.is_set():
                 break

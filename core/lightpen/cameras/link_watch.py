@@ -53,9 +53,9 @@ class LinkWatch:
         seconds = now - self.began
         if self.is_told or seconds < WATCHED:
             return self, None
-        trouble = _fault(stats.since(self.since), seconds, settings)
-        is_told = trouble is not None
-        return replace(self, since=stats, began=now, is_told=is_told), trouble
+        fault = _fault(stats.since(self.since), seconds, settings)
+        is_told = fault is not None
+        return replace(self, since=stats, began=now, is_told=is_told), fault
 
 
 def _fault(

@@ -356,11 +356,11 @@ class CameraWorker:
             stats, skipped=self._n_skipped, missed=self._n_missed_read
         )
         if self._camera.caps.has_link:
-            self._link, trouble = self._link.after(
+            self._link, fault = self._link.after(
                 self._stats, self._heard_ns * 1e-9, self._applied
             )
-            if trouble is not None:
-                self._on_event(FaultRaised(trouble))
+            if fault is not None:
+                self._on_event(FaultRaised(fault))
 
     def _open_first(self) -> None:
         """Open the camera; wait briefly while another program uses it."""

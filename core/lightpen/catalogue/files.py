@@ -154,7 +154,7 @@ MESSAGES = {
     "rig-file.no-mapping": "{place} is not a mapping with name, intrinsics and cam_from_rig.",
     "rig-file.name-twice": "{name} has two cameras named {camera}. Give each camera a unique name.",
     "rig-file.file-twice": "{name} has the same camera file {file} for {one} and {other}. Give each camera its own calibration file.",
-    "rig-file.camera-file": "{name} names the camera file of {camera}: {trouble}",
+    "rig-file.camera-file": "{name} names the camera file of {camera}: {fault}",
     "system.not-permitted": "Operation not permitted",
     "system.not-there": "No such file or directory",
     "system.input-output": "Input/output error",

@@ -35,7 +35,7 @@ MESSAGES = {
     "pen.leds-exchanged": "LEDs {first} and {second} are swapped. LEDs 1 to 4 must be in order along the back line, and 5 to 7 and 8 to 10 along the columns in the same direction. Swap their coordinates.",
     "pen.led-in-place-of": "{led} where {other} belongs",
     "pen.neither-framed-nor-handed": "The LEDs are a mirror image of the pen, in another frame. Change the sign of one coordinate, then transform them to the pen frame.",
-    "rig.of-camera": "Camera {camera}: {trouble}",
+    "rig.of-camera": "Camera {camera}: {fault}",
     "limit.max-uncertainty": "Swing: max. U (k = 2)",
     "limit.min-images": "Swing: min. images",
     "limit.max-images": "Swing: max. images",

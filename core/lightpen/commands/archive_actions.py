@@ -111,8 +111,8 @@ def _deliver(options: argparse.Namespace) -> None:
         if options.again:
             note_delivered(database, chain, chain_head(server, chain).number)
         require_same(database, chain, server)
-        for trouble in logbook.enter_owed():
-            print(shown(str(trouble)))
+        for fault in logbook.enter_owed():
+            print(shown(str(fault)))
         copied = deliver(database, chain, server)
         logbook.share_library(server)
         shared = deliver(database, chain, server)
@@ -154,8 +154,8 @@ def _new_key(options: argparse.Namespace) -> None:
         signature = supervisor_signature(options.supervisor)
         logbook.confirm(read_supervision(data))
         public = renew_station_key(data, logbook.chain, signature, local_now())
-        for trouble in logbook.enter_owed():
-            print(shown(str(trouble)))
+        for fault in logbook.enter_owed():
+            print(shown(str(fault)))
     print(f"The station key is {public} from now on.")
 
 

@@ -82,8 +82,8 @@ def keep_record(
 
     kept = keep_verification(data, record, is_simulated=is_simulated)
     with closing(Logbook(data, server_address())) as logbook:
-        for trouble in logbook.enter_owed():
-            print(shown(str(trouble)))
+        for fault in logbook.enter_owed():
+            print(shown(str(fault)))
     if not is_simulated:
         _tell_overdue(data, names)
     print(shown(f"Entered in the archive: {kept}"))

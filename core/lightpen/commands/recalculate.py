@@ -40,14 +40,14 @@ class Recalculated:
     ----------
     tip_pen : (3,) array or None
         mm; None where there is no tip any more.
-    trouble : str
+    fault : str
         Why not.
     """
 
     name: str
     tip_pen: FloatArray | None
     change: FloatArray | None
-    trouble: str = ""
+    fault: str = ""
 
 
 def add_recalculate(parser: argparse.ArgumentParser) -> None:
@@ -154,7 +154,7 @@ def _text(solved: list[Recalculated], trials: dict[str, MonteCarlo]) -> str:
     ]
     for each in solved:
         if each.tip_pen is None or each.change is None:
-            lines.append(f"{each.name}: {each.trouble}")
+            lines.append(f"{each.name}: {each.fault}")
             continue
         lines.append(_row(each.name, each.tip_pen))
         lines.append(_row("  change", each.change))
@@ -186,7 +186,7 @@ def _record(
                 "name": each.name,
                 "tip_pen_mm": each.tip_pen,
                 "change_mm": each.change,
-                "trouble": each.trouble,
+                "fault": each.fault,
                 "monte_carlo": (
                     None
                     if found is None

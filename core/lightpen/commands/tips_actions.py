@@ -124,8 +124,8 @@ def _share(options: argparse.Namespace) -> None:
             deliver(logbook.database, logbook.chain, server)
     for each in taken:
         print(shown(str(each.message)))
-    for trouble in faults:
-        print(shown(f"It is not in the archive yet: {trouble}"))
+    for fault in faults:
+        print(shown(f"It is not in the archive yet: {fault}"))
     print(f"{len(taken)} changes of other stations were taken over.")
 
 
@@ -239,8 +239,8 @@ def _tell(options: argparse.Namespace, item: AnyItem, library: Library) -> None:
             faults = logbook.enter_owed()
     except ArchiveError as error:  # it stays owed
         faults = (error.message,)
-    for trouble in faults:
-        print(shown(f"It is not in the archive yet: {trouble}"))
+    for fault in faults:
+        print(shown(f"It is not in the archive yet: {fault}"))
     kept = known_item(library, item.kind, item.id.strip())
     record = _record(kept, _statuses(data, library, None))
     print(json.dumps(record, indent=1) if options.json else shown(_line(record)))

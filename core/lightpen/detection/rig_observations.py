@@ -61,8 +61,8 @@ def observe_rig_images(
         except FileError as error:
             raise FileError(_with_exchange(rig, c, error.message)) from error
         except CalibrationError as error:
-            trouble = of_camera(rig.names[c], error.message)
-            raise CalibrationError(trouble) from error
+            fault = of_camera(rig.names[c], error.message)
+            raise CalibrationError(fault) from error
     return at_moments(seen, pairing)
 
 
@@ -121,10 +121,10 @@ def _responsive(seen: Observations, images: IntArray) -> Observations:
     )
 
 
-def _with_exchange(rig: Rig, c: int, trouble: Message) -> Message:
+def _with_exchange(rig: Rig, c: int, fault: Message) -> Message:
     """Return the error of a camera's images, and the camera with that size."""
-    told = of_camera(rig.names[c], trouble)
-    size = trouble.values.get("size")
+    told = of_camera(rig.names[c], fault)
+    size = fault.values.get("size")
     if not isinstance(size, Message):
         return told
     theirs = size.values["width"], size.values["height"]

@@ -80,7 +80,7 @@ def find_spots(
         No image can be read, or they differ in size.
     """
     found: list[tuple[Spots, tuple[int, int] | None]] = []
-    trouble: FileError | None = None
+    fault: FileError | None = None
 
     def search(load: Callable[[], Image]) -> tuple[Spots, tuple[int, int] | FileError]:
         try:
@@ -96,13 +96,13 @@ def find_spots(
     n_images = len(source.names)
     for spots, seen in look_at_all(source, search, SEARCH_MEMORY_A_PIXEL):
         if isinstance(seen, FileError):
-            trouble = seen
+            fault = seen
         found.append((spots, None if isinstance(seen, FileError) else seen))
         report(len(found) / n_images)
     sizes = [size for _, size in found if size is not None]
     if not sizes:
-        assert trouble is not None
-        raise FileError("images.none-readable", n_images=n_images, why=trouble.message)
+        assert fault is not None
+        raise FileError("images.none-readable", n_images=n_images, why=fault.message)
     size = max(set(sizes), key=sizes.count)
     return sightings_of_spots(
         source.names, [s if own == size else Spots.none() for s, own in found], size

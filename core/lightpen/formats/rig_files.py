@@ -204,7 +204,7 @@ def _read_of(rig_name: str, name: str, file: Path) -> Camera:
         return read_camera(file)
     except FileError as error:
         raise FileError(
-            "rig-file.camera-file", name=rig_name, camera=name, trouble=error.message
+            "rig-file.camera-file", name=rig_name, camera=name, fault=error.message
         ) from error
 
 

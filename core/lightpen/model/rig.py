@@ -67,6 +67,6 @@ def from_first(rig: Rig) -> Rig:
     return replace(rig, rotations=rotations, translations=translations)
 
 
-def of_camera(name: str, trouble: Message) -> Message:
+def of_camera(name: str, fault: Message) -> Message:
     """Return an error of a camera of a rig, with the camera's name."""
-    return message("rig.of-camera", camera=name, trouble=trouble)
+    return message("rig.of-camera", camera=name, fault=fault)

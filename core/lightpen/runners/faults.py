@@ -22,9 +22,9 @@ class FaultListener(Protocol):
 
 
 class FaultReporter:
-    """Tells one trouble at a time, and when it is over.
+    """Tells one fault at a time, and when it is over.
 
-    A trouble that can end automatically has a cause, of whatever kinds its owner knows.
+    A fault that can end automatically has a cause, of whatever kinds its owner knows.
     """
 
     def __init__(self, listener: FaultListener) -> None:
@@ -44,20 +44,20 @@ class FaultReporter:
         except LightpenError as error:
             self.tell(error.message)
 
-    def tell(self, trouble: Message, cause: Enum | None = None) -> None:
-        """Tell a trouble in place of the one before."""
-        self._told, self._cause = trouble, cause
-        _logger.warning("fault raised: %s: %s", trouble.code, trouble)
-        self._listener.on_fault(trouble)
+    def tell(self, fault: Message, cause: Enum | None = None) -> None:
+        """Tell a fault in place of the one before."""
+        self._told, self._cause = fault, cause
+        _logger.warning("fault raised: %s: %s", fault.code, fault)
+        self._listener.on_fault(fault)
 
     def end(self) -> None:
-        """State that the trouble is over, whatever its cause."""
+        """State that the fault is over, whatever its cause."""
         told, self._told = self._told, None
         if told is not None:
             _logger.info("fault cleared: %s", told.code)
             self._listener.on_fault_cleared(told)
 
     def end_of(self, cause: Enum) -> None:
-        """State that the trouble is over, if this was its cause."""
+        """State that the fault is over, if this was its cause."""
         if self._cause is cause:
             self.end()

@@ -684,8 +684,8 @@ class _LogbookEntries:
             )
 
     def _on_caught_up(self, faults: tuple[Message, ...]) -> None:
-        for trouble in faults:
-            self._tell_fault(trouble)
+        for fault in faults:
+            self._tell_fault(fault)
 
     def enter_owed(self) -> None:
         """Enter events in the archive that only files hold so far."""

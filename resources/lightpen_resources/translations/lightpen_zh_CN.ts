@@ -156,6 +156,10 @@
         <translation>摆动时的光笔温度</translation>
     </message>
     <message>
+        <source>Relative humidity (for the report)</source>
+        <translation>相对湿度（用于报告）</translation>
+    </message>
+    <message>
         <source>Temperature difference from LED measurement (if not measured)</source>
         <translation>与测量 LED 时的温差（未测量温度时）</translation>
     </message>
@@ -573,6 +577,10 @@
         <translation>检查 LED</translation>
     </message>
     <message>
+        <source>Enter the temperature</source>
+        <translation>输入温度</translation>
+    </message>
+    <message>
         <source>Verify the tip</source>
         <translation>验证测头</translation>
     </message>
@@ -592,8 +600,8 @@
         <translation>锥孔 {0}</translation>
     </message>
     <message>
-        <source>nominal {0} {1} {2}</source>
-        <translation>标称 {0} {1} {2}</translation>
+        <source>nominal {0} {1} {2} mm</source>
+        <translation>标称 {0} {1} {2} mm</translation>
     </message>
     <message>
         <source>limit of U {0:g} mm</source>
@@ -652,6 +660,10 @@
         <translation>光笔 {0} 的 LED</translation>
     </message>
     <message>
+        <source>Measure the temperature of the pen.</source>
+        <translation>请测量光笔的温度。</translation>
+    </message>
+    <message>
         <source>No temperature</source>
         <translation>未给出温度</translation>
     </message>
@@ -689,6 +701,18 @@
     <message>
         <source>Temperature</source>
         <translation>温度</translation>
+    </message>
+    <message>
+        <source>Pen temperature today</source>
+        <translation>今日光笔温度</translation>
+    </message>
+    <message>
+        <source>not measured</source>
+        <translation>未测量</translation>
+    </message>
+    <message>
+        <source>Confirm</source>
+        <translation>确认</translation>
     </message>
     <message>
         <source>Scan or type a tip</source>
@@ -1003,6 +1027,10 @@
         <translation>新增一个条目</translation>
     </message>
     <message>
+        <source>Verification report...</source>
+        <translation>验证报告…</translation>
+    </message>
+    <message>
         <source>Calibration report...</source>
         <translation>标定报告...</translation>
     </message>
@@ -1043,8 +1071,8 @@
         <translation>该测头为当前测头。</translation>
     </message>
     <message>
-        <source>Only an accepted tip has a calibration report.</source>
-        <translation>只有已接受的测头才有标定报告。</translation>
+        <source>Only accepted tips and verifications have a report.</source>
+        <translation>只有已接受的测头和验证才有报告。</translation>
     </message>
     <message>
         <source>The result is stored at its own station.</source>
@@ -1415,6 +1443,10 @@
     <message>
         <source>{0} entries</source>
         <translation>{0} 个条目</translation>
+    </message>
+    <message>
+        <source>1 entry</source>
+        <translation>1 条记录</translation>
     </message>
     <message>
         <source>Open the files of camera and LEDs first.</source>
@@ -1974,6 +2006,18 @@
         <translation>有效期至</translation>
     </message>
     <message>
+        <source>Certificate number</source>
+        <translation>证书编号</translation>
+    </message>
+    <message>
+        <source>Date of the certificate</source>
+        <translation>证书日期</translation>
+    </message>
+    <message>
+        <source>Certified value</source>
+        <translation>检定值</translation>
+    </message>
+    <message>
         <source>Max. change since last calibration</source>
         <translation>距上次标定的最大变化</translation>
     </message>
@@ -2051,6 +2095,42 @@
     <message>
         <source>Country code, two capital letters such as DE</source>
         <translation>国家代码，两个大写字母，例如 DE</translation>
+    </message>
+    <message>
+        <source>Street (optional)</source>
+        <translation>街道（可选）</translation>
+    </message>
+    <message>
+        <source>Post code (optional)</source>
+        <translation>邮政编码（可选）</translation>
+    </message>
+    <message>
+        <source>Procedure (optional)</source>
+        <translation>规程（可选）</translation>
+    </message>
+    <message>
+        <source>Place of calibration</source>
+        <translation>校准地点</translation>
+    </message>
+    <message>
+        <source>Laboratory</source>
+        <translation>实验室</translation>
+    </message>
+    <message>
+        <source>Customer</source>
+        <translation>客户</translation>
+    </message>
+    <message>
+        <source>Branch of the laboratory</source>
+        <translation>实验室分支机构</translation>
+    </message>
+    <message>
+        <source>Branch of the customer</source>
+        <translation>客户分支机构</translation>
+    </message>
+    <message>
+        <source>Elsewhere</source>
+        <translation>其他地点</translation>
     </message>
     <message>
         <source>Save...</source>
@@ -2470,6 +2550,10 @@
         <translation>测头库</translation>
     </message>
     <message>
+        <source>Pens, tips, cones, cameras and references with their limits. Each change is recorded in the archive with name and time.</source>
+        <translation>光笔、测头、锥座、相机和标准器及其限值。每次更改均连同姓名和时间记入存档。</translation>
+    </message>
+    <message>
         <source>Tips</source>
         <translation>测头</translation>
     </message>
@@ -2480,6 +2564,14 @@
     <message>
         <source>Cones</source>
         <translation>锥孔</translation>
+    </message>
+    <message>
+        <source>Cameras</source>
+        <translation>相机</translation>
+    </message>
+    <message>
+        <source>References</source>
+        <translation>标准器</translation>
     </message>
     <message>
         <source>State</source>
@@ -2536,10 +2628,6 @@
     <message>
         <source>Saved with your name and the time</source>
         <translation>连同您的姓名和时间保存</translation>
-    </message>
-    <message>
-        <source>Pens, tips and cones with their limits. Each change is recorded in the archive with name and time.</source>
-        <translation>光笔、测头和锥孔及其限值。每次更改连同姓名和时间记入档案库。</translation>
     </message>
     <message>
         <source>ID</source>
@@ -3389,6 +3477,14 @@
         <translation>识别</translation>
     </message>
     <message>
+        <source>Scan</source>
+        <translation>扫描</translation>
+    </message>
+    <message>
+        <source>Hold still on the feature, then slide along it.</source>
+        <translation>在要素上停稳，然后沿要素滑动。</translation>
+    </message>
+    <message>
         <source>Part moved</source>
         <translation>工件已移动</translation>
     </message>
@@ -3494,6 +3590,12 @@
         <translation>相机</translation>
     </message>
     <message>
+        <source>images
+needed</source>
+        <translation>所需
+图像</translation>
+    </message>
+    <message>
         <source>turn about the pen&apos;s own axis</source>
         <translation>绕光笔自身轴线转动</translation>
     </message>
@@ -3559,8 +3661,8 @@
         <translation>自动探测所有任务。</translation>
     </message>
     <message>
-        <source>Its ring has a radius of {0} mm, its bar a length of {1} mm, its sphere a diameter of {2} mm by the ball centres.</source>
-        <translation>其环规半径为 {0} mm，长度杆长 {1} mm，标准球直径为 {2} mm（按球心计）。</translation>
+        <source>Simulated artefacts: ring radius {0} mm, bar length {1} mm, sphere diameter {2} mm (ball centres).</source>
+        <translation>模拟标准器：环规半径 {0} mm，长度杆 {1} mm，标准球直径 {2} mm（球心）。</translation>
     </message>
     <message>
         <source>Lift</source>
@@ -3602,6 +3704,10 @@
         <translation>说明理由后使用测头</translation>
     </message>
     <message>
+        <source>Report...</source>
+        <translation>报告…</translation>
+    </message>
+    <message>
         <source>Undo point</source>
         <translation>撤销点</translation>
     </message>
@@ -3620,6 +3726,10 @@
     <message>
         <source>Start over? Results are kept.</source>
         <translation>重新开始？结果会保留。</translation>
+    </message>
+    <message>
+        <source>Saved: {0}</source>
+        <translation>已保存：{0}</translation>
     </message>
     <message>
         <source>Progress</source>
@@ -3681,6 +3791,10 @@
     <message>
         <source>y / px</source>
         <translation>y / px</translation>
+    </message>
+    <message>
+        <source>Lens field × {0}</source>
+        <translation>镜头残余场 × {0}</translation>
     </message>
     <message>
         <source>Residuals by axis / px</source>
@@ -3818,6 +3932,14 @@
     <message>
         <source>Preview, save as PDF, or print</source>
         <translation>预览、另存为 PDF 或打印</translation>
+    </message>
+    <message>
+        <source>Swing again with firm pressure and compare: shows a stylus that gives way</source>
+        <translation>用力按压再摆动一次并比较：可显示测杆的退让</translation>
+    </message>
+    <message>
+        <source>Press test</source>
+        <translation>压力试验</translation>
     </message>
     <message>
         <source>Calibration report...</source>
@@ -4201,6 +4323,10 @@
     <message>
         <source>Select {0} or more calibrations.</source>
         <translation>请选择至少 {0} 次标定。</translation>
+    </message>
+    <message>
+        <source>Repeatability report...</source>
+        <translation>重复性报告…</translation>
     </message>
     <message>
         <source>Mean / mm</source>
@@ -5030,6 +5156,10 @@
         <translation>让模拟操作员摆动；或按“就位”，再拖动姿态盘使光笔倾斜。</translation>
     </message>
     <message>
+        <source>Press test: press the tip firmly into the cone.</source>
+        <translation>压力试验：将测头用力压入锥座。</translation>
+    </message>
+    <message>
         <source>Check needed</source>
         <translation>需检查</translation>
     </message>
@@ -5620,8 +5750,8 @@ mm</translation>
         <translation>CSV，每个特性一行</translation>
     </message>
     <message>
-        <source>Camera {camera}: {trouble}</source>
-        <translation>相机 {camera}：{trouble}</translation>
+        <source>Camera {camera}: {fault}</source>
+        <translation>相机 {camera}：{fault}</translation>
     </message>
     <message>
         <source>Capture more images.</source>
@@ -5918,10 +6048,6 @@ mm</translation>
     <message>
         <source>Length</source>
         <translation>长度</translation>
-    </message>
-    <message>
-        <source>Length / mm; certified {certified:.4f} mm, U (k = 2) {uncertainty:.4f} mm</source>
-        <translation>长度 / mm；证书值 {certified:.4f} mm，U (k = 2) {uncertainty:.4f} mm</translation>
     </message>
     <message>
         <source>Length error {error:+.4f} mm at most (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
@@ -6952,6 +7078,26 @@ mm</translation>
         <translation>{folder} 的限值中缺少一个文件。在从副本恢复该文件夹之前，不接受任何结果。</translation>
     </message>
     <message>
+        <source>A password in the system keyring needs the package keyring, which is not installed. Install it with: pip install &quot;lightpen[keyring]&quot;.</source>
+        <translation>系统密钥环中的密码需要软件包 keyring，但尚未安装。安装命令：pip install &quot;lightpen[keyring]&quot;。</translation>
+    </message>
+    <message>
+        <source>A press test compares two swings with the same cameras and LEDs. Give two calibrations of one station and pen.</source>
+        <translation>压力试验比较使用相同相机和 LED 的两次摆动。请给出同一工位、同一光笔的两次校准。</translation>
+    </message>
+    <message>
+        <source>A swing with firm pressure is compared only and cannot be accepted.</source>
+        <translation>用力按压的摆动仅供比较，不能接受。</translation>
+    </message>
+    <message>
+        <source>All LEDs changed by one scale factor, {growth:+.0f} ppm (U {uncertainty:.0f} ppm): the pen is {kelvin:+.1f} K warmer (aluminium), or the distance between cone and camera changed. No single LED moved.</source>
+        <translation>全部 LED 按同一比例变化 {growth:+.0f} ppm（U {uncertainty:.0f} ppm）：光笔温度变化 {kelvin:+.1f} K（铝），或锥座与相机的距离已改变。没有单个 LED 移动。</translation>
+    </message>
+    <message>
+        <source>Camera {camera} is not synchronised with the first camera (about {lag}). This shifts the tip and may cause other warnings. Trigger all cameras by one signal, or hold the pen still for each image.</source>
+        <translation>相机 {camera} 与第一台相机不同步（约 {lag}）。这会使测头位置偏移，并可能引起其他警告。请用同一信号触发全部相机，或在每次取图时保持光笔静止。</translation>
+    </message>
+    <message>
         <source>The swing is paused.</source>
         <translation>摆动已暂停。</translation>
     </message>
@@ -7544,10 +7690,6 @@ mm</translation>
         <translation>需要主管批准和理由。请输入主管的姓名和密码。</translation>
     </message>
     <message>
-        <source>All LEDs changed by one scale factor, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (aluminium), or the distance between cone and camera changed. No single LED moved.</source>
-        <translation>所有 LED 按同一比例变化（{growth:+.0f} ppm）：光笔温度变化 {kelvin:+.1f} K（按铝计），或锥孔与相机沿视线方向相互远离。没有单个 LED 移位。</translation>
-    </message>
-    <message>
         <source>All points of {run} lie within {extent:.3f} mm: one end was probed again and the other not at all. Probe both ends.</source>
         <translation>{run} 的全部测点都在 {extent:.3f} mm 之内：同一端被重复触测，另一端没有触测。请触测两端。</translation>
     </message>
@@ -7606,10 +7748,6 @@ mm</translation>
     <message>
         <source>Camera {camera} has no image at {n_absent} of {n_moments} instants, such as {example}. The images of the other cameras are used there.</source>
         <translation>相机 {camera} 在 {n_moments} 个时刻中的 {n_absent} 个没有图像，例如 {example}。这些时刻采用其他相机的图像。</translation>
-    </message>
-    <message>
-        <source>Camera {camera} is not synchronised with the first camera (about {lag:.2f} frame intervals). This shifts the tip and may cause other warnings. Trigger all cameras by one signal, or hold the pen still for each image.</source>
-        <translation>相机 {camera} 与第一台相机不同步（约 {lag:.2f} 个帧间隔）。这会使测头偏移，也可能引起其他警告。请用同一信号触发所有相机，或在每次拍摄时握稳光笔。</translation>
     </message>
     <message>
         <source>Camera {camera} shows another posture of the pen than the other cameras at {n_apart} of {n_moments} instants, such as {example}; these images are excluded. Check that simultaneous images have the same name, and check the trigger.</source>
@@ -7680,12 +7818,20 @@ mm</translation>
         <translation>条目 {number} 没有完整的标定记录，无法恢复使用。请重新标定该测头。</translation>
     </message>
     <message>
+        <source>Entry {number} is later than its timestamp: the clock of the station is ahead. Nothing was stored. Set the clock, and repeat the request after the next entry.</source>
+        <translation>记录 {number} 晚于其时间戳：工位时钟超前。未保存任何内容。请校准时钟，并在下一条记录之后重新请求。</translation>
+    </message>
+    <message>
         <source>Entry {number} is not an accepted tip. Choose the entry of an accepted tip.</source>
         <translation>条目 {number} 不是已接受的测头。请选择已接受测头的条目。</translation>
     </message>
     <message>
         <source>Entry {number} is not of this station. Only a tip that was accepted here can be reinstated.</source>
         <translation>第 {number} 条记录不属于本工位。只有在此接受的测头才能恢复。</translation>
+    </message>
+    <message>
+        <source>Entry {number} is the last one and has a timestamp already.</source>
+        <translation>记录 {number} 是最后一条，已有时间戳。</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} does not match its predecessor: one of the two was replaced.</source>
@@ -7714,6 +7860,14 @@ mm</translation>
     <message>
         <source>Entry {number} of chain {chain} was modified.</source>
         <translation>链 {chain} 的第 {number} 个条目被更改。</translation>
+    </message>
+    <message>
+        <source>Expansion</source>
+        <translation>热膨胀</translation>
+    </message>
+    <message>
+        <source>Feature {name}: {said}</source>
+        <translation>要素 {name}：{said}</translation>
     </message>
     <message>
         <source>Fewer than {least} views have the board tilted {sides}. Add such views.</source>
@@ -7832,8 +7986,20 @@ mm</translation>
         <translation>LED {first} 和 {second} 互换了：各自在对方的位置上。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 沿两列同方向依次排列。请交换它们的坐标。</translation>
     </message>
     <message>
+        <source>Largest error: {share:.0f} % of its limit at {run}. Places: {n_places} (ISO 10360-12: {needed}).</source>
+        <translation>最大误差：{run} 处为其限值的 {share:.0f} %。位置数：{n_places}（ISO 10360-12：{needed}）。</translation>
+    </message>
+    <message>
+        <source>Length / mm</source>
+        <translation>长度 / mm</translation>
+    </message>
+    <message>
         <source>Length error at {run} {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Check the certified length of this bar. Otherwise the scale of the LED file or the camera file is wrong, or the pen is warmer than at its measurement.</source>
         <translation>{run} 处长度误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。请检查该长度杆的校准长度。否则 LED 文件或相机文件的比例有误，或光笔温度高于其测量时的温度。</translation>
+    </message>
+    <message>
+        <source>Length: additional error per metre</source>
+        <translation>长度：每米附加误差</translation>
     </message>
     <message>
         <source>Line {line} of {file} is damaged. Restore the file from a copy, or remove the line to continue without that image.</source>
@@ -7892,6 +8058,18 @@ mm</translation>
         <translation>请重新测量工件。</translation>
     </message>
     <message>
+        <source>Monte Carlo confirms U: the largest difference is {percent:.0f} % along {axis}, with a standard error of {own:.0f} %.</source>
+        <translation>蒙特卡洛法证实了 U：最大差异沿 {axis} 为 {percent:.0f} %，标准误差为 {own:.0f} %。</translation>
+    </message>
+    <message>
+        <source>Monte Carlo gives less: U is {percent:.0f} % larger along {axis} (standard error {own:.0f} %), on the safe side. It counts seat, drift and assumed values in full; each trial corrects what its images show of them.</source>
+        <translation>蒙特卡洛法的结果较小：U 沿 {axis} 大 {percent:.0f} %（标准误差 {own:.0f} %），偏于安全。U 全额计入就位、漂移和假定值；每次试验则修正其图像所显示的部分。</translation>
+    </message>
+    <message>
+        <source>Monte Carlo gives more: U is {percent:.0f} % smaller along {axis} (standard error {own:.0f} %). The calibration is not linear within the uncertainties of its files. State U by Monte Carlo, or reduce these uncertainties and tilt the pen farther.</source>
+        <translation>蒙特卡洛法的结果较大：U 沿 {axis} 小 {percent:.0f} %（标准误差 {own:.0f} %）。在文件的不确定度范围内校准不是线性的。请按蒙特卡洛法给出 U，或减小这些不确定度并加大倾斜。</translation>
+    </message>
+    <message>
         <source>Most images show fewer than {n_needed} spots (median {median:.0f}); at least {n_needed} of the {n_leds} LEDs are needed. Check that the LEDs are lit and in the image, and check the exposure.</source>
         <translation>多数图像中的光点少于 {n_needed} 个（中位数 {median:.0f}）；光笔的 {n_leds} 个 LED 中须看到 {n_needed} 个。请检查 LED 是否点亮并在图像内，以及曝光是否合适。</translation>
     </message>
@@ -7936,8 +8114,16 @@ mm</translation>
         <translation>下一步：检查相机组文件，然后重新摆动。</translation>
     </message>
     <message>
+        <source>Next: clamp cone and camera, and repeat the press test.</source>
+        <translation>下一步：夹紧锥座和相机，重做压力试验。</translation>
+    </message>
+    <message>
         <source>Next: continue with this pen and its LED file.</source>
         <translation>下一步：继续使用此光笔及其 LED 文件。</translation>
+    </message>
+    <message>
+        <source>Next: continue with this stylus and cone.</source>
+        <translation>下一步：继续使用此测杆和锥座。</translation>
     </message>
     <message>
         <source>Next: correct the stated cause, then repeat the swing.</source>
@@ -7962,6 +8148,14 @@ mm</translation>
     <message>
         <source>Next: repeat the calibration, with the tip seated anew each time.</source>
         <translation>下一步：重复标定，每次都重新放置测头。</translation>
+    </message>
+    <message>
+        <source>Next: repeat the press test with more images, tilted farther to all sides.</source>
+        <translation>下一步：以更多图像、向各方向更大倾斜，重做压力试验。</translation>
+    </message>
+    <message>
+        <source>Next: tighten the stylus or use a shorter, stiffer one, clamp the cone, and calibrate again with gentle pressure.</source>
+        <translation>下一步：拧紧测杆或换用更短、更硬的测杆，夹紧锥座，以轻压重新校准。</translation>
     </message>
     <message>
         <source>Next: tighten the tip, inspect the LEDs, calibrate again, and verify the new result.</source>
@@ -8076,6 +8270,26 @@ mm</translation>
         <translation>位置 {position}：基准点与第一位置相差达 {residual:.4f} mm，远大于其 U。所测基准点不是同一些点，或工件又移动了。</translation>
     </message>
     <message>
+        <source>Press test without result: {why}</source>
+        <translation>压力试验没有结果：{why}</translation>
+    </message>
+    <message>
+        <source>Press test: no change found, but U is {uncertainty:.4f} mm along the pen.</source>
+        <translation>压力试验：未发现变化，但沿光笔方向 U 为 {uncertainty:.4f} mm。</translation>
+    </message>
+    <message>
+        <source>Press test: the cone or the camera moved by {distance:.4f} mm (U {uncertainty:.4f} mm) between the two swings.</source>
+        <translation>压力试验：两次摆动之间，锥座或相机移动了 {distance:.4f} mm（U {uncertainty:.4f} mm）。</translation>
+    </message>
+    <message>
+        <source>Press test: under firm pressure the tip moves by {change:+.4f} mm along the pen (U {uncertainty:.4f} mm): no significant change.</source>
+        <translation>压力试验：用力按压时测头沿光笔移动 {change:+.4f} mm（U {uncertainty:.4f} mm）：无显著变化。</translation>
+    </message>
+    <message>
+        <source>Press test: under firm pressure the tip moves by {change:.4f} mm along the pen (U {uncertainty:.4f} mm): the stylus, its thread or the seat gives way.</source>
+        <translation>压力试验：用力按压时测头沿光笔移动 {change:.4f} mm（U {uncertainty:.4f} mm）：测杆、其螺纹或锥座退让。</translation>
+    </message>
+    <message>
         <source>Probe one end of the length, then the other, and hold still on each: {n_touches} of 2.</source>
         <translation>先触测长度的一端，再触测另一端，各保持不动：{n_touches} / 2。</translation>
     </message>
@@ -8108,6 +8322,10 @@ mm</translation>
         <translation>残差 {sigma:.2f} px，通常不超过 {usual:.2f} px。请检查 LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头。</translation>
     </message>
     <message>
+        <source>Retired at another station: {kind} {id}, {by}.</source>
+        <translation>已在其他工位停用：{kind} {id}，{by}。</translation>
+    </message>
+    <message>
         <source>Ring, plate: form and out-of-plane deviation</source>
         <translation>圆环、平板：形状误差和面外偏差</translation>
     </message>
@@ -8128,12 +8346,32 @@ mm</translation>
         <translation>设置已保存，但另一个程序将 {file} 锁定了 {seconds:g} s。如果该程序无响应，请结束它，否则它可能覆盖设置。</translation>
     </message>
     <message>
+        <source>Slide along the {kind} {name}: {n_points} of {needed} points.</source>
+        <translation>沿{kind} {name} 滑动：{n_points} / {needed} 点。</translation>
+    </message>
+    <message>
         <source>Swing {number} shows too little of the lens to be adjusted with the others. Omit it, or move the pen over more of the image.</source>
         <translation>摆动 {number} 覆盖的镜头视场太小，无法与其他摆动联合平差。请略去它，或让光笔覆盖更大的图像范围。</translation>
     </message>
     <message>
+        <source>Swing: pen temperature</source>
+        <translation>摆动：光笔温度</translation>
+    </message>
+    <message>
         <source>Swings given: {n_swings}. {needed} are needed for pooling, and one more for confirmation.</source>
         <translation>给出的摆动次数：{n_swings}。合并需要 {needed} 次，另需一次来确认所得结果。</translation>
+    </message>
+    <message>
+        <source>Taken over from another station: {kind} {id}, {by}.</source>
+        <translation>已从其他工位接收：{kind} {id}，{by}。</translation>
+    </message>
+    <message>
+        <source>Taken over from another station: {kind} {id}, {by}. It replaces the earlier change by {before}.</source>
+        <translation>已从其他工位接收：{kind} {id}，{by}。它取代 {before} 较早的更改。</translation>
+    </message>
+    <message>
+        <source>Temperature</source>
+        <translation>温度</translation>
     </message>
     <message>
         <source>The GenTL producer {file} does not load: {why}. Choose the 64-bit producer of this camera for this system.</source>
@@ -8178,6 +8416,14 @@ mm</translation>
     <message>
         <source>The LEDs are {width:.1f} px wide in most images; at least {needed:.0f} px are needed. Bring the camera nearer, or use a longer focal length or a camera of higher resolution.</source>
         <translation>大多数图像中 LED 宽度为 {width:.1f} px；至少需要 {needed:.0f} px。请将相机移近，或使用更长的焦距或更高分辨率的相机。</translation>
+    </message>
+    <message>
+        <source>The LEDs light one after the other, {time} apart; the result is corrected and U includes the rest. Light all LEDs at once, or hold the pen still for each image.</source>
+        <translation>LED 依次发光，间隔 {time}；结果已修正，其余部分计入 U。请同时点亮全部 LED，或在每次取图时保持光笔静止。</translation>
+    </message>
+    <message>
+        <source>The archive has no entry of this station, so there is nothing to timestamp.</source>
+        <translation>存档中没有本工位的记录，因此没有可加时间戳的内容。</translation>
     </message>
     <message>
         <source>The archive of this data folder is not the one its limits belong to. Nothing is accepted until the archive is restored from a copy.</source>
@@ -8384,6 +8630,10 @@ mm</translation>
         <translation>文件 {file} 在档案中尚无记录。请启动程序进行登记。</translation>
     </message>
     <message>
+        <source>The file {file} has no root certificate. It needs that of the time stamping authority, in PEM form.</source>
+        <translation>文件 {file} 中没有根证书。需要时间戳机构的 PEM 格式根证书。</translation>
+    </message>
+    <message>
         <source>The file {file} is not signed by this station and its supervisor: it was changed or comes from elsewhere. Restore it from a copy, or move it away to continue without it.</source>
         <translation>文件 {file} 未由本工位及其主管签名：它被更改或来自别处。请从副本恢复，或将其移走后继续。</translation>
     </message>
@@ -8434,6 +8684,10 @@ mm</translation>
     <message>
         <source>The images are from two cameras, or one camera with two zoom or focus settings (fx {fx:.1f} and {other_fx:.1f} px): {n_named} of {n_views} differ from the others: {names}. Give the images of one camera with one setting.</source>
         <translation>图像来自两台相机，或来自同一相机的两种变焦或对焦设置（fx {fx:.1f} 和 {other_fx:.1f} px）：{n_views} 个视图中有 {n_named} 个与其他不同：{names}。请给出同一相机同一设置的图像。</translation>
+    </message>
+    <message>
+        <source>The images are {time}; the result is corrected and U includes the rest. Trigger all cameras by one signal.</source>
+        <translation>图像{time}；结果已修正，其余部分计入 U。请用同一信号触发全部相机。</translation>
     </message>
     <message>
         <source>The images contradict the LED file: the standard deviation of its coordinates is {found:.4f} mm, stated {stated:.4f} mm. Measure the pen again, or check that the file belongs to this pen.</source>
@@ -8560,6 +8814,14 @@ mm</translation>
         <translation>光笔水平时其上端因自重弯曲 {size:.4f} mm；结果已修正，U 包含其余部分。请握住其中部附近，或提高其刚度。</translation>
     </message>
     <message>
+        <source>The pen frame depends on LED {leds}: the tip is {by_file} mm by the LED file without it, {by_all} mm by all LEDs as they are. Result and U refer to the former. Measure with this result, which contains the LEDs as they are; to measure with the LED file, leave out LED {leds}.</source>
+        <translation>光笔坐标系取决于 LED {leds}：按不含该 LED 的 LED 文件，测头为 {by_file} mm；按全部 LED 的实际位置，为 {by_all} mm。结果和 U 以前者为准。测量时请使用本结果，它含有 LED 的实际位置；若用 LED 文件测量，请不使用 LED {leds}。</translation>
+    </message>
+    <message>
+        <source>The pen frame depends on LED {leds}: the tip is {by_file} mm by the LED file without it, {by_all} mm by all LEDs as they are. Result and U refer to the latter. Measure with this result, which contains the LEDs as they are; to measure with the LED file, use the former tip and leave out LED {leds}.</source>
+        <translation>光笔坐标系取决于 LED {leds}：按不含该 LED 的 LED 文件，测头为 {by_file} mm；按全部 LED 的实际位置，为 {by_all} mm。结果和 U 以后者为准。测量时请使用本结果，它含有 LED 的实际位置；若用 LED 文件测量，请使用前者并不使用 LED {leds}。</translation>
+    </message>
+    <message>
         <source>The pen hardly moved: its postures differ by {found:.1f}° (RMS); {needed:.0f}° are needed. Tilt the pen to all sides by 20° or more, and turn it about its own axis.</source>
         <translation>光笔几乎没有动：各姿态仅相差 {found:.1f}°（均方根），需要 {needed:.0f}°。请把光笔向各个方向倾斜 20° 以上，并绕自身轴线转动。</translation>
     </message>
@@ -8590,6 +8852,10 @@ mm</translation>
     <message>
         <source>The picture {path} was modified after it was saved. Save it again.</source>
         <translation>图片 {path} 在保存后被更改。请重新保存。</translation>
+    </message>
+    <message>
+        <source>The points are up to {off:.3g} mm off a {kind}. Check the kind in the plan, and whether a point lies elsewhere.</source>
+        <translation>各点偏离{kind}达 {off:.3g} mm。请检查测量计划中的要素类型，以及是否有点位于别处。</translation>
     </message>
     <message>
         <source>The points do not determine a {kind}. Distribute them over more of its surface.</source>
@@ -8680,8 +8946,16 @@ mm</translation>
         <translation>旋转矩阵似乎被转置：按现有数据，各位姿的测头散布为 {as_read:.3g} mm，转置后为 {undone:.3g} mm。请按行给出 r11 至 r33，且旋转与平移均为 cam_from_pen。</translation>
     </message>
     <message>
+        <source>The rows of the images are read one after the other, over {time} (rolling shutter); the result is corrected and U includes the rest. Use a global shutter, or hold the pen still for each image.</source>
+        <translation>图像逐行读出，历时 {time}（卷帘快门）；结果已修正，其余部分计入 U。请使用全局快门，或在每次取图时保持光笔静止。</translation>
+    </message>
+    <message>
         <source>The same as {name}.</source>
         <translation>与 {name} 相同。</translation>
+    </message>
+    <message>
+        <source>The selected files or names are not those of the swing. Select them, then repeat the press test.</source>
+        <translation>所选文件或名称与该摆动的不同。请先选择，再重做压力试验。</translation>
     </message>
     <message>
         <source>The server had the entries {first} to {last} of this station and no longer shows them. Ask its administrator whether they were removed or the user was changed. They are delivered again only on request.</source>
@@ -8716,6 +8990,10 @@ mm</translation>
         <translation>链 {chain} 的第 {number} 条记录的签名缺失或错误：记录或其签名被更改。</translation>
     </message>
     <message>
+        <source>The signatures of {n} timestamps were not verified: the certificate of the time stamping authority is not set.</source>
+        <translation>{n} 个时间戳的签名未经验证：未设置时间戳机构的证书。</translation>
+    </message>
+    <message>
         <source>The station key {file} was changed or damaged. Restore it from a copy, or remove it and let a supervisor introduce another (documents: security).</source>
         <translation>工位密钥 {file} 被更改或损坏。请从副本恢复，或删除后由主管引入新密钥（见文档：安全）。</translation>
     </message>
@@ -8742,6 +9020,42 @@ mm</translation>
     <message>
         <source>The swing {swing} does not confirm the new LED file: residuals {after:.4f} px, with the old file {before:.4f} px. The old file is as good, or the pen changed in between.</source>
         <translation>未参与合并的摆动 {swing} 不支持新的 LED 文件：新文件的残差为 {after:.4f} px，旧文件为 {before:.4f} px。旧文件同样好，或光笔在此期间有变化。</translation>
+    </message>
+    <message>
+        <source>The system keyring cannot be read: {reason}. Unlock it, or keep the password in a file.</source>
+        <translation>无法读取系统密钥环：{reason}。请将其解锁，或将密码保存在文件中。</translation>
+    </message>
+    <message>
+        <source>The system keyring has no password of user {user} for the service {service}. Store it with: keyring set {service} {user}.</source>
+        <translation>系统密钥环中没有用户 {user} 在服务 {service} 上的密码。保存命令：keyring set {service} {user}。</translation>
+    </message>
+    <message>
+        <source>The temperature of the pen was not measured; this station requires it. Measure it and enter it at Start, then repeat the swing.</source>
+        <translation>光笔温度未测量，而本工位要求测量。请测量并在“开始”页输入，然后重新摆动。</translation>
+    </message>
+    <message>
+        <source>The time stamping authority {authority} gave no timestamp: {reason}. Check its address and the network, then try again.</source>
+        <translation>时间戳机构 {authority} 未给出时间戳：{reason}。请检查其地址和网络，然后重试。</translation>
+    </message>
+    <message>
+        <source>The timestamp of the authority {authority} is not valid for this entry, or not signed by the certificate that is set. Nothing was stored. Check the certificate.</source>
+        <translation>机构 {authority} 的时间戳对此记录无效，或不是由所设证书签署。未保存任何内容。请检查证书。</translation>
+    </message>
+    <message>
+        <source>The timestamp {file} is damaged, or not signed by the time stamping authority.</source>
+        <translation>时间戳 {file} 已损坏，或不是由时间戳机构签署。</translation>
+    </message>
+    <message>
+        <source>The timestamp {file} is earlier than its entry {number}: the clock of the station was ahead, or the entry was falsified.</source>
+        <translation>时间戳 {file} 早于其记录 {number}：工位时钟曾超前，或记录被伪造。</translation>
+    </message>
+    <message>
+        <source>The timestamp {file} is not of entry {number} of chain {chain}: it was copied from another entry, or the entry was replaced.</source>
+        <translation>时间戳 {file} 不属于链 {chain} 的记录 {number}：它是从其他记录复制的，或该记录已被替换。</translation>
+    </message>
+    <message>
+        <source>The timestamp {file} is of entry {number} of chain {chain}, which is missing: entries were removed, or the archive was replaced by an older copy.</source>
+        <translation>时间戳 {file} 属于链 {chain} 的记录 {number}，而该记录缺失：记录被删除，或存档被较旧的副本取代。</translation>
     </message>
     <message>
         <source>The tip cannot be compared with the current one. {why}</source>
@@ -8996,6 +9310,10 @@ mm</translation>
         <translation>除了左右，请也朝向和远离相机倾斜光笔，并绕自身轴线转动。</translation>
     </message>
     <message>
+        <source>Timestamps need the package rfc3161-client, which is not installed. Install it with: pip install &quot;lightpen[timestamps]&quot;.</source>
+        <translation>时间戳需要软件包 rfc3161-client，但尚未安装。安装命令：pip install &quot;lightpen[timestamps]&quot;。</translation>
+    </message>
+    <message>
         <source>Tip error</source>
         <translation>测头误差</translation>
     </message>
@@ -9124,6 +9442,10 @@ mm</translation>
         <translation>标定结果</translation>
     </message>
     <message>
+        <source>camera</source>
+        <translation>相机</translation>
+    </message>
+    <message>
         <source>camera calibration</source>
         <translation>相机标定</translation>
     </message>
@@ -9134,6 +9456,10 @@ mm</translation>
     <message>
         <source>cameras in {name} is not a list of 2 to {most} cameras. A single camera needs no rig file.</source>
         <translation>{name} 中的 cameras 不是 2 至 {most} 台相机的列表。单台相机不需要相机组文件。</translation>
+    </message>
+    <message>
+        <source>certificate file</source>
+        <translation>证书文件</translation>
     </message>
     <message>
         <source>circle</source>
@@ -9224,6 +9550,10 @@ mm</translation>
         <translation>在其内侧</translation>
     </message>
     <message>
+        <source>optional</source>
+        <translation>可选</translation>
+    </message>
+    <message>
         <source>outside</source>
         <translation>外侧</translation>
     </message>
@@ -9250,6 +9580,14 @@ mm</translation>
     <message>
         <source>program error</source>
         <translation>程序错误</translation>
+    </message>
+    <message>
+        <source>reference</source>
+        <translation>标准器</translation>
+    </message>
+    <message>
+        <source>required</source>
+        <translation>必需</translation>
     </message>
     <message>
         <source>rotation of cam_from_rig about {axis}</source>
@@ -9330,6 +9668,10 @@ mm</translation>
     <message>
         <source>the temperature of the pen. State its thermal expansion in the LED file, and measure its temperature during the swing</source>
         <translation>光笔的温度。请在 LED 文件中给出其膨胀系数，并在摆动时测量其温度</translation>
+    </message>
+    <message>
+        <source>timestamp</source>
+        <translation>时间戳</translation>
     </message>
     <message>
         <source>tip library file</source>
@@ -9456,8 +9798,24 @@ mm</translation>
         <translation>{name} 不是有效的 YAML。请检查是否选对了文件。</translation>
     </message>
     <message>
+        <source>{n} changes of other stations to the tip library wait for a supervisor to sign them.</source>
+        <translation>其他工位对测头库的 {n} 项更改等待主管签署。</translation>
+    </message>
+    <message>
+        <source>{n} entries after entry {after} have no timestamp yet.</source>
+        <translation>记录 {after} 之后的 {n} 条记录尚无时间戳。</translation>
+    </message>
+    <message>
         <source>{one} and {other} hold the same tip to the last digit. Give each calibration once.</source>
         <translation>{one} 与 {other} 的测头完全相同。每次校准只需给出一次。</translation>
+    </message>
+    <message>
+        <source>{other} was calibrated with another camera file than {first}. Give two swings with one camera file.</source>
+        <translation>{other} 与 {first} 所用的内参文件不同。请给出使用同一内参文件的两次摆动。</translation>
+    </message>
+    <message>
+        <source>{path} has two cones; the record holds the LED centres of the first one alone. Calibrate from the images.</source>
+        <translation>{path} 有两个锥座；记录只含第一个锥座的 LED 中心。请从图像校准。</translation>
     </message>
     <message>
         <source>{path} is the name of a device on Windows, not of a file. Choose another name.</source>
@@ -9468,6 +9826,14 @@ mm</translation>
         <translation>{reason} {power}</translation>
     </message>
     <message>
+        <source>{time} early</source>
+        <translation>提前 {time}</translation>
+    </message>
+    <message>
+        <source>{time} late</source>
+        <translation>滞后 {time}</translation>
+    </message>
+    <message>
         <source>{unit} is not a supported unit of length. Choose one of {known}.</source>
         <translation>{unit} 不是本程序支持的长度单位。请从 {known} 中选择。</translation>
     </message>
@@ -9476,12 +9842,20 @@ mm</translation>
         <translation>{usable}（剔除：{left_out}）</translation>
     </message>
     <message>
+        <source>{value:.3g} image intervals</source>
+        <translation>{value:.3g} 个图像间隔</translation>
+    </message>
+    <message>
+        <source>{value:.3g} ms</source>
+        <translation>{value:.3g} ms</translation>
+    </message>
+    <message>
         <source>{where} Check that the file matches the current camera positions, or calibrate the rig again.</source>
         <translation>{where}请检查该文件是否对应这些相机当前的位置，或重新标定相机组。</translation>
     </message>
     <message>
-        <source>{name} names the camera file of {camera}: {trouble}</source>
-        <translation>{name} 所指定的相机 {camera} 的文件：{trouble}</translation>
+        <source>{name} names the camera file of {camera}: {fault}</source>
+        <translation>{name} 所指定的相机 {camera} 的文件：{fault}</translation>
     </message>
     <message>
         <source>{name}: {flaw}</source>
@@ -9548,10 +9922,6 @@ mm</translation>
         <translation>找到的 LED 以任何顺序都与草图不符。请检查草图是否属于此光笔、为右手系、单位为毫米且精度为 5 mm。</translation>
     </message>
     <message>
-        <source>The LEDs light one after the other, {size:.4f} image intervals apart; the result is corrected and U includes the rest. Light all LEDs at once, or hold the pen still for each image.</source>
-        <translation>LED 依次点亮，间隔为 {size:.4f} 个图像周期；结果已修正，其余计入 U。请同时点亮所有 LED，或每幅图像时保持光笔静止。</translation>
-    </message>
-    <message>
         <source>The LEDs span only {extent:.4g} mm, less than one disc of {diameter:g} mm. If the coordinates are in metres, state the unit, for example in the header: x_m, y_m, z_m.</source>
         <translation>LED 的跨度仅 {extent:.4g} mm，小于一个 {diameter:g} mm 的圆盘。若坐标单位为米，请注明单位，例如在表头写：x_m, y_m, z_m。</translation>
     </message>
@@ -9590,10 +9960,6 @@ mm</translation>
     <message>
         <source>The image shifts by {size:.3f} px with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it.</source>
         <translation>图像随光笔倾斜移动 {size:.3f} px：相机随操作员移动而转动。结果已修正，其余计入 U。请将相机放在脚步不会使其移动的稳固支架上。</translation>
-    </message>
-    <message>
-        <source>The images are {size:.3f} image intervals late; the result is corrected and U includes the rest. Trigger all cameras by one signal.</source>
-        <translation>图像延迟 {size:.3f} 个图像周期；结果已修正，其余计入 U。请用同一信号触发所有相机。</translation>
     </message>
     <message>
         <source>The images contradict the LED file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this pen, or measure the pen again.</source>
@@ -9676,10 +10042,6 @@ mm</translation>
         <translation>{run} 的点位于两个以上的位置：{touch} 与其所在端的其他点相距 {distance:.2f} mm。光笔是否在该处被抬起？请只探测两端。</translation>
     </message>
     <message>
-        <source>The rows of the images are read one after the other, over {size:.3f} image intervals (rolling shutter); the result is corrected and U includes the rest. Use a global shutter, or hold the pen still for each image.</source>
-        <translation>图像各行依次读出，历时 {size:.3f} 个图像周期（卷帘快门）；结果已修正，其余计入 U。请使用全局快门，或每幅图像时保持光笔静止。</translation>
-    </message>
-    <message>
         <source>The seal {file} is missing: entries removed from the end of the archive cannot be detected.</source>
         <translation>缺少封签 {file}：无法发现从存档末尾删除的条目。</translation>
     </message>
@@ -9726,10 +10088,6 @@ mm</translation>
     <message>
         <source>{path} cannot be written: {reason} The previous content is unchanged.</source>
         <translation>无法写入 {path}：{reason} 原有内容未改变。</translation>
-    </message>
-    <message>
-        <source>{path} has several cameras or two cones; only records of one camera and one cone can be recomputed. Calibrate from the images.</source>
-        <translation>{path} 来自多台相机或两个锥孔；只有单相机、单锥孔的标定数据本身才足以重新计算。请用图像标定。</translation>
     </message>
     <message>
         <source>{path} has several cameras; only calibrations of a single camera can be recomputed. Remove it.</source>
@@ -10108,6 +10466,10 @@ mm</translation>
         <translation>图像来源</translation>
     </message>
     <message>
+        <source>Relative humidity</source>
+        <translation>相对湿度</translation>
+    </message>
+    <message>
         <source>Next due</source>
         <translation>下次到期</translation>
     </message>
@@ -10118,6 +10480,54 @@ mm</translation>
     <message>
         <source>[U+...] is the Unicode number of a character missing in the fonts of this report.</source>
         <translation>[U+...] 为本报告字体所缺字符的 Unicode 编码。</translation>
+    </message>
+    <message>
+        <source>Laboratory</source>
+        <translation>实验室</translation>
+    </message>
+    <message>
+        <source>Place</source>
+        <translation>地点</translation>
+    </message>
+    <message>
+        <source>Procedure</source>
+        <translation>规程</translation>
+    </message>
+    <message>
+        <source>Camera (intrinsics)</source>
+        <translation>相机（内参）</translation>
+    </message>
+    <message>
+        <source>Pen (LED measurement)</source>
+        <translation>光笔（LED 测量）</translation>
+    </message>
+    <message>
+        <source>Probe tip (ball)</source>
+        <translation>测头（测球）</translation>
+    </message>
+    <message>
+        <source>Reference</source>
+        <translation>标准器</translation>
+    </message>
+    <message>
+        <source>Measured with</source>
+        <translation>测量设备</translation>
+    </message>
+    <message>
+        <source>ID</source>
+        <translation>编号</translation>
+    </message>
+    <message>
+        <source>Certificate</source>
+        <translation>证书</translation>
+    </message>
+    <message>
+        <source>Date</source>
+        <translation>日期</translation>
+    </message>
+    <message>
+        <source>Traceability</source>
+        <translation>溯源</translation>
     </message>
     <message>
         <source>Source of this report</source>
@@ -10925,6 +11335,10 @@ mm</translation>
     <message>
         <source>LED displaced</source>
         <translation>LED 移位</translation>
+    </message>
+    <message>
+        <source>Temperature not measured</source>
+        <translation>温度未测量</translation>
     </message>
     <message>
         <source>Cameras not synchronised</source>

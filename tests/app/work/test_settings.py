@@ -129,8 +129,8 @@ def test_wrong_settings_of_the_administrator_are_told_and_left_out(
 
     settings = Settings(tmp_path / "own" / "lightpen.json")
 
-    assert settings.trouble is not None
-    assert "'langauge' is none of" in settings.trouble.text()
+    assert settings.fault is not None
+    assert "'langauge' is none of" in settings.fault.text()
     assert settings.preferences() == Preferences(language=system_language())
 
 
@@ -192,9 +192,7 @@ def test_a_damaged_file_gives_the_defaults_is_told_and_kept(
     again = Settings(settings.file)
 
     assert again.station("any") == Station()
-    assert "are damaged and were renamed to lightpen.json.damaged." in str(
-        again.trouble
-    )
+    assert "are damaged and were renamed to lightpen.json.damaged." in str(again.fault)
     aside = settings.file.with_name("lightpen.json.damaged")
     assert aside.read_bytes() == content
 
@@ -225,7 +223,7 @@ def test_a_pipe_in_place_of_the_file_is_told_and_waited_for_by_nobody(
     with qtbot.waitSignal(again.troubled):
         again.set_last_station("Hall 3")
 
-    assert "is a pipe or a device" in str(again.trouble)
+    assert "is a pipe or a device" in str(again.fault)
     assert again.last_station() == "Hall 3"
     assert again.await_saved(TIMEOUT)
 

@@ -107,8 +107,8 @@ def test_a_damaged_file_of_the_library_stays_owed_and_is_told(
     sound = file.read_bytes()
     file.write_bytes(sound.replace(b"C-1", b"C-2"))
 
-    (trouble,) = logbook.enter_owed()
-    assert trouble.code == "library.damaged"
+    (fault,) = logbook.enter_owed()
+    assert fault.code == "library.damaged"
     assert entered(logbook) == []
     file.write_bytes(sound)
     assert logbook.enter_owed() == ()

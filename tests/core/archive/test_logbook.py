@@ -181,8 +181,8 @@ def test_a_damaged_result_stays_owed_and_the_others_are_entered(
     whole = first.read_bytes()
     first.write_bytes(whole[:-50])
 
-    (trouble,) = logbook.enter_owed()
-    assert "000001.json is damaged" in str(trouble)
+    (fault,) = logbook.enter_owed()
+    assert "000001.json is damaged" in str(fault)
     first.write_bytes(whole)
     assert logbook.enter_owed() == ()
     assert [each.event.tip_pen_mm[0] for each in entered(logbook)] == [1.0, 0.0]  # type: ignore[index]

@@ -72,8 +72,8 @@ def test_a_station_goes_on_while_its_server_is_away(station: Station) -> None:
     station.enter(3)
     carrying.close(PATIENCE_S)
 
-    assert carrying.trouble is not None
-    assert "secret" not in str(carrying.trouble)
+    assert carrying.fault is not None
+    assert "secret" not in str(carrying.fault)
     assert len(list(entries_of(station.database, station.chain))) == 3
 
 

@@ -181,8 +181,8 @@ def test_one_that_is_changed_later_is_found_and_one_before_stays_owed(
     file = keep(tmp_path, Grade.PASS)
     whole = file.read_bytes()
     file.write_bytes(whole.replace(b"0.01", b"0.09"))
-    (trouble,) = logbook.enter_owed()
-    assert trouble.code == "verification.damaged"
+    (fault,) = logbook.enter_owed()
+    assert fault.code == "verification.damaged"
 
     file.write_bytes(whole)
     assert len(events(logbook)) == 1
@@ -199,8 +199,8 @@ def test_an_absurd_time_is_not_entered(tmp_path: Path, logbook: Logbook) -> None
     }
     add_numbered(tmp_path / VERIFICATIONS, record_bytes(record))
 
-    (trouble,) = logbook.enter_owed()
-    assert trouble.code == "verification.damaged"
+    (fault,) = logbook.enter_owed()
+    assert fault.code == "verification.damaged"
 
 
 def accepted_by_supervisor() -> dict[str, object]:

@@ -12,8 +12,8 @@ def told(
     later: Stats, settings: CameraSettings = AT_20, seconds: float = WATCHED
 ) -> CameraFailure | None:
     """Return what is told when the counts have come to this after a while."""
-    watch, trouble = LinkWatch().after(Stats(delivered=7), 100.0, settings)
-    assert trouble is None
+    watch, fault = LinkWatch().after(Stats(delivered=7), 100.0, settings)
+    assert fault is None
     return watch.after(later, 100.0 + seconds, settings)[1]
 
 
@@ -24,10 +24,10 @@ def test_a_link_that_carries_all_is_not_told_of() -> None:
 
 @pytest.mark.parametrize("lost", [Stats(57, 10), Stats(57, 0, 10), Stats(57, 4, 6)])
 def test_images_that_get_lost_are_told_with_what_to_do(lost: Stats) -> None:
-    trouble = told(lost)
+    fault = told(lost)
 
-    assert "of 60 incomplete" in str(trouble)
-    assert "Lower the frame rate" in str(trouble)
+    assert "of 60 incomplete" in str(fault)
+    assert "Lower the frame rate" in str(fault)
 
 
 def test_a_frame_rate_that_is_not_reached_is_told() -> None:

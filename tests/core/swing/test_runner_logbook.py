@@ -123,4 +123,4 @@ def test_a_tip_comes_into_force_though_nothing_can_be_entered(
     logging.solve()
     logging.accept()
 
-    assert any("not a database" in trouble for trouble in logging.witness.faults)
+    assert any("not a database" in fault for fault in logging.witness.faults)

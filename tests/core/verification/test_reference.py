@@ -186,8 +186,8 @@ def step_of(
     if not progress.points:
         return step | {"said": [{"code": each.code} for each in said]}
     screened = task.screen(options, conditions, progress)
-    if screened.trouble is not None:
-        said.append(screened.trouble)
+    if screened.fault is not None:
+        said.append(screened.fault)
     return step | {
         "said": [{"code": each.code} for each in said],
         "kept": list(screened.kept),

@@ -157,13 +157,13 @@ class ArchivePanel(Translated, QWidget):
         self._delivered.set_value(remark)
 
     def _message_on(self, delivery: ReplicationState) -> StatusMessage:
-        n_waiting, trouble = delivery.n_waiting, delivery.trouble
-        if trouble is not None:
+        n_waiting, fault = delivery.n_waiting, delivery.fault
+        if fault is not None:
             text = self.tr(
                 "Entries not yet on the server; they are stored here and delivered "
                 "when it responds. {0}"
             )
-            return StatusMessage(text.format(worded(trouble)), Sign.WARNING, Tone.WARN)
+            return StatusMessage(text.format(worded(fault)), Sign.WARNING, Tone.WARN)
         if n_waiting == 0:
             return StatusMessage(
                 self.tr("The server has all entries."), Sign.CHECK, Tone.GOOD

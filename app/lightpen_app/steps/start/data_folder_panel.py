@@ -66,9 +66,9 @@ class DataFolderPanel(Translated, QGroupBox):
         self._n_others = n_others
         self._retranslate()
 
-    def set_fault(self, trouble: str) -> None:
+    def set_fault(self, fault: str) -> None:
         """Show why the folder cannot be written; an empty text ends it."""
-        self._fault = trouble
+        self._fault = fault
         self._retranslate()
 
     def _on_open_clicked(self) -> None:

@@ -104,9 +104,9 @@ class VerificationRow(InterruptedItem):
         return moment_text(under_way.began, self.tr("d MMM yyyy, hh:mm"))
 
     def _description(self) -> str:
-        under_way, trouble = self._found.under_way, self._found.trouble
+        under_way, fault = self._found.under_way, self._found.fault
         if under_way is None:
-            return "" if trouble is None else breakable(worded(trouble))
+            return "" if fault is None else breakable(worded(fault))
         names = under_way.names
         called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
         done = self.tr("verification, {0} of {1} tasks").format(

@@ -99,7 +99,7 @@ class LastResultPresenter(QObject):
             self._selection.set_preparation(now.with_last(result))
 
     def _on_failed(self, sentence: str) -> None:
-        self._panel.set_value(LastResult(trouble=sentence))
+        self._panel.set_value(LastResult(fault=sentence))
 
     def _on_crashed(self) -> None:
         self._on_failed(self.tr("Last calibration not available"))

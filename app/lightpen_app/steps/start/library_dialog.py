@@ -225,12 +225,12 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         if asked is self._asked:
             self._stop_editing()
 
-    def tell_refused(self, asked: RequestedChange, trouble: str) -> bool:
+    def tell_refused(self, asked: RequestedChange, fault: str) -> bool:
         """Say why it was not; return whether that is still waited for."""
         if asked is not self._asked:
             return False
         self._asked = None
-        self._fault.set_value(StatusMessage(trouble, Sign.CROSS, Tone.BAD))
+        self._fault.set_value(StatusMessage(fault, Sign.CROSS, Tone.BAD))
         self._refresh()
         return True
 

@@ -104,10 +104,10 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         self._retranslate()
         self._refresh()
 
-    def tell(self, trouble: str) -> None:
+    def tell(self, fault: str) -> None:
         """Say why nothing was set."""
         self._is_signed = False
-        self._fault.set_value(StatusMessage(trouble, Sign.CROSS, Tone.BAD))
+        self._fault.set_value(StatusMessage(fault, Sign.CROSS, Tone.BAD))
         self._supervisor.clear_password()
 
     def _refresh(self) -> None:

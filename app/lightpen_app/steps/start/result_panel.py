@@ -51,7 +51,7 @@ class LastResult:
         None if there is none yet.
     is_named : bool
         Whether pen and tip are named at all.
-    trouble : str
+    fault : str
         Why it cannot be told; else empty.
     is_simulated : bool
         Whether the pen is simulated.
@@ -59,7 +59,7 @@ class LastResult:
 
     result: Result | None = None
     is_named: bool = True
-    trouble: str = ""
+    fault: str = ""
     is_simulated: bool = False
 
 
@@ -209,8 +209,8 @@ class LastResultPanel(Translated, QGroupBox):
             button.setVisible(value.result is not None)
         if value.result is not None:
             self._show(value.result)
-        elif value.trouble:
-            self._say(trouble=value.trouble)
+        elif value.fault:
+            self._say(fault=value.fault)
         elif value.is_named:
             self._say(
                 self.tr("No result yet"),
@@ -232,7 +232,7 @@ class LastResultPanel(Translated, QGroupBox):
             self.tr("Keep acceptance"),
         )
 
-    def _say(self, short: str = "", hint: str = "", trouble: str = "") -> None:
+    def _say(self, short: str = "", hint: str = "", fault: str = "") -> None:
         """Say why there is no result."""
         self._age.setText(short)
         self._age.setVisible(bool(short))
@@ -242,7 +242,7 @@ class LastResultPanel(Translated, QGroupBox):
         self._table.hide()
         for remark in (self._origin, self._reason):
             remark.set_value(StatusMessage())
-        self._warning.set_value(StatusMessage(trouble, Sign.CROSS, Tone.BAD))
+        self._warning.set_value(StatusMessage(fault, Sign.CROSS, Tone.BAD))
 
     def _show(self, result: Result) -> None:
         now = self._now()

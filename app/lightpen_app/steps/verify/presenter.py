@@ -227,8 +227,8 @@ class VerifyPresenter(QObject):
             return self.tr("Pick up the pen")
         if touching.phase is ProbingPhase.KNOWN:
             return self.tr("Probed before")
-        if state.trouble is not None:
-            is_broken = state.trouble.code == BROKEN_OFF.code
+        if state.fault is not None:
+            is_broken = state.fault.code == BROKEN_OFF.code
             return self.tr("Not recorded") if is_broken else self.tr("Not counted")
         if task is None:
             return ""
@@ -267,7 +267,7 @@ class VerifyPresenter(QObject):
         if is_held(state):
             fraction = touching.progress(rules_of(setup, state, task))
             return State(self.tr("STEADY"), "", Sign.RECORD, Tone.ACTIVE, fraction)
-        if state.trouble is not None:
+        if state.fault is not None:
             return State(self.tr("NOT RECORDED"), "", Sign.WARNING, Tone.WARN)
         if touching.n_lost or not (touching.held or touching.path):
             return State(self.tr("WAITING"), "", Sign.WAIT, Tone.QUIET)

@@ -77,7 +77,7 @@ class FoundEffect:
             told = _LENGTHS[self.name](self.size)
         if not self.camera:
             return told
-        return message("rig.of-camera", camera=self.camera, trouble=told)
+        return message("rig.of-camera", camera=self.camera, fault=told)
 
 
 def found_effects(

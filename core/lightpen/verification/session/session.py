@@ -83,7 +83,7 @@ def advance_session(
     happened = {event.what for event in events}
     state = replace(state, touching=touched.state)
     if ProbingEventKind.BROKEN_OFF in happened:
-        state = replace(state, trouble=BROKEN_OFF)
+        state = replace(state, fault=BROKEN_OFF)
     if ProbingEventKind.RECORDED not in happened:
         return SessionTransition(state, events)
     try:
@@ -92,7 +92,7 @@ def advance_session(
             return SessionTransition(state, events)
         state = _with_run(setup, state, task)
     except CalibrationError as error:
-        state = replace(state, trouble=error.message)
+        state = replace(state, fault=error.message)
     is_finished = task.kind in state.found
     return SessionTransition(state, events, task if is_finished else None)
 
@@ -107,7 +107,7 @@ def end_task(setup: SessionSetup, state: SessionState) -> SessionTransition:
     try:
         ended = _done(setup, state, task, runs)
     except CalibrationError as error:
-        return SessionTransition(replace(state, trouble=error.message))
+        return SessionTransition(replace(state, fault=error.message))
     if task is DRIFT and state.touches:
         ended = replace(ended, visits=(*state.visits, state.touches))
     return SessionTransition(ended, finished=task)
@@ -134,8 +134,8 @@ def run_again(
     if not is_last:
         return _with_run(setup, state, task)
     ended = end_task(setup, state).state
-    if ended.trouble is not None:
-        raise CalibrationError(ended.trouble)
+    if ended.fault is not None:
+        raise CalibrationError(ended.fault)
     return ended
 
 
@@ -234,7 +234,7 @@ def without_last_touch(state: SessionState) -> SessionState:
         places=state.touching.places[:-1],
         is_sliding=False,
     )
-    return replace(state, touching=touching, touches=state.touches[:-1], trouble=None)
+    return replace(state, touching=touching, touches=state.touches[:-1], fault=None)
 
 
 def with_moved_part(setup: SessionSetup, state: SessionState) -> SessionSetup:
@@ -328,7 +328,7 @@ def with_touch(setup: SessionSetup, state: SessionState, task: AnyTask) -> Sessi
         state,
         touching=touching,
         touches=tuple(points[i] for i in kept),
-        trouble=screening.trouble,
+        fault=screening.fault,
     )
 
 

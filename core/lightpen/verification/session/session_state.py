@@ -97,7 +97,7 @@ class SessionState:
         Measured for it.
     runs : tuple of tuple of ProbedPoint
         Runs of the task at hand that are done.
-    trouble : Message or None
+    fault : Message or None
         Problem with the last point, or why the points do not suffice although their
         number does.
     found : mapping of str to Found
@@ -113,7 +113,7 @@ class SessionState:
     touching: ProbingState = field(default_factory=ProbingState)
     touches: Points = ()
     runs: tuple[Points, ...] = ()
-    trouble: Message | None = None
+    fault: Message | None = None
     found: Mapping[str, Found] = field(default_factory=dict)
     measured: Mapping[str, RunsOfTask] = field(default_factory=dict)
     visits: tuple[Points, ...] = ()
@@ -193,7 +193,7 @@ def n_visits(choices: VerificationChoices) -> int:
 def without_touches(state: SessionState) -> SessionState:
     """Return it with the next run to begin; a pen at rest has to move on first."""
     touching = replace(state.touching, taken=(), places=())
-    return replace(state, touching=touching, touches=(), runs=(), trouble=None)
+    return replace(state, touching=touching, touches=(), runs=(), fault=None)
 
 
 def with_pen_at_rest(state: SessionState) -> SessionState:
@@ -216,8 +216,8 @@ def instruction(setup: SessionSetup, state: SessionState) -> Message:
         return message("session.at-rest")
     if state.touching.phase is ProbingPhase.KNOWN:
         return task.known
-    if state.trouble is not None:
-        return state.trouble
+    if state.fault is not None:
+        return state.fault
     options = setup.choices.options_of(task)
     return task.instruction(options, state.progress(setup, task))
 

@@ -123,13 +123,13 @@ class InterruptedVerification:
     ----------
     under_way : VerificationCheckpoint or None
         None where its file is damaged.
-    trouble : Message or None
+    fault : Message or None
         Why it cannot be resumed.
     """
 
     path: Path
     under_way: VerificationCheckpoint | None
-    trouble: Message | None = None
+    fault: Message | None = None
 
 
 class CheckpointFile:

@@ -396,8 +396,8 @@ def _screen(
     distance = float(np.linalg.norm(one - other)) + beyond
     if abs(distance - certified) <= ANOTHER * certified:
         return keep_all(2)
-    trouble = message("session.no-ends", distance=distance, certified=certified)
-    return Screening((1,), trouble)
+    fault = message("session.no-ends", distance=distance, certified=certified)
+    return Screening((1,), fault)
 
 
 def _missing(options: LengthOptions, ball_diameter: float | None) -> Message | None:

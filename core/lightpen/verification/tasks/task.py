@@ -238,7 +238,7 @@ class Screening:
     """Accepted points of the current run, and the reason for a rejection."""
 
     kept: Sequence[int]
-    trouble: Message | None = None
+    fault: Message | None = None
 
 
 def keep_all(count: int) -> Screening:
@@ -246,9 +246,9 @@ def keep_all(count: int) -> Screening:
     return Screening(range(count))
 
 
-def without_last(count: int, trouble: Message) -> Screening:
+def without_last(count: int, fault: Message) -> Screening:
     """Return that the last point does not count."""
-    return Screening(range(count - 1), trouble)
+    return Screening(range(count - 1), fault)
 
 
 @dataclass(frozen=True)

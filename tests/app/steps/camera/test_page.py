@@ -678,11 +678,11 @@ def test_a_damaged_image_is_counted_and_the_others_are_shown(
     damaged.write_bytes(damaged.read_bytes()[:-20])
     live.choose("Recorded images")
 
-    with qtbot.waitSignal(workbench.notifications.raised) as trouble:
+    with qtbot.waitSignal(workbench.notifications.raised) as fault:
         live.enter("Folder, record or video", str(folder))
 
-    assert trouble.args is not None
-    assert trouble.args[0] == "frame_1.png is cut off. Capture or copy it again."
+    assert fault.args is not None
+    assert fault.args[0] == "frame_1.png is cut off. Capture or copy it again."
     live.wait("Lost: ")
     assert "80 x 64 px" in live.words
 

@@ -266,8 +266,8 @@ def test_less_than_270_degrees_are_said_and_do_not_end_the_ring(
     assert session.says() == "session.touch-ring"
 
     ended = end_task(session.setup, session.state)
-    assert ended.state.trouble is not None
-    assert ended.state.trouble.code == "circle.open"
+    assert ended.state.fault is not None
+    assert ended.state.fault.code == "circle.open"
     assert ended.finished is None
     assert len(ended.state.touches) == len(session.state.touches)
 
@@ -289,8 +289,8 @@ def test_a_task_ended_early_has_what_its_touches_give(session: Session) -> None:
     assert ended.finished is FIXED_POINT
     assert FIXED_POINT.kind in ended.state.found
     too_few = end_task(session.setup, SessionState())
-    assert too_few.state.trouble is not None
-    assert too_few.state.trouble.code == "fixed-point.too-few"
+    assert too_few.state.fault is not None
+    assert too_few.state.fault.code == "fixed-point.too-few"
 
 
 def test_another_tip_than_the_one_in_force_is_named(session: Session) -> None:
@@ -344,14 +344,14 @@ def test_a_posture_held_before_and_one_that_changes_do_not_count(
     postures.touch(upright)
     postures.see(postures.holder.away())
     postures.touch(Hold(tilt=0.4))
-    assert postures.state.trouble is OTHER_POSTURE
+    assert postures.state.fault is OTHER_POSTURE
     assert len(postures.state.touches) == 1
 
     for _ in range(5):
         postures.see(postures.holder.away())
         postures.touch(upright)
     assert len(postures.state.runs) == 1
-    assert postures.state.trouble is ALIKE
+    assert postures.state.fault is ALIKE
     assert not postures.state.touches
 
 

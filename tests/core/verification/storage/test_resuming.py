@@ -397,8 +397,8 @@ def test_a_damaged_file_is_told_and_put_aside(
     found = interrupted_in(copy)
     found.path.write_bytes(found.path.read_bytes().replace(b"LP-04", b"LP-05"))
     damaged = interrupted_in(copy)
-    assert damaged.trouble is not None
-    assert damaged.trouble.code == "under-way.damaged"
+    assert damaged.fault is not None
+    assert damaged.fault.code == "under-way.damaged"
     abandon_interrupted(copy, damaged, NOON)
 
     assert find_interrupted(copy) == ()

@@ -289,8 +289,8 @@ def test_points_that_do_not_determine_their_feature_are_told_at_once(
     at_it.probe(4, structs.replace(plan, features=(flat,)))
 
     assert not at_it.state.runs
-    assert at_it.state.trouble is not None
-    assert str(at_it.state.trouble).startswith(
+    assert at_it.state.fault is not None
+    assert str(at_it.state.fault).startswith(
         "Feature front: The points do not determine a plane."
     )
     assert len(at_it.state.touches) == 4  # nothing is lost
