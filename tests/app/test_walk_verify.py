@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
 
 STATION = "Hall 2"
+RULE = "Decision rule: simple acceptance (JCGM 106, 8.2)."
 TASKS_BEFORE_PEN = len(TASKS)
 FIVE = (FixedPointOptions(n_touches=5),)  # fewer do not verify a tip
 TOUCHES = Station(
@@ -140,14 +141,14 @@ def test_the_pen_is_shown_over_its_swings_and_no_file_is_made_that_is_no_better(
     walker.until_says("Probe the cone")
     for _ in range(TASKS_BEFORE_PEN):
         walker.press(Qt.Key.Key_Down)
-    walker.until_says("No LED moved relative to the others in 2 swings.")
+    walker.until_says("No LED moved relative to the others in 2 swings. " + RULE)
     assert not walker.offers("Improve the LED file")
 
     for seed in (5, 6):
         accept_tip(workbench.folder, workbench.selection.preparation, seed=seed)
     walker.press(Qt.Key.Key_Up)
     walker.press(Qt.Key.Key_Down)
-    walker.until_says("No LED moved relative to the others in 4 swings.")
+    walker.until_says("No LED moved relative to the others in 4 swings. " + RULE)
     walker.click("Improve the LED file")
     walker.until_tells("does not confirm the new LED file")
     assert not list(workbench.folder.rglob("led files/*"))

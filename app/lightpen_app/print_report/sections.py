@@ -157,18 +157,7 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
                 else zoned_moment_text(accepted),
             ),
             (translate("paper", "Image source"), origin_text(calibration_file.origin)),
-            (
-                translate("paper", "Pen temperature"),
-                translate("paper", "not measured")
-                if temperature is None
-                else f"{temperature:.1f} \xb0C",
-            ),
-            (
-                translate("paper", "Relative humidity"),
-                translate("paper", "not measured")
-                if humidity is None
-                else f"{humidity:g} %",
-            ),
+            *environment_facts(temperature, humidity),
             (translate("paper", "Method"), _method(calibration.method)),
             (
                 translate("paper", "Next due"),
@@ -190,6 +179,23 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
                 "of this report.",
             )
         )
+
+
+def environment_facts(
+    temperature_c: float | None, humidity_percent: float | None
+) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Return temperature of the pen and humidity of the room, with their names."""
+    unknown = translate("paper", "not measured")
+    return (
+        (
+            translate("paper", "Pen temperature"),
+            unknown if temperature_c is None else f"{temperature_c:.1f} \xb0C",
+        ),
+        (
+            translate("paper", "Relative humidity"),
+            unknown if humidity_percent is None else f"{humidity_percent:g} %",
+        ),
+    )
 
 
 def laboratory_blocks(laboratory: Laboratory | None) -> Iterable[Block]:

@@ -35,6 +35,7 @@ from lightpen_app.print_report.blocks import (
 from lightpen_app.print_report.pages import Margins, PrintReport, lay_out
 from lightpen_app.print_report.part import part_blocks
 from lightpen_app.print_report.sections import (
+    environment_facts,
     laboratory_blocks,
     proof_blocks,
     record_number,
@@ -50,6 +51,7 @@ translate = QCoreApplication.translate
 ELSEWHERE = {
     *("program", "created", "verification", "verdict", "session", "station"),
     *("operator", "pen", "tip", "origin", "inputs", "records", "checksum"),
+    *("temperature_c", "humidity_percent", "camera_serials"),
     *("touches", "left_out", "rejected", "witness", "images", "covariance"),
 }
 N_DECIMALS = 4  # of a length in mm
@@ -84,7 +86,7 @@ def verification_paper(
         by = translate("paper", "Measured by")
     blocks = (
         paragraph(title, PrintSize.TITLE, bold=True),
-        *_items(done),
+        *_items(done, record),
         *laboratory_blocks(laboratory),
         *traced_blocks(traced),
         *_verdict(done, record.get("verdict")),
@@ -119,7 +121,7 @@ def _badges(done: StoredVerification) -> tuple[str, ...]:
     return tuple(badges)
 
 
-def _items(done: StoredVerification) -> Iterator[Block]:
+def _items(done: StoredVerification, record: Mapping[str, Any]) -> Iterator[Block]:
     is_part = done.verification == PART.kind
     under_verification = translate("paper", "Item under verification")
     yield heading(translate("paper", "Station") if is_part else under_verification)
@@ -132,6 +134,9 @@ def _items(done: StoredVerification) -> Iterator[Block]:
             (translate("paper", "Probe tip"), stated(done.tip)),
             (translate("paper", "Operator"), stated(done.operator)),
             (translate("paper", "Image source"), origin_text(done.origin)),
+            *environment_facts(
+                record.get("temperature_c"), record.get("humidity_percent")
+            ),
             (translate("paper", "Program"), str(done.program)),
         ]
     )

@@ -11,6 +11,7 @@ MESSAGES = {
     "measuring.cone": "cone",
     "measuring.sided": "{kind}, {side}",
     "measuring.sided-by": "{kind}, {side} ({by})",
+    "measuring.decided-by": "{kind} ({by})",
     "measuring.inside": "inside",
     "measuring.outside": "outside",
     "measuring.by-air": "point in air",

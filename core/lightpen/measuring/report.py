@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from lightpen.measuring.characteristics import IS_ANGLE, Measured
-from lightpen.measuring.compensation import Evidence
+from lightpen.measuring.compensation import ROUND, Evidence
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
 from lightpen.measuring.plan import Nominal, Side
 from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind
@@ -73,6 +73,8 @@ def _kind_and_side(one: Measured) -> Message:
     if evidence is Evidence.PLAN:
         return message("measuring.sided", kind=kind, side=SIDES[side])
     by = EVIDENCES[evidence]
+    if one.kind not in ROUND:  # it is outside of the material
+        return message("measuring.decided-by", kind=kind, by=by)
     return message("measuring.sided-by", kind=kind, side=SIDES[side], by=by)
 
 

@@ -3505,10 +3505,6 @@
         <translation>导出...</translation>
     </message>
     <message>
-        <source>Report...</source>
-        <translation>报告…</translation>
-    </message>
-    <message>
         <source>Open a measuring plan</source>
         <translation>打开测量计划</translation>
     </message>
@@ -9716,6 +9712,10 @@ mm</translation>
     <message>
         <source>{key} of {place} must contain the uncertainty of the rotation about x y z (rad) and of the translation (mm): 6 non-negative standard deviations, or a symmetric positive covariance matrix; up to 1 rad and 10 m. Correct or remove it.</source>
         <translation>{place}的 {key} 必须给出绕 x y z 的转角（rad）和平移（mm）的不确定度：6 个非负的标准差，或一个对称的正定协方差矩阵；最大为 1 rad 和 10 m。请更正或删除它。</translation>
+    </message>
+    <message>
+        <source>{kind} ({by})</source>
+        <translation>{kind}（{by}）</translation>
     </message>
     <message>
         <source>{kind}, {side} ({by})</source>

@@ -44,7 +44,7 @@ class SettingsPanel(Translated, QGroupBox):
 
         # Widgets
         self._rate_name = QLabel()
-        self._rate = SettingField("fps", (0.1, 1000.0), 1)
+        self._rate = SettingField("Hz", (0.1, 1000.0), 1)
         self._format_name = QLabel()
         self._format = ChoiceField()
         self._trigger_name = QLabel()

@@ -46,7 +46,7 @@ NAMED = {  # the least and the most that is shown whole, of what anybody may hav
 }
 MOMENT, COORDINATE, UNCERTAINTY = "0000-00-00 00:00", "-000.0000", "0.0000"
 CELL_MARGIN = 24  # px, beside the words
-LEAST_WORDS = 10 * GRID  # px, of the last column
+LEAST_WORDS = 8 * GRID  # px, of the last column
 LEAST_ROWS = 5
 MOST_BLOCKS = 40  # that are kept
 MOST_SELECTED = 1000  # lines that are compared

@@ -18,7 +18,7 @@ from lightpen.verification.history.trend import (
 )
 from lightpen.verification.tasks.repeatability import Repeatability, RepeatedPoint
 from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.layouts import grid_layout, horizontal_layout
+from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.quantities import AXES, decimals_for, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
@@ -84,9 +84,10 @@ class SelectionPanel(Translated, QWidget):
             layout.setAlignment(remark, Qt.AlignmentFlag.AlignTop)
         layout.addWidget(self._touched, 3, 1)
         layout.addWidget(self._study, 4, 1)
-        horizontal_layout(layout, self._adjust, self._report, 1, at=(5, 0))
+        for row, button in enumerate((self._adjust, self._report), 5):
+            layout.addWidget(button, row, 0, Qt.AlignmentFlag.AlignLeft)
         layout.addWidget(self._adjusted, 5, 1)
-        layout.setRowStretch(6, 1)
+        layout.setRowStretch(7, 1)
 
         # Connections
         self._study.value_changed.connect(self._retranslate)

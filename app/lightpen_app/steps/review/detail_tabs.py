@@ -89,7 +89,7 @@ class DetailTabs(QTabWidget):
         for panel in self._panels:
             self._show_solution(panel.content())
         cards = chain.from_iterable(panel.content().cards() for panel in self._panels)
-        return [card.picture() for card in cards]
+        return [card.picture() for card in cards if card.is_needed]
 
     def shut_down(self) -> None:
         """Cancel running jobs."""

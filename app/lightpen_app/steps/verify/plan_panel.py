@@ -27,7 +27,6 @@ from lightpen.verification.tasks.part_course import PartOptions, base_name, plan
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
@@ -60,15 +59,12 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         for kind in (None, *FeatureKind):
             self._kind.addItem("", None if kind is None else kind.value)
         self._scan = QCheckBox()
-        self._moved, self._save_plan, self._export, self._report = (
-            PushButton() for _ in range(4)
-        )
-        self._paper = PrintReportControl(workbench.save_place, self)
+        self._moved, self._save_plan, self._export = (PushButton() for _ in range(3))
 
         # Layout
         cells = (self._open, self._free, self._plate, (self._name, 1))
         of_feature = self._kind_label, self._kind, self._scan
-        of_part = self._moved, self._save_plan, self._export, self._report
+        of_part = self._moved, self._save_plan, self._export
         self._rows = horizontal_layout(self)
         horizontal_layout(self._rows, *cells, stretch=1)
         horizontal_layout(self._rows, *of_feature, *of_part)
@@ -83,9 +79,6 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._moved.clicked.connect(self._on_moved_clicked)
         self._save_plan.clicked.connect(self._on_save_plan_clicked)
         self._export.clicked.connect(self._on_export_clicked)
-        self._report.clicked.connect(self._on_report_clicked)
-        self._paper.failed.connect(partial(self._notices.tell, self))
-        self._paper.saved.connect(self._on_saved)
 
         self._retranslate()
 
@@ -104,7 +97,6 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._plate.setVisible(self._live.operator is not None)
         for button in (self._save_plan, self._export):
             button.setVisible(self._part() is not None)
-        self._report.setVisible(self._part() is not None and bool(status.files))
 
     def choose(self, plan: Plan) -> None:
         """Measure by a plan, from its first feature."""
@@ -175,7 +167,6 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
             self.tr("Save a plan with the measured features as nominals.")
         )
         self._export.setText(self.tr("Export..."))
-        self._report.setText(self.tr("Report..."))
 
     def _on_open_clicked(self) -> None:
         name, _ = QFileDialog.getOpenFileName(
@@ -277,6 +268,3 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
 
     def _on_saved(self, path: Path) -> None:
         self._notices.show_status(self.tr("Saved: {0}").format(path))
-
-    def _on_report_clicked(self) -> None:
-        self._paper.show_verification(self._status.files[0])

@@ -36,6 +36,8 @@ class CurrentTip:
         mm; the cone of the calibration is not known before another camera.
     masks : tuple of (M, 3) array
         Circles of stray light before each camera: centre x, y and radius, px.
+    temperature_c, humidity_percent : float or None
+        Of the pen and of the room on the day of the verification, for the record.
     """
 
     names: Names
@@ -48,6 +50,8 @@ class CurrentTip:
     viewers: PenCameras
     tip_file: InputFile
     pen_file: InputFile
+    temperature_c: float | None = None
+    humidity_percent: float | None = None
 
     @property
     def region(self) -> RegionOfInterest:
@@ -101,6 +105,7 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> Curre
     nominal_tip = preparation.nominal_tip
     for known in (pen_file.pen.nominal_tip, calibration.nominal_tip):
         nominal_tip = known if nominal_tip is None else nominal_tip
+    today = preparation.assumptions_today
     return CurrentTip(
         names=names,
         origin=origin,
@@ -112,6 +117,8 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> Curre
         viewers=viewers,
         tip_file=hashed(file),
         pen_file=hashed(pen_file.path),
+        temperature_c=today.temperature_c,
+        humidity_percent=today.humidity_percent,
     )
 
 

@@ -17,6 +17,7 @@ from lightpen.model.origin import Origin
 from lightpen.record.folder.verifications import VERIFICATIONS
 from lightpen.record.library.numbered_files import add_numbered
 from lightpen.record.library.supervision import read_supervision
+from lightpen.record.library.traceability import CAMERA_SERIALS
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.signing.keys import SigningKey
 from lightpen.record.signing.signed_text import place_in
@@ -120,6 +121,8 @@ def task_record(
             "pen": names.pen,
             "tip": names.tip,
             "origin": images.origin,
+            CAMERA_SERIALS: [each.serial for each in tip.instrument.rig.cameras],
+            **measured_conditions(tip),
             **task.entries(found, tip.instrument),
             "rejected": rejected_entries(images.rejected),
             "witness": lamp_drift_entries(images.lamp_drift),
@@ -138,6 +141,15 @@ def task_record(
         },
         task.rule_of(choices.options_of(task), choices.limits),
     )
+
+
+def measured_conditions(tip: CurrentTip) -> dict[str, float]:
+    """Return what was measured of the environment, as entries of a record."""
+    conditions = {
+        "temperature_c": tip.temperature_c,
+        "humidity_percent": tip.humidity_percent,
+    }
+    return {name: each for name, each in conditions.items() if each is not None}
 
 
 def viewer_entries(viewers: PenCameras) -> dict[str, Any]:
