@@ -12,7 +12,7 @@ from lightpen.estimation.bundle.seat_modes import lean_modes
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contact.joint import fit_joint
-from lightpen.estimation.uncertainty.budget import ContributionName
+from lightpen.estimation.uncertainty.budget import SHARES_OF_EFFECTS, ContributionName
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
@@ -138,9 +138,11 @@ def test_the_tip_does_not_take_on_led_errors_and_its_covariance_is_honest(
         )
         errors.append(error_of(result, measured))
         plain.append(held.tip_pen - (result.joint.tip_pen - errors[-1]))
-        # What the seat may do besides is counted, not drawn.
-        by_seat = share(result, ContributionName.SEAT) ** 2
-        predicted.append(np.diag(result.budget.covariance)[:3] - by_seat)
+        # What seat, lens and mechanics may do besides is counted, not drawn.
+        besides = {ContributionName.SEAT, *SHARES_OF_EFFECTS.values()}
+        drawn = [s for s in result.budget.shares if s.name not in besides]
+        variances = [s.standard_uncertainty[:3] ** 2 for s in drawn]
+        predicted.append(np.sum(variances, axis=0))
     ratio = np.sqrt(np.mean(np.square(errors), axis=0) / np.mean(predicted, axis=0))
 
     # Only the pen's scale, which moves the tip along y, cannot be told from images.
