@@ -113,7 +113,9 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     assert set(steps.values()) == {"done", "now"}
     result = result_on_disk(walker)
     assert result.grade == "pass"
-    np.testing.assert_allclose(result.tip_pen, shown.tip, atol=1e-4)
+    np.testing.assert_allclose(
+        result.tip_pen, shown.tip, atol=5e-4
+    )  # to the digit of U
     record = open_record(Path(result.record))
     assert record.verdict == "pass"
     assert find_unfinished(record.folder.parent).interrupted == ()
