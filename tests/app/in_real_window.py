@@ -113,6 +113,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     assert set(steps.values()) == {"done", "now"}
     result = result_on_disk(walker)
     assert result.grade == "pass"
+    # The value is shown to the digit of its U.
     np.testing.assert_allclose(
         result.tip_pen, shown.tip, atol=5e-4
     )  # to the digit of U
