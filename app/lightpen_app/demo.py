@@ -103,7 +103,8 @@ class Demo(QObject):
             return
         is_at_it = key == "measure" and not self._workbench.measuring.status.is_done
         if self._is_watched and is_at_it:
-            self._workbench.live.set_touching(True)
+            if self._workbench.measuring.probing_operator is None:  # once it is here
+                self._workbench.live.set_touching(True)
         else:
             self._end(self._farewell())
 
