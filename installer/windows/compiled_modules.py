@@ -12,7 +12,7 @@ import os
 import sys
 import zlib
 from collections.abc import Iterable, Sequence
-from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from importlib.util import spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -48,7 +48,7 @@ def install() -> None:
         finder = Finder(FILE, FILE.parent / PACKAGES)
     except (OSError, ValueError, TypeError, EOFError):
         return  # damaged, which the self-test names
-    sys.meta_path.insert(len(sys.meta_path) - 1, finder)  # before the one for folders
+    sys.meta_path.insert(sys.meta_path.index(PathFinder), finder)
 
 
 def write(file: Path, modules: Iterable[tuple[str, bytes]]) -> None:

@@ -4,6 +4,7 @@ import importlib
 import marshal
 import sys
 from collections.abc import Iterator
+from importlib.machinery import FrozenImporter
 from importlib.util import MAGIC_NUMBER, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -52,7 +53,8 @@ def modules(runtime: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     )
     monkeypatch.setattr(module, "FILE", runtime / "compiled_modules.bin")
     monkeypatch.setattr(sys, "path", [*sys.path, str(packages)])
-    monkeypatch.setattr(sys, "meta_path", list(sys.meta_path))
+    # A library may have added a finder behind that for folders.
+    monkeypatch.setattr(sys, "meta_path", [*sys.meta_path, FrozenImporter])
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     yield module
     for name in [name for name in sys.modules if name.startswith("packed_")]:
