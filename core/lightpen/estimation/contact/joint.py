@@ -46,6 +46,7 @@ CONVERGED = 1e-7  # mm
 MAX_STEPS = 50
 MAX_SELECTIONS = 5
 TURN_RIDGE = 1e-6  # px^2/rad^2 beside some 1e6; an image may lose all its LEDs
+ONE_LED_RIDGE = 1e-10  # of the trace; or all but one, about which it turns freely
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,7 +289,9 @@ class _Reduced:
 def reduce(state: Linearised, weights: FloatArray) -> _Reduced:
     """Eliminate the rotations of a linearised model, LED weights (N, L)."""
     H, g = normal_equations(state.jacobian, state.residuals, weights)
-    H_turn = H[:, :3, :3] + TURN_RIDGE * np.eye(3)
+    trace = np.trace(H[:, :3, :3], axis1=1, axis2=2)
+    ridge = TURN_RIDGE + ONE_LED_RIDGE * trace
+    H_turn = H[:, :3, :3] + ridge[:, None, None] * np.eye(3)
     solved = np.linalg.solve(
         H_turn, np.concatenate([H[:, :3, 3:], g[:, :3, None]], axis=2)
     )

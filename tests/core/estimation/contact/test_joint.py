@@ -5,7 +5,13 @@ import pytest
 from tests.simulated_centers import displace_centers, drop_centers
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_joint, inliers
+from lightpen.estimation.contact.joint import (
+    ContactModel,
+    JointFit,
+    fit_joint,
+    inliers,
+    reduce,
+)
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import (
     Swing,
@@ -209,3 +215,21 @@ def test_an_image_of_three_leds_counts_and_one_of_two_does_not() -> None:
     np.testing.assert_array_equal(
         inliers(residuals).sum(axis=1), [8, 8, 8, 3, 0, 8, 8, 8, 8, 8]
     )
+
+
+@pytest.mark.parametrize("weight", np.geomspace(1, 1e9, 40))
+def test_an_image_of_one_led_leaves_the_fit_solvable(weight: float) -> None:
+    """It turns freely about the line of sight of that LED."""
+    rng = np.random.default_rng(5)
+    swing = swing_poses(30, rng)
+    pixels = simulate_centers(
+        CAMERA, PEN, swing.rotations, swing.translations, 0.03, rng
+    )
+    model = ContactModel.of(CAMERA, PEN, pixels)
+    state = model.at(swing.rotations, swing.tip_pen, swing.cone_cam)
+    weights = np.ones(pixels.shape[:2])
+    usual = reduce(state, weights).step()
+    weights[0] = 0.0
+    weights[0, 4] = weight
+    step = reduce(state, weights).step()
+    assert np.abs(step - usual).max() < 0.01
