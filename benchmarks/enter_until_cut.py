@@ -4,7 +4,7 @@ Usage: python benchmarks/enter_until_cut.py FOLDER
 
 For each line of its input it forks; the child tells its number, and then what it has
 acknowledged: ``file PLACE`` for a result or a change of the library, ``entry HASH`` for
-an entry, ``fault TEXT`` for a write that failed and was told to the user.
+an entry, ``fault TEXT`` for a write that failed with a message.
 """
 
 import os

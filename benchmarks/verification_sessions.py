@@ -37,7 +37,7 @@ KNOCK, WARMTH = 0.05, 5 * 23e-6  # mm; 5 K of aluminium
 
 
 class _Outcome(NamedTuple):
-    """What became of the sessions of a station, by task.
+    """Outcomes of the sessions of a station, by task.
 
     Attributes
     ----------

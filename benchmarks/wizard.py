@@ -80,7 +80,7 @@ def idle_rows(seconds: float = IDLE_SECONDS) -> list[Row]:
             limit = QUIET_LIMIT if page in QUIET else WATCHED_LIMIT
             if page == CAPTURING:
                 limit = 1.0
-            elif page.startswith(CAPTURING):  # nobody looks at it
+            elif page.startswith(CAPTURING):  # the window is hidden
                 limit = 0.5 * shares[CAPTURING]
             rows.append(
                 Row(

@@ -25,7 +25,6 @@ from lightpen.record.folder.verifications import (
 )
 from lightpen.record.library.tip_library import Library, read_library
 from lightpen.record.library.traceability import (
-    CAMERA_SERIALS,
     TracedItem,
     certified_values,
     traced_items,
@@ -100,11 +99,10 @@ def read_kept_verification(path: Path) -> KeptVerification:
     data = data_folder_of_verification(path)
     library = Library() if data is None else read_library(data)
     names = Names(done.station, done.operator, done.pen, done.tip)
-    record = json.loads(file.content or b"{}")
-    serials, certified = record.get(CAMERA_SERIALS, ()), certified_values(record)
+    certified = certified_values(json.loads(file.content or b"{}"))
     return KeptVerification(
         *(file, done, entry_of_file(path, file.sha256)),
-        traced_items(library, names, serials, certified),
+        traced_items(library, names, done.camera_serials, certified),
     )
 
 

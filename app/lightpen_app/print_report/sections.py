@@ -199,7 +199,7 @@ def environment_facts(
 
 
 def laboratory_blocks(laboratory: Laboratory | None) -> Iterable[Block]:
-    """Return who calibrates where, and by which procedure."""
+    """Return laboratory, place and procedure."""
     known = laboratory or Laboratory("", "", "", "")
     place = (known.street, f"{known.post_code} {known.city}".strip(), known.country)
     yield from facts(

@@ -86,7 +86,7 @@ def verification_paper(
         by = translate("paper", "Measured by")
     blocks = (
         paragraph(title, PrintSize.TITLE, bold=True),
-        *_items(done, record),
+        *_items(done),
         *laboratory_blocks(laboratory),
         *traced_blocks(traced),
         *_verdict(done, record.get("verdict")),
@@ -121,7 +121,7 @@ def _badges(done: StoredVerification) -> tuple[str, ...]:
     return tuple(badges)
 
 
-def _items(done: StoredVerification, record: Mapping[str, Any]) -> Iterator[Block]:
+def _items(done: StoredVerification) -> Iterator[Block]:
     is_part = done.verification == PART.kind
     under_verification = translate("paper", "Item under verification")
     yield heading(translate("paper", "Station") if is_part else under_verification)
@@ -134,9 +134,7 @@ def _items(done: StoredVerification, record: Mapping[str, Any]) -> Iterator[Bloc
             (translate("paper", "Probe tip"), stated(done.tip)),
             (translate("paper", "Operator"), stated(done.operator)),
             (translate("paper", "Image source"), origin_text(done.origin)),
-            *environment_facts(
-                record.get("temperature_c"), record.get("humidity_percent")
-            ),
+            *environment_facts(done.temperature_c, done.humidity_percent),
             (translate("paper", "Program"), str(done.program)),
         ]
     )

@@ -64,7 +64,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fps",
         type=number_from(0.01, 10_000.0, "image rate", "images a second"),
-        help="image rate, by which times are stated in ms",
+        help="image rate; with it times are stated in ms",
     )
     parser.add_argument(
         "--camera-sigma",

@@ -103,7 +103,7 @@ def _add_entries(action: argparse.ArgumentParser) -> None:
         "--value",
         type=_or_nothing(finite),
         metavar="MM",
-        help="certified value as given in a verification, by which reports find it",
+        help="certified value; reports find the reference by it",
     )
     of_tips = action.add_argument_group(
         "tips", f"'{NOTHING}' instead of a value clears the field"

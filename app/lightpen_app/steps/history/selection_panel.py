@@ -103,7 +103,7 @@ class SelectionPanel(Translated, QWidget):
             self._retranslate()
 
     def limits(self) -> VerificationLimits:
-        """Return the limits by which is judged."""
+        """Return the limits of the verdicts."""
         return self._limits
 
     def set_value(self, selected: Sequence[StoredEntry], trend: Trend) -> None:

@@ -52,6 +52,10 @@ class StoredVerification(Struct, frozen=True):
     ----------
     verification : str
         Kind of the task; "conclusion" for the end of the session.
+    temperature_c, humidity_percent : float or None
+        Of the pen and of the room; None if not measured.
+    camera_serials : tuple of str
+        Of the cameras that saw the pen.
     reason, supervisor : str
         Conclusion only: why a tip is used that did not pass, and who approved it.
     """
@@ -64,6 +68,9 @@ class StoredVerification(Struct, frozen=True):
     pen: str = ""
     tip: str = ""
     origin: Origin | None = None
+    temperature_c: float | None = None
+    humidity_percent: float | None = None
+    camera_serials: tuple[str, ...] = ()
     verdict: _Verdict | None = None
     ended: TrialOutcome | None = field(name="outcome", default=None)
     reason: str = ""

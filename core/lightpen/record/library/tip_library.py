@@ -161,7 +161,7 @@ class ListedReference(Item, frozen=True, kw_only=True, tag="reference"):
     Attributes
     ----------
     certified_mm : float or None
-        The value as it is typed in a verification, by which reports find the item.
+        Certified value, as entered in a verification; reports find the item by it.
     """
 
     kind: ClassVar[ItemKind] = ItemKind.REFERENCE

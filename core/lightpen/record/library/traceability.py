@@ -9,7 +9,6 @@ from lightpen.record.swings.names import Names
 
 SAME = 1e-6  # mm, between a certified value and that of a verification
 CERTIFIED, IN_MM = "certified_", "_mm"  # of the names of such values in its record
-CAMERA_SERIALS = "camera_serials"  # in the record of a verification
 
 
 @dataclass(frozen=True)

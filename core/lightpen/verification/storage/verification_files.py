@@ -17,7 +17,6 @@ from lightpen.model.origin import Origin
 from lightpen.record.folder.verifications import VERIFICATIONS
 from lightpen.record.library.numbered_files import add_numbered
 from lightpen.record.library.supervision import read_supervision
-from lightpen.record.library.traceability import CAMERA_SERIALS
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.signing.keys import SigningKey
 from lightpen.record.signing.signed_text import place_in
@@ -121,7 +120,7 @@ def task_record(
             "pen": names.pen,
             "tip": names.tip,
             "origin": images.origin,
-            CAMERA_SERIALS: [each.serial for each in tip.instrument.rig.cameras],
+            "camera_serials": [each.serial for each in tip.instrument.rig.cameras],
             **measured_conditions(tip),
             **task.entries(found, tip.instrument),
             "rejected": rejected_entries(images.rejected),
