@@ -487,12 +487,17 @@ def _measured(
     scene: _Survey, box: PixelBox, level: float, floor: float, budget: Iterator[int]
 ) -> Iterator[Disc]:
     """Measure the region in a box, and others that coarse sampling took for one."""
-    boxes = [box]
+    boxes, seen = [box], {box}
     while boxes and next(budget, None) is not None:
         disc = measure_disc(scene.image, boxes.pop(), level, scene.noise, floor)
         if disc is None:
             continue
-        boxes += (other for other in disc.others if other.size < box.size)
+        # Two regions of which each is another of the other would go round for ever.
+        new = [
+            each for each in disc.others if each.size < box.size and each not in seen
+        ]
+        boxes += new
+        seen |= {disc.box, *new}
         height = disc.levels.plateau - scene.background
         if disc.levels.contrast > MIN_RELATIVE_CONTRAST * height:
             yield disc

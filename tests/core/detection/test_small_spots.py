@@ -87,6 +87,15 @@ def test_clipped_leds_that_bloom_have_centers(width: float) -> None:
     assert found.rms < 0.06
 
 
+@pytest.mark.parametrize(("width", "gains"), [(10.0, (2.0, 6.0)), (14.0, (0.4, 4.0))])
+def test_regions_beside_each_other_are_measured_once(
+    width: float, gains: tuple[float, float]
+) -> None:
+    found = found_on(replace(EASY, gains=gains, bloom=0.15, width=width), 6)
+    assert len(found.flaws) == found.n_leds
+    assert found.rms < 0.04
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("panel", [EASY, HARD, replace(HARD, width=8.0)])
 def test_the_stated_standard_deviation_is_about_the_error(panel: Panel) -> None:
