@@ -157,9 +157,7 @@ def page(
             f"{platform.platform()}, Python {platform.python_version()}</p>",
             f"<p>Each test with its result: {file.name}, SHA-256 {digest}</p>",
             "<h2>Requirements</h2>",
-            _table(
-                ("", "requirement", "passed", "skipped", "failed", ""), requirements
-            ),
+            _table(REQUIREMENT_HEAD, requirements),
             "<h2>Software test: feature fitting (ISO 10360-6)</h2>",
             f"<p>{FORM.format(n=fitting[0].n_sets)}</p>",
             _table(("feature", "quality", "largest deviation", "MPE", ""), fits),

@@ -23,6 +23,7 @@ JUNIT = """<testsuites><testsuite>
 <testcase classname="tests.core.test_a" name="test_two[x]"><failure/></testcase>
 <testcase classname="tests.core.test_ab" name="test_three"><skipped/></testcase>
 </testsuite></testsuites>"""
+SUPPORTING = {"runners", "__pycache__"}  # no function of the program by themselves
 FIT = FittingResult("sphere", "size, mm", 20, 1e-10, 1e-6)
 
 
@@ -66,6 +67,22 @@ def test_every_requirement_names_tests_that_exist() -> None:
             file, _, test = name.partition("::")
             assert (ROOT / file).exists(), name
             assert not test or f"def {test}(" in (ROOT / file).read_text("utf-8"), name
+
+
+def test_every_package_of_the_core_and_every_command_is_required_of() -> None:
+    listed = tomllib.loads(REQUIREMENTS.read_text("utf-8"))["requirement"]
+    named = {name for each in listed for name in each["tests"]}
+    folders = [path for path in (ROOT / "tests" / "core").iterdir() if path.is_dir()]
+    commands = (ROOT / "tests").glob("test_*_command*.py")
+    tested = {
+        path.relative_to(ROOT).as_posix()
+        for path in (*folders, *commands)
+        if path.name not in SUPPORTING
+    }
+
+    assert {path for path in tested if not any(n.startswith(path) for n in named)} == (
+        set()
+    )
 
 
 def test_the_dossier_states_results_in_json_and_pdf(tmp_path: Path) -> None:

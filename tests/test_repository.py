@@ -1,0 +1,83 @@
+"""What the repository holds beside the program: for IT, auditors and contributors."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from lightpen import __version__
+
+ROOT = Path(__file__).parents[1]
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+MOST_PICTURES = 12
+PICTURES = (".png", ".jpg", ".jpeg", ".gif", ".webp")
+POWERSHELL = re.compile(r"powershell (?=-)(?!-NoProfile)")
+
+
+def tracked() -> list[Path]:
+    listing = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if listing.returncode != 0:
+        pytest.skip("this is no clone")
+    return [ROOT / name for name in listing.stdout.split("\0") if name]
+
+
+def test_few_pictures_and_no_links_are_in_the_repository() -> None:
+    files = tracked()
+
+    pictures = [path for path in files if path.suffix.lower() in PICTURES]
+    assert len(pictures) <= MOST_PICTURES
+    assert [path for path in files if path.is_symlink()] == []
+
+
+@pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.stem)
+def test_every_action_is_pinned_by_hash_and_only_a_release_has_a_secret(
+    workflow: Path,
+) -> None:
+    text = workflow.read_text("utf-8")
+    used = re.findall(r"uses: *(\S+)", text)
+
+    assert used
+    assert [each for each in used if not re.search(r"@[0-9a-f]{40}$", each)] == []
+    assert "pull_request_target" not in text
+    is_release = workflow.stem == "release"
+    assert ("secrets." in text) == is_release
+    assert ("pull_request" in text) != is_release
+
+
+def test_a_release_is_of_a_tag_approved_signed_checked_and_summed() -> None:
+    text = (ROOT / ".github" / "workflows" / "release.yml").read_text("utf-8")
+
+    assert re.search(r'^on:\n  push:\n    tags: \["v\*"\]\n\n', text, re.MULTILINE)
+    steps = ["environment: release", "LIGHTPEN_SIGN", "check.py", "dossier.py"]
+    places = [text.find(step) for step in [*steps, "SHA256SUMS", "--verify-tag"]]
+    assert -1 not in places
+    assert places == sorted(places)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("SECURITY.md", "CITATION.cff", "CHANGELOG.md", "LICENSE"),
+        ".github/PULL_REQUEST_TEMPLATE.md",
+        *(f".github/ISSUE_TEMPLATE/{kind}.md" for kind in ("bug", "feature")),
+    ],
+)
+def test_whoever_reports_changes_or_cites_finds_how(name: str) -> None:
+    assert (ROOT / name).read_text("utf-8").strip()
+
+
+def test_the_version_to_cite_is_that_of_the_program() -> None:
+    stated = (ROOT / "CITATION.cff").read_text("utf-8")
+
+    assert f"\nversion: {__version__}\n" in stated
+
+
+def test_no_profile_of_a_user_changes_what_powershell_runs() -> None:
+    texts = [path for path in tracked() if path.suffix in (".md", ".ps1", ".yml")]
+    found = [path for path in texts if POWERSHELL.search(path.read_text("utf-8"))]
+
+    assert texts
+    assert found == []
