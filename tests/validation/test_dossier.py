@@ -42,6 +42,7 @@ def results(tmp_path: Path) -> list[Outcome]:
         ('"tests/core/test_ab.py"', "not tested", 1),
         ('"tests/core"', "failed", 3),
         ('"tests/co"', "not tested", 0),
+        ('"tests/core/test_a.py::test_one", "tests/core/test_c.py"', "not tested", 1),
     ],
 )
 def test_a_requirement_is_proven_by_tests_that_ran_and_passed(
