@@ -120,6 +120,7 @@ MESSAGES = {
     "drift.note": "A fixed cone is the drift reference: its moves from visit to visit count in U of what is probed in between.",
     "verification.no-supervisor": "The tip is outside the limits. {why} Only a supervisor can accept it, with a reason.",
     "led-file.changed-meanwhile": "LED {led} moved by {distance:.3f} mm between the swings {first} and {swing}; no LED file fits both. Give only later swings.",
+    "led-file.own-images": "The files of camera and pen were found from the images of {swing}, which would count twice. Remove it.",
     "led-file.of-rig": "{path} has several cameras; only calibrations of a single camera can be recomputed. Remove it.",
     "led-file.too-few": "Swings given: {n_swings}. {needed} are needed for pooling, and one more for confirmation.",
     "led-file.not-confirmed": "The swing {swing} does not confirm the new LED file: residuals {after:.4f} px, with the old file {before:.4f} px. The old file is as good, or the pen changed in between.",

@@ -116,7 +116,8 @@ def _adjusted(
     require_length(calibration, request, lengths)
     report(0.95)
     discovery = discovery_of(
-        calibration, lengths, request.rough_leds, is_relative=request.is_relative
+        *(calibration, lengths, request.rough_leds, second),
+        is_relative=request.is_relative,
     )
     require_certain(discovery)
     return replace(

@@ -7,17 +7,23 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.discovery.hypotheses import Hypothesis
 from lightpen.discovery.normals import FACING
-from lightpen.discovery.numbering import frame_by, framed, moved
-from lightpen.discovery.scale import EXACT_SCALE
+from lightpen.discovery.numbering import frame_by, framed, moved, turn_of_leds
+from lightpen.discovery.scale import (
+    farthest_apart,
+    with_led_covariance,
+    with_lengths_known,
+)
 from lightpen.discovery.starts import KnownLength
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.disc_normals import effect_of_normals
 from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mixing
+from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.intrinsics.distortion import Choice
 from lightpen.model.camera import Camera
 from lightpen.model.information import inverse
 from lightpen.model.pen import Pen, order_of_paper
+from lightpen.model.self_calibration import FoundCamera, FoundPen, marks_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +101,7 @@ def discovery_of(
     calibration: Calibration,
     lengths: tuple[KnownLength, ...],
     sketch: FloatArray | None,
+    second: SecondSwing | None,
     *,
     is_relative: bool,
 ) -> Discovery:
@@ -104,6 +111,8 @@ def discovery_of(
     ----------
     sketch : (L, 3) array or None
         Rough LEDs in the frame that the pen is given, mm.
+    second : SecondSwing or None
+        Swing in a second cone that the calibration includes.
     """
     bundle, instrument = calibration.bundle, calibration.instrument
     state, tip = bundle.state, calibration.joint.tip_pen
@@ -117,19 +126,25 @@ def discovery_of(
     values, vectors = np.linalg.eigh(budget)
     beyond_fit = (vectors * np.maximum(values, 0.0)) @ vectors.T
     covariance[at.tip, at.tip] += beyond_fit
+    pixels = [calibration.observations.pixels[calibration.used]]
+    pixels += [] if second is None else [second.observations.pixels]
+    marks = np.concatenate([marks_of(each) for each in pixels])
     camera = replace(
-        state.rig.cameras[0], covariance=covariance[at.cameras[0], at.cameras[0]]
+        state.rig.cameras[0],
+        covariance=covariance[at.cameras[0], at.cameras[0]],
+        found=_camera_before(bundle.unknowns.start.rig.cameras[0], marks),
     )
     diameter_sigma = float(np.sqrt(covariance[at.diameter, at.diameter][0, 0]))
     pen = replace(
-        state.pen,
-        led_covariance=covariance[at.leds, at.leds],
-        scale_sigma=EXACT_SCALE,
+        with_led_covariance(state.pen, covariance[at.leds, at.leds]),
         diameter_sigma=diameter_sigma,
         normal_sigma=float(np.sqrt(np.linalg.eigvalsh(of_turn)[-1])),
         nominal_tip=None,
         expansion=None,
+        found=_pen_before(bundle.unknowns.start.pen, marks),
     )
+    if not (lengths or is_relative):
+        pen = _with_length_found(pen)
     _, R, t = framed(pen, tip, sketch)
     found = Discovery(
         pen=pen,
@@ -146,6 +161,30 @@ def discovery_of(
     return _in_frame(found, R, t)
 
 
+def _camera_before(start: Camera, marks: FloatArray) -> FoundCamera:
+    earlier = start.found
+    if earlier is not None:
+        return replace(earlier, marks=np.concatenate([earlier.marks, marks]))
+    return FoundCamera(marks, start.intrinsics, start.covariance)
+
+
+def _pen_before(start: Pen, marks: FloatArray) -> FoundPen:
+    assert start.led_covariance is not None
+    return FoundPen(marks, start.diameter, start.led_covariance)
+
+
+def _with_length_found(pen: Pen) -> Pen:
+    """Return a pen whose scale, known by two cones, holds without these images, too."""
+    assert pen.found is not None
+    assert pen.scale_sigma is not None
+    first, second = farthest_apart(pen.leds)
+    length = float(np.linalg.norm(pen.leds[second] - pen.leds[first]))
+    longest = KnownLength(first, second, length, length * pen.scale_sigma)
+    known = with_lengths_known(pen, (longest,)).led_covariance
+    assert known is not None
+    return replace(pen, found=replace(pen.found, led_covariance=known))
+
+
 def with_frame(found: Discovery, origin: int, along: int) -> Discovery:
     """Return what was found with one LED as origin and y to another, by indices."""
     return _in_frame(found, *frame_by(found.pen, origin, along))
@@ -155,12 +194,11 @@ def _in_frame(found: Discovery, R: FloatArray, t: FloatArray) -> Discovery:
     at = found.parameters
     turn = np.eye(at.number)
     turn[at.tip, at.tip] = R
-    turn[at.leds, at.leds] = np.kron(np.eye(found.pen.n_leds), R)
+    turn[at.leds, at.leds] = turn_of_leds(found.pen.n_leds, R)
     covariance = turn @ found.covariance @ turn.T
-    of_leds = covariance[at.leds, at.leds]
     return replace(
         found,
-        pen=replace(moved(found.pen, R, t), led_covariance=of_leds),
+        pen=moved(found.pen, R, t),
         tip_pen=R @ found.tip_pen + t,
         covariance=covariance,
         beyond_fit=R @ found.beyond_fit @ R.T,

@@ -121,8 +121,25 @@ def frame_by(pen: Pen, origin: int, along: int) -> tuple[FloatArray, FloatArray]
 
 
 def moved(pen: Pen, R: FloatArray, t: FloatArray) -> Pen:
-    """Return LEDs and normals in another frame; covariances stay as they are."""
-    return replace(pen, leds=pen.leds @ R.T + t, normals=pen.normals @ R.T)
+    """Return a pen in another frame."""
+    turn, covariance, found = turn_of_leds(pen.n_leds, R), pen.led_covariance, pen.found
+    if covariance is not None:
+        covariance = turn @ covariance @ turn.T
+    if found is not None:
+        before = turn @ found.led_covariance @ turn.T
+        found = replace(found, led_covariance=before)
+    return replace(
+        pen,
+        leds=pen.leds @ R.T + t,
+        normals=pen.normals @ R.T,
+        led_covariance=covariance,
+        found=found,
+    )
+
+
+def turn_of_leds(n_leds: int, R: FloatArray) -> FloatArray:
+    """Return the turn of all LED coordinates, (3 L, 3 L), by that of one."""
+    return np.asarray(np.kron(np.eye(n_leds), R))
 
 
 def _normalised(vector: FloatArray) -> FloatArray:

@@ -10,9 +10,10 @@ from lightpen.discovery.starts import KnownLength, gradient_of
 from lightpen.errors import CalibrationError
 from lightpen.model.information import inverse
 from lightpen.model.pen import Pen
+from lightpen.model.self_calibration import EXACT_SCALE
 
 WIDE = 0.02  # of the pen's size: prior of an LED coordinate
-EXACT_SCALE = 1e-6  # relative: what is left to `led_covariance`
+LARGEST_SCALE = 0.01  # relative, of a scale that a pen file can state apart
 CONTRADICTING = 4.0  # standard deviations
 
 
@@ -48,9 +49,7 @@ def known_lengths(
 
 def _known(each: MeasuredLength, leds: FloatArray) -> KnownLength:
     if each.leds is None:
-        apart = np.linalg.norm(leds[:, None] - leds, axis=2)
-        one, other = np.unravel_index(np.argmax(apart), apart.shape)
-        return KnownLength(int(one), int(other), each.length, each.sigma)
+        return KnownLength(*farthest_apart(leds), each.length, each.sigma)
     first, second = each.leds
     for number in each.leds:
         if not 1 <= number <= len(leds):
@@ -60,6 +59,13 @@ def _known(each: MeasuredLength, leds: FloatArray) -> KnownLength:
     if first == second:
         raise CalibrationError("discover.same-led", number=first)
     return KnownLength(first - 1, second - 1, each.length, each.sigma)
+
+
+def farthest_apart(leds: FloatArray) -> tuple[int, int]:
+    """Return the indices of the two of LEDs (L, 3) that are farthest apart."""
+    apart = np.linalg.norm(leds[:, None] - leds, axis=2)
+    one, other = np.unravel_index(np.argmax(apart), apart.shape)
+    return int(one), int(other)
 
 
 def scale_by(lengths: Sequence[KnownLength], leds: FloatArray) -> float:
@@ -119,6 +125,25 @@ def with_lengths_known(pen: Pen, lengths: Sequence[KnownLength]) -> Pen:
         expansion=0.0,
         expansion_sigma=None,
         temperature_c=None,
+    )
+
+
+def with_led_covariance(pen: Pen, covariance: FloatArray) -> Pen:
+    """Return a pen with a covariance of its LEDs (3 L, 3 L), the scale stated apart.
+
+    Images fit a pen of any size, so the longest distance tells the scale.
+    """
+    longest = KnownLength(*farthest_apart(pen.leds), 0.0, 0.0)
+    row = gradient_of(pen.leds, longest)
+    by_scale = covariance @ row
+    variance = float(row @ by_scale)
+    sigma = float(np.sqrt(variance)) / _distance(pen.leds, longest)
+    if sigma > LARGEST_SCALE:
+        return replace(pen, led_covariance=covariance, scale_sigma=EXACT_SCALE)
+    return replace(
+        pen,
+        led_covariance=covariance - np.outer(by_scale, by_scale) / variance,
+        scale_sigma=max(sigma, EXACT_SCALE),
     )
 
 

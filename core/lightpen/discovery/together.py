@@ -16,12 +16,14 @@ from lightpen.arrays import FloatArray
 from lightpen.discovery.discover import discover
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.request import Request
-from lightpen.discovery.scale import MeasuredLength
+from lightpen.discovery.scale import MeasuredLength, with_led_covariance
 from lightpen.discovery.sightings import Report, Sightings
 from lightpen.discovery.starts import any_camera, gradient_of
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.unknowns import whole_moves
+from lightpen.model.camera import Camera
 from lightpen.model.information import inverse, known_by
+from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 
 CONTRADICTING = 4.0  # standard deviations of a held-out swing
@@ -157,13 +159,28 @@ def joined(swings: Sequence[Discovery]) -> Discovery:
         first.pen,
         leds=whole[at.leds].reshape(-1, 3),
         diameter=float(whole[at.diameter][0]),
-        led_covariance=spread[at.leds, at.leds],
         diameter_sigma=float(np.sqrt(spread[at.diameter, at.diameter][0, 0])),
     )
+    pen = with_led_covariance(pen, spread[at.leds, at.leds])
     camera = first.camera.with_intrinsics(whole[at.cameras[0]])
     camera = replace(camera, covariance=spread[at.cameras[0], at.cameras[0]])
+    pen, camera = _found_from_all(pen, camera, swings)
     return replace(
         first, pen=pen, camera=camera, tip_pen=whole[at.tip], covariance=spread
+    )
+
+
+def _found_from_all(
+    pen: Pen, camera: Camera, swings: Sequence[Discovery]
+) -> tuple[Pen, Camera]:
+    """Return pen and camera with the marks of the images of all swings."""
+    assert pen.found is not None
+    assert camera.found is not None
+    marks = [each.pen.found.marks for each in swings if each.pen.found is not None]
+    every = np.concatenate(marks)
+    return (
+        replace(pen, found=replace(pen.found, marks=every)),
+        replace(camera, found=replace(camera.found, marks=every)),
     )
 
 

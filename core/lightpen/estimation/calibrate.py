@@ -142,6 +142,9 @@ class Calibration:
         Default uncertainties where the files state none.
     growth : float
         Thermal expansion of the pen against its file, relative.
+    shares_images : bool
+        Whether the files of camera or pen were found from these images, which are not
+        counted twice.
     contradictions : tuple of Contradiction
         Numbers of the files that the images contradict.
     two_stage : TwoStageFit
@@ -165,6 +168,7 @@ class Calibration:
     priors: Priors
     assumptions: Assumptions
     growth: float
+    shares_images: bool
     contradictions: tuple[Contradiction, ...]
     two_stage: TwoStageFit
     two_stage_covariance: FloatArray
@@ -267,8 +271,10 @@ def calibrate_rig(
     CalibrationError
         The images do not determine the tip; the text says what is missing.
     """
-    growth = thermal_growth(pen, assumptions)
-    inputs = _Inputs(rig, grown(pen, growth), growth, assumptions)
+    before = _before_images(rig, pen, observations)
+    growth = thermal_growth(before.pen, assumptions)
+    pen = grown(before.pen, growth)
+    inputs = _Inputs(before.rig, pen, growth, assumptions, before.shares_images)
     single = _fit_single_cameras(inputs, observations)
     start = _find_start(inputs, single)
     adjusted = _adjust_jointly(inputs, single, start, second)
@@ -282,6 +288,26 @@ class _Inputs(NamedTuple):
     pen: Pen
     growth: float
     assumptions: Assumptions
+    shares_images: bool
+
+
+class _Before(NamedTuple):
+    """What is known of rig and pen without the images of a calibration."""
+
+    rig: Rig
+    pen: Pen
+    shares_images: bool
+
+
+def _before_images(rig: Rig, pen: Pen, observations: Sequence[Observations]) -> _Before:
+    """Return rig and pen without what their files found from the same images."""
+    cameras, shares = list(rig.cameras), False
+    for c, seen in enumerate(observations):
+        if cameras[c].is_found_from(seen.pixels):
+            cameras[c], shares = cameras[c].before_images(), True
+        if pen.is_found_from(seen.pixels):
+            pen, shares = pen.before_images(), True
+    return _Before(replace(rig, cameras=tuple(cameras)), pen, shares)
 
 
 @dataclass(frozen=True, eq=False)
@@ -500,6 +526,7 @@ def _calibration_of(
         priors=adjustment.priors,
         assumptions=inputs.assumptions,
         growth=inputs.growth,
+        shares_images=inputs.shares_images,
         contradictions=adjustment.contradictions,
         two_stage=two_stage,
         two_stage_covariance=propagated_covariance(

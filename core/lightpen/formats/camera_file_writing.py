@@ -14,6 +14,7 @@ from lightpen.errors import UsageError
 from lightpen.formats.files import printable, write_whole
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.lens_field import LensField
+from lightpen.model.self_calibration import MARK_DIGITS, FoundCamera
 
 FISHEYE_NAME = "equidistant"  # of the model of Kannala and Brandt, in Kalibr and ROS
 
@@ -98,7 +99,20 @@ def _further_lines(camera: Camera, n: int | None = None) -> list[str]:
         lines.append(f"calibration_temperature: {_decimal(camera.temperature_c)}")
     if camera.lens_field is not None:
         lines += ["lens_field:", *_field_lines(camera.lens_field, n)]
+    if camera.found is not None:
+        lines += ["found_from:", *_found_lines(camera.found)]
     return lines
+
+
+def _found_lines(found: FoundCamera) -> list[str]:
+    """Return the lines below ``found_from``."""
+    lines = [
+        *_matrix_lines("images", found.marks.round(MARK_DIGITS)),
+        *_matrix_lines("intrinsics", found.intrinsics[None]),
+    ]
+    if found.covariance is not None:
+        lines += _matrix_lines("intrinsics_covariance", found.covariance)
+    return ["   " + line.replace("\n", "\n   ") for line in lines]
 
 
 def _field_lines(field: LensField, n: int | None) -> list[str]:

@@ -30,7 +30,10 @@ serial number of the camera, ``camera_serial``; how warm it was,
 ``lens_field``, see `lightpen.model.lens_field`: ``amplitude`` and
 ``correlation_length``, px, and where it was measured ``columns``, ``rows``, ``values``
 (a row u v for each node), ``covariance``, and ``intrinsics_covariance`` of what does
-not go with the field.
+not go with the field; and of a camera found from images of a pen (``lightpen
+discover``) ``found_from``: an LED centre of each of these ``images``, px, and the
+``intrinsics`` without them, fx fy cx cy and the coefficients, with their
+``intrinsics_covariance``.
 """
 
 import re
@@ -56,6 +59,7 @@ from lightpen.formats.files import MEGABYTE, printable, quoted, read_text
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.lens_field import MOST, LensField
+from lightpen.model.self_calibration import FoundCamera
 
 CAMERA_FILE = message("file.camera")
 CAMERA_FILE_LIMIT = 4 * MEGABYTE  # some keep the points they were calibrated from
@@ -82,6 +86,7 @@ _DATE = ("calibration_date", "calibration_time")
 _SERIAL = ("camera_serial",)
 _TEMPERATURE = ("calibration_temperature",)
 _FIELD = ("lens_field",)
+_FOUND = ("found_from",)
 _FIELD_ENTRIES = (
     *("amplitude", "correlation_length", "columns", "rows", "values", "covariance"),
     *_COVARIANCE,
@@ -248,6 +253,7 @@ def _camera(
             entries, width, height, len(coefficients), len(distortion)
         ),
         lens=lens,
+        found=_found(entries, width, height, len(distortion)),
     )
     check_fold(camera, entries)
     return camera
@@ -323,6 +329,17 @@ def _temperature(entries: Entries) -> float | None:
             warmest=WARMEST,
         )
     return celsius
+
+
+def _found(entries: Entries, width: int, height: int, kept: int) -> FoundCamera | None:
+    if not entries.has(*_FOUND):
+        return None
+    part = entries.part(*_FOUND)
+    part.refuse_others("images", "intrinsics", *_COVARIANCE)
+    intrinsics = part.counted(4 + kept, "intrinsics")
+    check_pinhole(intrinsics[:4], width, height, entries.name)
+    covariance = _covariance(part, kept, kept)
+    return FoundCamera(part.points("images"), intrinsics, covariance)
 
 
 def _lens_field(

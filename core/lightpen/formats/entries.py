@@ -126,6 +126,14 @@ class Entries:
             )
         return numbers
 
+    def points(self, *names: str) -> FloatArray:
+        """Return the numbers of an entry as points, (M, 2).
+
+        See `numbers`.
+        """
+        numbers = self.numbers(*names)
+        return self.counted(len(numbers) // 2 * 2, *names).reshape(-1, 2)
+
     def word(self, *names: str) -> str:
         """Return the text of an entry, empty if it is missing or is not a text."""
         value = self.value(*names) if self.has(*names) else ""

@@ -9,6 +9,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, UsageError
 from lightpen.messages import Message
 from lightpen.model.pen import Pen
+from lightpen.model.self_calibration import FoundPen
 
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4}
 LARGEST_DIAMETER = 100.0  # mm
@@ -45,6 +46,7 @@ class PenContent:
     name: str = ""
     stated: Mapping[str, float] = field(default_factory=dict)
     covariance: FloatArray | None = None
+    found: FoundPen | None = None
 
 
 def agreed_unit(stated: str, given: str | None, name: str) -> str:

@@ -26,6 +26,9 @@ A JSON file has
 ``nominal_tip`` list of three coordinates, optional
 ``name``        name or serial number, optional
 ``led_covariance`` of all coordinates but for the scale, 3 L rows of 3 L, optional
+``found_from``  of LEDs found from images (``lightpen discover``), optional: an LED
+                centre of each of these ``images``, px, and ``diameter`` and
+                ``led_covariance`` without them
 ``parent_sha256`` of the file that this one was made better from, not read
 ``comment``     not read
 ================== ===================================================================
@@ -179,19 +182,20 @@ def write_pen(pen: Pen, path: Path, parent_sha256: str = "") -> None:
 
 
 def _pen(
-    content: PenContent, diameter: float | None, nominal_tip: FloatArray | None
+    content: PenContent, given: float | None, nominal_tip: FloatArray | None
 ) -> Pen:
-    if diameter is not None and not 0 < diameter <= LARGEST_DIAMETER:
+    if given is not None and not 0 < given <= LARGEST_DIAMETER:
         raise UsageError(
-            "pen-file.given-diameter", diameter=diameter, most=LARGEST_DIAMETER
+            "pen-file.given-diameter", diameter=given, most=LARGEST_DIAMETER
         )
     if nominal_tip is None:
         nominal_tip = content.nominal_tip
-    if diameter is None:
-        diameter = DISC_DIAMETER if content.diameter is None else content.diameter
-    normals = content.normals
+    diameter = given or content.diameter or DISC_DIAMETER
+    normals, found = content.normals, content.found
     if normals is None:
         normals = _facing_normals(len(content.leds))
+    if found is not None:
+        found = replace(found, diameter=given or found.diameter)
     return Pen(
         content.leds,
         normals,
@@ -200,6 +204,7 @@ def _pen(
         content.name,
         **content.stated,
         led_covariance=content.covariance,
+        found=found,
     )
 
 

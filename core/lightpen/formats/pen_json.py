@@ -23,6 +23,7 @@ from lightpen.formats.pen_content import (
 )
 from lightpen.messages import message
 from lightpen.model.pen import Pen
+from lightpen.model.self_calibration import MARK_DIGITS, FoundPen
 
 _LED_KEYS = {"led", "x", "y", "z", "normal"}
 _FILE_KEYS = {
@@ -31,7 +32,9 @@ _FILE_KEYS = {
     "normal_sigma",
     *("expansion", "expansion_sigma", "temperature_c"),
     "parent_sha256",
+    "found_from",
 }
+_FOUND_KEYS = {"images", "diameter", "led_covariance"}
 ASYMMETRY = 1e-6  # of the largest variance
 
 
@@ -90,7 +93,21 @@ def from_json(tree: Tree, units: str | None, name: str) -> PenContent:
             if entries.has(what)
         },
         covariance=_covariance(entries, len(leds), unit, name),
+        found=_found(entries, len(leds), unit, name),
     )
+
+
+def _found(entries: Entries, n_leds: int, unit: float, name: str) -> FoundPen | None:
+    if not entries.has("found_from"):
+        return None
+    part = entries.part("found_from")
+    part.refuse_others(*_FOUND_KEYS)
+    covariance = _covariance(part, n_leds, unit, name)
+    if covariance is None:
+        raise FileError("entry.missing", name=name, entry="led_covariance")
+    diameter = float(part.counted(1, "diameter")[0]) * unit
+    check_diameter(diameter, name)
+    return FoundPen(part.points("images"), diameter, covariance)
 
 
 def _covariance(
@@ -158,6 +175,17 @@ def json_text(pen: Pen, parent_sha256: str) -> str:
         f'"leds": [\n    {rows}\n  ]',
     ]
     if pen.led_covariance is not None:
-        of_leds = ",\n    ".join(map(json.dumps, pen.led_covariance.tolist()))
-        entries.append(f'"led_covariance": [\n    {of_leds}\n  ]')
+        entries.append(_matrix("led_covariance", pen.led_covariance))
+    if pen.found is not None:
+        found = [
+            _matrix("images", pen.found.marks.round(MARK_DIGITS)),
+            f'"diameter": {json.dumps(float(pen.found.diameter), allow_nan=False)}',
+            _matrix("led_covariance", pen.found.led_covariance),
+        ]
+        entries.append('"found_from": {\n  ' + ",\n  ".join(found) + "\n  }")
     return "{\n  " + ",\n  ".join(entries) + "\n}\n"
+
+
+def _matrix(name: str, matrix: FloatArray) -> str:
+    rows = ",\n    ".join(json.dumps(row, allow_nan=False) for row in matrix.tolist())
+    return f'"{name}": [\n    {rows}\n  ]'

@@ -31,6 +31,7 @@ from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.errors import CalibrationError
 from lightpen.model import fisheye
 from lightpen.model.lens_field import LensField
+from lightpen.model.self_calibration import FoundCamera, are_shared
 
 UNDISTORT_STEPS = 20
 # Of a step of Newton's method, in normalised units: what is left is about its square,
@@ -93,6 +94,9 @@ class Camera:
         part of the projection: `without_lens_field` removes it from observed pixels.
     lens : LensModel
         Model of the distortion.
+    found : FoundCamera or None
+        What was known before the images of a pen that the intrinsics were found from;
+        None if they were calibrated otherwise.
     """
 
     width: int
@@ -108,6 +112,7 @@ class Camera:
     temperature_c: float | None = None
     lens_field: LensField | None = None
     lens: LensModel = LensModel.BROWN
+    found: FoundCamera | None = None
 
     @property
     def distortion_names(self) -> tuple[str, ...]:
@@ -140,6 +145,17 @@ class Camera:
         """Return the camera with other `intrinsics`, of as many coefficients."""
         fx, fy, cx, cy = values[:4].tolist()
         return replace(self, fx=fx, fy=fy, cx=cx, cy=cy, distortion=values[4:])
+
+    def is_found_from(self, pixels: FloatArray) -> bool:
+        """Return whether it was found from images with LED centres (N, L, 2)."""
+        return self.found is not None and are_shared(self.found.marks, pixels)
+
+    def before_images(self) -> "Camera":
+        """Return what was known before the images that the camera was found from."""
+        if self.found is None:
+            return self
+        camera = self.with_intrinsics(self.found.intrinsics)
+        return replace(camera, covariance=self.found.covariance)
 
     def without_lens_field(self, pixels: FloatArray) -> FloatArray:
         """Return observed pixels less the mean of the lens field, both (..., 2)."""

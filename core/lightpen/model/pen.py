@@ -26,6 +26,7 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
 from lightpen.messages import Message, message
+from lightpen.model.self_calibration import EXACT_SCALE, FoundPen, are_shared
 
 DISC_DIAMETER = 10.0  # mm, of each LED of the paper's pen
 FRAME_TOLERANCE = 1.0  # mm; LEDs deviate by up to 0.4 mm from line and plane
@@ -82,6 +83,9 @@ class Pen:
     led_covariance : (3 L, 3 L) array or None
         Of all LED coordinates but for the scale that they share, mm^2; None if no more
         than ``led_sigma`` is known.
+    found : FoundPen or None
+        What was known before the images that the LEDs were found from; None if they
+        were measured.
     """
 
     leds: FloatArray
@@ -97,11 +101,31 @@ class Pen:
     temperature_c: float | None = None
     led_covariance: FloatArray | None = None
     normal_sigma: float | None = None
+    found: FoundPen | None = None
 
     @property
     def n_leds(self) -> int:
         """Number of LEDs."""
         return len(self.leds)
+
+    def is_found_from(self, pixels: FloatArray) -> bool:
+        """Return whether the LEDs were found from images with centres (N, L, 2)."""
+        return self.found is not None and are_shared(self.found.marks, pixels)
+
+    def before_images(self) -> "Pen":
+        """Return the pen with what was known before the images it was found from."""
+        if self.found is None:
+            return self
+        return replace(
+            self,
+            diameter=self.found.diameter,
+            diameter_sigma=None,
+            scale_sigma=EXACT_SCALE,
+            led_covariance=self.found.led_covariance,
+            expansion=0.0,  # the lengths are those during the swing
+            expansion_sigma=None,
+            temperature_c=None,
+        )
 
 
 def grown(pen: Pen, growth: float) -> Pen:

@@ -20,6 +20,7 @@ from lightpen.formats.camera_file_writing import CameraForm, write_camera
 from lightpen.formats.camera_files import FOCAL_CORRELATION, read_camera
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.lens_field import LensField
+from lightpen.model.self_calibration import FoundCamera
 
 DISTORTION = np.array([-0.082, 0.105, 3e-4, -2e-4, 1 / 3])
 OPENCV = """%YAML:1.0
@@ -716,6 +717,36 @@ def cameras(draw: st.DrawFn) -> Camera:
         serial=draw(st.text(SERIAL_LETTERS, max_size=20)),
         temperature_c=draw(st.none() | st.floats(-50, 100)),
     )
+
+
+@pytest.mark.parametrize("form", list(CameraForm))
+@pytest.mark.parametrize("covariance", [None, np.diag(np.arange(1.0, 10.0))])
+def test_what_was_known_of_a_camera_found_from_images_is_read_back(
+    tmp_path: Path, form: CameraForm, covariance: np.ndarray | None
+) -> None:
+    marks = np.array([[1.25, 2.5], [1000.125, 2000.0]])
+    known = FoundCamera(marks, camera().intrinsics + 0.5, covariance)
+    plain = np.append(DISTORTION[:4], 0.0)
+    write_camera(camera(distortion=plain, found=known), tmp_path / "cam.yaml", form)
+
+    read = read_camera(tmp_path / "cam.yaml").found
+
+    assert read is not None
+    np.testing.assert_array_equal(read.marks, marks)
+    np.testing.assert_array_equal(read.intrinsics, known.intrinsics)
+    assert (read.covariance is None) == (covariance is None)
+    if covariance is not None:
+        np.testing.assert_array_equal(read.covariance, covariance)
+
+
+def test_an_impossible_camera_before_its_images_is_refused(tmp_path: Path) -> None:
+    values = camera().intrinsics
+    values[0] = -1.0
+    known = FoundCamera(np.ones((1, 2)), values, None)
+    write_camera(camera(found=known), tmp_path / "cam.yaml")
+
+    with pytest.raises(FileError, match="focal length"):
+        read_camera(tmp_path / "cam.yaml")
 
 
 @pytest.mark.slow

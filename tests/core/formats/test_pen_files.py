@@ -22,6 +22,7 @@ from lightpen.formats.pen_files import (
 )
 from lightpen.model.pen import DISC_DIAMETER, Pen
 from lightpen.model.rigid import rotation_from_vector
+from lightpen.model.self_calibration import FoundPen
 
 LEDS = np.array(
     [
@@ -557,3 +558,41 @@ def test_a_covariance_that_is_none_is_refused(tmp_path: Path) -> None:
             match=r"The led_covariance of pen\.json is not a covariance matrix:",
         ):
             read_pen(tmp_path / "pen.json")
+
+
+def test_what_was_known_of_a_pen_found_from_images_is_read_back(tmp_path: Path) -> None:
+    rng, path = np.random.default_rng(1), tmp_path / "pen.json"
+    root = rng.normal(size=(3 * len(LEDS), 3 * len(LEDS)))
+    marks = rng.uniform(0, 2000, (60, 2)).round(3)
+    pen = Pen(LEDS, FACING, 8.0, found=FoundPen(marks, 9.5, root @ root.T))
+    write_pen(pen, path)
+
+    for diameter in None, 7.0:
+        read = read_pen(path, diameter=diameter).found
+        assert read is not None
+        np.testing.assert_array_equal(read.marks, marks)
+        np.testing.assert_array_equal(read.led_covariance, root @ root.T)
+        assert read.diameter == (diameter or 9.5)
+
+
+@pytest.mark.parametrize(
+    ("line", "other", "told"),
+    [
+        ('"diameter": 9.5', '"width": 9.5', 'unknown key "width"'),
+        ('"diameter": 9.5', '"diameter": -9.5', "discs"),
+        ("[1.0, 2.0]", "[1.0, 2.0, 3.0]", "3 numbers"),
+        ("[[1.0, 0.0, ", "[[1.0, 1.0, ", "not a covariance matrix"),
+    ],
+)
+def test_a_flaw_of_what_was_known_of_a_pen_is_named(
+    tmp_path: Path, line: str, other: str, told: str
+) -> None:
+    path = tmp_path / "pen.json"
+    found = FoundPen(np.array([[1.0, 2.0]]), 9.5, np.eye(3 * len(LEDS)))
+    write_pen(Pen(LEDS, FACING, found=found), path)
+    text = path.read_text().replace("[\n    [", "[[")
+    assert line in text
+    path.write_text(text.replace(line, other))
+
+    with pytest.raises(FileError, match=told):
+        read_pen(path)

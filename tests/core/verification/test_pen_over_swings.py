@@ -20,7 +20,8 @@ from lightpen.formats.json_records import FileRecord
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.model.pen import Pen
-from lightpen.record.calibrations.calibrations import CalibrationFile
+from lightpen.model.self_calibration import FoundPen, marks_of
+from lightpen.record.calibrations.calibrations import CalibrationFile, shown_images
 from lightpen.simulator.swings import (
     PAPER_TIP,
     paper_camera,
@@ -185,6 +186,35 @@ def test_a_length_gives_the_new_file_its_scale(swing: Swing) -> None:
     extents = np.ptp(found.pen.leds[:4, 1]) / np.ptp(PEN_FILE.leds[:4, 1])
     # The LEDs at the ends of the pen are off by 0.01 mm in the file, of 180 mm.
     assert extents - 1 == pytest.approx(3e-4, abs=1e-4)
+
+
+def test_what_no_swing_shows_stays_as_uncertain_as_the_file_states(
+    swing: Swing,
+) -> None:
+    swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
+    scaling = (PEN_FILE.leds - PEN_FILE.leds.mean(axis=0)).ravel()
+    known = 1e-4 * np.eye(len(scaling)) + 1e-6 * np.outer(scaling, scaling)
+    stated = replace(
+        PEN_FILE, led_sigma=None, scale_sigma=1e-6, expansion=0.0, led_covariance=known
+    )
+
+    found = improve_pen(swings, paper_camera(), stated)
+
+    assert found.pen.led_covariance is not None
+    unit = scaling / (scaling @ scaling)
+    scale = np.sqrt(unit @ found.pen.led_covariance @ unit)
+    assert scale == pytest.approx(1e-3, rel=0.1)
+    of_shape = np.diag(found.pen.led_covariance) - (scale * scaling) ** 2
+    assert of_shape.max() < 0.005**2
+
+
+def test_swings_that_the_files_were_found_from_are_not_pooled(swing: Swing) -> None:
+    swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
+    shown = shown_images(swings[1].calibration)
+    known = FoundPen(marks_of(shown.pixels), 10.0, np.eye(PEN_FILE.leds.size))
+
+    with pytest.raises(CalibrationError, match=r"found from the images of swing 2\."):
+        improve_pen(swings, paper_camera(), replace(PEN_FILE, found=known))
 
 
 @pytest.mark.slow

@@ -43,6 +43,7 @@ def warnings_of(calibration: Calibration) -> list[Message]:
         *_seat_warnings(calibration),
         *(each.message for each in calibration.effects if each.is_certain),
         *_copy_warnings(calibration),
+        *([message("warning.own-images")] if calibration.shares_images else []),
         *_noise_warnings(calibration),
         *_self_check_warnings(calibration),
         *_frame_warnings(calibration),

@@ -129,7 +129,10 @@ def improve_pen(
     *pooled, held_out = calibrations
     again = []
     for n, calibration in enumerate(calibrations, start=1):
-        again.append(calibrate_again(calibration, camera, pen))
+        each = calibrate_again(calibration, camera, pen)
+        if each.shares_images:
+            raise CalibrationError("led-file.own-images", swing=calibration.path.name)
+        again.append(each)
         report(n / len(calibrations))
     (improved, refined), confirming = _pooled(again[:-1], camera, pen, scale), again[-1]
     rig = confirming.instrument.rig
@@ -181,8 +184,12 @@ def _pooled(
     leds = np.flatnonzero(np.isin(common, np.r_[at.leds]))
     information[np.ix_(leds, leds)] = 0.0
     typical = float(np.median([each.led_sigma for each in calibrations]))
-    known = pen.led_sigma or max(typical, FINEST)
-    information[leds, leds] = 1 / known**2
+    if pen.led_covariance is None or typical > 0:  # the images deny what is stated
+        information[leds, leds] = 1 / (pen.led_sigma or max(typical, FINEST)) ** 2
+    else:
+        known = first.unknowns.basis.T @ pen.led_covariance @ first.unknowns.basis
+        known += FINEST**2 * np.eye(len(known))
+        information[np.ix_(leds, leds)] = inverse(known)
     right = np.zeros(len(common))
     for calibration in calibrations:
         own, own_right = _of_images(calibration.bundle)

@@ -1,0 +1,73 @@
+"""Recognition of the images that a pen or a camera was found from.
+
+A file found from a swing (`lightpen.discovery`) has used the information of its images.
+A calibration of the same images starts from what was known before them, so that this
+information counts once.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+
+SAME = 0.02  # px, of one centre found twice in an image
+MIN_SHARED = 5  # images; fewer count little
+EXACT_SCALE = 1e-6  # relative, of a pen whose lengths are in its LED covariance
+MAX_MARKS = 1000  # images
+MARK_DIGITS = 3  # of a mark in a file, px
+
+
+@dataclass(frozen=True, eq=False)
+class FoundPen:
+    """What was known of a pen before the images that it was found from.
+
+    Attributes
+    ----------
+    marks : (M, 2) array
+        An LED centre of each of these images, px.
+    diameter : float
+        Of the LED discs, mm.
+    led_covariance : (3 L, 3 L) array
+        Of all LED coordinates, by the known lengths, mm^2.
+    """
+
+    marks: FloatArray
+    diameter: float
+    led_covariance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class FoundCamera:
+    """What was known of a camera before the images that it was found from.
+
+    Attributes
+    ----------
+    marks : (M, 2) array
+        An LED centre of each of these images, px.
+    intrinsics : (k,) array
+        As `Camera.intrinsics`.
+    covariance : (k, k) array or None
+        None if it was not stated.
+    """
+
+    marks: FloatArray
+    intrinsics: FloatArray
+    covariance: FloatArray | None
+
+
+def marks_of(pixels: FloatArray) -> FloatArray:
+    """Return an LED centre of each image, (M, 2), px, from centres (N, L, 2)."""
+    seen = np.isfinite(pixels[..., 0])
+    images = np.flatnonzero(seen.any(axis=1))
+    images = images[:: -(-len(images) // MAX_MARKS) or 1]
+    return np.asarray(pixels[images, seen[images].argmax(axis=1)])
+
+
+def are_shared(marks: FloatArray, pixels: FloatArray) -> bool:
+    """Return whether several images with centres (N, L, 2) are those of the marks."""
+    n_shared = sum(
+        bool(np.any(np.abs(image[:, None] - marks).max(axis=-1) < SAME))
+        for image in pixels
+    )
+    return n_shared >= MIN_SHARED
