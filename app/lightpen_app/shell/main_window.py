@@ -313,6 +313,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
         if event.type() == QEvent.Type.WindowStateChange:
+            self.setUpdatesEnabled(not self.isMinimized())
             self._tell_attention()
         if event.type() == QEvent.Type.LanguageChange:
             self._retranslate()

@@ -43,7 +43,7 @@ GAIN_DB = Range(0.0, 24.0, 0.1)
 FRAME_RATE = Range(0.1, 200.0)
 USUAL_EXPOSURE_US = 1000.0  # short, so that the swing hardly blurs
 USUAL_FRAME_RATE = 20.0
-UNSEEN = 2  # times the period, while no image is displayed
+UNSEEN = 4  # times the period, while no image is displayed
 BITS: dict[str, Literal[8, 12, 16]] = {"Mono8": 8, "Mono12": 12, "Mono16": 16}
 
 N_BUFFERED = 2  # images that wait for a late reader

@@ -17,11 +17,11 @@ from lightpen_app.work.live_view import DisplayedImage, LiveView
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.swing_run import SwingRun
 
-PERIOD_MS = 500
+PERIOD_MS = 1000
 
 
 class PenWatch(QObject):
-    """Compares a pen with the detections, at most twice a second.
+    """Compares a pen with the detections, at most once a second.
 
     Signals
     -------
