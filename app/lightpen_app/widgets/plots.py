@@ -381,6 +381,7 @@ class TracePlot(Plot):
         if not len(x):
             self._show_nothing()
             return
+        self._item.getAxis("left").setStyle(showValues=True)
         n_hidden = int((1 - self._tail) * len(x))
         in_sight = [self._height(value)[n_hidden:] for value in values]
         if self._limit_at is not None:
@@ -400,11 +401,12 @@ class TracePlot(Plot):
             self._show_range()
 
     def _show_nothing(self) -> None:
-        """Show the axes as they are before the first image."""
+        """Show the axes, without numbers unless a limit is among them."""
         top = np.ones(1)
         if self._limit_at is not None and self._y_log:
             top = np.maximum(top, self._height(np.array([LABEL_ROOM * self._limit_at])))
         y_range = (0.0, float(top[0]))
+        self._item.getAxis("left").setStyle(showValues=self._limit_at is not None)
         self._item.setRange(xRange=(1, N_LEAST), yRange=y_range, padding=0.01)
 
     def _place_words(self) -> None:

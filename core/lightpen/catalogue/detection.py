@@ -20,7 +20,7 @@ MESSAGES = {
     "reason.blurred": "blurred",
     "reason.too-few-leds": "too few LEDs",
     "reason.too-small": "LEDs too small",
-    "reason.not-the-pen": "spots do not match the pen",
+    "reason.not-the-pen": "not matching the pen",
     "reason.ambiguous": "ambiguous",
     "reason.misfit": "LEDs do not fit",
     "reason.slipped": "tip slipped",

@@ -1516,7 +1516,7 @@
         <translation>操作员</translation>
     </message>
     <message>
-        <source>Remarks</source>
+        <source>Notes</source>
         <translation>说明</translation>
     </message>
 </context>
@@ -9610,7 +9610,7 @@ mm</translation>
         <translation>球</translation>
     </message>
     <message>
-        <source>spots do not match the pen</source>
+        <source>not matching the pen</source>
         <translation>光点与光笔不匹配</translation>
     </message>
     <message>

@@ -154,7 +154,7 @@ class HistoryModel(QAbstractTableModel):
             *(self.tr("When"), self.tr("Station"), self.tr("Pen"), self.tr("Tip")),
             *(self.tr("Entry type"), self.tr("Verdict")),
             *(self.tr("x / mm"), self.tr("y / mm"), self.tr("z / mm")),
-            *(self.tr("U / mm"), self.tr("Operator"), self.tr("Remarks")),
+            *(self.tr("U / mm"), self.tr("Operator"), self.tr("Notes")),
         )[section]
 
 
