@@ -31,9 +31,11 @@ Each command first sets up whatever it needs."""
 
 ROOT = Path(__file__).resolve().parent
 PIP = "pip>=25.1"
-# All tests of a file in one process: what they share is made once.
+# All tests of a file in one process: what they share is made once. Many tests wait for a
+# camera or a clock: a process more than there are cores.
 PARALLEL = (
-    *("--numprocesses", "auto", "--dist", "loadfile", "--no-loadscope-reorder"),
+    *("--numprocesses", str(1 + (os.cpu_count() or 1))),
+    *("--dist", "loadfile", "--no-loadscope-reorder"),
     *("--max-worker-restart", "1"),  # a test that ends its process is run again
 )
 CHECKS = (
