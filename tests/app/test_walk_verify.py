@@ -68,16 +68,16 @@ def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
     for _ in range(2):
         walker.press(Qt.Key.Key_Down)
     walker.click("Probe both ends")
-    walker.until_says("NOT POSSIBLE")
+    walker.until_says("NOT READY")
     assert walker.tells("The length is not specified. Enter the certified one.")
     walker.click_into("Certified length", f"{SIMULATED_LENGTH:g}")
     walker.press(Qt.Key.Key_Tab)
     walker.until_tells("The uncertainty of the certified value is not specified.")
-    assert walker.says("NOT POSSIBLE")
+    assert walker.says("NOT READY")
     walker.click_into("U (k = 2) of certificate", "0.001")
     walker.press(Qt.Key.Key_Tab)
     # The pen that came by itself may have touched the cone meanwhile.
-    walker.until(lambda: not walker.says("NOT POSSIBLE"))
+    walker.until(lambda: not walker.says("NOT READY"))
     walker.click("Let the simulated operator probe")
     n_inputs = walker.n_inputs
     walker.until_says("Tip verified")

@@ -158,6 +158,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self.setWindowTitle(self.tr("Find pen and camera"))
         self._image.set_message(self.tr("No image"))
         self._save.setText(self.tr("Save both files and calibrate the tip"))
+        self._length.setSpecialValueText(self.tr("Not specified"))
         for label, name in zip(
             self._names,
             (

@@ -35,7 +35,7 @@ MESSAGES = {
     "source.named": "{name}",
     "source.simulated": "Simulated pen",
     "source.webcam": "Webcam (evaluation only)",
-    "camera.too-slow": "Processing cannot keep up: {n_missed} of {n_offered} images skipped. Close other programs, or the swing takes longer.",
+    "camera.too-slow": "Processing cannot keep up: {n_missed} of {n_offered} images skipped. Close other programs, or capturing takes longer.",
     "camera.did-not-stop": "Camera {serial} did not stop within {waited:.0f} s. Unplug it and restart the program.",
     "camera.silent": "No image from camera {serial} for {silence:.0f} s. Check cable and power.",
     "live.bug": "An internal error occurred; image processing stopped. Open the camera again.",

@@ -8298,8 +8298,8 @@ mm</translation>
         <translation>沿环规整圈探测，在每个点上保持静止。点数：{n_touches}。</translation>
     </message>
     <message>
-        <source>Processing cannot keep up: {n_missed} of {n_offered} images skipped. Close other programs, or the swing takes longer.</source>
-        <translation>处理速度不足：{n_offered} 幅图像中有 {n_missed} 幅未处理。请关闭其他程序，否则摆动会更久。</translation>
+        <source>Processing cannot keep up: {n_missed} of {n_offered} images skipped. Close other programs, or capturing takes longer.</source>
+        <translation>处理速度不足：{n_offered} 幅图像中有 {n_missed} 幅未处理。请关闭其他程序，否则采集时间更长。</translation>
     </message>
     <message>
         <source>Put the tip into the cone and hold it still, each time with another tilt: {n_touches} of {needed}.</source>

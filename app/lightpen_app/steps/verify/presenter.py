@@ -242,6 +242,8 @@ class VerifyPresenter(QObject):
         if status.reading is ReadingState.IMAGES:
             fraction = self._verification.progress
             return State(self.tr("READING"), "", Sign.WAIT, Tone.ACTIVE, fraction)
+        if status.refusal is not None and status.tip is not None:  # an input is missing
+            return State(self.tr("NOT READY"), "", Sign.WARNING, Tone.WARN)
         if status.refusal is not None:
             return State(self.tr("NOT POSSIBLE"), "", Sign.CROSS, Tone.BAD)
         if setup is None or state is None:
