@@ -173,6 +173,16 @@ def test_a_pen_file_of_another_pen_is_refused() -> None:
         calibration(centers(swing(), 0.02), other)
 
 
+@pytest.mark.parametrize("n_images", [12, 24, 60])
+def test_a_camera_file_of_another_lens_is_blamed_before_the_seat(n_images: int) -> None:
+    seen = centers(swing(n_images), 0.02)
+    other = replace(CAMERA, fy=1.026 * CAMERA.fy)
+    given = Centers(np.arange(n_images), seen, Path("centers.csv"))
+
+    with pytest.raises(CalibrationError, match="LED positions and images disagree:"):
+        calibrate(other, PEN, observe_centers(given, other, PEN))
+
+
 def test_a_scaled_camera_shows_in_the_cone_not_in_silence() -> None:
     truth = swing(200)
     result = calibration(centers(truth, 0.02))

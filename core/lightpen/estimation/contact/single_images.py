@@ -18,6 +18,7 @@ from lightpen.model.pen import Pen
 MIN_IMAGES = 6  # the paper starts from six
 MAX_SIGMA = 1.0  # px, of one image coordinate; LED errors of 0.3 mm make this
 USUAL_SIGMA = 0.1  # px
+DOUBTFUL_SIGMA = 3 * USUAL_SIGMA  # by which a tip that seems to move is laid to the files
 # An LED that runs along an arc during the exposure appears inside it, which moves the
 # pose of a blurred image by some hundredths of a millimetre; more is a slip.
 MAX_SMEAR = 0.15  # mm
@@ -78,11 +79,16 @@ def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedIm
     fitting = _fitting(poses)
     reasons[posed[~fitting]] = Reason.MISFIT
     require_images(posed[fitting], reasons, observations.advice)
-    pivot = fit_pivot(
-        poses.rotations[fitting],
-        poses.translations[fitting],
-        poses.covariances[fitting],
-    )
+    try:
+        pivot = fit_pivot(
+            poses.rotations[fitting],
+            poses.translations[fitting],
+            poses.covariances[fitting],
+        )
+    except CalibrationError as error:
+        if error.message.code == "pivot.tip-moved":
+            require_fit(poses.sigma, DOUBTFUL_SIGMA)
+        raise
     outliers = posed[fitting][~pivot.used]
     distances = np.linalg.norm(pivot.residuals[~pivot.used], axis=1)
     smeared = _smeared(observations)[outliers] & (distances < MAX_SMEAR)
@@ -98,7 +104,7 @@ def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedIm
     )
 
 
-def require_fit(sigma: float) -> None:
+def require_fit(sigma: float, most: float = MAX_SIGMA) -> None:
     """Refuse LEDs that lie farther off the model than any that was measured, px.
 
     Raises
@@ -106,7 +112,7 @@ def require_fit(sigma: float) -> None:
     CalibrationError
         Names the files that may be of others.
     """
-    if sigma > MAX_SIGMA:
+    if sigma > most:
         raise CalibrationError(
             "calibrate.leds-do-not-fit", sigma=sigma, usual=USUAL_SIGMA
         )
