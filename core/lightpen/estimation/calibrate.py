@@ -70,6 +70,7 @@ from lightpen.estimation.uncertainty.budget import (
 from lightpen.estimation.uncertainty.instrument import Instrument, adjusted_instrument
 from lightpen.estimation.uncertainty.second_cone import (
     SecondCone,
+    SecondImages,
     SecondSwing,
     second_cone,
     second_images,
@@ -381,12 +382,15 @@ class _Adjusted:
     ----------
     pixels : (M, C, L, 2) array
         LED centres less the effects of lens and mechanics, px.
+    second : SecondImages or None
+        Images of a second swing, which are the last adjusted.
     """
 
     adjustment: Adjustment
     joint: JointFit
     stated: Priors
     pixels: FloatArray
+    second: SecondImages | None
 
 
 def _fit_single_cameras(
@@ -469,8 +473,9 @@ def _adjust_jointly(
     # Of several cameras each has lamps of its own, and what they leave is not fitted.
     is_one = rig.n_cameras == 1 and second is None
     shifts = path.shifts[moments] if is_one and path is not None else None
+    others = None
     if second is not None:
-        others = second_images(rig.cameras[0], pen, second.observations)
+        others = second_images(rig.cameras[0], pen, second)
         state, pixels = others.joined(state, pixels)
         priors = replace(priors, separation=second.separation)
     adjustment = adjust(state, pixels, priors, start.extrinsics, shifts)
@@ -484,7 +489,7 @@ def _adjust_jointly(
         found.cone_rig,
         bundle.used[:n].reshape(n, -1),
     )
-    return _Adjusted(adjustment, joint, priors, corrected)
+    return _Adjusted(adjustment, joint, priors, corrected, others)
 
 
 def _calibration_of(
@@ -513,7 +518,6 @@ def _calibration_of(
     budget = combine(adjustment, joint)
     paper_poses = _paper_poses(inputs.rig.cameras[0], pen, single, start)
     two_stage = fit_two_stage(paper_poses.rotations, paper_poses.translations)
-    has_second = state.at_second is not None
     return Calibration(
         cameras=cameras,
         reasons=reasons,
@@ -539,7 +543,9 @@ def _calibration_of(
         coverage=measure_coverage(joint.rotations),
         lags=start.lags,
         second=(
-            second_cone(adjustment, budget, len(start.moments)) if has_second else None
+            None
+            if adjusted.second is None
+            else second_cone(adjustment, budget, adjusted.second)
         ),
     )
 

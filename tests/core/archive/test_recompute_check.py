@@ -7,6 +7,7 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from msgspec import structs
 from tests.accepted_tip import accept_tip
@@ -14,11 +15,23 @@ from tests.accepted_tip import accept_tip
 from lightpen.archive.check import ArchiveCheckResult, check_archive
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.recompute_check import with_recomputed
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.bundle.priors import ConeSeparation
+from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.reports.calibration_record import CalibrationRecord
+from lightpen.estimation.reports.report import calibration_record
+from lightpen.estimation.uncertainty.second_cone import SecondSwing
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.hashes import Inputs, with_content
+from lightpen.formats.observation_files import Centers
 from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import read_rig
+from lightpen.model.limits import SwingLimits
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
+from lightpen.simulator.swings import PAPER_CONE, simulate_centers, swing_poses
 from lightpen.swing.preparation import Preparation, SecondCamera
 
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
@@ -82,6 +95,37 @@ def test_a_tip_of_two_cameras_follows_from_the_centres_of_both(
 
     assert (checked.n_tips, checked.notes) == (2, ())
     assert [each.values["number"] for each in checked.findings] == [2]
+
+
+def test_a_tip_of_two_cones_follows_from_the_centres_in_both(
+    tmp_path: Path, shared_data: Path, result: Result, shifted: Callable[..., Result]
+) -> None:
+    honest = replace(result, calibration=in_two_cones(shared_data / "fixed-point"))
+    FolderArchive(tmp_path).store(honest)
+    FolderArchive(tmp_path).store(shifted(honest, "tip"))
+
+    checked = entered_and_recomputed(tmp_path)
+
+    assert (checked.n_tips, checked.notes) == (3, ())
+    assert [each.values["number"] for each in checked.findings] == [3]
+
+
+def in_two_cones(files: Path) -> CalibrationRecord:
+    """Calibrate a tip by two swings, in cones 120 mm apart."""
+    camera, pen = read_camera(files / "camera.yaml"), read_pen(files / "leds.csv")
+    rng = np.random.default_rng(8)
+    swings = []
+    for cone in (PAPER_CONE, np.add(PAPER_CONE, [120.0, 0.0, 0.0])):
+        swing = swing_poses(30, rng, pen=pen, camera=camera, cone_cam=cone)
+        poses = swing.rotations, swing.translations
+        pixels = simulate_centers(camera, pen, *poses, 0.02, rng)
+        centers = Centers(np.arange(1, 31), pixels, Path("swing.csv"))
+        swings.append(observe_centers(centers, camera, pen))
+    second = SecondSwing(swings[1], ConeSeparation(120.0, 0.002))
+    found = calibrate(camera, pen, swings[0], second=second)
+    camera_file, pen_file = files / "camera.yaml", files / "leds.csv"
+    inputs = Inputs(with_content(camera_file), with_content(pen_file), (), None)
+    return calibration_record(found, inputs, "joint", SwingLimits())
 
 
 def test_no_more_tips_are_recomputed_than_asked_for(

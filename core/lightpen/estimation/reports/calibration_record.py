@@ -259,18 +259,6 @@ class LampRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     shifts_px: tuple[Pair, ...]
 
 
-class SecondConeRecord(Struct, frozen=True):
-    """The second cone, and U (k = 2) of the tip without and with their distance."""
-
-    cone_cam_mm: Triple
-    images_used: Count
-    stated_distance_mm: Number
-    stated_standard_uncertainty_mm: Number
-    distance_mm: Number
-    expanded_uncertainty_without_mm: Triple
-    expanded_uncertainty_with_mm: Triple
-
-
 class OtherCameraRecord(Struct, frozen=True):
     """A camera of a rig but the first, as fitted."""
 
@@ -417,6 +405,25 @@ class FrameRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     leds: tuple[SpotRecord, ...]
 
 
+class SecondConeRecord(Struct, frozen=True, omit_defaults=True):
+    """The second cone, and U (k = 2) of the tip without and with their distance.
+
+    Attributes
+    ----------
+    frames
+        The images of the swing in it; records of earlier versions lack them.
+    """
+
+    cone_cam_mm: Triple
+    images_used: Count
+    stated_distance_mm: Number
+    stated_standard_uncertainty_mm: Number
+    distance_mm: Number
+    expanded_uncertainty_without_mm: Triple
+    expanded_uncertainty_with_mm: Triple
+    frames: tuple[FrameRecord, ...] = ()
+
+
 class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     """Calibration of the probe tip of a light pen.
 
@@ -492,7 +499,9 @@ class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
 
     def __post_init__(self) -> None:
         n_leds = len(self.leds)
-        if max((spot.led for f in self.frames for spot in f.leds), default=0) > n_leds:
+        second = () if self.second_cone is None else self.second_cone.frames
+        frames = (*self.frames, *second)
+        if max((spot.led for f in frames for spot in f.leds), default=0) > n_leds:
             raise ValueError("An LED is seen that the pen does not have.")
         if len(self.instrument.leds_mm) != n_leds:
             raise ValueError("The instrument is of another pen.")

@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 
 import numpy as np
+from msgspec import structs
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
-from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.calibrate import Calibration, CameraImages
 from lightpen.estimation.reports.calibration_record import (
     AdjustedParameter,
     AdjustmentRecord,
@@ -278,6 +279,7 @@ def _second_cone(second: SecondCone | None) -> SecondConeRecord | None:
         distance_mm=plain(second.distance),
         expanded_uncertainty_without_mm=plain(second.uncertainty_without),
         expanded_uncertainty_with_mm=plain(second.uncertainty_with),
+        frames=tuple(_frames_of(second)),
     )
 
 
@@ -338,35 +340,43 @@ def _frames(calibration: Calibration) -> Iterator[FrameRecord]:
     names = calibration.bundle.state.rig.names
     tips = plain(calibration.tips_cam)
     for c, images in enumerate(calibration.cameras):
-        observations = images.observations
-        pixels, areas = plain(observations.seen_pixels), plain(observations.areas)
-        fit = np.isfinite(observations.pixels[..., 0]).tolist()
-        rms, widths = plain(images.rms), plain(observations.edge_widths)
-        leds_used, lamps = images.leds_used.tolist(), plain(observations.lamps)
-        for i, reason in enumerate(images.reasons):
-            if reason is Reason.ABSENT:
-                continue
-            told = observations.details[i]
-            detail = None if told is None else StoredMessage.of(told)
-            yield FrameRecord(
-                camera=names[c] if names else "",
-                moment=i + 1 if names else 0,
-                file=observations.names[i],
-                used=reason is Reason.NONE,
-                reason=reason,
-                detail="" if detail is None else detail.text,
-                detail_code="" if detail is None else detail.code,
-                detail_values={} if detail is None else detail.values,
-                rms_px=rms[i],
-                tip_cam_mm=tips[i],
-                edge_width_px=widths[i],
-                lamps_px=lamps[i],
-                leds=tuple(
-                    SpotRecord(j + 1, x, y, areas[i][j], fit[i][j], leds_used[i][j])
-                    for j, (x, y) in enumerate(pixels[i])
-                    if x is not None
-                ),
-            )
+        for i, frame in enumerate(_frames_of(images)):
+            if frame.reason is not Reason.ABSENT:
+                yield structs.replace(
+                    frame,
+                    camera=names[c] if names else "",
+                    moment=i + 1 if names else 0,
+                    tip_cam_mm=tips[i],
+                )
+
+
+def _frames_of(images: CameraImages | SecondCone) -> Iterator[FrameRecord]:
+    """Yield the images of one camera, without a tip of each."""
+    observations = images.observations
+    pixels, areas = plain(observations.seen_pixels), plain(observations.areas)
+    fit = np.isfinite(observations.pixels[..., 0]).tolist()
+    rms, widths = plain(images.rms), plain(observations.edge_widths)
+    leds_used, lamps = images.leds_used.tolist(), plain(observations.lamps)
+    for i, reason in enumerate(images.reasons):
+        told = observations.details[i]
+        detail = None if told is None else StoredMessage.of(told)
+        yield FrameRecord(
+            file=observations.names[i],
+            used=reason is Reason.NONE,
+            reason=reason,
+            detail="" if detail is None else detail.text,
+            detail_code="" if detail is None else detail.code,
+            detail_values={} if detail is None else detail.values,
+            rms_px=rms[i],
+            tip_cam_mm=(None, None, None),
+            edge_width_px=widths[i],
+            lamps_px=lamps[i],
+            leds=tuple(
+                SpotRecord(j + 1, x, y, areas[i][j], fit[i][j], leds_used[i][j])
+                for j, (x, y) in enumerate(pixels[i])
+                if x is not None
+            ),
+        )
 
 
 def adjusted_intrinsics(

@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.observations import Observations
+from lightpen.detection.reasons import Reason
 from lightpen.estimation.bundle.adjustment import Adjustment
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import ConeSeparation
-from lightpen.estimation.contact.camera_motion import pose_steadily
+from lightpen.estimation.contact.camera_motion import pose_steadily, without_field
+from lightpen.estimation.contact.copies import without_copies
 from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_contact
 from lightpen.estimation.contact.single_images import require_fit
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR, Budget
@@ -33,8 +35,18 @@ class SecondSwing:
 
 @dataclass(frozen=True, eq=False)
 class SecondImages:
-    """The images of a second swing that agree on a tip, (M, L, 2), and their fit."""
+    """The images of a second swing that agree on a tip, and their fit.
 
+    Attributes
+    ----------
+    reasons : tuple of Reason
+        Why an image of the swing is not among the M.
+    pixels : (M, L, 2) array
+        px.
+    """
+
+    swing: SecondSwing
+    reasons: tuple[Reason, ...]
     pixels: FloatArray
     joint: JointFit
 
@@ -60,7 +72,7 @@ class SecondImages:
         return state, np.concatenate([pixels, self.pixels[:, None]])
 
 
-def second_images(camera: Camera, pen: Pen, observations: Observations) -> SecondImages:
+def second_images(camera: Camera, pen: Pen, swing: SecondSwing) -> SecondImages:
     """Return the images of a second swing that agree on a tip.
 
     Raises
@@ -68,7 +80,8 @@ def second_images(camera: Camera, pen: Pen, observations: Observations) -> Secon
     CalibrationError
         They do not; the text says what is missing.
     """
-    steady = pose_steadily(camera, pen, observations)
+    seen = without_field(camera, without_copies(swing.observations))
+    steady = pose_steadily(camera, pen, seen)
     part = steady.posed
     pixels = steady.observations.pixels[part.chosen]
     joint = fit_contact(
@@ -78,7 +91,7 @@ def second_images(camera: Camera, pen: Pen, observations: Observations) -> Secon
         part.pivot.pivot_cam,
     )
     require_fit(joint.sigma)
-    return SecondImages(pixels, joint)
+    return SecondImages(swing, tuple(part.reasons), pixels, joint)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +102,11 @@ class SecondCone:
     ----------
     cone_cam : (3,) array
         Cone point in the camera frame, mm.
-    n_used : int
-        Images of the second swing that take part.
+    reasons : tuple of Reason
+        Why an image of the second swing was left out; `Reason.NONE` for the used ones.
+    rms : (N,) array
+        Root mean square residual of each image, px; NaN of those left out.
+    leds_used : (N, L) array of bool
     distance : float
         Of the cones as they were adjusted, mm.
     uncertainty_without, uncertainty_with : (3,) array
@@ -98,32 +114,57 @@ class SecondCone:
     """
 
     cone_cam: FloatArray
-    n_used: int
-    separation: ConeSeparation
+    swing: SecondSwing
+    reasons: tuple[Reason, ...]
+    rms: FloatArray
+    leds_used: BoolArray
     distance: float
     uncertainty_without: FloatArray
     uncertainty_with: FloatArray
 
+    @property
+    def observations(self) -> Observations:
+        """Observations of the second swing."""
+        return self.swing.observations
 
-def second_cone(adjusted: Adjustment, budget: Budget, n_first: int) -> SecondCone:
-    """Return the effect of a second swing; ``n_first`` images are of the first.
+    @property
+    def separation(self) -> ConeSeparation:
+        """Certified distance of the cones."""
+        return self.swing.separation
 
-    The adjustment holds a separation.
-    """
+    @property
+    def n_used(self) -> int:
+        """Images of the second swing that take part."""
+        return self.reasons.count(Reason.NONE)
+
+
+def second_cone(
+    adjusted: Adjustment, budget: Budget, images: SecondImages
+) -> SecondCone:
+    """Return the effect of a second swing, whose images are the last adjusted."""
     bundle, unshrunk = adjusted.bundle, adjusted.unshrunk
-    separation = adjusted.priors.separation
-    if separation is None:
-        raise ValueError("`adjusted` must hold the separation of two cones.")
     at = unshrunk.layout.between
     measured = unshrunk.measured_information.copy()
     measured[at, at] = 0.0
     without = inverse(unshrunk.information + unshrunk.prior_information + measured)
     grown = budget.covariance + (without - unshrunk.covariance)[:6, :6]
-    state = bundle.state
+    state, n = bundle.state, len(images.pixels)
+    used, residuals = bundle.used[-n:, 0], bundle.residuals[-n:, 0]
+    reasons = np.array(images.reasons, dtype=object)
+    chosen = np.flatnonzero(reasons == Reason.NONE)
+    reasons[chosen[~used.any(axis=1)]] = Reason.MISFIT
+    leds_used = np.zeros((len(reasons), used.shape[1]), dtype=bool)
+    leds_used[chosen] = used
+    squares = np.full(leds_used.shape, np.nan)
+    squares[chosen] = np.sum(residuals**2, axis=-1)
+    n_leds = leds_used.sum(axis=1)
+    totals = np.sum(squares, axis=1, where=leds_used)
     return SecondCone(
         cone_cam=state.cone_rig + state.between_rig,
-        n_used=int(bundle.used[n_first:].any(axis=(1, 2)).sum()),
-        separation=separation,
+        swing=images.swing,
+        reasons=tuple(reasons),
+        rms=np.sqrt(np.where(n_leds > 0, totals / np.maximum(n_leds, 1), np.nan)),
+        leds_used=leds_used,
         distance=float(np.linalg.norm(state.between_rig)),
         uncertainty_without=COVERAGE_FACTOR * np.sqrt(np.diag(grown)[:3]),
         uncertainty_with=budget.expanded_uncertainty[:3],

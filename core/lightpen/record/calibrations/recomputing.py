@@ -7,6 +7,7 @@ showed is not judged again.
 
 from base64 import b64decode
 from binascii import Error as NoBase64
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
@@ -17,9 +18,14 @@ import numpy as np
 from lightpen.detection.observations import Observations, leave_out, observe_centers
 from lightpen.detection.rig_observations import at_moments
 from lightpen.errors import UsageError
+from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
-from lightpen.estimation.reports.calibration_record import CalibrationRecord
+from lightpen.estimation.reports.calibration_record import (
+    CalibrationRecord,
+    FrameRecord,
+)
 from lightpen.estimation.reports.methods import Method
+from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import printable
 from lightpen.formats.hashes import InputFile, Inputs, RigInputs
@@ -29,6 +35,7 @@ from lightpen.formats.own_json import DamagedError
 from lightpen.formats.pairing import NONE, Pairing
 from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import read_rig
+from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
@@ -61,14 +68,14 @@ def recompute(path: Path) -> Recomputed:
     Raises
     ------
     UsageError
-        It is of two cones, or does not hold the files.
+        It does not hold the files, or not the images in the second of two cones.
     FileError
         It cannot be read, or is not as it was written.
     CalibrationError
         It does not determine the tip.
     """
     record = read_calibration(path).calibration
-    if record.second_cone is not None:
+    if record.second_cone is not None and not record.second_cone.frames:
         raise UsageError("recompute.two-cones", path=printable(str(path)))
     found, limits = record.inputs, record.verdict.limits
     try:
@@ -89,9 +96,10 @@ def recompute(path: Path) -> Recomputed:
         else:
             rig = read_rig(_written(kept_rig, Path(folder, "rig")), cameras).rig
         pen = read_pen(pen_file, found.units, found.led_diameter_mm, nominal)
-    seen = [_observations(path, record, c, rig, pen) for c in range(rig.n_cameras)]
+    seen = [_of_camera(path, record, c, rig, pen) for c in range(rig.n_cameras)]
+    second = _second_swing(path, record, rig, pen)
     return Recomputed(
-        calibrate_rig(rig, pen, seen, record.assumptions),
+        calibrate_rig(rig, pen, seen, record.assumptions, second),
         Inputs(
             kept_cameras[0],
             kept_pen,
@@ -129,25 +137,28 @@ def _written(file: InputFile, place: Path) -> Path:
     return path
 
 
-def _observations(
+def _second_swing(
+    path: Path, record: CalibrationRecord, rig: Rig, pen: Pen
+) -> SecondSwing | None:
+    found = record.second_cone
+    if found is None:
+        return None
+    distance, sigma = found.stated_distance_mm, found.stated_standard_uncertainty_mm
+    assert distance is not None
+    assert sigma is not None
+    return SecondSwing(
+        _observations(path, record, found.frames, rig.cameras[0], pen),
+        ConeSeparation(distance, sigma),
+    )
+
+
+def _of_camera(
     path: Path, record: CalibrationRecord, c: int, rig: Rig, pen: Pen
 ) -> Observations:
-    """Return the detections of a camera, with the same images excluded."""
+    """Return the detections of a camera at the moments of its rig."""
     name = rig.names[c] if rig.names else ""
     frames = tuple(each for each in record.frames if each.camera == name)
-    shown = shown_images(record, frames)
-    pixels = np.where(shown.fit[..., None], shown.pixels, np.nan)
-    numbers = np.arange(1, len(frames) + 1)
-    seen = replace(
-        observe_centers(Centers(numbers, pixels, path), rig.cameras[c], pen),
-        names=tuple(frame.file for frame in frames),
-        seen_pixels=shown.pixels,
-        areas=shown.areas,
-        lamps=shown.lamps,
-        edge_widths=shown.edge_widths,
-        interval_ms=record.inputs.image_interval_ms,
-    )
-    seen = leave_out(seen, {i: f.reason for i, f in enumerate(frames) if f.reason})
+    seen = _observations(path, record, frames, rig.cameras[c], pen)
     if not rig.names:
         return seen
     n_moments = max(each.moment for each in record.frames)
@@ -156,3 +167,26 @@ def _observations(
         images[frame.moment - 1] = i
     (placed,) = at_moments([seen], Pairing(images))
     return placed
+
+
+def _observations(
+    path: Path,
+    record: CalibrationRecord,
+    frames: Sequence[FrameRecord],
+    camera: Camera,
+    pen: Pen,
+) -> Observations:
+    """Return the detections in images, with the same ones excluded."""
+    shown = shown_images(record, frames)
+    pixels = np.where(shown.fit[..., None], shown.pixels, np.nan)
+    numbers = np.arange(1, len(frames) + 1)
+    seen = replace(
+        observe_centers(Centers(numbers, pixels, path), camera, pen),
+        names=tuple(frame.file for frame in frames),
+        seen_pixels=shown.pixels,
+        areas=shown.areas,
+        lamps=shown.lamps,
+        edge_widths=shown.edge_widths,
+        interval_ms=record.inputs.image_interval_ms,
+    )
+    return leave_out(seen, {i: f.reason for i, f in enumerate(frames) if f.reason})
