@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from lightpen.formats.files import A_FILE, LARGEST_RECORD, read_bytes, write_whole
-from lightpen.record.exports.dcc import Laboratory
+from lightpen.model.laboratory import Laboratory
 from lightpen.record.exports.exports import save_new
 from lightpen.record.folder.verifications import is_verification
 from lightpen_app.application import has_display, make_application
@@ -69,7 +69,7 @@ def _write_verification(file: Path, out: Path | None, language: str) -> Path:
 
 
 def _laboratory() -> Laboratory | None:
-    """Return the laboratory that was named in the window."""
+    """Return the laboratory that was named in the window, or of this computer."""
     return Settings(settings_file()).laboratory()
 
 

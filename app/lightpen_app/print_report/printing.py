@@ -16,10 +16,10 @@ from PySide6.QtGui import (
 
 from lightpen.archive.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
-from lightpen.record.exports.dcc import Laboratory
 from lightpen.record.exports.exports import export_stem
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.print_report.blocks import DOTS_AN_INCH

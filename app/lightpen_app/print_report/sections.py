@@ -9,9 +9,9 @@ from PySide6.QtGui import QPainter
 
 from lightpen.archive.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
-from lightpen.record.exports.dcc import Laboratory
 from lightpen.record.exports.export_status import OVERDUE, RETIRED
 from lightpen.record.library.tip_library import ItemKind
 from lightpen.record.library.traceability import TracedItem
@@ -200,7 +200,7 @@ def environment_facts(
 
 def laboratory_blocks(laboratory: Laboratory | None) -> Iterable[Block]:
     """Return laboratory, place and procedure."""
-    known = laboratory or Laboratory("", "", "", "")
+    known = laboratory or Laboratory()
     place = (known.street, f"{known.post_code} {known.city}".strip(), known.country)
     yield from facts(
         [

@@ -14,8 +14,8 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.archive.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.hashes import InputFile
+from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
-from lightpen.record.exports.dcc import Laboratory
 from lightpen.record.folder.verifications import StoredVerification
 from lightpen.record.library.traceability import TracedItem
 from lightpen.verification.tasks.part import PART

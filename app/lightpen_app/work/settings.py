@@ -20,8 +20,8 @@ from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import LightpenError
 from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.messages import Message
+from lightpen.model.laboratory import Laboratory
 from lightpen.model.limits import DueRule, StationLimits
-from lightpen.record.exports.dcc import Laboratory
 from lightpen.streaming.server import StreamPlace
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen_app.look.languages import system_language
@@ -189,11 +189,11 @@ class Settings(QObject):
         self._save("last", {"export folder": folder})
 
     def laboratory(self) -> Laboratory | None:
-        """Return the laboratory that was named last in a certificate."""
+        """Return the laboratory that was named last, or that of this computer."""
         try:
             return in_shape(self._content["last"]["laboratory"], Laboratory)
         except (KeyError, DamagedError):
-            return None
+            return self._machine.laboratory
 
     def set_laboratory(self, laboratory: Laboratory) -> None:
         """Remember the laboratory that a certificate names."""

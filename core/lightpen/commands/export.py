@@ -1,15 +1,17 @@
 """``lightpen export``: a calibration in the formats of other programs."""
 
 import argparse
+from dataclasses import fields, replace
 from pathlib import Path
 
 from lightpen.archive.result_entry import with_entry
 from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
 from lightpen.formats.files import printable, write_whole
+from lightpen.formats.machine_settings import machine_settings
 from lightpen.local_time import local_now
+from lightpen.model.laboratory import PLACES, Laboratory, is_country
 from lightpen.record.calibrations.calibrations import read_calibration
-from lightpen.record.exports.dcc import PLACES, Laboratory, is_country
 from lightpen.record.exports.export_status import with_status
 from lightpen.record.exports.formats import FORMATS
 
@@ -52,24 +54,43 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--place",
         choices=PLACES,
-        default=PLACES[0],
-        help="for dcc: where it was calibrated",
+        default="",
+        help=f"for dcc: where it was calibrated ({PLACES[0]})",
     )
     for name, told in (LABORATORY | MORE_OF_IT).items():
         parser.add_argument(
-            f"--{name}", default="", metavar="TEXT", help=f"for dcc: {told}"
+            f"--{name}",
+            default="",
+            metavar="TEXT",
+            help=f"for dcc: {told} (default: of the settings of this computer)",
         )
 
 
 def _laboratory(options: argparse.Namespace) -> Laboratory:
-    missing = [f"--{name}" for name in LABORATORY if not getattr(options, name).strip()]
+    """Return the laboratory of the options, or that of this computer as they have it.
+
+    Raises
+    ------
+    UsageError
+        Something that a certificate needs is missing.
+    """
+    own = None if options.laboratory.strip() else machine_settings().laboratory
+    names = [item.name for item in fields(Laboratory)]
+    given = {name: getattr(options, name, "").strip() for name in names}
+    given["name"] = options.laboratory.strip()
+    chosen = {name: text for name, text in given.items() if text}
+    laboratory = replace(own or Laboratory(), **chosen)
+    missing = [
+        f"--{option}"
+        for option, name in zip(LABORATORY, names, strict=False)
+        if not getattr(laboratory, name)
+    ]
     if missing:
         raise UsageError("cli.laboratory-missing", options=", ".join(missing))
-    if not is_country(options.country):
-        country = printable(options.country)
+    if not is_country(laboratory.country):
+        country = printable(laboratory.country)
         raise UsageError("cli.no-country", country=country)
-    names = (*LABORATORY, "street", "post_code", "procedure", "place")
-    return Laboratory(*(getattr(options, name) for name in names))
+    return laboratory
 
 
 @printing

@@ -15,6 +15,7 @@ from lightpen.errors import FileError
 from lightpen.formats.files import MEGABYTE, printable, read_bytes
 from lightpen.formats.own_json import DamagedError, in_shape, parse_own_json
 from lightpen.messages import message
+from lightpen.model.laboratory import PLACES, Laboratory, is_country
 from lightpen.model.limits import LIMITS, StationLimits
 
 WHAT = message("file.machine-settings")
@@ -38,6 +39,8 @@ class MachineSettings:
         File with its certificate.
     limits : mapping of str to float
         Limits of new stations, by `lightpen.model.limits.Limit.key`.
+    laboratory : Laboratory or None
+        For certificates and reports.
     """
 
     language: str = ""
@@ -46,6 +49,7 @@ class MachineSettings:
     timestamp_authority: str = ""
     timestamp_certificate: str = ""
     limits: Mapping[str, float] = field(default_factory=dict)
+    laboratory: Laboratory | None = None
 
     def station_limits(self) -> StationLimits:
         """Return the limits of a new station."""
@@ -114,10 +118,20 @@ def machine_settings() -> MachineSettings:
             if not least <= value <= most:
                 raise DamagedError(f"{key} is {value}, not {least:g} to {most:g}")
         settings.station_limits()
+        _require_laboratory(entries.get("laboratory"), settings.laboratory)
     except ValueError as error:
         path = printable(str(file))
         raise FileError("machine-settings.wrong", file=path, why=str(error)) from error
     return settings
+
+
+def _require_laboratory(entries: object, found: Laboratory | None) -> None:
+    if found is None or not isinstance(entries, dict):
+        return
+    _require_known(entries, [item.name for item in fields(Laboratory)])
+    _require_known([found.place], PLACES)
+    if found.country and not is_country(found.country):
+        raise DamagedError(f"{found.country!r} is not a country code such as DE")
 
 
 def _require_known(names: Iterable[str], known: Collection[str]) -> None:

@@ -17,10 +17,10 @@ from lightpen.archive.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import write_whole
 from lightpen.formats.stored_messages import StoredMessage
+from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.calibrations.reestimated_poses import reestimate_poses
-from lightpen.record.exports.dcc import Laboratory
 from lightpen.record.library.traceability import TracedItem
 from lightpen.record.results.results import Result, result_bytes
 from lightpen.record.swings.names import Names

@@ -16,8 +16,8 @@ from PySide6.QtWidgets import QApplication
 from lightpen.archive.result_entry import ArchivePlace
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import message
+from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
-from lightpen.record.exports.dcc import Laboratory
 from lightpen.record.library.tip_library import ItemKind, ListedPen
 from lightpen.record.library.traceability import TracedItem
 from lightpen.record.results.results import Result, TipChange, result_bytes

@@ -16,6 +16,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
 from lightpen.formats.machine_settings import machine_file
+from lightpen.model.laboratory import Laboratory
 from lightpen.record.swings.names import Names
 from lightpen.swing.preparation import SourceChoice
 from lightpen.verification.session.choices import VerificationChoices
@@ -102,7 +103,8 @@ def test_what_the_administrator_set_is_below_what_the_user_chose(
     if not machine.is_relative_to(tmp_path):
         pytest.skip("This system has one folder for the settings of all users.")
     limits = {"max_uncertainty_mm": 0.02, "max_tip_mm": 0.05, "due_max_days": 14}
-    write(machine, {"language": "zh_CN", "limits": limits})
+    works = {"name": "Works 2", "procedure": "WI-0815"}
+    write(machine, {"language": "zh_CN", "limits": limits, "laboratory": works})
     before = machine.read_bytes()
     settings = Settings(tmp_path / "own" / "lightpen.json")
 
@@ -110,11 +112,15 @@ def test_what_the_administrator_set_is_below_what_the_user_chose(
     assert settings.station("new").limits.max_uncertainty == 0.02
     assert settings.station("new").verification.limits.tip == 0.05
     assert settings.due_rule().max_days == 14
+    assert settings.laboratory() == Laboratory(name="Works 2", procedure="WI-0815")
 
+    own = Laboratory(name="Hall 3", procedure="WI-1")
+    settings.set_laboratory(own)
     settings.set_preferences(replace(settings.preferences(), language="en"))
     settings.set_station("new", STATION)
     assert reopened(settings).preferences().language == "en"
     assert reopened(settings).station("new") == STATION
+    assert reopened(settings).laboratory() == own
     assert machine.read_bytes() == before
 
 

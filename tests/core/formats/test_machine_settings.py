@@ -15,6 +15,7 @@ from lightpen.formats.machine_settings import (
     machine_settings,
     read_update,
 )
+from lightpen.model.laboratory import Laboratory
 
 ADDRESS = "postgresql://archive.plant/lightpen"
 
@@ -46,6 +47,13 @@ def test_language_server_and_limits_are_read(file: Path) -> None:
     assert of_station.swing.max_uncertainty == 0.02
     assert of_station.verification.tip == 0.05
     assert of_station.due.max_days == 14
+
+
+def test_laboratory_and_procedure_are_read(file: Path) -> None:
+    file.write_text('{"laboratory": {"name": "Works 2", "procedure": "WI-0815"}}')
+
+    known = Laboratory(name="Works 2", procedure="WI-0815")
+    assert machine_settings().laboratory == known
 
 
 @pytest.mark.parametrize(
@@ -80,6 +88,10 @@ def test_a_file_that_names_no_version_is_told(
         ({"limits": {"max_uncertainty_mm": 200}}, "max_uncertainty_mm is 200"),
         ({"limits": {"due_max_days": 0}}, "due_max_days is 0"),
         ({"language": 5}, "language"),
+        ({"laboratory": {"procedures": "WI-0815"}}, "'procedures'"),
+        ({"laboratory": {"country": "Germany"}}, "'Germany' is not a country code"),
+        ({"laboratory": {"place": "moon"}}, "'moon' is none of: laboratory"),
+        ({"laboratory": "Works 2"}, "laboratory"),
         ([], "object"),
     ],
 )

@@ -6,7 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QDialog, QDialogButtonBox, QLineEdit, QWidget
 from typing_extensions import override
 
-from lightpen.record.exports.dcc import PLACES, Laboratory, is_country
+from lightpen.model.laboratory import PLACES, Laboratory, is_country
 from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.fitted_window import FittedWindow

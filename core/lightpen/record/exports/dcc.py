@@ -9,8 +9,6 @@ References
    (2017) 4, 75-81; https://www.ptb.de/dcc
 """
 
-import re
-from dataclasses import dataclass
 from datetime import datetime
 from itertools import combinations_with_replacement
 from xml.etree import ElementTree
@@ -19,6 +17,7 @@ from xml.etree.ElementTree import Element, SubElement
 from lightpen.estimation.reports.verdict import AXES
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.local_time import local_now
+from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.decision_rule import decision_rule
 from lightpen.record.exports.export_status import status_of
@@ -33,43 +32,11 @@ LANGUAGE = "en"
 MILLIMETRE, SQUARE_MILLIMETRE = r"\milli\metre", r"\milli\metre\tothe{2}"
 DEGREE_CELSIUS, PERCENT = r"\degreecelsius", r"\percent"
 PROBABILITY = 0.95
-PLACES = ("laboratory", "customer", "laboratoryBranch", "customerBranch", "other")
 UNSTATED = "not stated"
 NO_CERTIFICATE = (
     "Calibration record of a light pen and its tip. It is no certificate of an "
     "accredited laboratory, states no conformity, and relates only to the items named."
 )
-
-
-@dataclass(frozen=True)
-class Laboratory:
-    """Who calibrates and where, as the schema and reports state it.
-
-    Attributes
-    ----------
-    country : str
-        ISO 3166-1, two letters.
-    street, post_code : str
-        May be empty.
-    procedure : str
-        Name or number of the working instruction; may be empty.
-    place : str
-        Where it calibrates, one of `PLACES`.
-    """
-
-    name: str
-    email: str
-    city: str
-    country: str
-    street: str = ""
-    post_code: str = ""
-    procedure: str = ""
-    place: str = "laboratory"
-
-
-def is_country(code: str) -> bool:
-    """Return whether a text has the form of a country code of ISO 3166-1."""
-    return re.fullmatch("[A-Z]{2}", code) is not None
 
 
 def dcc_text(file: CalibrationFile, laboratory: Laboratory) -> str:

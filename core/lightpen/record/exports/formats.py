@@ -22,8 +22,9 @@ from lightpen.formats.files import printable
 from lightpen.formats.json_records import record_bytes
 from lightpen.local_time import local_time
 from lightpen.messages import Message, message
+from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import CalibrationFile
-from lightpen.record.exports.dcc import Laboratory, dcc_text
+from lightpen.record.exports.dcc import dcc_text
 from lightpen.record.exports.export_status import status_of
 
 MILLIMETRES = 1000.0  # in a metre, the unit of ROS

@@ -40,9 +40,9 @@ from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.model.laboratory import Laboratory
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
-from lightpen.record.exports.dcc import Laboratory
 from lightpen.record.exports.formats import FORMATS
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import ListedTip

@@ -18,9 +18,9 @@ from tests.aqdef import read_aqdef
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.json_records import record_bytes
+from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.record.exports.dcc import Laboratory
 from lightpen.record.exports.export_status import (
     OVERDUE,
     RETIRED,
