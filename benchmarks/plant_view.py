@@ -20,7 +20,8 @@ from benchmarks.rows import Row, table
 
 DASHBOARD = Path(__file__).parents[1] / "docs" / "grafana" / "plant.json"
 N_ENTRIES, N_PENS, N_TIPS, N_STATIONS = 100_000, 10, 40, 20
-N_TIMED, MAX_MS = 5, 300.0
+N_TIMED = 20
+MAX_MS = 150.0  # of processor time, which other programs do not lengthen
 VALUES = {
     "pen": "LP-1",
     "tip": "T-1",
@@ -52,19 +53,21 @@ UPDATE archive_entries b SET concerns = e.sha256 FROM archive_entries e
 
 
 def dashboard_queries(values: Mapping[str, object]) -> dict[str, str]:
-    """Return the query of each panel by its title, with these values of variables."""
+    """Return the query of each panel and variable by its title, with these values."""
     content = json.loads(DASHBOARD.read_text("utf-8"))
-    queries = {}
-    for panel in content["panels"]:
-        sql = panel["targets"][0]["rawSql"]
-        for name, value in values.items():
-            sql = sql.replace(f"${name}", str(value))
-        queries[panel["title"]] = sql
+    queries = {
+        panel["title"]: panel["targets"][0]["rawSql"] for panel in content["panels"]
+    }
+    for variable in content["templating"]["list"]:
+        if variable["type"] == "query":
+            queries[f"choice of {variable['name']}"] = variable["query"]
+    for name, value in values.items():
+        queries = {k: sql.replace(f"${name}", str(value)) for k, sql in queries.items()}
     return queries
 
 
 def plant_view_rows() -> list[Row]:
-    """Return how long each query takes."""
+    """Return the processor time of each query, and how long it took."""
     programs = postgres_programs()
     if programs is None:
         return [Row("queries of the Grafana dashboard", "needs PostgreSQL")]
@@ -92,22 +95,31 @@ def _rows(server: Postgres) -> list[Row]:
         )  # as the server itself does
     rows = []
     with psycopg.connect(server.new_role(address, "lightpen_auditor")) as connection:
+        # So that one process does it all, whose time is known.
+        connection.execute("SET max_parallel_workers_per_gather = 0")
         for title, sql in dashboard_queries(VALUES).items():
-            times = []
+            times, work = [], []
             for _ in range(N_TIMED):
-                start = time.perf_counter()
+                start, done = time.perf_counter(), _work_ms(connection.info.backend_pid)
                 n_rows = len(connection.execute(sql.encode()).fetchall())
                 times.append(1000 * (time.perf_counter() - start))
-            median = statistics.median(times)
+                work.append(_work_ms(connection.info.backend_pid) - done)
             rows.append(
                 Row(
-                    f"dashboard on {N_ENTRIES:,} entries, {title}: {n_rows} rows",
-                    f"{median:.0f} ms, at most {max(times):.0f}",
-                    f"{MAX_MS:g} ms",
-                    met=median <= MAX_MS and n_rows > 0,
+                    f"dashboard on {N_ENTRIES:,} entries, {title}, {n_rows} rows: "
+                    f"processor time, {N_TIMED} times; elapsed beside other programs",
+                    f"{statistics.median(work):.0f} ms, at most {max(work):.0f}; "
+                    f"{statistics.median(times):.0f} ms",
+                    f"<= {MAX_MS:g} ms; -",
+                    met=max(work) <= MAX_MS and n_rows > 0,
                 )
             )
     return rows
+
+
+def _work_ms(process: int) -> float:
+    """Return the processor time that a process of Linux took so far."""
+    return int(Path(f"/proc/{process}/schedstat").read_text().split()[0]) / 1e6
 
 
 def main() -> int:
