@@ -19,6 +19,7 @@ from lightpen.archive.logbook import ARCHIVE
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
+from lightpen.record.folder.verifications import read_verification
 from lightpen.record.swings.names import Names
 from lightpen.simulator.swings import PAPER_TIP, simulate_centers, swing_poses
 from lightpen.swing.preparation import Preparation
@@ -101,6 +102,25 @@ def test_a_verification_of_an_accepted_tip_is_entered_beside_it(
     assert "No change was found: 2 entries, 2 files, tips recomputed: 1." in (
         checked.stdout
     )
+
+
+def test_conditions_that_are_given_are_in_the_record(
+    verify: Verify, tmp_path: Path
+) -> None:
+    verify("--pen-temperature", "23.4", "--humidity", "41")
+
+    kept = tmp_path / "data" / "simulated" / "verifications" / "000001.json"
+    done = read_verification(kept.read_bytes(), kept)
+    assert (done.temperature_c, done.humidity_percent) == (23.4, 41.0)
+    assert len(done.camera_serials) == 1
+
+
+def test_conditions_out_of_range_are_refused(verify: Verify) -> None:
+    for option, number in (("--pen-temperature", "500"), ("--humidity", "101")):
+        outcome = verify(option, number)
+
+        assert outcome.returncode == 2
+        assert option in outcome.stderr
 
 
 def test_a_verification_that_fails_is_entered_as_refused(

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpen.formats.pen_content import UNITS
+from lightpen.model.assumptions import COLDEST, WARMEST
 from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import LIMITS, VerificationLimits
 
@@ -101,6 +102,32 @@ def add_pen_options(parser: argparse.ArgumentParser) -> None:
         type=finite,
         metavar="MM",
         help="diameter of the LED discs if the LED file does not state it (10)",
+    )
+
+
+def add_conditions(
+    parser: argparse.ArgumentParser, *names: str, meaning: str = "for the record"
+) -> None:
+    """Add what was measured of the environment.
+
+    Parameters
+    ----------
+    names : str
+        Other names of the option for the temperature of the pen.
+    meaning : str
+        What the temperature is for.
+    """
+    parser.add_argument(
+        *(*names, "--pen-temperature"),
+        type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),
+        metavar="CELSIUS",
+        help=f"pen temperature, {meaning}",
+    )
+    parser.add_argument(
+        "--humidity",
+        type=number_from(0.0, 100.0, "relative humidity", "%"),
+        metavar="PERCENT",
+        help="relative humidity, for the record",
     )
 
 

@@ -4,17 +4,17 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from lightpen.commands.arguments import add_json, add_pen_options, finite, number_from
+from lightpen.commands.arguments import (
+    add_conditions,
+    add_json,
+    add_pen_options,
+    finite,
+    number_from,
+)
 from lightpen.errors import UsageError
 from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.reports.methods import METHODS
-from lightpen.model.assumptions import (
-    COLDEST,
-    USUAL,
-    WARMEST,
-    Assumptions,
-    with_focal_length,
-)
+from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
 
 SMALLEST_SHARE, LARGEST_SHARE = 1e-9, 0.1
 
@@ -84,18 +84,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
             "the LED file states none"
         ),
     )
-    parser.add_argument(
-        "--temperature",
-        type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),
-        metavar="CELSIUS",
-        help="pen temperature during the swing, for thermal expansion",
-    )
-    parser.add_argument(
-        "--humidity",
-        type=number_from(0.0, 100.0, "relative humidity", "%"),
-        metavar="PERCENT",
-        help="relative humidity during the swing, for the record",
-    )
+    add_conditions(parser, "--temperature", meaning="for thermal expansion")
     parser.add_argument(
         "--temperature-sigma",
         type=number_from(0.001, 50.0, "uncertainty", "K"),

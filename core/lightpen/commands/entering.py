@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lightpen.commands.arguments import add_conditions
 from lightpen.commands.console import shown, write_record
 from lightpen.local_time import local_now
 from lightpen.model.limits import StationLimits
@@ -17,11 +18,14 @@ from lightpen.record.library.tip_library import read_library
 from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.names import Names
-from lightpen.verification.storage.verification_files import keep_verification
+from lightpen.verification.storage.verification_files import (
+    conditions_entries,
+    keep_verification,
+)
 
 
 def add_entering(parser: argparse.ArgumentParser) -> None:
-    """Add whether and where a verification is entered."""
+    """Add whether, where and with what besides a verification is entered."""
     place = parser.add_mutually_exclusive_group()
     place.add_argument(
         "--data",
@@ -38,6 +42,7 @@ def add_entering(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="operator of the entry (default: of the result)",
     )
+    add_conditions(parser)
 
 
 def keep_record(
@@ -67,7 +72,10 @@ def keep_record(
         origin = Origin.SIMULATED
     if options.operator is not None:
         names = replace(names, operator=options.operator)
-    record = attributed(record, names, origin or own)
+    record = {
+        **attributed(record, names, origin or own),
+        **conditions_entries(options.pen_temperature, options.humidity),
+    }
     if options.json is not None:
         write_record(options.json, record)
     data = options.data or (None if tip is None else data_folder_of(tip.path))

@@ -27,6 +27,7 @@ from lightpen.verification.probing.drift_reference import (
 )
 from lightpen.verification.reports.records import verification_record
 from lightpen.verification.reports.summaries import found_text
+from lightpen.verification.storage.verification_files import camera_serials
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
 from lightpen.verification.tasks.probed_point import rejected_entries
@@ -105,6 +106,7 @@ def _measure(given: argparse.Namespace) -> int:
     record = verification_record(
         PART.kind,
         {
+            "camera_serials": camera_serials(measured.instrument),
             **PART.entries(found, measured.instrument),
             "rejected": rejected_entries(measured.rejected),
             "witness": lamp_drift_entries(measured.lamp_drift),

@@ -10,6 +10,7 @@ import numpy as np
 
 from lightpen.commands.arguments import (
     above_zero,
+    add_conditions,
     add_json,
     add_limits,
     add_verdict,
@@ -31,6 +32,10 @@ from lightpen.verification.probing.drift_reference import (
 )
 from lightpen.verification.reports.records import verification_record
 from lightpen.verification.reports.summaries import found_text, touches_text
+from lightpen.verification.storage.verification_files import (
+    camera_serials,
+    conditions_entries,
+)
 from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.probed_point import (
     ProbedPoint,
@@ -141,6 +146,7 @@ def _add_touches(parser: argparse.ArgumentParser) -> None:
         ),
     )
     _add_common(parser)
+    add_conditions(parser)
 
 
 def _add_runs(parser: argparse.ArgumentParser, what: str) -> None:
@@ -226,7 +232,10 @@ def _touches(options: argparse.Namespace) -> None:
     print(shown(touches_text(touches, instrument, measured.rejected)))
     _print_lamp_drift(measured)
     if options.json is not None:
-        entries = {"touches": point_entries(touches, instrument)}
+        entries = {
+            **conditions_entries(options.pen_temperature, options.humidity),
+            "touches": point_entries(touches, instrument),
+        }
         write_record(options.json, _record(options, measured, "touches", entries, None))
 
 
@@ -264,6 +273,7 @@ def _record(
     return verification_record(
         kind,
         {
+            "camera_serials": camera_serials(measured.instrument),
             **entries,
             "rejected": rejected_entries(measured.rejected),
             "witness": lamp_drift_entries(measured.lamp_drift),

@@ -10,6 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import file_entry, json_bytes, record_bytes
 from lightpen.formats.own_json import with_checksum
@@ -120,8 +121,8 @@ def task_record(
             "pen": names.pen,
             "tip": names.tip,
             "origin": images.origin,
-            "camera_serials": [each.serial for each in tip.instrument.rig.cameras],
-            **measured_conditions(tip),
+            "camera_serials": camera_serials(tip.instrument),
+            **conditions_entries(tip.temperature_c, tip.humidity_percent),
             **task.entries(found, tip.instrument),
             "rejected": rejected_entries(images.rejected),
             "witness": lamp_drift_entries(images.lamp_drift),
@@ -142,12 +143,16 @@ def task_record(
     )
 
 
-def measured_conditions(tip: CurrentTip) -> dict[str, float]:
+def camera_serials(instrument: Instrument) -> list[str]:
+    """Return the serial number of each camera, as an entry of a record."""
+    return [each.serial for each in instrument.rig.cameras]
+
+
+def conditions_entries(
+    temperature_c: float | None, humidity_percent: float | None
+) -> dict[str, float]:
     """Return what was measured of the environment, as entries of a record."""
-    conditions = {
-        "temperature_c": tip.temperature_c,
-        "humidity_percent": tip.humidity_percent,
-    }
+    conditions = {"temperature_c": temperature_c, "humidity_percent": humidity_percent}
     return {name: each for name, each in conditions.items() if each is not None}
 
 
