@@ -1,4 +1,4 @@
-"""45 sessions of each verification task: what passes, what is found, what U covers."""
+"""300 sessions of each verification task: what passes, what is found, what U covers."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -26,7 +26,7 @@ from lightpen.verification.tasks.repeatability import TipEstimate, measure_repea
 from lightpen.verification.tasks.task import Found
 from lightpen.verification.tasks.tip_evidence import TipEvidence
 
-N_STATIONS = 45
+N_STATIONS = 300
 MIN_PASSED, MIN_FOUND = 0.95, 0.9
 WRONG = 0.02  # mm
 BY_DEFAULT = "fixed point"  # which must find it, whatever it claims
