@@ -31,8 +31,12 @@ from lightpen.record.library.tip_library import library_files
 from lightpen.record.results.result_folder import FolderArchive
 
 
-class _Created(Struct):
+class _Calibrated(Struct):
     created: ZonedTime
+
+
+class _Accepted(Struct):
+    calibration: _Calibrated
 
 
 def check_notes(database: Database, data: Path) -> Iterator[Message]:
@@ -97,8 +101,8 @@ def _impossible_times(database: Database, home: str) -> Iterator[Message]:
             before = event.at
             record = records.get(event.record_sha256 or "", "")
             try:
-                created = parse_own_json(record.encode(), _Created).created
+                whole = parse_own_json(record.encode(), _Accepted)
             except (DamagedError, FileError, UnicodeEncodeError):
                 continue
-            if event.at < created.replace(microsecond=0):
+            if event.at < whole.calibration.created.replace(microsecond=0):
                 yield message("archive.accepted-too-early", number=number)

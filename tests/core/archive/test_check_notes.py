@@ -3,17 +3,15 @@
 import shutil
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
 import pytest
 from msgspec import structs
-from tests.core.archive.conftest import accepted
 from tests.core.archive.test_logbook import result
 
-from lightpen.archive.chains import append
 from lightpen.archive.check import check_file
-from lightpen.archive.entries import text_sha256
 from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.archive.seal import seal_of
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
@@ -53,11 +51,10 @@ def test_a_file_without_an_entry_is_noted(data: Path) -> None:
 
 
 def test_impossible_times_are_noted(data: Path) -> None:
+    usual = result(data, 2)
+    early = usual.accepted - timedelta(days=1)
+    calibration = structs.replace(usual.calibration, created=usual.accepted)
+    FolderArchive(data).store(replace(usual, accepted=early, calibration=calibration))
     with closing(Logbook(data)) as logbook:
-        event, _ = accepted(3)
-        early = event.at - timedelta(days=4000)
-        record = f'{{"created": "{event.at.isoformat()}", "inputs": {{}}}}'
-        digest = text_sha256(record)
-        event = structs.replace(event, at=early, record_sha256=digest)
-        append(logbook.database, logbook.chain, event, record)
+        assert logbook.enter_owed() == ()
     assert notes(data) == {"archive.clock-back", "archive.accepted-too-early"}
