@@ -27,6 +27,7 @@ from lightpen_app.print_report.pages import Margins, PrintReport, lay_out, paint
 from lightpen_app.print_report.sections import (
     all_sections,
     record_number,
+    status_words,
     title_text,
     translate,
 )
@@ -116,7 +117,7 @@ def _margins(calibration_file: CalibrationFile) -> Margins:
 
 
 def _badges(calibration_file: CalibrationFile) -> tuple[str, ...]:
-    """Return the badges: origin, grade, and whether the result is current."""
+    """Return the badges: origin, grade, acceptance, and status of pen and tip."""
     badges = []
     if calibration_file.origin is not Origin.LIVE:
         badges.append(origin_text(calibration_file.origin))
@@ -124,4 +125,4 @@ def _badges(calibration_file: CalibrationFile) -> tuple[str, ...]:
         badges.append(grade_text(calibration_file.grade))
     if calibration_file.accepted is None:
         badges.append(translate("paper", "NOT ACCEPTED"))
-    return tuple(badges)
+    return (*badges, *status_words(calibration_file))

@@ -316,12 +316,16 @@ def _status(calibration_file: CalibrationFile) -> str:
     """Return what the library says of pen and tip."""
     if calibration_file.due is None:
         return stated("")
+    return ", ".join(status_words(calibration_file)) or translate("paper", "valid")
+
+
+def status_words(calibration_file: CalibrationFile) -> tuple[str, ...]:
+    """Return why pen or tip are not valid."""
     words = {
         RETIRED: translate("paper", "RETIRED"),
         OVERDUE: translate("paper", "OVERDUE"),
     }
-    status = [words[each] for each in calibration_file.library_status]
-    return ", ".join(status) or translate("paper", "valid")
+    return tuple(words[each] for each in calibration_file.library_status)
 
 
 def _method(method: str) -> str:

@@ -85,10 +85,13 @@ def printed(tmp_path: Path) -> Callable[..., PrintReport]:
         entered: ArchivePlace | None = None,
         traced: tuple[TracedItem, ...] = (),
         laboratory: Laboratory | None = None,
+        status: tuple[str, ...] = (),
     ) -> PrintReport:
         path = tmp_path / "000017.json"
         write_whole(path, result_bytes(result, "records/1"))
-        calibration_file = replace(read_calibration(path), traced=traced)
+        calibration_file = replace(
+            read_calibration(path), traced=traced, library_status=status
+        )
         poses = reestimate_poses(calibration_file.calibration)
         return paper_of(calibration_file, poses, entered, laboratory)
 

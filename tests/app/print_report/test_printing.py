@@ -18,6 +18,7 @@ from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import message
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
+from lightpen.record.exports.export_status import OVERDUE, RETIRED
 from lightpen.record.library.tip_library import ItemKind, ListedPen
 from lightpen.record.library.traceability import TracedItem
 from lightpen.record.results.results import Result, TipChange, result_bytes
@@ -61,6 +62,13 @@ def test_a_tip_that_passed_before_a_live_camera_has_no_mark(
     assert printed(result).margins.badges == ()
     simulated = replace(result, origin=Origin.SIMULATED)
     assert printed(simulated).margins.badges == ("SIMULATED",)
+
+
+def test_every_page_says_that_a_tip_is_retired_or_overdue(
+    result: Result, printed: Printed, words: Words
+) -> None:
+    for page in words(printed(result, status=(RETIRED, OVERDUE))):
+        assert {"RETIRED", "OVERDUE"} <= set(page)
 
 
 def test_a_tip_that_is_in_force_again_is_told_to_be_so(
