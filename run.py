@@ -31,8 +31,8 @@ Each command first sets up whatever it needs."""
 
 ROOT = Path(__file__).resolve().parent
 PIP = "pip>=25.1"
-# All tests of a file in one process: what they share is made once. Many tests wait for a
-# camera or a clock: a process more than there are cores.
+# All tests of a file in one process: what they share is made once. Many tests wait for
+# a camera or a clock: a process more than there are cores.
 PARALLEL = (
     *("--numprocesses", str(1 + (os.cpu_count() or 1))),
     *("--dist", "loadfile", "--no-loadscope-reorder"),

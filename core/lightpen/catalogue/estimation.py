@@ -21,6 +21,7 @@ MESSAGES = {
     "calibrate.images-left-out": "{usable} (excluded: {left_out})",
     "calibrate.too-few-images": "{usable}; the tip needs at least {needed}. {advice}",
     "calibrate.leds-do-not-fit": "LED positions and images disagree: {sigma:.1f} px; usual is {usual} px or less. Check that the LED file belongs to this pen with its LEDs in order, and the camera file to this camera.",
+    "calibrate.leds-do-not-fit-nor-tip": "LED positions and images disagree: {sigma:.2f} px; usual is {usual} px or less. The tip seems to move, too. First check that the LED file belongs to this pen with its LEDs in order, and the camera file to this camera, lens and focus; then that the tip was pressed into the cone.",
     "monte-carlo.confirms": "Monte Carlo confirms U: the largest difference is {percent:.0f} % along {axis}, with a standard error of {own:.0f} %.",
     "monte-carlo.less": "Monte Carlo gives less: U is {percent:.0f} % larger along {axis} (standard error {own:.0f} %), on the safe side. It counts seat, drift and assumed values in full; each trial corrects what its images show of them.",
     "monte-carlo.more": "Monte Carlo gives more: U is {percent:.0f} % smaller along {axis} (standard error {own:.0f} %). The calibration is not linear within the uncertainties of its files. State U by Monte Carlo, or reduce these uncertainties and tilt the pen farther.",

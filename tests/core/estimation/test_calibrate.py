@@ -161,7 +161,7 @@ def test_what_was_left_out_is_counted_when_too_few_images_remain() -> None:
     [
         (0.02, "times the image noise"),
         # The files are more likely at fault.
-        (0.5, "LED positions and images disagree: 0.5 px"),
+        (0.5, "LED positions and images disagree: 0.47 px"),
     ],
 )
 def test_a_tip_that_was_not_in_the_cone_is_refused(noise: float, words: str) -> None:

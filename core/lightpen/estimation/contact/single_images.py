@@ -88,9 +88,11 @@ def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedIm
             poses.covariances[fitting],
         )
     except CalibrationError as error:
-        if error.message.code == "pivot.tip-moved":
-            require_fit(poses.sigma, DOUBTFUL_SIGMA)
-        raise
+        if error.message.code != "pivot.tip-moved" or poses.sigma <= USUAL_SIGMA:
+            raise
+        raise CalibrationError(
+            "calibrate.leds-do-not-fit-nor-tip", sigma=poses.sigma, usual=USUAL_SIGMA
+        ) from error
     outliers = posed[fitting][~pivot.used]
     distances = np.linalg.norm(pivot.residuals[~pivot.used], axis=1)
     smeared = _smeared(observations)[outliers] & (distances < MAX_SMEAR)
@@ -106,7 +108,7 @@ def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedIm
     )
 
 
-def require_fit(sigma: float, most: float = MAX_SIGMA) -> None:
+def require_fit(sigma: float) -> None:
     """Refuse LEDs that lie farther off the model than any that was measured, px.
 
     Raises
@@ -114,7 +116,7 @@ def require_fit(sigma: float, most: float = MAX_SIGMA) -> None:
     CalibrationError
         Names the files that may be of others.
     """
-    if sigma > most:
+    if sigma > MAX_SIGMA:
         raise CalibrationError(
             "calibrate.leds-do-not-fit", sigma=sigma, usual=USUAL_SIGMA
         )
