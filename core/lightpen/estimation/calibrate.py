@@ -473,12 +473,14 @@ def _adjust_jointly(
     # Of several cameras each has lamps of its own, and what they leave is not fitted.
     is_one = rig.n_cameras == 1 and second is None
     shifts = path.shifts[moments] if is_one and path is not None else None
+    sigmas = np.stack([each.sigmas for each in single.observations], axis=1)[moments]
     others = None
     if second is not None:
         others = second_images(rig.cameras[0], pen, second)
         state, pixels = others.joined(state, pixels)
+        sigmas = np.concatenate([sigmas, others.sigmas[:, None]])
         priors = replace(priors, separation=second.separation)
-    adjustment = adjust(state, pixels, priors, start.extrinsics, shifts)
+    adjustment = adjust(state, pixels, priors, start.extrinsics, shifts, sigmas)
     bundle, found = adjustment.bundle, adjustment.bundle.state
     n = len(moments)
     corrected = (pixels - bundle.effect_shifts)[:n]

@@ -68,7 +68,7 @@ def check_prediction(
         Observed minus modelled centres at the state, px; a move of the pen as a whole
         makes no difference.
     used : (N, C, L) array of bool
-    noise : (C, L) or (N, C, L) array
+    noise : (N, C, L) array
         Noise of the LEDs' centres, by that of a usual one.
     correlation_factor : float
         Factor on the variance of a mean by noise that is correlated between images.
@@ -82,7 +82,7 @@ def check_prediction(
     J = np.stack(
         [np.concatenate([view.turn, view.cone], axis=-1) for view in views], axis=1
     )
-    weights = np.where(used, 1 / np.broadcast_to(noise, used.shape), 0.0)[..., None]
+    weights = np.where(used, 1 / noise, 0.0)[..., None]
     # LEDs that few images use, or none, would leave no image that uses all.
     seen = np.asarray(used.any(axis=1))
     taking_part = seen.mean(axis=0) >= MOSTLY_USED

@@ -22,7 +22,7 @@ from lightpen.estimation.bundle.consistency_findings import (
     find_pen_contradictions,
 )
 from lightpen.estimation.bundle.effect_search import SearchedEffect, search_effects
-from lightpen.estimation.bundle.led_noise import find_led_noise
+from lightpen.estimation.bundle.led_noise import find_center_noise, find_led_noise
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.noise_correlation import (
     Correlation,
@@ -89,6 +89,7 @@ def adjust(
     priors: Priors,
     places: FloatArray | None = None,
     shifts: FloatArray | None = None,
+    sigmas: FloatArray | None = None,
 ) -> Adjustment:
     """Run the adjustment; release priors that the images contradict.
 
@@ -103,6 +104,8 @@ def adjust(
         `Rig.covariance`, rad and mm.
     shifts : (N, k) array, optional
         Shifts of fixed lamps in view, px, along which the cone may drift.
+    sigmas : (N, C, L) array, optional
+        Standard deviation of each centre by its detector, px.
 
     Raises
     ------
@@ -113,7 +116,9 @@ def adjust(
     fit = partial(fit_bundle, pixels, state, modes=modes, places=places)
 
     def consistent_fit(inflation: float) -> _ConsistentFit:
-        return _fit_consistent(partial(fit, inflation=inflation), pixels, state, priors)
+        return _fit_consistent(
+            partial(fit, inflation=inflation), pixels, state, priors, sigmas
+        )
 
     inflation = 1.0
     fitted = consistent_fit(inflation)
@@ -139,16 +144,26 @@ def adjust(
 
 
 def _fit_consistent(
-    fit: "partial[Bundle]", pixels: FloatArray, state: BundleState, priors: Priors
+    fit: "partial[Bundle]",
+    pixels: FloatArray,
+    state: BundleState,
+    priors: Priors,
+    sigmas: FloatArray | None,
 ) -> _ConsistentFit:
     """Fit again and again, with contradicted numbers released, until none is left."""
     rig, bundle = state.rig, fit(priors)
+    of_centers = None
+    if sigmas is not None:
+        of_centers = find_center_noise(bundle.residuals, bundle.used, sigmas)
+    if of_centers is not None:
+        fit = partial(fit, noise=of_centers)
+        bundle = fit(priors)
     effects = search_effects(bundle, pixels, priors.compliance)
     candidates = tuple(each.effect for each in effects if each.is_candidate)
     if candidates:
         fit = partial(fit, effects=candidates)
         bundle = fit(priors)
-    fit, bundle = _with_led_noise(fit, bundle, priors)
+    fit, bundle = _with_led_noise(fit, bundle, priors, of_centers)
     correlation = measure_correlation(bundle, pixels)
     inputs = ContradictedInputs(priors)
     for _ in range(MAX_RELEASES):
@@ -168,15 +183,23 @@ def _fit_consistent(
 
 
 def _with_led_noise(
-    fit: "partial[Bundle]", bundle: Bundle, priors: Priors
+    fit: "partial[Bundle]",
+    bundle: Bundle,
+    priors: Priors,
+    of_centers: FloatArray | None,
 ) -> tuple["partial[Bundle]", Bundle]:
-    """Weigh each LED by its noise, where these differ, until it settles."""
+    """Weigh each LED by its noise, where these differ, until it settles.
+
+    ``of_centers`` (N, C, L) is that of single centres, if these differ.
+    """
+    known = np.ones_like(bundle.unknowns.noise) if of_centers is None else of_centers
+    weights = np.ones(known.shape[1:])
     for _ in range(NOISE_ROUNDS):
-        weights = bundle.unknowns.noise
-        noise = find_led_noise(bundle.residuals, bundle.used, bundle.sigma, weights)
+        left = bundle.residuals / known[..., None]
+        noise = find_led_noise(left, bundle.used, bundle.sigma, weights)
         if noise is None or np.abs(noise / weights - 1).max() < NOISE_SETTLED:
             break
-        fit = partial(fit, noise=noise)
+        weights, fit = noise, partial(fit, noise=known * noise)
         bundle = fit(priors)
     return fit, bundle
 

@@ -84,6 +84,9 @@ def search_effects(
         compliance,
     )
     columns = np.concatenate([each.columns for each in effects], axis=-1)
+    noise = bundle.unknowns.noise
+    views = tuple(view.in_units_of(noise[:, c]) for c, view in enumerate(views))
+    columns = columns / noise[..., None, None]
     own, with_others, right = _information(bundle, views, columns, used, sigma)
     at_best = inverse(bundle.covariance) @ bundle.values
     start = bundle.values if residuals_at is None else residuals_at
@@ -192,5 +195,6 @@ def _information(
     cones = by_cone + np.swapaxes(coupled, 1, 2) @ to_inner
     shifted = np.tensordot(unknowns.forms, cones, ([0], [0])).reshape(-1, E)
     with_others = np.concatenate([unknowns.mixing.T @ with_columns, shifted])
-    residuals = np.where(used[..., None], bundle.residuals, 0.0) / sigma
+    residuals = bundle.residuals / unknowns.noise[..., None]
+    residuals = np.where(used[..., None], residuals, 0.0) / sigma
     return own, with_others, flat.T @ residuals.ravel()

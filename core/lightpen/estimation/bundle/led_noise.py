@@ -1,4 +1,7 @@
-"""Noise of each LED as a variance component.
+"""Noise of each centre by its detector, and of each LED as a variance component.
+
+What the detector states of a centre is compared with other centres alone, and taken to
+the power by which the residuals are likeliest: 0 where they do not follow it.
 
 The logarithms of the LEDs' variances are normal about a common mean. Their spread is
 that beyond what as few residuals scatter by, and each is shrunk to the mean by what is
@@ -14,6 +17,35 @@ from lightpen.model.quantiles import chi_square_quantile
 WORTH_IT = 1.25  # times the noise of another LED; less is not worth a new fit
 MIN_FREE = 10.0  # degrees of freedom of an LED that is distinguished
 LEAST = 1e-12  # px^2
+POWERS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+
+
+def find_center_noise(
+    residuals: FloatArray, used: BoolArray, sigmas: FloatArray
+) -> FloatArray | None:
+    """Return the noise of centres over that of a usual one, (N, C, L); None if equal.
+
+    Parameters
+    ----------
+    residuals : (N, C, L, 2) array
+        px.
+    used : (N, C, L) array of bool
+    sigmas : (N, C, L) array
+        Standard deviation of each centre by its detector, px; NaN where not seen.
+    """
+    known = used & np.isfinite(sigmas)
+    if not known.any() or sigmas[known].min() == sigmas[known].max():
+        return None
+    ratios = np.where(np.isfinite(sigmas), sigmas, np.nan) / np.median(sigmas[known])
+    ratios = np.where(np.isfinite(ratios), ratios, 1.0)
+    squares, logs = np.sum(residuals[known] ** 2, axis=-1), np.log(ratios[known])
+    # Minus twice the logarithm of the likelihood, with the likeliest common factor.
+    means = [np.mean(squares * np.exp(-2 * power * logs)) for power in POWERS]
+    costs = 2 * len(logs) * np.log(np.maximum(means, LEAST)) + 4 * POWERS * logs.sum()
+    best = int(np.argmin(costs))
+    if costs[0] - costs[best] < chi_square_quantile(1, CERTAIN):
+        return None
+    return np.asarray(ratios ** POWERS[best])
 
 
 def find_led_noise(

@@ -69,7 +69,7 @@ class Unknowns:
         Move of the LEDs by a scale of 1.
     effects : tuple of Effect
         That are fitted.
-    noise : (C, L) or (N, C, L) array
+    noise : (N, C, L) array
         Noise of the LEDs' centres, by that of a usual one.
     """
 
@@ -149,7 +149,10 @@ class Unknowns:
         return cls(
             *(layout, start, mixing, forms, given.oval, basis, scaling, priors),
             effects,
-            np.ones((rig.n_cameras, n_leds)) if noise is None else noise,
+            np.broadcast_to(
+                1.0 if noise is None else noise,
+                (len(start.rotations), rig.n_cameras, n_leds),
+            ),
         )
 
     def views_at(
@@ -157,10 +160,7 @@ class Unknowns:
     ) -> tuple[CameraView, ...]:
         """Linearise the images about a state, each LED in units of its noise."""
         views = views_at(state, pixels, self.effect_columns)
-        return tuple(
-            view.in_units_of(np.broadcast_to(self.noise, pixels.shape[:-1])[:, c])
-            for c, view in enumerate(views)
-        )
+        return tuple(view.in_units_of(self.noise[:, c]) for c, view in enumerate(views))
 
     @property
     def effect_columns(self) -> FloatArray | None:

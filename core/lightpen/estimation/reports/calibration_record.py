@@ -368,8 +368,15 @@ class InputsRecord(Struct, frozen=True, omit_defaults=True):
     cameras: tuple[FileRecord, ...] = ()
 
 
-class SpotRecord(Struct, frozen=True):
-    """The image of an LED: its centre, and whether it was usable and used."""
+class SpotRecord(Struct, frozen=True, omit_defaults=True):
+    """The image of an LED: its centre, and whether it was usable and used.
+
+    Attributes
+    ----------
+    sigma_px
+        Standard deviation of a coordinate by detection, of an LED too small to have an
+        edge; it weights the LED.
+    """
 
     led: Place
     x_px: Length
@@ -377,6 +384,7 @@ class SpotRecord(Struct, frozen=True):
     area_px2: Length | None
     fit: bool
     used: bool
+    sigma_px: Length | None = None
 
 
 class FrameRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):

@@ -7,6 +7,7 @@ from msgspec import structs
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
+from lightpen.detection.spots import EXACT_SIGMA
 from lightpen.estimation.calibrate import Calibration, CameraImages
 from lightpen.estimation.reports.calibration_record import (
     AdjustedParameter,
@@ -355,6 +356,9 @@ def _frames_of(images: CameraImages | SecondCone) -> Iterator[FrameRecord]:
     observations = images.observations
     pixels, areas = plain(observations.seen_pixels), plain(observations.areas)
     fit = np.isfinite(observations.pixels[..., 0]).tolist()
+    sigmas = observations.sigmas
+    usual = ~np.isfinite(sigmas) | (sigmas == EXACT_SIGMA)
+    sigmas = plain(np.where(usual, np.nan, sigmas))
     rms, widths = plain(images.rms), plain(observations.edge_widths)
     leds_used, lamps = images.leds_used.tolist(), plain(observations.lamps)
     for i, reason in enumerate(images.reasons):
@@ -372,7 +376,10 @@ def _frames_of(images: CameraImages | SecondCone) -> Iterator[FrameRecord]:
             edge_width_px=widths[i],
             lamps_px=lamps[i],
             leds=tuple(
-                SpotRecord(j + 1, x, y, areas[i][j], fit[i][j], leds_used[i][j])
+                SpotRecord(
+                    *(j + 1, x, y, areas[i][j], fit[i][j], leds_used[i][j]),
+                    sigmas[i][j],
+                )
                 for j, (x, y) in enumerate(pixels[i])
                 if x is not None
             ),

@@ -78,7 +78,7 @@ def _copy_warnings(calibration: Calibration) -> list[Message]:
 def _noise_warnings(calibration: Calibration) -> list[Message]:
     """Return what is reported of LEDs that are far noisier than the others."""
     bundle = calibration.bundle
-    noise = bundle.unknowns.noise.max(axis=0)
+    noise = np.median(bundle.unknowns.noise, axis=0).max(axis=0)
     return [
         message(
             "warning.led-noise",

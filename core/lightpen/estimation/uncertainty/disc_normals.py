@@ -56,8 +56,7 @@ def effect_of_normals(bundle: Bundle) -> NormalEffect:
     state, unknowns = bundle.state, bundle.unknowns
     there = np.zeros_like(bundle.residuals)
     view = views_at(state, there, unknowns.effect_columns)[0]
-    noise = np.broadcast_to(unknowns.noise[0], there.shape[:1] + there.shape[2:3])
-    extended = with_normal(view, state).in_units_of(noise)
+    extended = with_normal(view, state).in_units_of(unknowns.noise[:, 0])
     jitter = bundle.components.jitter.covariance
     each = eliminate((extended,), bundle.used, bundle.weight_sigma, jitter)
     own_end = N_CONE + view.own.shape[-1]

@@ -43,11 +43,14 @@ class SecondImages:
         Why an image of the swing is not among the M.
     pixels : (M, L, 2) array
         px.
+    sigmas : (M, L) array
+        Of the centres by their detector, px.
     """
 
     swing: SecondSwing
     reasons: tuple[Reason, ...]
     pixels: FloatArray
+    sigmas: FloatArray
     joint: JointFit
 
     def joined(
@@ -91,7 +94,8 @@ def second_images(camera: Camera, pen: Pen, swing: SecondSwing) -> SecondImages:
         part.pivot.pivot_cam,
     )
     require_fit(joint.sigma)
-    return SecondImages(swing, tuple(part.reasons), pixels, joint)
+    sigmas = steady.observations.sigmas[part.chosen]
+    return SecondImages(swing, tuple(part.reasons), pixels, sigmas, joint)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
+from lightpen.detection.spots import EXACT_SIGMA
 from lightpen.errors import FileError, UsageError
 from lightpen.estimation.reports.calibration_record import (
     CalibrationRecord,
@@ -172,6 +173,9 @@ class ShownImages:
         Which of them were fit for use.
     areas : (N, L) array
         Of the LEDs, px^2; NaN where not known.
+    sigmas : (N, L) array
+        Standard deviation of a coordinate of each centre by detection, px; NaN where
+        not seen.
     edge_widths : (N,) array
         Of the rims of the LEDs, px; NaN where not known.
     lamps : (N, K, 2) array
@@ -181,6 +185,7 @@ class ShownImages:
     pixels: FloatArray
     fit: BoolArray
     areas: FloatArray
+    sigmas: FloatArray
     edge_widths: FloatArray
     lamps: FloatArray
 
@@ -191,15 +196,17 @@ def shown_images(
     """Return the detections in all images of a record, or in those of one camera."""
     frames = frames or record.frames
     shape = len(frames), len(record.leds)
-    seen, fit = np.full((*shape, 3), np.nan), np.zeros(shape, dtype=bool)
+    seen, fit = np.full((*shape, 4), np.nan), np.zeros(shape, dtype=bool)
     for i, frame in enumerate(frames):
         for led in frame.leds:
-            seen[i, led.led - 1] = floats((led.x_px, led.y_px, led.area_px2))
+            sigma = EXACT_SIGMA if led.sigma_px is None else led.sigma_px
+            seen[i, led.led - 1] = floats((led.x_px, led.y_px, led.area_px2, sigma))
             fit[i, led.led - 1] = led.fit
     return ShownImages(
         pixels=seen[..., :2],
         fit=fit,
         areas=seen[..., 2],
+        sigmas=seen[..., 3],
         edge_widths=floats([frame.edge_width_px for frame in frames]),
         lamps=floats([frame.lamps_px for frame in frames]).reshape(len(frames), -1, 2),
     )

@@ -185,6 +185,7 @@ def _observations(
         names=tuple(frame.file for frame in frames),
         seen_pixels=shown.pixels,
         areas=shown.areas,
+        sigmas=shown.sigmas,
         lamps=shown.lamps,
         edge_widths=shown.edge_widths,
         interval_ms=record.inputs.image_interval_ms,

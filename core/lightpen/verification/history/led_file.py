@@ -90,6 +90,7 @@ def calibrate_again(
     measured = replace(
         observe_centers(centers, camera, pen),
         areas=shown.areas,
+        sigmas=shown.sigmas,
         edge_widths=shown.edge_widths,
         lamps=shown.lamps,
     )

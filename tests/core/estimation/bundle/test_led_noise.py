@@ -1,5 +1,6 @@
-"""The noise of each LED as a variance component."""
+"""The noise of each centre by its detector, and of each LED."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,13 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
-from lightpen.estimation.bundle.led_noise import find_led_noise
+from lightpen.estimation.bundle.led_noise import find_center_noise, find_led_noise
 from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.reports.report import calibration_record
+from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.observation_files import Centers
+from lightpen.model.limits import SwingLimits
+from lightpen.record.calibrations.calibrations import shown_images
 from lightpen.simulator.swings import (
     paper_camera,
     paper_pen,
@@ -19,6 +24,7 @@ from lightpen.simulator.swings import (
 
 CAMERA, PEN = paper_camera(), paper_pen()
 EVEN = np.ones((1, 10))
+FILE = InputFile(Path("simulated"), "0" * 64, b"")
 
 
 def drawn(sigmas: FloatArray, seed: int = 0, n_images: int = 100) -> FloatArray:
@@ -85,4 +91,56 @@ def test_the_noise_that_weighs_is_that_of_the_usual_leds() -> None:
     noisy[[1, 8]] = 0.2
     found, _ = calibrated(noisy, 0)
     assert found.bundle.sigma == pytest.approx(0.03, rel=0.15)
-    assert found.bundle.unknowns.noise[0, 8] > 4.0
+    assert (found.bundle.unknowns.noise[:, 0, 8] > 4.0).all()
+
+
+def test_centers_are_weighed_as_far_as_residuals_follow_their_sigmas() -> None:
+    used = np.ones((100, 1, 10), bool)
+    rng = np.random.default_rng(3)
+    stated = 0.03 * np.exp(0.5 * rng.standard_normal(used.shape))
+    usual = stated / np.median(stated)
+    for power in (0.0, 0.5, 1.0):
+        residuals = 0.05 * drawn(np.ones(10)) * usual[..., None] ** power
+        noise = find_center_noise(residuals, used, stated)
+        if power == 0:
+            assert noise is None
+        else:
+            assert noise is not None
+            np.testing.assert_allclose(noise, usual**power, rtol=1e-9)
+
+
+def test_centers_without_sigmas_count_as_usual() -> None:
+    used = np.ones((100, 1, 10), bool)
+    stated = np.where(np.arange(10) < 5, 0.01, 0.05) * np.ones(used.shape)
+    residuals = drawn(np.where(np.arange(10) < 5, 0.02, 0.1))
+    stated[0, 0, 0] = np.nan
+    noise = find_center_noise(residuals, used, stated)
+    assert noise is not None
+    assert noise[0, 0, 0] == 1.0
+    np.testing.assert_allclose(noise[1, 0, 9] / noise[1, 0, 0], 5.0)
+
+
+def test_sigmas_of_centers_sharpen_the_tip_and_are_recorded() -> None:
+    rng = np.random.default_rng(28)
+    swing = swing_poses(60, rng)
+    pixels = simulate_centers(
+        CAMERA, PEN, swing.rotations, swing.translations, 0.0, rng
+    )
+    sigmas = 0.05 * np.exp(0.7 * rng.standard_normal(pixels.shape[:-1]))
+    pixels += sigmas[..., None] * rng.standard_normal(pixels.shape)
+    alike = observe_centers(
+        Centers(np.arange(60), pixels, Path("simulated")), CAMERA, PEN
+    )
+    own = replace(alike, sigmas=np.where(np.isfinite(pixels[..., 0]), sigmas, np.nan))
+    by_own, by_alike = (calibrate(CAMERA, PEN, seen) for seen in (own, alike))
+    noise = [
+        float(np.trace(found.bundle.independent_noise[:3, :3]))
+        for found in (by_own, by_alike)
+    ]
+    assert noise[0] < 0.8 * noise[1]
+    record = calibration_record(
+        by_own, Inputs(FILE, FILE, (FILE,), None), "joint", SwingLimits()
+    )
+    np.testing.assert_array_equal(shown_images(record).sigmas, own.sigmas)
+    off = by_own.joint.tip_pen - swing.tip_pen
+    assert (np.abs(off) < by_own.budget.expanded_uncertainty[:3]).all()
