@@ -1,7 +1,7 @@
 """What a verification found: a grade, the reason that counts most, and what to do."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import Message, message
@@ -80,6 +80,38 @@ def graded(
     decision = limits.decision(value, uncertainty, limit)
     if decision is Decision.REJECTED:
         return Grade.REPEAT
-    by_chance = normal_quantile(BY_CHANCE / (2 * n_values)) / COVERAGE_FACTOR
-    is_significant = abs(value) > max(by_chance * uncertainty, RELEVANT * limit)
+    is_significant = _is_significant(value, uncertainty, limit, n_values)
     return Grade.CHECK if is_significant or decision is Decision.OPEN else Grade.PASS
+
+
+def judged_error(
+    error: float,
+    uncertainty: float,
+    limit: float,
+    limits: VerificationLimits,
+    blamed: VerificationAssessment,
+    n_values: int = 1,
+) -> VerificationAssessment | None:
+    """Return what an error with its U (k = 2), mm, is found to be; None if it passes.
+
+    Parameters
+    ----------
+    blamed : VerificationAssessment
+        Reason and next step of a significant error; its grade is not used.
+    """
+    grade = graded(error, uncertainty, limit, limits, n_values)
+    if grade is Grade.PASS:
+        return None
+    if grade is Grade.REPEAT or _is_significant(error, uncertainty, limit, n_values):
+        return replace(blamed, grade=grade)
+    unproven = message(
+        "verification.unproven", error=error, uncertainty=uncertainty, limit=limit
+    )
+    return check(unproven, MORE_POINTS)
+
+
+def _is_significant(
+    value: float, uncertainty: float, limit: float, n_values: int
+) -> bool:
+    by_chance = normal_quantile(BY_CHANCE / (2 * n_values)) / COVERAGE_FACTOR
+    return abs(value) > max(by_chance * uncertainty, RELEVANT * limit)

@@ -25,7 +25,7 @@ from lightpen.verification.tasks.assessment import (
     VERIFY_AGAIN,
     VerificationAssessment,
     check,
-    graded,
+    judged_error,
     refused,
 )
 from lightpen.verification.tasks.circle_fit import (
@@ -338,21 +338,16 @@ def _assessment(
         return refused(
             message("circle.another", measured=mean, certified=certified), VERIFY_AGAIN
         )
-    grade = graded(error, uncertainty, limits.radius, limits)
+    reason = message(
+        "circle.radius-off", error=error, uncertainty=uncertainty, limit=limits.radius
+    )
+    blamed = refused(reason, CALIBRATE_AGAIN)
+    off = judged_error(error, uncertainty, limits.radius, limits, blamed)
     against = judged_tip(tip, limits)
     if against is not None and against.grade is Grade.REPEAT:
         return against
-    if grade is not Grade.PASS:
-        return VerificationAssessment(
-            grade,
-            message(
-                "circle.radius-off",
-                error=error,
-                uncertainty=uncertainty,
-                limit=limits.radius,
-            ),
-            CALIBRATE_AGAIN,
-        )
+    if off is not None:
+        return off
     if against is not None:
         return against
     worst = max(runs, key=lambda run: run.form / max(limits.form, run.form_by_noise))

@@ -32,7 +32,8 @@ from lightpen.verification.tasks.assessment import (
     VerificationAssessment,
     accepted,
     check,
-    graded,
+    judged_error,
+    refused,
 )
 from lightpen.verification.tasks.probed_point import (
     ProbedPoint,
@@ -353,21 +354,19 @@ def _good(worst: LengthRun) -> Message:
 def _assessment(found: Length, limits: VerificationLimits) -> VerificationAssessment:
     worst, against = found.worst, judged_tip(found.tip, limits)
     n_places = len(found.runs)
-    grade = graded(worst.error, worst.uncertainty, worst.limit, limits, n_places)
+    figures = worst.error, worst.uncertainty, worst.limit
+    reason = message(
+        "length.off",
+        run=worst.name,
+        error=worst.error,
+        uncertainty=worst.uncertainty,
+        limit=worst.limit,
+    )
+    off = judged_error(*figures, limits, refused(reason, CHECK_FILES), n_places)
     if against is not None and against.grade is Grade.REPEAT:
         return against
-    if grade is not Grade.PASS:
-        return VerificationAssessment(
-            grade,
-            message(
-                "length.off",
-                run=worst.name,
-                error=worst.error,
-                uncertainty=worst.uncertainty,
-                limit=worst.limit,
-            ),
-            CHECK_FILES,
-        )
+    if off is not None:
+        return off
     if against is not None:
         return against
     least = max(found.runs, key=lambda run: run.uncertainty / run.limit)

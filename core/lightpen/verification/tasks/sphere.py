@@ -34,7 +34,7 @@ from lightpen.verification.tasks.assessment import (
     VERIFY_AGAIN,
     VerificationAssessment,
     check,
-    graded,
+    judged_error,
     refused,
 )
 from lightpen.verification.tasks.circle import away_from_cones
@@ -283,15 +283,16 @@ def _assessment(
             "sphere.another", measured=size.measured, certified=size.certified
         )
         return refused(another, VERIFY_AGAIN)
-    grade = graded(error, uncertainty, limit, limits)
+    reason = message(
+        "sphere.size-off", error=error, uncertainty=uncertainty, limit=limit
+    )
+    blamed = refused(reason, CALIBRATE_AGAIN)
+    off = judged_error(error, uncertainty, limit, limits, blamed)
     against = judged_tip(tip, limits)
     if against is not None and against.grade is Grade.REPEAT:
         return against
-    if grade is not Grade.PASS:
-        off = message(
-            "sphere.size-off", error=error, uncertainty=uncertainty, limit=limit
-        )
-        return VerificationAssessment(grade, off, CALIBRATE_AGAIN)
+    if off is not None:
+        return off
     if against is not None:
         return against
     found, by_noise = form
