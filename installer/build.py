@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from installer import runtime
 from installer.binaries import missing_exports, unmet_needs
+from installer.bundled import EXTRAS
 from installer.bytecode import compile_modules
 from installer.downloads import PIP, download_runtime, download_wheels
 from installer.launchers import (
@@ -48,16 +49,12 @@ from installer.places import INSTALLER, IS_WINDOWS, ROOT
 from installer.runtime import RuntimeFileError
 from installer.sbom import BundledPart, bill_of_materials, cpe
 from installer.signatures import is_signed, unsigned
+from packaging.utils import canonicalize_name
 
 from lightpen import __version__
 
 KILOBYTE = 1024
 PYTHON_MAKER = "Python Software Foundation"
-EXTRAS = {
-    *("genicam", "harvesters"),  # "genicam"
-    *("crcmod", "pyigtl"),  # "stream"
-    *("psycopg", "psycopg-binary", "tzdata"),  # "postgres"
-}
 
 
 class BuildError(Exception):
@@ -147,11 +144,12 @@ def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> P
 
 
 def shipped_pins() -> tuple[Pin, ...]:
-    """Return what is bundled: all that the program needs, and three of its extras.
+    """Return what is bundled: all that the program needs, and five of its extras.
 
     An installed program cannot be added to, and without them it would have no
-    industrial camera, no archive on a server, and nobody could follow the pen. They are
-    tested with the versions of requirements-dev.lock.
+    industrial camera, no archive on a server with its password in the keyring, no
+    timestamps, and nobody could follow the pen. They are tested with the versions of
+    requirements-dev.lock.
     """
     program, development = (
         windows_pins((ROOT / name).read_text("utf-8"), runtime.VERSION)
@@ -254,8 +252,12 @@ def _require_fit(folder: Path, parts: Sequence[Part], pins: Sequence[Pin]) -> No
     """Refuse what would not run on a bare Windows, or lacks a licence."""
     faults = [*unmet_needs(folder), *missing_exports(folder)]
     faults += [f"{name} brings no licence." for name in unlicensed(parts)]
-    there = {part.name.lower().replace("_", "-") for part in parts}
-    faults += [f"{p.name} is missing." for p in pins if p.name.lower() not in there]
+    there = {canonicalize_name(part.name) for part in parts}
+    faults += [
+        f"{pin.name} is missing."
+        for pin in pins
+        if canonicalize_name(pin.name) not in there
+    ]
     if faults:
         raise BuildError("\n".join(faults))
 
@@ -272,8 +274,8 @@ def _components(
     wheels: Sequence[Path],
     parts: Sequence[Part],
 ) -> list[BundledPart]:
-    found = {part.name.lower().replace("_", "-"): part for part in parts}
-    files = {path.name.split("-")[0].lower().replace("_", "-"): path for path in wheels}
+    found = {canonicalize_name(part.name): part for part in parts}
+    files = {canonicalize_name(path.name.split("-")[0]): path for path in wheels}
     python = BundledPart(
         "CPython",
         runtime.VERSION,
@@ -288,14 +290,15 @@ def _components(
         BundledPart(
             pin.name,
             pin.version,
-            files[pin.name.lower()].name,
-            _digest(files[pin.name.lower()]),
-            f"pkg:pypi/{pin.name.lower()}@{pin.version}",
-            found[pin.name.lower()].licence,
-            found[pin.name.lower()].supplier,
-            cpe(f"{pin.name.lower()}:{pin.name.lower()}", pin.version),
+            files[name].name,
+            _digest(files[name]),
+            f"pkg:pypi/{name}@{pin.version}",
+            found[name].licence,
+            found[name].supplier,
+            cpe(f"{name}:{name}", pin.version),
         )
         for pin in pins
+        for name in [canonicalize_name(pin.name)]
     ]
     libraries = [
         BundledPart(

@@ -34,8 +34,10 @@ SPDX = {
     "Apache 2.0": "Apache-2.0",
     "Apache Software License V2.0": "Apache-2.0",
     "BSD License": "BSD-3-Clause",  # colorama
+    "MIT License": "MIT",  # jaraco.classes
 }
-SPDX_OF = {"scipy": "BSD-3-Clause"}  # states its copyright there
+# What these state there is no name of a licence.
+SPDX_OF = {"scipy": "BSD-3-Clause", "rfc3161-client": "Apache-2.0"}
 LICENCE = "License :: "  # of the classifiers of PyPI
 NAMES = re.compile("(licen[cs]e|copying|notice|authors|ofl)", re.IGNORECASE)
 

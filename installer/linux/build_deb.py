@@ -1,9 +1,10 @@
 """Build the package for the Debian that this runs on: ``python3 build_deb.py``.
 
 Needs ``python3-venv`` and ``dpkg-dev`` and no environment of the project. The package
-holds the program and the libraries of requirements.lock, each checked by its hash, in
-``/opt/lightpen``, for the Python of this Debian. Its wheels are for one version of
-Python, so each Debian has a package of its own.
+holds the program and the libraries of requirements.lock and of the extras that the
+Windows installer has, too, each checked by its hash, in ``/opt/lightpen``, for the
+Python of this Debian. Its wheels are for one version of Python, so each Debian has a
+package of its own.
 """
 
 import argparse
@@ -15,7 +16,11 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from installer.bundled import extra_requirements
+from installer.places import ROOT
+
 PLACE = Path("opt/lightpen")
 # Of the wheels, what the program never uses.
 DROPPED = (
@@ -67,7 +72,10 @@ def install_program(work: Path, tree: Path) -> None:
     pip = (tools / "bin" / "python", "-m", "pip", "--disable-pip-version-check")
     run(*pip, "wheel", "--quiet", "--no-deps", "--wheel-dir", work, ROOT)
     into = (*pip, "--python", target / "bin" / "python", "install", "--quiet")
-    locked = ("--requirement", ROOT / "requirements.lock")
+    extras = work / "extras.txt"
+    lock = (ROOT / "requirements-dev.lock").read_text("utf-8")
+    extras.write_text(extra_requirements(lock), "utf-8")
+    locked = ("--requirement", ROOT / "requirements.lock", "--requirement", extras)
     run(*into, "--no-compile", "--no-deps", "--require-hashes", *locked)
     run(*into, "--no-compile", "--no-deps", *work.glob("lightpen-*.whl"))
     for name in ("pyvenv.cfg", "bin/lightpen"):

@@ -1,10 +1,12 @@
 """What of the lock file goes into the Windows installer."""
 
+import re
 from pathlib import Path
 
 import pytest
 from installer import runtime
 from installer.build import shipped_pins
+from installer.bundled import EXTRAS, extra_requirements
 from installer.locked import windows_pins
 
 LOCK = """\
@@ -44,9 +46,19 @@ def test_what_is_not_pinned_by_hash_is_refused(entry: str) -> None:
         windows_pins(entry, "3.13.2")
 
 
-def test_the_installed_program_can_use_industrial_cameras() -> None:
+def test_the_installed_program_has_the_extras_that_a_station_can_need() -> None:
     shipped = {pin.name for pin in shipped_pins()}
     assert {"numpy", "genicam", "harvesters", "pyigtl", "crcmod"} <= shipped
+    assert {"psycopg-binary", "keyring", "pywin32-ctypes", "rfc3161-client"} <= shipped
+
+
+def test_packages_of_linux_have_the_same_extras_each_with_its_hashes() -> None:
+    lock = Path(__file__).parents[2] / "requirements-dev.lock"
+    requirements = extra_requirements(lock.read_text("utf-8"))
+
+    named = re.findall(r"^([\w-]+)==", requirements, re.MULTILINE)
+    assert set(named) == EXTRAS
+    assert all(len(pin.hashes) > 0 for pin in windows_pins(requirements, "3.13.2"))
 
 
 def test_the_lock_file_itself_gives_one_version_of_each() -> None:

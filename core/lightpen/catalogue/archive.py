@@ -33,7 +33,7 @@ MESSAGES = {
     "archive.no-driver": 'An archive on a server needs the package psycopg, which is not installed. Install it with: pip install "lightpen[postgres]".',
     "archive.no-keyring": 'A password in the system keyring needs the package keyring, which is not installed. Install it with: pip install "lightpen[keyring]".',
     "archive.keyring-closed": "The system keyring cannot be read: {reason}. Unlock it, or keep the password in a file.",
-    "archive.no-password": "The system keyring has no password of user {user} for the service {service}. Store it with: keyring set {service} {user}.",
+    "archive.no-password": "The system keyring has no password of user {user} for the service {service}. Store it with: keyring set {service} {user} (Windows: cmdkey /generic:{service} /user:{user} /pass).",
     "archive.entry": "entry {number} of chain {chain}",
     "archive.entry-of-station": "entry {number} of the station {station}",
     "file.exported-archive": "exported archive",
