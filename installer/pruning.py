@@ -31,8 +31,8 @@ DROPPED = (
     "*/_test_*.pyd", "numpy/*_tests.*.pyd", "numpy/_core/_simd.*",
     "sqlalchemy/testing/*", "alembic/testing/*",
     # Parts of libraries that nothing here imports.
-    "pyqtgraph/console/*", "pyqtgraph/dockarea/*", "pyqtgraph/examples/*",
-    "pyqtgraph/flowchart/*", "pyqtgraph/icons/peegee/*.png",
+    "pyqtgraph/colors/maps/*", "pyqtgraph/console/*", "pyqtgraph/dockarea/*",
+    "pyqtgraph/examples/*", "pyqtgraph/flowchart/*", "pyqtgraph/icons/peegee/*.png",
     "sqlalchemy/dialects/mssql/*", "sqlalchemy/dialects/mysql/*",
     "sqlalchemy/dialects/oracle/*", "sqlalchemy/orm/*",
     "scipy/special/cython_special*",

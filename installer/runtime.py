@@ -25,6 +25,10 @@ FOLDER = "cp313/"
 LIBRARY = "python313.zip"
 # Compiled modules whose sources were not at hand to compare them with.
 UNPROVEN = ("__phello__/", "_pydecimal.pyc", "pydoc_data/topics.pyc")
+# Nothing that is installed imports them.
+UNUSED = ("_pyio.pyc", "imaplib.pyc", "mailbox.pyc", "modulefinder.pyc",
+          "pickletools.pyc", "poplib.pyc", "symtable.pyc", "wsgiref/", "xmlrpc/",
+)  # fmt: skip
 # Paths from the folder of the runtime in which modules are looked for, and no others.
 PATHS = "python313.zip\r\n.\r\nLib\\site-packages\r\n"
 
@@ -68,15 +72,15 @@ def unpack(distribution: Path, folder: Path) -> None:
                     f"{name} in {distribution} is not the one that was proven."
                 )
             if name == LIBRARY:
-                content = without_unproven(content)
+                content = reduced(content)
             (folder / name).write_bytes(content)
     (folder / LIBRARY.replace(".zip", "._pth")).write_text(PATHS, newline="")
 
 
-def without_unproven(library: bytes) -> bytes:
-    """Return the library of Python without the modules that could not be proven.
+def reduced(library: bytes) -> bytes:
+    """Return the library of Python without what could not be proven or is not used.
 
-    They are stored as they are: the installer packs them better.
+    Modules are stored as they are: the installer packs them better.
     """
     packed = io.BytesIO()
     with (
@@ -84,6 +88,6 @@ def without_unproven(library: bytes) -> bytes:
         zipfile.ZipFile(packed, "w") as after,
     ):
         for entry in before.infolist():
-            if not entry.filename.startswith(UNPROVEN):
+            if not entry.filename.startswith((*UNPROVEN, *UNUSED)):
                 after.writestr(entry, before.read(entry), zipfile.ZIP_STORED)
     return packed.getvalue()

@@ -40,6 +40,7 @@ def test_what_the_program_can_come_to_use_is_installed(name: str) -> None:
         "PySide6/qml/QtQuick/qmldir",
         "PySide6/opengl32sw.dll",
         "pyqtgraph/opengl/GLViewWidget.py",
+        "pyqtgraph/colors/maps/CET-C1.csv",
         "PySide6/QtOpenGL.pyd",  # for which windows/without_opengl.py stands in
         "PySide6/Qt6OpenGL.dll",
         "cv2/opencv_videoio_ffmpeg500_64.dll",  # OpenCV itself reads Motion JPEG
