@@ -9,7 +9,7 @@ EXTRAS = {
     "rfc3161-client",  # "timestamps"
     *("keyring", "jaraco-classes", "jaraco-context", "jaraco-functools"),  # "keyring"
     *("more-itertools", "pywin32-ctypes", "jeepney", "secretstorage"),
-    *("backports-tarfile", "importlib-metadata", "zipp"),
+    *("backports-tarfile", "importlib-metadata", "lazy-importer", "zipp"),
 }
 
 

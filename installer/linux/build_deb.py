@@ -141,9 +141,13 @@ def pack(tree: Path, out: Path) -> Path:
 
 
 def python_range() -> str:
-    """Return the dependency on the Python that the wheels are for."""
+    """Return the dependency on the Python that the wheels are for.
+
+    GenICam loads its library, which the program of Python itself does without.
+    """
     major, minor = sys.version_info[:2]
-    return f"python3 (>= {major}.{minor}), python3 (<< {major}.{minor + 1})"
+    exact = f"python3 (>= {major}.{minor}), python3 (<< {major}.{minor + 1})"
+    return f"{exact}, libpython{major}.{minor}"
 
 
 def libraries() -> list[str]:

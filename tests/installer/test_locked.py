@@ -56,6 +56,11 @@ def test_packages_of_linux_have_the_same_extras_each_with_its_hashes() -> None:
     lock = Path(__file__).parents[2] / "requirements-dev.lock"
     requirements = extra_requirements(lock.read_text("utf-8"))
 
+    entries = re.split(r"^(?=[\w-]+==)", lock.read_text("utf-8"), flags=re.MULTILINE)
+    words_of = {e.partition("==")[0]: set(re.split(r"[\s#]+", e)) for e in entries}
+    program = lock.with_name("requirements.lock").read_text("utf-8")
+    needed = {name for name, words in words_of.items() if words & EXTRAS - {name}}
+    assert {name for name in needed if f"{name}==" not in program} <= EXTRAS
     named = re.findall(r"^([\w-]+)==", requirements, re.MULTILINE)
     assert set(named) == EXTRAS
     assert all(len(pin.hashes) > 0 for pin in windows_pins(requirements, "3.13.2"))
