@@ -40,6 +40,7 @@ REFUSAL = """check.py: This account has Lightpen or its data:
   {}
 They would be changed and deleted. Nothing was done: use an account or a computer
 without them."""
+DOWNLOAD_LIMIT = 65e6  # bytes of the installer
 START_LIMIT_S = 8.0
 N_LATER_STARTS = 2
 TIP_LIMIT = 1e-6  # mm between the tips of Linux and Windows
@@ -97,6 +98,8 @@ def try_all(trial: Trial, payload: Path, authority: Path | None) -> None:
         File of the certificate that signatures go back to.
     """
     files, registry = trial.machine.files(), trial.machine.registry()
+    size = trial.setup.stat().st_size
+    trial.expect(f"{size / 1e6:.1f} MB to download", size <= DOWNLOAD_LIMIT)
     bad_conditions.try_no_right(trial)
     bad_conditions.try_full_disk(trial)
     bad_conditions.try_other_folders(trial)
