@@ -32,7 +32,7 @@ WRONG = 0.02  # mm
 BY_DEFAULT = "fixed point"  # which must find it, whatever it claims
 N_DRIFTS = 10  # sessions at each station, for the coverage of U
 COVERED = 0.93, 0.97
-N_PENS, N_SWINGS = 20, 5
+N_PENS, N_SWINGS = 45, 5
 KNOCK, WARMTH = 0.05, 5 * 23e-6  # mm; 5 K of aluminium
 
 
