@@ -103,8 +103,8 @@ def _history_row(folder: Path) -> Row:
     script = Path(__file__).with_name("history_step.py")
     words = [sys.executable, str(script), str(folder)]
     outcome = subprocess.run(words, capture_output=True, text=True, check=True)
-    told = json.loads(outcome.stdout.splitlines()[-1])
-    opened, blocked = told["opened_ms"], told["blocked_ms"]
+    reported = json.loads(outcome.stdout.splitlines()[-1])
+    opened, blocked = reported["opened_ms"], reported["blocked_ms"]
     return Row(
         "- the step History: opened; 95 % of scrolls answer again after",
         f"{opened:.0f} ms; {blocked:.0f} ms",

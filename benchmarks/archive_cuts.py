@@ -68,7 +68,7 @@ class FrameCounters:
 
     Attributes
     ----------
-    n_told : int
+    n_reported : int
         Entries and files that were acknowledged.
     n_lost : int
         Of these, what was not there after the cut.
@@ -76,13 +76,13 @@ class FrameCounters:
         Cuts after which the archive opened and passed its check, and after which the
         next start entered each file once.
     n_faults : int
-        Writes that failed, and were told.
+        Writes that failed, and were reported.
     faults : list of str
         What was wrong.
     """
 
     n_cuts: int = 0
-    n_told: int = 0
+    n_reported: int = 0
     n_lost: int = 0
     n_whole: int = 0
     n_faults: int = 0
@@ -113,7 +113,7 @@ class Place:
 
 
 class Victim:
-    """The process that is cut off, and what it told."""
+    """The process that is cut off, and what it reported."""
 
     def __init__(self, data: Path) -> None:
         self._process = subprocess.Popen(
@@ -136,20 +136,20 @@ class Victim:
         """Send it a signal."""
         os.kill(self._child, number)
 
-    def told(self) -> list[str]:
-        """Return what it has told by now and was not returned yet."""
+    def reported(self) -> list[str]:
+        """Return what it has reported by now and was not returned yet."""
         while select.select([self._output()], [], [], 0)[0]:
             self._unread += os.read(self._output(), 65536)
         *lines, self._unread = self._unread.split(b"\n")
         return [line.decode() for line in lines]
 
     def killed(self) -> list[str]:
-        """Kill it, and return what it had told."""
+        """Kill it, and return what it had reported."""
         self.signal(signal.SIGKILL)
-        told = []
+        reported = []
         while (line := self._line()) != "dead":
-            told.append(line)
-        return told
+            reported.append(line)
+        return reported
 
     def close(self) -> None:
         """End it."""
@@ -180,12 +180,12 @@ def _row(kind: str, counters: FrameCounters | None) -> Row:
     for fault in counters.faults[:10]:
         print(f"{kind}: {fault}", file=sys.stderr)
     return Row(
-        f"{what}lost of {counters.n_told} acknowledged entries and files; times "
+        f"{what}lost of {counters.n_reported} acknowledged entries and files; times "
         "that the archive was intact",
         f"{counters.n_lost}; {counters.n_whole}",
         f"0; {N_CUTS}",
         met=(counters.n_lost, counters.n_whole) == (0, N_CUTS)
-        and counters.n_told > N_CUTS,
+        and counters.n_reported > N_CUTS,
     )
 
 
@@ -201,8 +201,8 @@ def _apart(kind: str, n_cuts: int) -> FrameCounters | None:
         if subprocess.run([*namespace, "true"], check=False).returncode != 0:
             return None
         words = [*namespace, *words]
-    told = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True)
-    return FrameCounters(**json.loads(told.stdout))
+    reported = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True)
+    return FrameCounters(**json.loads(reported.stdout))
 
 
 def cut_off(kind: str, n_cuts: int) -> FrameCounters:
@@ -231,7 +231,7 @@ class _Trial:
         self.place, self._rng = Place(folder), rng
 
     def cut(self, victim: Victim) -> list[str]:
-        """Cut a victim off, put right what was cut, and return what was told."""
+        """Cut a victim off, put right what was cut, and return what was reported."""
         return victim.killed()
 
     def close(self) -> None:
@@ -243,33 +243,35 @@ class _Stopped(_Trial):
 
     def cut(self, victim: Victim) -> list[str]:
         victim.signal(signal.SIGSTOP)
-        told: list[str] = []
-        others = [Thread(target=do, args=(told,)) for do in (self._enter, self._look)]
+        reported: list[str] = []
+        others = [
+            Thread(target=do, args=(reported,)) for do in (self._enter, self._look)
+        ]
         for other in others:
             other.start()
         time.sleep(STOPPED_S)
         if self._rng.random() < 0.5:
             victim.signal(signal.SIGCONT)
             time.sleep(self._rng.uniform(0, LONGEST_LIFE_S))
-        told += victim.killed()
+        reported += victim.killed()
         for other in others:
             other.join()
-        return told
+        return reported
 
-    def _look(self, told: list[str]) -> None:
+    def _look(self, reported: list[str]) -> None:
         """Check the archive meanwhile."""
         with suppress(NoArchiveError), closing(look_into(self.place.archive)) as found:
-            told += [f"fault {each}" for each in check_archive(found).findings]
+            reported += [f"fault {each}" for each in check_archive(found).findings]
 
-    def _enter(self, told: list[str]) -> None:
+    def _enter(self, reported: list[str]) -> None:
         """Enter a note, as another program on the same data folder."""
         try:
             with closing(Logbook(self.place.data)) as logbook:
                 logbook.enter_owed()
                 (last, *_) = heads(logbook.database)
-                told.append(f"entry {last.sha256}")
+                reported.append(f"entry {last.sha256}")
         except LightpenError as error:
-            told.append(f"fault {error}")
+            reported.append(f"fault {error}")
 
 
 class _Full(_Trial):
@@ -310,14 +312,14 @@ class _OnDisk(_Trial):
     def cut(self, victim: Victim) -> list[str]:
         # What it tells when the disk is gone, no cut of the power lets anybody hear.
         victim.signal(signal.SIGSTOP)
-        told = victim.told()
+        reported = victim.reported()
         self.stop()
         victim.signal(signal.SIGCONT)
         time.sleep(WITHOUT_DISK_S)
-        told += [line for line in victim.killed() if line.startswith("fault")]
+        reported += [line for line in victim.killed() if line.startswith("fault")]
         _run("umount", str(self.place.folder))
         self._mount()
-        return told
+        return reported
 
     def stop(self) -> None:
         """Stop the disk."""
@@ -371,15 +373,19 @@ WORDS = {
 }
 
 
-def _note(counters: FrameCounters, told: list[str], place: Place) -> None:
-    """Note what is there of what was told."""
-    of = Counter(line.partition(" ")[0] for line in told)
+def _note(counters: FrameCounters, reported: list[str], place: Place) -> None:
+    """Note what is there of what was reported."""
+    of = Counter(line.partition(" ")[0] for line in reported)
     counters.n_cuts += 1
     counters.n_faults += of["fault"]
-    entries = {line.removeprefix("entry ") for line in told if line.startswith("entry")}
-    files = {line.removeprefix("file ") for line in told if line.startswith("file")}
-    faults = [line.removeprefix("fault ") for line in told if line.startswith("fault")]
-    counters.n_told += len(entries) + len(files)
+    entries = {
+        line.removeprefix("entry ") for line in reported if line.startswith("entry")
+    }
+    files = {line.removeprefix("file ") for line in reported if line.startswith("file")}
+    faults = [
+        line.removeprefix("fault ") for line in reported if line.startswith("fault")
+    ]
+    counters.n_reported += len(entries) + len(files)
     lost = {file for file in files if not (place.data / file).is_file()}
     there = set[str]()
     try:

@@ -72,14 +72,14 @@ def _rows(what: str, folder: Path, server: Postgres, away_s: float) -> list[Row]
         time.sleep(away_s)
         relay.become(Line.OPEN)
         time.sleep(WORKING_S)
-    told = [json.loads(station.communicate()[0]) for station in stations]
+    reported = [json.loads(station.communicate()[0]) for station in stations]
     start = time.perf_counter()
     n_entries, n_wrong = _delivered([folder / name for name in STATIONS], address)
     took = time.perf_counter() - start
     relay.close()
-    n_accepted = sum(each["n"] for each in told)
-    slowest = max(each["slowest_s"] for each in told)
-    closed = max(each["closed_s"] for each in told)
+    n_accepted = sum(each["n"] for each in reported)
+    slowest = max(each["slowest_s"] for each in reported)
+    closed = max(each["closed_s"] for each in reported)
     with closing(open_server(direct)) as database:
         findings = check_archive(database).findings
     for finding in findings:

@@ -1,4 +1,4 @@
-"""Enter tips at a station that delivers to a server, until told to end.
+"""Enter tips at a station that delivers to a server, until it is ended.
 
 Usage: python benchmarks/enter_for_plant.py FOLDER STATION, with the server's address in
 LIGHTPEN_ARCHIVE
@@ -52,8 +52,8 @@ def main() -> int:
     start = time.perf_counter()
     logbook.close()
     closed = time.perf_counter() - start
-    told = {"n": len(times), "slowest_s": max(times), "closed_s": closed}
-    print(json.dumps(told))
+    reported = {"n": len(times), "slowest_s": max(times), "closed_s": closed}
+    print(json.dumps(reported))
     return 0
 
 

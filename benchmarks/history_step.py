@@ -73,7 +73,7 @@ def main(data: Path) -> int:
         stopped = time.perf_counter()
         while last.data() == UNREAD and time.perf_counter() < stopped + LONGEST_S:
             QApplication.processEvents()
-        told = {
+        reported = {
             "n_lines": table.n_lines(),
             "opened_ms": 1000 * opened_s,
             "blocked_ms": 1000 * statistics.quantiles(blocked, n=20)[-1],
@@ -82,7 +82,7 @@ def main(data: Path) -> int:
         }
         page.shut_down()
         workbench.shut_down()
-    print(json.dumps(told))
+    print(json.dumps(reported))
     return 0
 
 

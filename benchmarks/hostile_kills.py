@@ -44,7 +44,7 @@ VICTIM = Path(__file__).with_name("write_until_killed.py")
 
 Victim: TypeAlias = "subprocess.Popen[str]"
 
-# Whether all is whole in a data folder after a kill, by what was told before it.
+# Whether all is whole in a data folder after a kill, by what was reported before it.
 Check = Callable[[Path, list[str]], bool]
 
 
@@ -54,7 +54,7 @@ class KillCount:
 
     Attributes
     ----------
-    n_told : int
+    n_reported : int
         Writes that were acknowledged.
     n_sound : int
         Kills that lost none of them, and mixed nothing.
@@ -62,7 +62,7 @@ class KillCount:
         Files and folders that were left behind after the next start.
     """
 
-    n_told: int
+    n_reported: int
     n_sound: int
     n_left: int
 
@@ -75,8 +75,8 @@ def hostile_kill_rows() -> list[Row]:
         outcomes = {kind: killed(victim, kind, N_KILLS) for kind in CHECKS}
     return [
         Row(
-            f"killed {N_KILLS} times while it writes ({kind}), {outcome.n_told} writes "
-            "acknowledged: kills without lost or mixed data, files left behind",
+            f"killed {N_KILLS} times while it writes ({kind}), {outcome.n_reported} "
+            "writes acknowledged: kills without lost or mixed data, files left behind",
             f"{outcome.n_sound}, {outcome.n_left}",
             f"{N_KILLS}, 0",
             met=outcome.n_sound == N_KILLS and outcome.n_left == 0,
@@ -86,7 +86,7 @@ def hostile_kill_rows() -> list[Row]:
 
 
 def start_victim() -> Victim:
-    """Return a process that writes what it is told to, by one that can be killed."""
+    """Return a process that writes what it is given, by one that can be killed."""
     return subprocess.Popen(
         [sys.executable, str(VICTIM)],
         stdin=subprocess.PIPE,
@@ -98,20 +98,20 @@ def start_victim() -> Victim:
 def killed(victim: Victim, kind: str, n_kills: int) -> KillCount:
     """Kill a process again and again while it writes; return what was left."""
     rng = np.random.default_rng(SEED)
-    n_sound = n_told = n_left = 0
+    n_sound = n_reported = n_left = 0
     with tempfile.TemporaryDirectory(prefix="lightpen-kills-") as folder:
         data = Path(folder)
         make_data(data)
         for _ in range(n_kills):
             seconds = float(rng.uniform(0, LONGEST))
-            told = _told_until_killed(victim, f"{kind}\t{folder}\n", seconds)
-            n_told += len(told)
-            n_sound += CHECKS[kind](data, told)
+            reported = _reported_until_killed(victim, f"{kind}\t{folder}\n", seconds)
+            n_reported += len(reported)
+            n_sound += CHECKS[kind](data, reported)
             n_left += _n_left_after_start(data)
-    return KillCount(n_told, n_sound, n_left)
+    return KillCount(n_reported, n_sound, n_left)
 
 
-def _told_until_killed(victim: Victim, wanted: str, seconds: float) -> list[str]:
+def _reported_until_killed(victim: Victim, wanted: str, seconds: float) -> list[str]:
     assert victim.stdin is not None
     assert victim.stdout is not None
     victim.stdin.write(wanted)
@@ -119,10 +119,10 @@ def _told_until_killed(victim: Victim, wanted: str, seconds: float) -> list[str]
     child = int(victim.stdout.readline())
     time.sleep(seconds)
     os.kill(child, signal.SIGKILL)
-    told = []
+    reported = []
     while (line := victim.stdout.readline().strip()) != "dead":
-        told.append(line)
-    return told
+        reported.append(line)
+    return reported
 
 
 def _n_left_after_start(data: Path) -> int:
@@ -137,12 +137,12 @@ def _n_left_after_start(data: Path) -> int:
     return len(list(data.rglob(".*.part"))) + len(unmade)
 
 
-def _swings_are_whole(data: Path, told: list[str]) -> bool:
+def _swings_are_whole(data: Path, reported: list[str]) -> bool:
     """Check that every image that was acknowledged is there as it was."""
     if find_unfinished(data / RECORDS).damaged:
         return False
     kept = defaultdict[str, set[int]](set)
-    for name, number in map(str.split, told):
+    for name, number in map(str.split, reported):
         kept[name].add(int(number))
     return all(
         numbers <= _sound_images(data / RECORDS / name)
@@ -157,49 +157,49 @@ def _sound_images(folder: Path) -> set[int]:
     return set(record.all_numbers.tolist())
 
 
-def _taken_out_is_one_edit(data: Path, told: list[str]) -> bool:
+def _taken_out_is_one_edit(data: Path, reported: list[str]) -> bool:
     record: Record = open_record(data / RECORDS / "swing")
     out = tuple(sorted(record.taken_out))
-    return out in {(1, 3), (2, 4, 5)} or (not told and out == (2,))
+    return out in {(1, 3), (2, 4, 5)} or (not reported and out == (2,))
 
 
-def _result_is_one(data: Path, told: list[str]) -> bool:
+def _result_is_one(data: Path, reported: list[str]) -> bool:
     """Check that the last that was acknowledged is in force, or the one after."""
     found = FolderArchive(data).in_force(NAMES.pen, NAMES.tip)
     if found is None:
         return False
     x, y, _ = found.tip_pen.tolist()
-    return not told or (x == y and x >= float(told[-1]))
+    return not reported or (x == y and x >= float(reported[-1]))
 
 
-def _taken_back_is_one_step(data: Path, told: list[str]) -> bool:
-    """Check that the tip that stays is in force, or the one beside it, as was told."""
+def _taken_back_is_one_step(data: Path, reported: list[str]) -> bool:
+    """Check that the tip that stays is in forceor the reported one beside it."""
     found = FolderArchive(data).in_force(NAMES.pen, NAMES.tip)
     if found is None:
         return False
     x, y, _ = found.tip_pen.tolist()
-    last = int(told[-1]) if told else 0
+    last = int(reported[-1]) if reported else 0
     stays = bool(x > 0)  # others are negative
     if last < 0:  # put in force; taking it back may have been under way
         return stays or bool(x == y == last)
     return stays or bool(x == y < 0)  # the next may be in force by now
 
 
-def _settings_are_one(data: Path, told: list[str]) -> bool:
+def _settings_are_one(data: Path, reported: list[str]) -> bool:
     loaded = load(data / "lightpen.json")
     if loaded.fault is not None:
         return False
     numbers = {loaded.content["last"].get(name, 0) for name in ("a", "b")}
-    return len(numbers) == 1 and (not told or max(numbers) >= int(told[-1]))
+    return len(numbers) == 1 and (not reported or max(numbers) >= int(reported[-1]))
 
 
-def _json_is_one(data: Path, told: list[str]) -> bool:
+def _json_is_one(data: Path, reported: list[str]) -> bool:
     path = data / "tip.json"
     if not path.exists():
-        return not told
+        return not reported
     record = json.loads(path.read_bytes())
     return len(set(record["frames"])) == 1 and (
-        not told or record["frames"][0] >= int(told[-1])
+        not reported or record["frames"][0] >= int(reported[-1])
     )
 
 

@@ -114,7 +114,7 @@ def _killed_again_and_again(folder: Path) -> Losses:
 def _killed_once(
     folder: Path, n_images: int, seconds: float
 ) -> tuple[Acknowledged, int]:
-    """Swing, be killed so long after so many images; return what was told."""
+    """Swing, be killed so long after so many images; return what was reported."""
     kept: Acknowledged = set()
     resumed = 0
     with subprocess.Popen(

@@ -76,13 +76,18 @@ def main() -> int:
         start = time.perf_counter()
         camera.kill()
         _until(lambda: Connection.LOST in connections)
-        told = time.perf_counter() - start
+        reported = time.perf_counter() - start
         camera = _plugged_in(stack)
         n_before, start = live.stats.delivered, time.perf_counter()
         _until(lambda: live.stats.delivered > n_before)
         back = time.perf_counter() - start
         camera.kill()
-        found = {"seconds": elapsed, "told": told, "back": back, **asdict(stats)}
+        found = {
+            "seconds": elapsed,
+            "reported": reported,
+            "back": back,
+            **asdict(stats),
+        }
         print(json.dumps(found), flush=True)
         wizard.window.close_unasked()
         return ended(wizard, 0)

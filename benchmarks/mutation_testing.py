@@ -414,7 +414,7 @@ def is_noticed(mutant: Mutant, calls: Calls, seconds: float) -> bool:
     return status != 0
 
 
-def told(mutant: Mutant) -> str:
+def description(mutant: Mutant) -> str:
     """Return a fault in words."""
     return f"{mutant.file}:{mutant.line}: {mutant.before}  ->  {mutant.after}"
 
@@ -458,7 +458,7 @@ def main() -> None:
     random.Random(options.seed).shuffle(mutants)
     if options.again is not None:
         listed = options.again.read_text()
-        mutants = [mutant for mutant in mutants if told(mutant) in listed]
+        mutants = [mutant for mutant in mutants if description(mutant) in listed]
     mutants = mutants[: options.mutants]
     n_survivors: Counter[str] = Counter()
     for n_tried, mutant in enumerate(mutants, 1):
@@ -466,7 +466,7 @@ def main() -> None:
         if is_noticed(mutant, calls, options.seconds):
             continue
         n_survivors[package] += 1
-        print(f"{n_tried}: {told(mutant)}", flush=True)
+        print(f"{n_tried}: {description(mutant)}", flush=True)
     n = sum(n_survivors.values())
     print(f"{n} of {len(mutants)} mutants ({n_all} there are) survive: {n_survivors}")
 

@@ -25,7 +25,7 @@ class Line(Enum):
 
 
 class Relay:
-    """Carries connections to a port of this machine, as long as it is told to."""
+    """Carries connections to a port of this machine, until it is stopped."""
 
     def __init__(self, port: int) -> None:
         self._target = port
@@ -40,7 +40,7 @@ class Relay:
         """Let the line be so from now on."""
         self._line, ends, self._ends = line, self._ends, []
         if line is Line.SILENT:
-            self._dead += ends  # held, so that no end is told
+            self._dead += ends  # held, so that no end is reported
         elif line is Line.REFUSED:
             for end in ends:
                 end.close()

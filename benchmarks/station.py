@@ -154,7 +154,7 @@ class Outcome(NamedTuple):
     error: float  # mm, of the tip
     covered: tuple[bool, bool, bool]  # by 95 % intervals
     is_beyond: bool  # U along any axis
-    is_told: bool  # by a warning, or by CHECK
+    is_reported: bool  # by a warning, or by CHECK
     is_passed: bool
 
 
@@ -181,9 +181,11 @@ def _outcome(drawn: tuple[StationCase, int]) -> Outcome:
 
 def _row(case: StationCase, outcomes: list[Outcome]) -> Row:
     n = len(outcomes)
-    errors, covered, beyond, told, passed = map(np.array, zip(*outcomes, strict=True))
+    errors, covered, beyond, reported, passed = map(
+        np.array, zip(*outcomes, strict=True)
+    )
     shares = 100 * covered.mean(axis=0)
-    silent = 100 * float(np.mean(beyond & ~told))
+    silent = 100 * float(np.mean(beyond & ~reported))
     n_passed, n_beyond = int(passed.sum()), int(np.sum(passed & beyond))
     chance = 300 * np.sqrt(0.95 * 0.05 / n)  # three standard errors
     is_limited = case.name == TOGETHER

@@ -89,13 +89,13 @@ def _task_row(name: str, outcomes: list[_Outcome]) -> Row:
     claiming = [each for each in outcomes if each.claims[name]]
     of_these = _share(each.found[name] for each in claiming) if claiming else 1.0
     by_default = found if name == BY_DEFAULT else 1.0
-    told = f"{100 * of_these:.0f} % of these" if claiming else "-"
+    reported = f"{100 * of_these:.0f} % of these" if claiming else "-"
     return Row(
         f"{N_STATIONS} sessions, {name}: correct tips pass; tips wrong by "
         f"{1000 * WRONG:.0f} µm are found; tasks that claim to find them; found by "
         "these",
         f"{100 * passed:.0f} %; {100 * found:.0f} %; "
-        f"{100 * len(claiming) / len(outcomes):.0f} %; {told}",
+        f"{100 * len(claiming) / len(outcomes):.0f} %; {reported}",
         f"{100 * MIN_PASSED:.0f} %; "
         + (f"{100 * MIN_FOUND:.0f} %" if name == BY_DEFAULT else "-")
         + f"; -; {100 * MIN_FOUND:.0f} %",
@@ -117,11 +117,11 @@ def pen_rows(workers: Workers) -> list[Row]:
     rows = [
         Row(
             f"{N_PENS} {what}",
-            f"{100 * _share(told):.0f} %",
+            f"{100 * _share(reported):.0f} %",
             f"{100 * MIN_PASSED:.0f} %",
-            met=_share(told) >= MIN_PASSED,
+            met=_share(reported) >= MIN_PASSED,
         )
-        for what, told in shares.items()
+        for what, reported in shares.items()
     ]
     within = [each for o in outcomes for each in o.within]
     return [
@@ -135,8 +135,8 @@ def pen_rows(workers: Workers) -> list[Row]:
     ]
 
 
-def _share(told: Iterable[bool]) -> float:
-    return float(np.mean(list(told)))
+def _share(reported: Iterable[bool]) -> float:
+    return float(np.mean(list(reported)))
 
 
 def _sessions(seed: int) -> _Outcome:

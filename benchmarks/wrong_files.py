@@ -14,7 +14,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.detection.pose import fit_poses
 from lightpen.estimation.bundle.priors import priors_of
-from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, lean_modes
+from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, tilt_modes
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import calibrate, calibrate_rig
 from lightpen.estimation.contact.joint import ContactModel, fit_contact, fit_joint
@@ -123,7 +123,7 @@ def _row(name: str, trial: Flaws, workers: Workers) -> Row:
     limit = MEDIAN_LIMITS[trial.n_images] if trial.camera_is_poor else None
     shakes = trial.jitter > 0 or trial.out_of_round > 0
     n = N_OF_FEW if shakes and trial.n_images <= FEW else N_CALIBRATIONS
-    return _told(f"Tip with {name}", partial(_errors, trial), n, limit, workers)
+    return _reported(f"Tip with {name}", partial(_errors, trial), n, limit, workers)
 
 
 def _rig_row(n_images: int, workers: Workers) -> Row:
@@ -132,7 +132,7 @@ def _rig_row(n_images: int, workers: Workers) -> Row:
         f"{n_images} images of each"
     )
     errors = partial(_rig_errors, n_images)
-    return _told(name, errors, N_CALIBRATIONS, RIG_LIMIT, workers)
+    return _reported(name, errors, N_CALIBRATIONS, RIG_LIMIT, workers)
 
 
 def _unstated_row(workers: Workers) -> Row:
@@ -170,7 +170,7 @@ def _passes_beyond(job: tuple[tuple[float, float, float], int]) -> tuple[bool, b
     return passes, passes and error > found.budget.weakest_uncertainty
 
 
-def _told(
+def _reported(
     name: str,
     errors_of: Callable[[int], tuple[FloatArray, FloatArray, FloatArray]],
     n_calibrations: int,
@@ -276,7 +276,7 @@ def _moves_of_seat(trial: Flaws, swing: Swing, rng: np.random.Generator) -> Floa
     out = trial.out_of_round * np.cos(2 * (directions - rng.uniform(0, 2 * np.pi)))
     zero = np.zeros_like(out)
     one_way = np.stack([out * np.cos(directions), zero, out * np.sin(directions)], 1)
-    forms = lean_modes(swing.rotations)
+    forms = tilt_modes(swing.rotations)
     by_form = USUAL.form_error * rng.standard_normal((forms.shape[1], 3))
     by_form[: MODE_COUNTS[0]] @= np.linalg.cholesky(
         one_wave_variance(swing.rotations)

@@ -53,9 +53,9 @@ from pathlib import Path
 from lightpen.cli import main
 
 status = main(sys.argv[2:])
-told = Path("/proc/self/status")
-if told.exists():
-    Path(sys.argv[1]).write_bytes(told.read_bytes())
+reported = Path("/proc/self/status")
+if reported.exists():
+    Path(sys.argv[1]).write_bytes(reported.read_bytes())
 sys.exit(status)
 """
 

@@ -80,6 +80,6 @@ class FaultyCamera(SimulatedCamera):
         if self._n_to_spoil:
             self._n_to_spoil -= 1
             self._stats = replace(self._stats, incomplete=self._stats.incomplete + 1)
-            told = message("camera.incomplete", seq=frame.seq, serial=self.serial)
-            raise FrameIncomplete(told)
+            reported = message("camera.incomplete", seq=frame.seq, serial=self.serial)
+            raise FrameIncomplete(reported)
         return frame

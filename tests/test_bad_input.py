@@ -578,7 +578,7 @@ def test_a_bad_pen_file_is_refused_by_name(
         "twice",
     ],
 )
-def test_what_is_wrong_with_a_pen_file_is_said(
+def test_what_is_wrong_with_a_pen_file_is_reported(
     edit: Edit, words: list[str], swing: Swing, lightpen: Run, tmp_path: Path
 ) -> None:
     file = tmp_path / "bad-pen.csv"
@@ -958,7 +958,7 @@ def test_an_image_of_another_size_is_refused_or_dropped_by_name(
         assert "39 of 40 used" in outcome.stdout
 
 
-def test_cropped_colour_and_deep_images_in_one_folder_are_told_apart(
+def test_cropped_colour_and_deep_images_in_one_folder_are_distinguished(
     swing: Swing, images: Path, lightpen: Run
 ) -> None:
     first, second, third, *_ = sorted(images.iterdir())

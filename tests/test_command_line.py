@@ -951,7 +951,7 @@ def test_a_name_that_cannot_be_looked_up_is_no_mistake_of_the_program() -> None:
         assert desktop.opened == [Path(name)]
 
 
-def test_a_record_on_paper_is_told_where_it_is(
+def test_a_record_on_paper_is_reported_where_it_is(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     desktop, result = WitnessingDesktop(), Path("000001.json")
@@ -983,7 +983,7 @@ def test_a_word_that_is_neither_command_nor_file_is_refused(
     assert "invalid choice: 'calibrte'" in capsys.readouterr().err
 
 
-def test_output_that_fails_is_told_even_without_a_standard_output(
+def test_output_that_fails_is_reported_even_without_a_standard_output(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def fail(*_: object) -> None:

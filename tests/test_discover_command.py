@@ -71,7 +71,7 @@ def test_a_swing_of_centres_and_a_length_give_pen_camera_and_record(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "reported"),
     [
         ([], "one known length"),
         (["--length", "1", "180"], "is not a length"),
@@ -79,17 +79,17 @@ def test_a_swing_of_centres_and_a_length_give_pen_camera_and_record(
         (["--length", "2", "2", "180"], "and itself"),
     ],
 )
-def test_what_cannot_be_done_is_told_and_nothing_is_written(
-    centers: Path, more: list[str], told: str, capsys: pytest.CaptureFixture[str]
+def test_what_cannot_be_done_is_reported_and_nothing_is_written(
+    centers: Path, more: list[str], reported: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(arguments(centers, *more)) != 0
 
-    assert told in capsys.readouterr().err
+    assert reported in capsys.readouterr().err
     assert not any((centers.parent / name).exists() for name in OUTPUTS)
 
 
 @pytest.mark.slow
-def test_a_length_between_the_wrong_leds_is_told(
+def test_a_length_between_the_wrong_leds_is_reported(
     centers: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     length = ("--length", "longest", f"{0.5 * STATION.longest}")

@@ -113,7 +113,7 @@ for line in sys.stdin:
 
 @dataclass(frozen=True)
 class Life:
-    """What one process told until it was killed.
+    """What one process reported until it was killed.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class Program:
         self._process = process
 
     def live(self, n_kept: int, seconds: float) -> Life:
-        """Swing, be killed so long after so many images, and return what was told."""
+        """Swing, be killed so long after so many images; return what was reported."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.write("swing\n")

@@ -69,7 +69,7 @@ def test_recorded_touches_are_measured_by_a_plan(
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "reported"),
     [
         ("kind: circle}", "kind: ring}", "Invalid enum value 'ring'"),
         ("touches: 8", "touches: 2", "a circle needs 3 touches"),
@@ -87,14 +87,14 @@ def test_a_bad_plan_is_refused_in_a_sentence(
     files: list[str | Path],
     old: str,
     new: str,
-    told: str,
+    reported: str,
 ) -> None:
     plan.write_text(PLAN.replace(old, new), encoding="utf-8")
 
     outcome = lightpen("measure", plan, shared_data / "circle", *files)
 
     assert outcome.returncode in {1, 2}
-    assert told in outcome.stderr
+    assert reported in outcome.stderr
     assert outcome.stdout == ""
 
 

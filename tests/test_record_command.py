@@ -301,7 +301,7 @@ def test_what_a_crash_left_behind_is_passed_over(
         ([24, 23, 22, 21], "4 images, the first images/000021.png, are in the folder"),
     ],
 )
-def test_images_that_the_journal_does_not_name_are_told(
+def test_images_that_the_journal_does_not_name_are_reported(
     lightpen: Run, folder: Path, numbers: list[int], note: str
 ) -> None:
     for number in numbers:
@@ -314,14 +314,16 @@ def test_images_that_the_journal_does_not_name_are_told(
     assert outcome.stderr.count("lightpen:") == 1
 
 
-def test_a_whole_record_has_nothing_to_be_told(lightpen: Run, folder: Path) -> None:
+def test_a_whole_record_has_nothing_to_report(lightpen: Run, folder: Path) -> None:
     (folder / "images" / ".0123456789abcdef.part").write_bytes(b"torn")
 
     assert lightpen("calibrate", folder).stderr == ""
 
 
 @pytest.mark.parametrize("name", [HEADER, JOURNAL])
-def test_what_a_record_lacks_is_told(lightpen: Run, folder: Path, name: str) -> None:
+def test_what_a_record_lacks_is_reported(
+    lightpen: Run, folder: Path, name: str
+) -> None:
     (folder / name).unlink()
     outcome = lightpen("calibrate", folder)
 
@@ -360,7 +362,7 @@ def test_a_folder_that_is_no_record_still_needs_its_files(
         ("of a later version", None, None),
     ],
 )
-def test_what_the_images_are_of_is_told(
+def test_what_the_images_are_of_is_reported(
     calibrated: Calibrated,
     folder: Path,
     rewrite_header: Callable[..., None],

@@ -168,7 +168,7 @@ def test_folders_in_another_order_are_refused_by_their_names(
     assert_refused(outcome, "another order than the cameras.*left, right", 2)
 
 
-def test_exchanged_folders_of_other_names_are_told_by_their_images(
+def test_exchanged_folders_of_other_names_are_reported_by_their_images(
     copied: Path, lightpen: Run
 ) -> None:
     (copied / "left").rename(copied / "b")
@@ -188,7 +188,7 @@ def test_images_of_another_size_name_the_camera(copied: Path, lightpen: Run) -> 
     assert "They have the size of left" in outcome.stderr
 
 
-def test_missing_images_are_told_and_the_others_used(
+def test_missing_images_are_reported_and_the_others_used(
     copied: Path, lightpen: Run
 ) -> None:
     (copied / "right" / "frame_0004.png").unlink()

@@ -34,8 +34,8 @@ def test_a_recorded_swing_is_streamed_with_its_tip(
         text=True,
     ) as process:
         assert process.stdout is not None
-        told = process.stdout.readline()
-        place = re.search(r"at 127\.0\.0\.1:(\d+)\.", told)
+        reported = process.stdout.readline()
+        place = re.search(r"at 127\.0\.0\.1:(\d+)\.", reported)
         assert place is not None
         client = OpenIGTLinkClient(port=int(place[1]))
         message = client.wait_for_message("TipToCamera", timeout=LONGEST)

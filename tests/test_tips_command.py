@@ -83,7 +83,7 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_kept(
     lightpen: Run, tmp_path: Path
 ) -> None:
     where = ("--data", tmp_path / "data")
-    for words, told in (
+    for words, reported in (
         (("add", "tip", "T-1", "--ball-diameter", "0"), "diameter 0 mm is not valid"),
         (("add", "cone", "C-1", "--ball-diameter", "5"), "Only a tip has a ball"),
         (("add", "tip", "T-1", "--axis", "0", "1"), "takes three numbers"),
@@ -91,7 +91,7 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_kept(
     ):
         refused = lightpen("tips", *words, *where)
         assert refused.returncode == 2
-        assert told in refused.stderr
+        assert reported in refused.stderr
     assert not (tmp_path / "data" / "library").exists()
 
 

@@ -333,7 +333,7 @@ def test_one_end_touched_twice_is_refused(
     assert "one end was probed again" in outcome.stderr
 
 
-def test_points_are_told_with_the_ball_compensated_along_the_axis(
+def test_points_are_reported_with_the_ball_compensated_along_the_axis(
     shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
 ) -> None:
     """No image shows where the tip came from, as each is a touch of its own."""

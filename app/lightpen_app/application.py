@@ -120,7 +120,7 @@ class Wizard(QObject):
         self.window.discovery_requested.connect(self._show_discovery)
         self.window.attention_changed.connect(self.workbench.live.set_watched)
         self.workbench.folder_watch.counted.connect(self._on_others_counted)
-        self.workbench.folder_watch.doubted.connect(self._on_folder_doubted)
+        self.workbench.folder_watch.fault_changed.connect(self._on_folder_fault_changed)
         for model in (
             *(self.workbench.run, self.workbench.library, self.workbench.selection),
         ):
@@ -163,7 +163,7 @@ class Wizard(QObject):
             subject_of(now, chosen, self.workbench.library.statuses)
         )
 
-    def _on_folder_doubted(self, fault: str) -> None:
+    def _on_folder_fault_changed(self, fault: str) -> None:
         """Advise another data folder while this one cannot be written."""
         folder = str(self.workbench.folder)
         self.window.set_unwritable(folder if fault else "", fault)
@@ -176,7 +176,7 @@ class Wizard(QObject):
         ).format(self.workbench.folder)
         notices = self.workbench.notifications
         if n_others:
-            notices.tell("other-windows", words, Tone.WARN)
+            notices.notify("other-windows", words, Tone.WARN)
         else:
             notices.withdraw("other-windows")
 
@@ -202,7 +202,7 @@ class Wizard(QObject):
         if not streaming.fault:
             notices.withdraw(streaming)
         elif streaming.fault != notices.text(streaming):
-            notices.tell(streaming, streaming.fault)
+            notices.notify(streaming, streaming.fault)
         self.window.set_stream(
             StreamState(streaming.status, streaming.has_tip, streaming.fault)
         )
@@ -269,7 +269,7 @@ def run_demo(make_pages: MakePages) -> int:
     )
     if not is_seen:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
-        qInstallMessageHandler(_tell_but_hints)
+        qInstallMessageHandler(_print_but_hints)
     application = make_application(sys.argv)
     with (
         EndSignals(application) as signals,
@@ -286,7 +286,7 @@ def run_demo(make_pages: MakePages) -> int:
 
         demo = Demo(wizard.window, wizard.workbench, is_watched=is_seen)
         if not is_seen:
-            demo.told.connect(partial(print, flush=True))
+            demo.message_sent.connect(partial(print, flush=True))
             demo.ended.connect(partial(_print_tip, wizard.workbench.run))
             demo.ended.connect(wizard.window.close_unasked)
         wizard.started.connect(demo.start)
@@ -338,7 +338,7 @@ def ended(wizard: Wizard, status: int) -> int:
     return status
 
 
-def _tell_but_hints(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
+def _print_but_hints(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
     """Forward Qt's messages, except geometry hints of hidden windows."""
     if "propagateSizeHints" not in text:
         print(text, file=sys.stderr)

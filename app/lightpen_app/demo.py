@@ -34,13 +34,13 @@ class Demo(QObject):
 
     Signals
     -------
-    told(str)
+    message_sent(str)
         A sentence on what is going on.
     ended()
         The tip is accepted, or the swing gave none.
     """
 
-    told = Signal(str)
+    message_sent = Signal(str)
     ended = Signal()
 
     def __init__(
@@ -63,7 +63,7 @@ class Demo(QObject):
 
         # Connections
         self._timer.timeout.connect(self._on_tick)
-        self.told.connect(self._show)
+        self.message_sent.connect(self._show)
 
     @property
     def is_accepted(self) -> bool:
@@ -131,7 +131,7 @@ class Demo(QObject):
             ),
         }
         if key in words:  # else somebody looks round
-            self.told.emit(words[key])
+            self.message_sent.emit(words[key])
         operator = self._workbench.live.operator
         if operator is not None:
             operator.seat()
@@ -143,7 +143,7 @@ class Demo(QObject):
             selection.set_choices(selection.choices.with_options(plate))
 
     def _show(self, words: str) -> None:
-        self._workbench.notifications.tell(self, words, Tone.ACTIVE)
+        self._workbench.notifications.notify(self, words, Tone.ACTIVE)
 
     def _farewell(self) -> str:
         if not self._is_watched:
@@ -156,4 +156,4 @@ class Demo(QObject):
     def _end(self, words: str) -> None:
         self._timer.stop()
         self.ended.emit()
-        self.told.emit(words)
+        self.message_sent.emit(words)

@@ -19,7 +19,7 @@ class EndSignals(QObject):
     Signals
     -------
     came(int)
-        The number of the first signal, told from the event loop, so that nothing is
+        The number of the first signal, emitted from the event loop, so that nothing is
         cut off in its midst.
     """
 

@@ -211,17 +211,17 @@ def _parser(
             commands.add_parser("report", help="write the calibration report as PDF"),
             desktop,
         )
-    for name, told, function in COMMANDS:
-        command = commands.add_parser(name, help=told)
+    for name, help_text, function in COMMANDS:
+        command = commands.add_parser(name, help=help_text)
         command.set_defaults(log_folder=usual_data_folder)
         if name in given:
             resolve_name(f"lightpen.commands.{function}")(command)
     data_folder = usual_data_folder if desktop is None else desktop.data_folder
-    for name, told, add in (
+    for name, help_text, add in (
         ("archive", "check, list, export and import entries", add_archive),
         ("tips", "manage the library of pens, tips and cones", add_tips),
     ):
-        command = commands.add_parser(name, help=told)
+        command = commands.add_parser(name, help=help_text)
         command.set_defaults(log_folder=usual_data_folder)
         if name in given:
             add(command, data_folder)

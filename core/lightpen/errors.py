@@ -8,14 +8,14 @@ class LightpenError(Exception):
 
     Parameters
     ----------
-    told : Message or str
+    content : Message or str
         Message or its code: what was found, what is needed, what to do.
     **values : Value
         Of a message given by its code.
     """
 
-    def __init__(self, told: Message | str, /, **values: Value) -> None:
-        self.message = Message(told, values) if isinstance(told, str) else told
+    def __init__(self, content: Message | str, /, **values: Value) -> None:
+        self.message = Message(content, values) if isinstance(content, str) else content
         super().__init__(self.message)
 
 

@@ -5,7 +5,7 @@ from enum import StrEnum, unique
 
 from lightpen.messages import Message, message
 
-MANY_SIDES = 4  # of eight; more are not told one by one
+MANY_SIDES = 4  # of eight; more are not listed one by one
 
 
 @unique

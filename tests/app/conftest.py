@@ -74,7 +74,7 @@ PATIENCE_MS = 120_000  # on a machine that does other things besides
 
 
 class PatientBot(QtBot):
-    """Waits as long as a loaded machine may take, unless told otherwise."""
+    """Waits as long as a loaded machine may take."""
 
     @override
     def waitUntil(
@@ -114,7 +114,9 @@ def kept_to_one_thread() -> Iterator[None]:
 def collected(kept_to_one_thread: None) -> Iterator[None]:
     """What a test has closed is gone before the next one: each would be styled anew."""
     yield
-    QThreadPool.globalInstance().waitForDone(PATIENCE_MS)  # its jobs are told of there
+    QThreadPool.globalInstance().waitForDone(
+        PATIENCE_MS
+    )  # its jobs are reported of there
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     collect_if_due()
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 WAY = "Choose the data folder at Set up station or in the options (F10)."
 
 
-def test_a_read_only_data_folder_is_told_with_the_way_to_another(
+def test_a_read_only_data_folder_is_reported_with_the_way_to_another(
     settings: Settings,
     open_wizard: "OpenWizard",
     around: SourceEnvironment,

@@ -12,9 +12,9 @@ from tests.app.walks import (
     NAMES,
     Run,
     calibrated,
+    page_text,
     read_out,
     result_on_disk,
-    told,
     watch_the_swing,
 )
 
@@ -154,4 +154,4 @@ def pixels_of(image: QImage) -> Image:
 
 def _misfit(walker: "Walker") -> float:
     """The RMS residual shown with the LEDs, px."""
-    return float(re.findall(r"RMS residual (\S+) px", told(walker))[0])
+    return float(re.findall(r"RMS residual (\S+) px", page_text(walker))[0])

@@ -115,7 +115,7 @@ def test_choices_take_effect_at_once_and_are_remembered(
         each.setParent(None)
 
 
-def test_settings_that_cannot_be_saved_are_told_and_stop_nothing(
+def test_settings_that_cannot_be_saved_are_reported_and_stop_nothing(
     qtbot: QtBot, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("not a folder")
@@ -144,13 +144,13 @@ def test_a_crash_is_shown_in_the_window(qtbot: QtBot, settings: Settings) -> Non
     wizard.setParent(None)
 
 
-def test_a_fault_that_is_over_is_no_longer_told(
+def test_a_fault_that_is_over_is_no_longer_reported(
     qtbot: QtBot, settings: Settings
 ) -> None:
     wizard = open_wizard(qtbot, settings)
     notifications = wizard.workbench.notifications
 
-    notifications.tell("a swing", "The disk is full.")
+    notifications.notify("a swing", "The disk is full.")
     assert "The disk is full." in wizard.window.words()
     notifications.withdraw("a swing")
 

@@ -1,4 +1,4 @@
-"""A bug is written down and told, and the program goes on."""
+"""A bug is written down and reported, and the program goes on."""
 
 import logging
 import subprocess
@@ -107,35 +107,35 @@ def test_a_report_ends_with_the_last_lines_of_the_log(
     assert "RuntimeError: the bug" in log
 
 
-def test_the_same_bug_is_told_once(qtbot: QtBot, hook: CrashHook) -> None:
-    told: list[str] = []
-    hook.reported.connect(told.append)
+def test_the_same_bug_is_reported_once(qtbot: QtBot, hook: CrashHook) -> None:
+    reported: list[str] = []
+    hook.reported.connect(reported.append)
 
     for _ in range(3):
         raise_and_report(hook, "in every paint event")
 
-    assert len(told) == 1
+    assert len(reported) == 1
 
 
 def test_ever_new_bugs_do_not_fill_the_disk(hook: CrashHook) -> None:
-    told: list[str] = []
-    hook.reported.connect(told.append)
+    reported: list[str] = []
+    hook.reported.connect(reported.append)
 
     for number in range(MAX_REPORTS + 5):
         raise_and_report(hook, f"number {number}")
 
-    assert len(set(told)) == MAX_REPORTS
+    assert len(set(reported)) == MAX_REPORTS
 
 
-def test_a_bug_is_told_even_if_no_report_can_be_written(tmp_path: Path) -> None:
+def test_a_bug_is_reported_even_if_no_report_can_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder")
     hook = CrashHook(tmp_path / "file")
-    told: list[str] = []
-    hook.reported.connect(told.append)
+    reported: list[str] = []
+    hook.reported.connect(reported.append)
 
     raise_and_report(hook, "the bug")
 
-    assert told == [""]
+    assert reported == [""]
 
 
 def test_a_report_reaches_the_window_on_its_own_thread(

@@ -129,11 +129,11 @@ def test_a_demo_goes_on_after_somebody_looked_at_another_step(
 ) -> None:
     walker = open_wizard()
     demo = Demo(walker.window, walker.workbench, is_watched=False)
-    told: list[str] = []
-    demo.told.connect(told.append)
+    reported: list[str] = []
+    demo.message_sent.connect(reported.append)
     walker.click_step("History")
     demo.start()
 
-    walker.until(lambda: bool(told))
-    assert told[0].startswith("Demo: enter station, pen, tip and cone.")
+    walker.until(lambda: bool(reported))
+    assert reported[0].startswith("Demo: enter station, pen, tip and cone.")
     demo.deleteLater()

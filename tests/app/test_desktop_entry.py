@@ -83,7 +83,7 @@ def test_removing_what_is_not_there_is_no_error(data: Path) -> None:
     assert remove_entry() == 0
 
 
-def test_another_system_is_told_to_use_its_installer(
+def test_another_system_is_referred_to_its_installer(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(sys, "platform", "win32")

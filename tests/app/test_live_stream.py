@@ -72,7 +72,7 @@ def test_the_tip_in_force_is_streamed_and_one_that_comes_into_force(
     qtbot.waitUntil(lambda: streaming.has_tip)
 
 
-def test_a_taken_port_is_told_until_another_place_is_chosen(
+def test_a_taken_port_is_reported_until_another_place_is_chosen(
     workbench: Workbench, qtbot: QtBot
 ) -> None:
     streaming = workbench.streaming

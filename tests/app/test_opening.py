@@ -51,7 +51,7 @@ def test_an_interrupted_swing_goes_on_at_the_step_swing(
     assert walker.workbench.run.status.is_capturing
 
 
-def test_what_is_no_swing_is_told_in_a_sentence(
+def test_what_is_no_swing_is_reported_in_a_sentence(
     open_wizard: "OpenWizard", tmp_path: Path
 ) -> None:
     walker = open_wizard()

@@ -22,9 +22,9 @@ from tests.app.walks import (
     NAMES,
     Run,
     calibrated,
+    page_text,
     read_out,
     result_on_disk,
-    told,
     watch_the_swing,
 )
 
@@ -130,7 +130,7 @@ def test_a_recorded_swing_gives_its_tip(
 
     n_inputs = walker.n_inputs
     walker.until_says("READING")
-    walker.until(lambda: bool(re.search(r"\d+ of 60 images loaded", told(walker))))
+    walker.until(lambda: bool(re.search(r"\d+ of 60 images loaded", page_text(walker))))
     assert not walker.tells("Tilt")
     walker.until_says("Review")
     walker.until(walker.main_button().isEnabled)

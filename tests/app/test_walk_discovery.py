@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from tests.app.walks import NAMES, read_out, result_on_disk, told
+from tests.app.walks import NAMES, page_text, read_out, result_on_disk
 
 from lightpen.record.swings.recordings import files_beside
 from lightpen_app.discovery.discovery_run import DISCOVERIES
@@ -65,7 +65,7 @@ def test_a_pen_without_a_file_becomes_an_accepted_tip(
     walker.until(walker.main_button().isEnabled)
     walker.click("Review")
     walker.until(walker.main_button().isEnabled)
-    assert walker.says("PASS: Within limits"), told(walker)
+    assert walker.says("PASS: Within limits"), page_text(walker)
     shown, true = read_out(walker), walker.workbench.around.scene.tip_pen
     assert (np.abs(shown.tip - true) < 1.5 * shown.u).all()
     walker.click("Accept")

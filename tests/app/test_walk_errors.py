@@ -1,4 +1,4 @@
-"""What can go wrong on the way through the wizard is told, and loses nothing."""
+"""What can go wrong on the way through the wizard is reported, and loses nothing."""
 
 import os
 import shutil
@@ -188,7 +188,7 @@ def test_a_picture_is_refused_as_intrinsics(prepared: "Walker", tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_intrinsics_of_another_size_are_told_and_close_the_next_steps(
+def test_intrinsics_of_another_size_are_reported_and_close_the_next_steps(
     prepared: "Walker", tmp_path: Path
 ) -> None:
     go_to(prepared, "Camera")
@@ -211,7 +211,7 @@ def test_intrinsics_of_another_size_are_told_and_close_the_next_steps(
 
 
 @pytest.mark.slow
-def test_a_letter_in_the_led_file_is_told_with_its_line(
+def test_a_letter_in_the_led_file_is_reported_with_its_line(
     prepared: "Walker", tmp_path: Path
 ) -> None:
     go_to(prepared, "LEDs")
@@ -258,7 +258,9 @@ def pen_in(folder: Path, leds: FloatArray) -> Path:
 
 
 @pytest.mark.slow
-def test_the_file_of_another_pen_is_told(prepared: "Walker", tmp_path: Path) -> None:
+def test_the_file_of_another_pen_is_reported(
+    prepared: "Walker", tmp_path: Path
+) -> None:
     path = tmp_path / "another.json"
     write_pen(eight_led_pen(), path)
     go_to(prepared, "LEDs")
@@ -295,7 +297,7 @@ def test_a_folder_without_images_can_be_tried_again(
 
 
 @pytest.mark.slow
-def test_a_camera_that_is_gone_is_told_and_comes_back(
+def test_a_camera_that_is_gone_is_reported_and_comes_back(
     cameras: list[FaultyCamera], prepared: "Walker"
 ) -> None:
     go_to(prepared, "Camera")
@@ -325,7 +327,7 @@ def test_a_camera_that_is_gone_is_told_and_comes_back(
 
 
 @pytest.mark.slow
-def test_what_befalls_the_pen_is_told_and_the_swing_goes_on(
+def test_what_befalls_the_pen_is_reported_and_the_swing_goes_on(
     capturing: "Walker",
 ) -> None:
     n_inputs = capturing.n_inputs
@@ -601,12 +603,12 @@ def _use_all_windows(walker: "Walker", title: str) -> None:
 
 @pytest.mark.slow
 def test_about_tells_the_versions(prepared: "Walker") -> None:
-    told: list[str] = []
+    reported: list[str] = []
 
     def read_and_close() -> None:
         about = QApplication.activeModalWidget()
         if about is not None and about.isActiveWindow():
-            told.extend(prepared.texts(about))
+            reported.extend(prepared.texts(about))
             prepared.press(Key.Key_Escape)
 
     timer = QTimer(prepared.window, interval=20)
@@ -616,7 +618,7 @@ def test_about_tells_the_versions(prepared: "Walker") -> None:
     prepared.choose("About Lightpen")
     timer.stop()
 
-    assert any("PySide6" in text for text in told)
+    assert any("PySide6" in text for text in reported)
 
 
 @pytest.mark.slow

@@ -52,7 +52,7 @@ def watch_the_swing(walker: "Walker") -> None:
     n_inputs = walker.n_inputs
     walker.until_tells("Starts in ")
     walker.until_says("Tilt RIGHT")
-    walker.until(lambda: bool(re.search(r"\d+ of about \d+ images", told(walker))))
+    walker.until(lambda: bool(re.search(r"\d+ of about \d+ images", page_text(walker))))
     walker.until_says("CAPTURING")
     walker.until_tells("10 of 10 LEDs, ")
     assert walker.main_button().isEnabled()
@@ -62,14 +62,14 @@ def watch_the_swing(walker: "Walker") -> None:
     assert walker.n_inputs == n_inputs
 
 
-def told(walker: "Walker") -> str:
+def page_text(walker: "Walker") -> str:
     """All that the window says."""
     return "\n".join(walker.texts())
 
 
 def read_out(walker: "Walker") -> ReadOut:
     """The tip that is shown in the review."""
-    words = told(walker)
+    words = page_text(walker)
     tip = re.findall(r"^[xyz] = (\S+) mm$", words, re.MULTILINE)
     u = re.findall(r"^\u00b1 (\S+) mm$", words, re.MULTILINE)
     assert len(tip) == len(u) == 3

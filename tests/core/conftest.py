@@ -44,11 +44,11 @@ class Witness:
     """Hears what a runner tells, and lets a test wait for it."""
 
     def __init__(self) -> None:
-        self.told: list[tuple[SwingStatus, tuple[SwingEvent, ...]]] = []
+        self.reported: list[tuple[SwingStatus, tuple[SwingEvent, ...]]] = []
         self.faults: list[str] = []
         self.reliefs: list[str] = []
         self.fractions: list[float] = []
-        self.threads: set[threading.Thread] = set()  # that told of the swing
+        self.threads: set[threading.Thread] = set()  # that reported the swing
         self.follower: GuidedOperator | None = None
         self._changed = threading.Condition()
 
@@ -56,7 +56,7 @@ class Witness:
         if self.follower is not None and status.state is not None:
             self.follower.follow(status.state)
         self.threads.add(threading.current_thread())
-        self._note(lambda: self.told.append((status, events)))
+        self._note(lambda: self.reported.append((status, events)))
 
     def on_progress(self, fraction: float) -> None:
         self._note(lambda: self.fractions.append(fraction))
@@ -69,11 +69,11 @@ class Witness:
 
     @property
     def statuses(self) -> list[SwingStatus]:
-        return [status for status, _ in self.told]
+        return [status for status, _ in self.reported]
 
     @property
     def events(self) -> list[SwingEvent]:
-        return [event for _, events in self.told for event in events]
+        return [event for _, events in self.reported for event in events]
 
     @property
     def event_kinds(self) -> list[SwingEventKind]:
@@ -215,7 +215,7 @@ class Station:
 
     def wait_until(self, is_so: Callable[[], bool]) -> None:
         """Wait until something is so, and the witness has heard of it."""
-        self.witness.wait_until(lambda: is_so() and self._is_told())
+        self.witness.wait_until(lambda: is_so() and self._is_reported())
 
     def wait_for_phase(self, phase: Phase) -> None:
         self.wait_until(
@@ -227,9 +227,9 @@ class Station:
         self.see()
         self.wait_until(lambda: not self.status.is_solving)
 
-    def _is_told(self) -> bool:
-        told = self.witness.told
-        return self.status is (told[-1][0] if told else self._first)
+    def _is_reported(self) -> bool:
+        reported = self.witness.reported
+        return self.status is (reported[-1][0] if reported else self._first)
 
 
 @pytest.fixture(scope="session")

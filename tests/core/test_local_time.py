@@ -12,14 +12,14 @@ TOLD = "from lightpen.local_time import local_now; print(local_now().utcoffset()
 
 def offset_in(zone: str) -> str:
     """Return the time zone that a program in such an environment counts with."""
-    told = subprocess.run(
+    reported = subprocess.run(
         [sys.executable, "-c", TOLD],
         env={**os.environ, "TZ": zone},
         capture_output=True,
         encoding="utf-8",
         check=True,
     )
-    return told.stdout.strip()
+    return reported.stdout.strip()
 
 
 @needs_posix

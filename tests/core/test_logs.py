@@ -253,7 +253,7 @@ def test_the_option_comes_before_the_variable(
     assert log_level(option) == level
 
 
-def test_a_variable_that_names_no_level_is_told(
+def test_a_variable_that_names_no_level_is_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv(LEVEL_VARIABLE, "loud")

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 URL = "https://example.org/Lightpen-setup.exe"
 
 
-def test_winget_is_told_version_digest_and_both_scopes(tmp_path: Path) -> None:
+def test_winget_gets_version_digest_and_both_scopes(tmp_path: Path) -> None:
     setup = tmp_path / "setup.exe"
     setup.write_bytes(b"setup")
 
@@ -32,10 +32,10 @@ def test_exit_statuses_for_winget_and_it_are_those_of_the_installer() -> None:
     stated = set(re.findall(r"(?:Refuse\}|SetErrorLevel) (\d+)", script))
     sheet = (ROOT / "docs" / "it.md").read_text("utf-8")
     rows = re.findall(r"^\| ([\d, ]+) \|", sheet, re.MULTILINE)
-    told = {number for row in rows for number in row.split(", ")}
+    reported = {number for row in rows for number in row.split(", ")}
 
     assert len(stated) > 6
-    assert stated <= told
+    assert stated <= reported
 
 
 def test_the_flatpak_takes_the_locked_versions() -> None:

@@ -21,7 +21,7 @@ from lightpen_app.look.sentences import worded
 from lightpen_app.look.translatable import QT_TRANSLATE_NOOP
 
 CONTEXT = "phrases"
-WORTH_A_TURN = math.radians(15)  # about the pen's own axis, to be told of
+WORTH_A_TURN = math.radians(15)  # about the pen's own axis, to be mentioned
 
 
 @dataclass(frozen=True)

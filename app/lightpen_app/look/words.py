@@ -9,7 +9,7 @@ from PySide6.QtCore import QCoreApplication, QDateTime, QLocale
 LONGEST_SHOWN = 32  # characters
 LONGEST_WORD = 24  # characters; what is longer may be parted
 BREAK = "\u200b"  # where a line may end, though no blank is there
-PARTED = "  \u00b7  "  # between things told in one line
+PARTED = "  \u00b7  "  # between items in one line
 
 
 def shortened(name: str, longest: int = LONGEST_SHOWN) -> str:

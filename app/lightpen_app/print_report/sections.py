@@ -96,10 +96,10 @@ def _verdict(calibration_file: CalibrationFile) -> Block:
     if calibration_file.accepted is None:
         lines.append(translate("paper", "This tip has not been accepted."))
     elif calibration_file.restores is not None:
-        told = translate(
+        text = translate(
             "paper", "This tip was reinstated from an earlier calibration. Reason: {0}"
         )
-        lines.append(told.format(calibration_file.reason))
+        lines.append(text.format(calibration_file.reason))
     elif calibration_file.grade is Grade.PASS:
         lines.append(translate("paper", "The tip was accepted."))
     else:

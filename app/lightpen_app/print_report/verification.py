@@ -156,8 +156,8 @@ def _verdict(done: StoredVerification, verdict: Any) -> Iterator[Block]:
         yield subheading(translate("paper", "Limits / mm"))
         yield from facts(limits)
     if done.reason:
-        told = translate("paper", "The tip was accepted. Reason: {0}")
-        yield paragraph(told.format(done.reason))
+        text = translate("paper", "The tip was accepted. Reason: {0}")
+        yield paragraph(text.format(done.reason))
 
 
 def _figures(record: Mapping[str, Any]) -> Iterator[Block]:

@@ -90,13 +90,13 @@ class ActionBar(Translated, QFrame):
         self._status.setAccessibleName(text)
         self._refresh_status()
 
-    def _told_status(self) -> str:
+    def _visible_status(self) -> str:
         """Return the status, but not the same sentence twice."""
         text = self._status.text()
         return "" if text == self._why_not.text() else text
 
     def _refresh_status(self) -> None:
-        self._status.setVisible(bool(self._told_status()))
+        self._status.setVisible(bool(self._visible_status()))
 
     def set_room(self, room: SizeClass) -> None:
         """Take less of a window that has little."""
@@ -106,7 +106,7 @@ class ActionBar(Translated, QFrame):
 
     def words(self) -> tuple[str, str]:
         """Return why the main button cannot be pressed, and the status."""
-        return self._why_not.text(), self._told_status()
+        return self._why_not.text(), self._visible_status()
 
     def press_main(self) -> None:
         """Press the main button, if it can be pressed."""

@@ -145,7 +145,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         notifications.raised.connect(self._notice.show_text)
         notifications.withdrawn.connect(self._notice.drop)
         notifications.status_changed.connect(self._action_bar.set_status)
-        self._sidebar.subject_told.connect(self._operator_view.set_subject)
+        self._sidebar.subject_changed.connect(self._operator_view.set_subject)
         for page in pages:
             self._add_page(page)
         application = QApplication.instance()
@@ -190,7 +190,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._action_bar.guard()
         self._notifications.withdraw(*(page.key for page in self._pages))
         self._area.show_page(self.page())
-        self._tell_attention()
+        self._emit_attention()
         self.page().entered()
         self._refresh()
         self._focus_page()
@@ -230,7 +230,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
                 "are saved. No report was written: the disk is full or "
                 "write-protected."
             )
-        self._notifications.tell("crash", text)
+        self._notifications.notify("crash", text)
 
     def close_unasked(self) -> None:
         """Close without a question, since nobody may be present."""
@@ -252,8 +252,12 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     def words(self) -> tuple[str, ...]:
         """Return the texts of the window without those of the page."""
-        said = (self._sidebar.subject(), *self._area.words(), *self._action_bar.words())
-        return tuple(filter(None, said))
+        texts = (
+            self._sidebar.subject(),
+            *self._area.words(),
+            *self._action_bar.words(),
+        )
+        return tuple(filter(None, texts))
 
     def is_seen(self) -> bool:
         """Return whether it, or the operator view, is on a screen."""
@@ -314,7 +318,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         super().changeEvent(event)
         if event.type() == QEvent.Type.WindowStateChange:
             self.setUpdatesEnabled(not self.isMinimized())
-            self._tell_attention()
+            self._emit_attention()
         if event.type() == QEvent.Type.LanguageChange:
             self._retranslate()
             self._refresh()
@@ -527,9 +531,9 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             self._operator_view.open_beside(self)
         else:
             self._operator_view.close()
-        self._tell_attention()
+        self._emit_attention()
 
-    def _tell_attention(self) -> None:
+    def _emit_attention(self) -> None:
         """Return whether live images can be seen now."""
         is_seen = self.is_seen()
         self.attention_changed.emit(self.page().shows_images and is_seen)
@@ -560,7 +564,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             "From the next start, swings and results are saved in {0}. Existing "
             "ones remain in place."
         )
-        self._notifications.tell(OPTIONS, words.format(folder), Tone.ACTIVE)
+        self._notifications.notify(OPTIONS, words.format(folder), Tone.ACTIVE)
 
     def _on_stream_asked(self) -> None:
         now = self._options.value()
@@ -584,4 +588,4 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Pen tip calibration"))
-        self._action_bar.set_status("")  # it was said in the language before
+        self._action_bar.set_status("")  # it is in the previous language

@@ -53,8 +53,8 @@ class NoticeBar(Translated, QFrame):
 
     def show_text(self, text: str, tone: Tone = Tone.BAD) -> None:
         """Say a sentence, instead of an earlier one."""
-        told, is_of_folder = self.text(), self._with_way(text) != text
-        if is_of_folder and told == self._with_way(self._fault):
+        shown, is_of_folder = self.text(), self._with_way(text) != text
+        if is_of_folder and shown == self._with_way(self._fault):
             return
         text = self._with_way(text)
         self._text.setText(text)

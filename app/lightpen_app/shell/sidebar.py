@@ -65,7 +65,7 @@ class Sidebar(Translated, QFrame):
         Index of the step, which may be closed.
     operator_view_chosen(), help_chosen(), options_chosen()
         The buttons.
-    subject_told(str, bool)
+    subject_changed(str, bool)
         What is calibrated, and what its images are of, in one line; whether some of it
         must not be measured with.
     """
@@ -74,7 +74,7 @@ class Sidebar(Translated, QFrame):
     operator_view_chosen = Signal()
     help_chosen = Signal()
     options_chosen = Signal()
-    subject_told = Signal(str, bool)
+    subject_changed = Signal(str, bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -164,12 +164,12 @@ class Sidebar(Translated, QFrame):
 
     def _show_subject(self) -> None:
         names = self._value.names
-        told = (
+        named = (
             (self.tr("Pen {0}"), names.pen),
             (self.tr("Tip {0}"), names.tip),
             (self.tr("Cone {0}"), names.cone),
         )
-        parts = [words.format(shortened(name)) for words, name in told if name]
+        parts = [words.format(shortened(name)) for words, name in named if name]
         self._subject.setText("\n".join(parts))
         self._subject.setVisible(bool(parts))
         standing = subject_message(names, self._value.origin, self._value.statuses)
@@ -177,7 +177,7 @@ class Sidebar(Translated, QFrame):
         origin = origin_message(self._value.origin)
         self._origin.set_value(origin)
         line = filter(None, (*parts, standing.text, origin.text))
-        self.subject_told.emit(PARTED.join(line), bool(standing.text))
+        self.subject_changed.emit(PARTED.join(line), bool(standing.text))
 
     def set_room(self, room: SizeClass) -> None:
         """Take less of a window that has little."""

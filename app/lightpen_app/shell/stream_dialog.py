@@ -64,7 +64,7 @@ class StreamDialog(FittedWindow, Translated, QDialog):
         self._port_label = text_label(TextSize.SMALL, Tone.QUIET)
         self._port_label.setBuddy(self._port)
         self._reach = SignLabel()
-        self._told = SignLabel()
+        self._state_label = SignLabel()
         self._buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
 
         # Layout
@@ -74,7 +74,7 @@ class StreamDialog(FittedWindow, Translated, QDialog):
         form.setHorizontalSpacing(2 * GRID)
         form.addRow(self._address_label, self._address)
         form.addRow(self._port_label, self._port)
-        fill(layout, self._reach, self._on, self._told, self._buttons)
+        fill(layout, self._reach, self._on, self._state_label, self._buttons)
         self.setMinimumWidth(72 * GRID)
 
         # Connections
@@ -104,7 +104,7 @@ class StreamDialog(FittedWindow, Translated, QDialog):
 
     def words(self) -> str:
         """Return the texts about the stream."""
-        return self._told.value().text
+        return self._state_label.value().text
 
     def _refresh(self) -> None:
         is_on = self._on.isChecked()
@@ -119,7 +119,7 @@ class StreamDialog(FittedWindow, Translated, QDialog):
             )
             reach = StatusMessage(text, Sign.WARNING, Tone.WARN)
         self._reach.set_value(reach)
-        self._told.set_value(self._state_message() if is_on else StatusMessage())
+        self._state_label.set_value(self._state_message() if is_on else StatusMessage())
 
     def _state_message(self) -> StatusMessage:
         state = self._state

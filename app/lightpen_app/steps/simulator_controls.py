@@ -35,8 +35,8 @@ class SimulatorControls(Translated, QFrame):
             act(operator)
 
 
-def set_words(button: QAbstractButton, text: str, told: str) -> None:
+def set_words(button: QAbstractButton, text: str, tooltip: str) -> None:
     """Set the text of a button and its tool tip."""
     button.setText(text)
-    button.setToolTip(told)
-    button.setAccessibleDescription(told)
+    button.setToolTip(tooltip)
+    button.setAccessibleDescription(tooltip)

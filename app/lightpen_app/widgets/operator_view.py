@@ -146,7 +146,7 @@ class OperatorView(Translated, QWidget):
         self._layout.setHorizontalSpacing(0 if value.dial is None else 4 * GRID)
         if value.dial is not None:
             self._dial.set_value(value.dial)
-        self._tell_keys()
+        self._show_keys()
         self._resize_letters()
 
     def set_subject(self, text: str, is_marked: bool = False) -> None:
@@ -248,9 +248,9 @@ class OperatorView(Translated, QWidget):
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Operator view"))
-        self._tell_keys()
+        self._show_keys()
 
-    def _tell_keys(self) -> None:
+    def _show_keys(self) -> None:
         keys = self._value.keys, self.tr("Esc: leave this view")
         self._keys.set_text(PARTED.join(filter(None, keys)), Tone.QUIET, bold=False)
 
@@ -262,6 +262,6 @@ def other_screen(present: QScreen, screens: list[QScreen]) -> QScreen:
 
 def _dots_per_inch(screen: QScreen) -> float:
     """Return the pixels per inch of a screen, or a default."""
-    told = screen.physicalDotsPerInch()
+    dpi = screen.physicalDotsPerInch()
     low, high = CREDIBLE_DPI
-    return told if low <= told <= high else USUAL_DPI
+    return dpi if low <= dpi <= high else USUAL_DPI

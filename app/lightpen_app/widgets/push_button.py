@@ -32,11 +32,11 @@ class PushButton(QPushButton):
         self.setCheckable(checkable)
         self._least_width = least_width
 
-    def set_why_not(self, why_not: str, told: str = "") -> None:
+    def set_why_not(self, why_not: str, tooltip: str = "") -> None:
         """Disable the button with a reason, or enable it with a tool tip."""
         self.setEnabled(not why_not)
-        self.setToolTip(why_not or told)
-        self.setAccessibleDescription(why_not or told)
+        self.setToolTip(why_not or tooltip)
+        self.setAccessibleDescription(why_not or tooltip)
 
     @override
     def sizeHint(self) -> QSize:

@@ -155,8 +155,8 @@ class ReasonBar(AskingBar):
 
     def _is_whole(self) -> bool:
         is_asked = self._supervisor.isVisibleTo(self)
-        is_said = bool(self._reason()) and n_letters(self._reason()) >= self._least
-        return is_said and (self._supervisor.is_filled() or not is_asked)
+        is_given = bool(self._reason()) and n_letters(self._reason()) >= self._least
+        return is_given and (self._supervisor.is_filled() or not is_asked)
 
     def _refresh(self) -> None:
         self._give.setEnabled(self._is_whole())

@@ -48,7 +48,7 @@ class StateBanner(QWidget):
     """A filled area with a sign, a word and a sentence.
 
     A screen reader announces each new word with its sentence, once all is shown that
-    belongs to it: what stands only in passing is not told.
+    belongs to it: transient texts are not announced.
 
     Parameters
     ----------

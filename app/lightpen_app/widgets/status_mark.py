@@ -77,12 +77,14 @@ def subject_message(
         ItemKind.PEN: of(ItemKind.PEN, names.pen),
         ItemKind.CONE: of(ItemKind.CONE, names.cone),
     }
-    told = {kind: each for kind, each in found.items() if each in WORST_FIRST and each}
-    if not told:
+    marked = {
+        kind: each for kind, each in found.items() if each in WORST_FIRST and each
+    }
+    if not marked:
         return StatusMessage()
     words = PARTED.join(
         QCoreApplication.translate(CONTEXT, _OF_KIND[kind]).format(status_text(each))
-        for kind, each in told.items()
+        for kind, each in marked.items()
     )
-    worst = min(told.values(), key=WORST_FIRST.index)
+    worst = min(marked.values(), key=WORST_FIRST.index)
     return StatusMessage(words, *_MARKS[worst])

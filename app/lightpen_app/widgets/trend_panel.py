@@ -101,12 +101,12 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
         self._value = Trend()
 
         # Widgets
-        self._told = text_label(TextSize.SMALL, Tone.QUIET)
+        self._text = text_label(TextSize.SMALL, Tone.QUIET)
         self._plots: tuple[TrendPlot, ...] = ()
 
         # Layout
         layout = vertical_layout(
-            self, self._told, spacing=GRID // 2, margins=(0, GRID, 0, 0)
+            self, self._text, spacing=GRID // 2, margins=(0, GRID, 0, 0)
         )
         self._grid = grid_layout(layout, stretch=1)
 
@@ -127,7 +127,7 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
             self._make_plots()
         if self._plots:
             self._show(trend)
-        self._told.setText(self._told_of(trend))
+        self._text.setText(self._text_of(trend))
 
     def _make_plots(self) -> None:
         self._plots = tuple(TrendPlot(Axes(axis)) for axis in (*AXES, "U"))
@@ -157,7 +157,7 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
 
     def words(self) -> str:
         """Return the text above the plots."""
-        return self._told.text()
+        return self._text.text()
 
     @override
     def _use_room(self) -> None:
@@ -172,9 +172,9 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
         for plot in self._plots[3:]:
             title = self.tr("Largest U (k = 2) / mm")
             plot.set_axes(Axes(title, self.tr("calibration no.")))
-        self._told.setText(self._told_of(self._value))
+        self._text.setText(self._text_of(self._value))
 
-    def _told_of(self, trend: Trend) -> str:
+    def _text_of(self, trend: Trend) -> str:
         if not trend.entries:
             return self.tr("Select an entry with a tip to see its trend.")
         days = (trend.entries[0].entry.event.at, trend.entries[-1].entry.event.at)

@@ -55,4 +55,4 @@ class ArchiveWriter(QObject):
         job.start()
 
     def _on_failed(self, why: str) -> None:
-        self._notifications.tell(self, why)
+        self._notifications.notify(self, why)

@@ -95,7 +95,7 @@ class FilesOfCameras(QObject):
         ).format(file.path.name, shortened(owner), shortened(serial))
         now = self._selection.preparation
         self._selection.set_preparation(replace(now, camera_file=None))
-        self._notifications.tell(self, words)
+        self._notifications.notify(self, words)
 
     def _open_own(self, now: Preparation, serials: tuple[str, ...]) -> None:
         """Use mask and files of the cameras that are open now."""
@@ -146,7 +146,7 @@ class FilesOfCameras(QObject):
 
     def _on_unread(self, why: str) -> None:
         self._job = None
-        self._notifications.tell(self, why)
+        self._notifications.notify(self, why)
 
 
 def serials_in_use(now: Preparation) -> tuple[str, ...]:

@@ -103,7 +103,7 @@ class ChosenFiles(QObject):
         def on_read(opened: OpenedFiles) -> None:
             self._job = None
             take(_of_source(opened, source, self._selection.preparation))
-            self._tell(*map(worded, opened.faults))
+            self._show_faults(*map(worded, opened.faults))
 
         # Connections
         job.succeeded.connect(on_read)
@@ -137,16 +137,16 @@ class ChosenFiles(QObject):
 
     def _on_failed(self, sentence: str) -> None:
         self._job = None
-        self._tell(sentence)
+        self._show_faults(sentence)
 
     def _on_selected(self, before: Preparation) -> None:
         if _files(before) != _files(self._selection.preparation):
             self._withdraw()
 
-    def _tell(self, *sentences: str) -> None:
+    def _show_faults(self, *sentences: str) -> None:
         self._faults = tuple((self, i) for i in range(len(sentences)))
         for cause, sentence in zip(self._faults, sentences, strict=True):
-            self._notifications.tell(cause, sentence)
+            self._notifications.notify(cause, sentence)
 
     def _withdraw(self) -> None:
         """Take back why files were not chosen: others are."""

@@ -16,13 +16,13 @@ class FolderWatch(QObject):
     Signals
     -------
     counted(int)
-        So many other windows of the program use it, told when it changes.
-    doubted(str)
-        The sentence why nothing can be kept in it, or that it can again, empty.
+        Number of other windows of the program that use it, when it changes.
+    fault_changed(str)
+        Why nothing can be stored in it; empty when it can again.
     """
 
     counted = Signal(int)
-    doubted = Signal(str)
+    fault_changed = Signal(str)
 
     def __init__(self, folder: Path, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -64,16 +64,16 @@ class FolderWatch(QObject):
 
         # Connections
         job.succeeded.connect(self._on_writable)
-        job.failed.connect(self._doubt)
+        job.failed.connect(self._set_fault)
         job.start()
 
     def _on_writable(self, _: None) -> None:
-        self._doubt("")
+        self._set_fault("")
 
-    def _doubt(self, fault: str) -> None:
+    def _set_fault(self, fault: str) -> None:
         if fault != self._fault:
             self._fault = fault
-            self.doubted.emit(fault)
+            self.fault_changed.emit(fault)
 
     def _count(self) -> None:
         presence = self._presence

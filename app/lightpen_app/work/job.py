@@ -74,18 +74,18 @@ class Job(QObject):
         self._cancelled.set()
 
     def _run(self) -> None:
-        tell: Callable[[], object] = self._broke.emit
+        emit: Callable[[], object] = self._broke.emit
         try:
             if self._cancelled.is_set():  # while it waited for a thread
                 raise Cancelled
-            tell = partial(self._returned.emit, self._function(self._report))
+            emit = partial(self._returned.emit, self._function(self._report))
         except Cancelled:
-            tell = _tell_nothing
+            emit = _emit_nothing
         except LightpenError as error:
             _logger.warning("%s: %s", error.message.code, error.message)
-            tell = partial(self._refused.emit, error.message)
+            emit = partial(self._refused.emit, error.message)
         finally:
-            tell()
+            emit()
             self._finished.emit()
             self._over.set()
 
@@ -94,8 +94,8 @@ class Job(QObject):
             raise Cancelled
         self._moved.emit(fraction)
 
-    # What is told may be under way between the threads while the user cancels: it is
-    # judged here, on the thread of the user.
+    # A queued signal may arrive after the user has cancelled; checked here, on the
+    # thread of the GUI.
 
     def _on_moved(self, fraction: float) -> None:
         if not self._cancelled.is_set():
@@ -119,5 +119,5 @@ class Job(QObject):
         self.deleteLater()
 
 
-def _tell_nothing() -> None:
+def _emit_nothing() -> None:
     """No-op for a cancelled job."""

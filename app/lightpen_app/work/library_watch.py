@@ -22,7 +22,7 @@ from lightpen_app.work.notifications import Notifications
 
 AGAIN_MS = 15 * 60 * 1000  # after which a tip may be overdue that was not
 LOOK_MS = 5000  # at what was taken over from other stations
-MOST_TOLD = 5  # changes; the newest
+MOST_SHOWN = 5  # changes; the newest
 SHARED = "shared library"  # cause of what is to be read
 
 Change = Callable[[], Library]
@@ -140,8 +140,8 @@ class LibraryWatch(QObject):
         if len(shared) == self._n_shared:
             return
         self._n_shared = len(shared)
-        told = " ".join(map(worded, shared[-MOST_TOLD:]))
-        self._notifications.tell(SHARED, told, Tone.WARN)
+        text = " ".join(map(worded, shared[-MOST_SHOWN:]))
+        self._notifications.notify(SHARED, text, Tone.WARN)
         self.refresh()
 
     def change(self, asked: object, change: Change) -> None:
@@ -201,6 +201,6 @@ class LibraryWatch(QObject):
     def _on_read_failed(self, why: str) -> None:
         self._reading = None
         if why != self._notifications.text(self):
-            self._notifications.tell(self, why)
+            self._notifications.notify(self, why)
         self._statuses = StationStatus()
         self.changed.emit()

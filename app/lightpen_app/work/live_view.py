@@ -100,8 +100,8 @@ class DisplayedImage:
 class LiveView(QObject):
     """Opens one or two cameras and signals their images.
 
-    Of two, one is `chosen`: what is asked, told and set is of it, but for `failed`,
-    `configured`, which are of both.
+    Of two, one is `chosen`: queries, signals and settings are of it, except `failed`
+    and `configured`, which are of both.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ class LiveView(QObject):
         self._listener = listener = _QueuedListener(self)
         listener.camera = self._chosen
         listener.image_shown.connect(self.image_shown)
-        listener.told.connect(self._on_told)
+        listener.event_received.connect(self._on_event_received)
         self._live = live = Live(
             *(cameras, settings, listener, self._run.runner, clock, known),
             verifiers=[each.runner for each in self._verifications],
@@ -402,12 +402,12 @@ class LiveView(QObject):
             self.other_changed.emit(connection)
 
     def _on_closing_failed(self, sentence: str) -> None:
-        self._notifications.tell((self, "closing"), sentence)
+        self._notifications.notify((self, "closing"), sentence)
 
-    def _tell(self, camera: int, error: LightpenError) -> None:
+    def _show_fault(self, camera: int, error: LightpenError) -> None:
         """Report a camera fault."""
         words = self._words_of(camera, error)
-        self._notifications.tell((self, camera, WITHOUT_IMAGES), words)
+        self._notifications.notify((self, camera, WITHOUT_IMAGES), words)
 
     def _words_of(self, camera: int, error: LightpenError) -> str:
         """Return the sentence of a fault, with the camera's number if there are two."""
@@ -419,7 +419,7 @@ class LiveView(QObject):
     def _withdraw(self, camera: int) -> None:
         self._notifications.withdraw((self, camera, WITHOUT_IMAGES))
 
-    def _on_told(self, what: WorkerEvent, camera: int) -> None:
+    def _on_event_received(self, what: WorkerEvent, camera: int) -> None:
         state = self._states[camera]
         match what:
             case ConnectionChanged(connection):
@@ -430,12 +430,12 @@ class LiveView(QObject):
                 if camera == self._chosen:
                     self.settings_applied.emit(settings)
             case Failed(error):
-                self._tell(camera, error)
+                self._show_fault(camera, error)
                 self.failed.emit()
             case FaultRaised(FramesSkipped() as fault):
                 self._notifications.show_status(self._words_of(camera, fault))
             case FaultRaised(fault):
-                self._tell(camera, fault)
+                self._show_fault(camera, fault)
             case ProcessingKeepsUp():
                 self._notifications.show_status("")
 
@@ -458,15 +458,15 @@ _WORST_FIRST = (
 
 
 class _QueuedListener(QObject):
-    """Takes what happens on the threads of a camera to that of the GUI.
+    """Forwards events from the threads of a camera to that of the GUI.
 
-    Its public signals are emitted on the thread of the GUI, so that one who blocks them
-    there hears nothing any more.
+    Its public signals are emitted on the thread of the GUI, so that blocking them
+    there is enough to receive none.
     """
 
     image_shown = Signal(object)
-    told = Signal(object, int)
-    _said = Signal(object, int)
+    event_received = Signal(object, int)
+    _event_posted = Signal(object, int)
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
@@ -476,7 +476,7 @@ class _QueuedListener(QObject):
         # Connections
         queued = Qt.ConnectionType.QueuedConnection
         self._images.ready.connect(self._on_image_ready, queued)
-        self._said.connect(self.told, queued)
+        self._event_posted.connect(self.event_received, queued)
 
     def discard(self) -> None:
         """Free the image that waits."""
@@ -494,9 +494,9 @@ class _QueuedListener(QObject):
         self._images.put(DisplayedImage(half, QSize(width, height), image))
 
     def on_camera(self, event: WorkerEvent, camera: int) -> None:
-        """Hand on what happens to a camera."""
+        """Forward an event of a camera."""
         if not isinstance(event, WorkerStopped):  # the connection closes besides
-            self._said.emit(event, camera)
+            self._event_posted.emit(event, camera)
 
     # On the thread of the GUI
 

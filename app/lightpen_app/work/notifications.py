@@ -15,7 +15,7 @@ class Notifications(QObject):
     raised(str, Tone)
         A sentence to be read.
     withdrawn(str)
-        A sentence of `raised` whose cause is gone, in the language it was told in.
+        A sentence of `raised` whose cause is gone, in the language it was raised in.
     status_changed(str)
         A sentence for the status line.
     """
@@ -32,7 +32,7 @@ class Notifications(QObject):
         """Return the text of a cause; empty without one."""
         return self._texts.get(cause, "")
 
-    def tell(self, cause: Hashable, text: str, tone: Tone = Tone.BAD) -> None:
+    def notify(self, cause: Hashable, text: str, tone: Tone = Tone.BAD) -> None:
         """Publish a sentence, instead of an earlier one of its cause."""
         if self.text(cause) != text:
             self.withdraw(cause)

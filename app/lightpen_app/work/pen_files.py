@@ -135,7 +135,7 @@ class PenFiles(QObject):
 
         # Connections
         job.succeeded.connect(lambda file: self._on_read(pen, own, file))
-        job.failed.connect(lambda why: self._notifications.tell(self, why))
+        job.failed.connect(lambda why: self._notifications.notify(self, why))
         job.start()
 
     def _on_read(self, pen: str, own: LedFile, file: PenFile) -> None:
@@ -147,7 +147,7 @@ class PenFiles(QObject):
                 "{0} was changed since it was stored with pen {1}. Open the LED file "
                 "of this pen."
             )
-            self._notifications.tell(self, words.format(file.path, pen))
+            self._notifications.notify(self, words.format(file.path, pen))
             return
         self._selection.set_preparation(
             replace(now, pen_file=file, assumptions=self._assumptions(pen, now))

@@ -19,7 +19,7 @@ class RunView(QObject, Generic[S, E]):
     Parameters
     ----------
     status : S
-        Before anything was told.
+        Initial status.
     notifications : Notifications
         Receives messages about failures.
 
@@ -30,7 +30,7 @@ class RunView(QObject, Generic[S, E]):
     happened(E)
         Each event, in order and before `changed`.
     progressed(float)
-        Of what takes long, 0 to 1.
+        Completed fraction of a long operation.
     refused()
         Something could not be done; nothing is lost.
     """
@@ -39,10 +39,10 @@ class RunView(QObject, Generic[S, E]):
     happened = Signal(object)
     progressed = Signal(float)
     refused = Signal()
-    _told = Signal()
-    _progress_told = Signal(float)
-    _fault_told = Signal(object)
-    _fault_cleared_told = Signal()
+    _status_posted = Signal()
+    _progress_posted = Signal(float)
+    _fault_posted = Signal(object)
+    _fault_cleared_posted = Signal()
 
     def __init__(
         self, status: S, notifications: Notifications, parent: QObject | None = None
@@ -57,10 +57,10 @@ class RunView(QObject, Generic[S, E]):
 
         # Connections
         queued = Qt.ConnectionType.QueuedConnection
-        self._told.connect(self._on_told, queued)
-        self._progress_told.connect(self._on_progress_told, queued)
-        self._fault_told.connect(self._on_fault_told, queued)
-        self._fault_cleared_told.connect(self._on_fault_cleared_told, queued)
+        self._status_posted.connect(self._on_status_posted, queued)
+        self._progress_posted.connect(self._on_progress_posted, queued)
+        self._fault_posted.connect(self._on_fault_posted, queued)
+        self._fault_cleared_posted.connect(self._on_fault_cleared_posted, queued)
 
     @property
     def status(self) -> S:
@@ -69,34 +69,34 @@ class RunView(QObject, Generic[S, E]):
 
     @property
     def progress(self) -> float:
-        """How far the runner was last with what takes long, 0 to 1."""
+        """Completed fraction of the current or last long operation, 0 to 1."""
         return self._progress
 
     # On the threads of the runner
 
-    def tell(self, status: S, events: tuple[E, ...]) -> None:
-        """Leave the newest status for the GUI, and every event."""
+    def post(self, status: S, events: tuple[E, ...]) -> None:
+        """Store the newest status and every event for the GUI."""
         with self._lock:
             is_first = self._newest is None
             self._newest, self._events = status, (*self._events, *events)
         if is_first:
-            self._told.emit()
+            self._status_posted.emit()
 
     def on_progress(self, fraction: float) -> None:
         """Forward the progress."""
-        self._progress_told.emit(fraction)
+        self._progress_posted.emit(fraction)
 
     def on_fault(self, message: Message) -> None:
-        """Hand on what could not be done."""
-        self._fault_told.emit(message)
+        """Forward a fault."""
+        self._fault_posted.emit(message)
 
     def on_fault_cleared(self, message: Message) -> None:
-        """Hand on that the cause of the last fault is gone."""
-        self._fault_cleared_told.emit()
+        """Forward that the last fault is cleared."""
+        self._fault_cleared_posted.emit()
 
     # On the thread of the GUI
 
-    def _on_told(self) -> None:
+    def _on_status_posted(self) -> None:
         with self._lock:
             newest, self._newest = self._newest, None
             events, self._events = self._events, ()
@@ -111,13 +111,13 @@ class RunView(QObject, Generic[S, E]):
     def _compare(self, before: S, now: S) -> None:
         """Emit signals for differences beyond `changed`; none by default."""
 
-    def _on_progress_told(self, fraction: float) -> None:
+    def _on_progress_posted(self, fraction: float) -> None:
         self._progress = fraction
         self.progressed.emit(fraction)
 
-    def _on_fault_told(self, message: Message) -> None:
-        self._notifications.tell(self, worded(message))
+    def _on_fault_posted(self, message: Message) -> None:
+        self._notifications.notify(self, worded(message))
         self.refused.emit()
 
-    def _on_fault_cleared_told(self) -> None:
+    def _on_fault_cleared_posted(self) -> None:
         self._notifications.withdraw(self)

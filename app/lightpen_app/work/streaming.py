@@ -36,7 +36,7 @@ class Streaming(QObject):
     """
 
     changed = Signal()
-    _told = Signal()
+    _status_changed = Signal()
 
     def __init__(
         self, archive: FolderArchive, clock: Clock, parent: QObject | None = None
@@ -50,10 +50,10 @@ class Streaming(QObject):
         self._reading: Job | None = None
         self._has_tip = False
         self._fault = ""
-        self.stream = PoseStream(clock, lambda status: self._told.emit())
+        self.stream = PoseStream(clock, lambda status: self._status_changed.emit())
 
         # Connections
-        self._told.connect(self.changed, Qt.ConnectionType.QueuedConnection)
+        self._status_changed.connect(self.changed, Qt.ConnectionType.QueuedConnection)
 
     @property
     def status(self) -> StreamStatus:
@@ -115,15 +115,15 @@ class Streaming(QObject):
             if place is not None:
                 stream.open(place)
 
-        self._tell("")
+        self._set_fault("")
         self._opening = job = Job(follow, self)
 
         # Connections
-        job.failed.connect(self._tell)
+        job.failed.connect(self._set_fault)
         job.ended.connect(self._on_opening_ended)
         job.start()
 
-    def _tell(self, fault: str) -> None:
+    def _set_fault(self, fault: str) -> None:
         self._fault = fault
         self.changed.emit()
 
@@ -159,5 +159,5 @@ def _tip(archive: FolderArchive, preparation: Preparation) -> StreamedTip | None
         tip = read_tip_in_force(archive, preparation)
     except LightpenError:  # the step Verify says why
         return None
-    told = tip_metadata(with_status(tip.calibration, local_now()))
-    return StreamedTip(tip.names, tip.instrument, told)
+    metadata = tip_metadata(with_status(tip.calibration, local_now()))
+    return StreamedTip(tip.names, tip.instrument, metadata)

@@ -83,7 +83,7 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
         follower = self.follower
         if follower is not None and status.state is not None:
             follower.follow(status.state)
-        self.tell(status, events)
+        self.post(status, events)
 
     @override
     def _compare(self, before: SwingStatus, now: SwingStatus) -> None:

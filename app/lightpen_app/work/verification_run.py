@@ -63,7 +63,7 @@ class VerificationRun(RunView[VerificationStatus, SessionEventKind]):
         )
         if probing_operator is not None and setup is not None and state is not None:
             probing_operator.follow(setup, state)
-        self.tell(status, events)
+        self.post(status, events)
 
     @override
     def _compare(self, before: VerificationStatus, now: VerificationStatus) -> None:

@@ -117,7 +117,7 @@ class Workbench(QObject):
         self.save_place = SavePlace(settings, self.run, around.now)
 
         # Connections: who computes knows a choice before who shows it
-        self.selection.changed.connect(self._tell_runners)
+        self.selection.changed.connect(self._update_runners)
         self.camera = CameraSetup(self.selection, self.live, settings, around, self)
         samples = folder / SIMULATED
         self.files = ChosenFiles(self.selection, notices, samples, around, self)
@@ -155,8 +155,8 @@ class Workbench(QObject):
             behind: all that was acknowledged is on the disk.
         """
         deadline = monotonic() + timeout_s
-        for told in (self.run, self.verification, self.measuring):
-            told.blockSignals(True)  # nothing more is begun because of what they tell
+        for view in (self.run, self.verification, self.measuring):
+            view.blockSignals(True)  # their signals start nothing more
         self.folder_watch.stop()
         self.pens.shut_down()
         self.camera_files.shut_down()
@@ -193,7 +193,7 @@ class Workbench(QObject):
             now = replace(chosen, heading=status.state.heading)
             self.selection.set_preparation(now)
 
-    def _tell_runners(self) -> None:
+    def _update_runners(self) -> None:
         chosen, choices = self.selection.preparation, self.selection.choices
         self.run.runner.choose(chosen)
         drift = {DRIFT.kind} & {*choices.kinds}
@@ -217,7 +217,7 @@ class Workbench(QObject):
             self.selection.set_supervision(supervision)
 
     def _on_supervision_unread(self, why: str) -> None:
-        self.notifications.tell("supervision", why)
+        self.notifications.notify("supervision", why)
 
     def _stream_points(self) -> None:
         status, stream = self.measuring.status, self.streaming.stream
@@ -225,7 +225,7 @@ class Workbench(QObject):
             stream.set_points(points_of(status.setup, status.state))
 
     def _on_settings_troubled(self, why: Message) -> None:
-        self.notifications.tell(SETTINGS, worded(why))
+        self.notifications.notify(SETTINGS, worded(why))
 
     def _look_for_update(self) -> None:
         """Read the file that the administrator has named, if any."""
@@ -233,7 +233,7 @@ class Workbench(QObject):
         if named:
             job = Job(lambda _: read_update(Path(named)), self)
             job.succeeded.connect(self._on_update_read)
-            job.failed.connect(partial(self.notifications.tell, UPDATE))
+            job.failed.connect(partial(self.notifications.notify, UPDATE))
             job.start()
 
     def _on_update_read(self, update: Update | None) -> None:
@@ -241,7 +241,7 @@ class Workbench(QObject):
             newest = message(
                 "machine-settings.update", version=update.version, text=update.text
             )
-            self.notifications.tell(UPDATE, worded(newest), Tone.GOOD)
+            self.notifications.notify(UPDATE, worded(newest), Tone.GOOD)
 
     def _on_settings_relieved(self) -> None:
         self.notifications.withdraw(SETTINGS)

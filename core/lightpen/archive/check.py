@@ -89,8 +89,8 @@ def check_archive(
         stages.append(_walked(database, head, own, part))
         n_before += head.number
     stages += [_strays(database), _changed_records(database), _lost_records(database)]
-    findings = tuple(each for stage in stages for each in _told(stage))
-    notes = () if data is None else tuple(_told(check_notes(database, data)))
+    findings = tuple(each for stage in stages for each in _findings(stage))
+    notes = () if data is None else tuple(_findings(check_notes(database, data)))
     return ArchiveCheckResult(n_before, files.n_files, findings, notes)
 
 
@@ -125,7 +125,7 @@ def _last_written(archive: Path) -> int | None:
     return archive.stat().st_mtime_ns
 
 
-def _told(stage: Iterator[Message]) -> Iterator[Message]:
+def _findings(stage: Iterator[Message]) -> Iterator[Message]:
     """Yield the findings of a stage, and the error that ended it."""
     try:
         yield from stage
@@ -227,7 +227,7 @@ def _strays(database: Database) -> Iterator[Message]:
 
 
 def _changed_records(database: Database) -> Iterator[Message]:
-    n_read = 0  # by their hashes it cannot be told, which may be damaged, too
+    n_read = 0  # not paged by hash: a hash may be damaged, too
     in_order = select(RECORDS).order_by(RECORDS.c.sha256).limit(BATCH)
     while True:
         with database.reading() as connection:

@@ -138,10 +138,10 @@ def _block_hashes(database: Database, chain: str, end: int) -> list[str]:
     """Return a hash of each block of entries up to a number, in their order."""
     n_blocks = -(-end // BLOCK)
     if database.file is not None:
-        told = [sha256() for _ in range(n_blocks)]
+        hashes = [sha256() for _ in range(n_blocks)]
         for number, digest in _hashes(database, chain, 0, end):
-            told[(number - 1) // BLOCK].update(f"{number} {digest};".encode())
-        return [each.hexdigest() for each in told]
+            hashes[(number - 1) // BLOCK].update(f"{number} {digest};".encode())
+        return [each.hexdigest() for each in hashes]
     wanted = {"size": BLOCK, "chain": chain, "end": end}
     with database.reading() as connection:
         found = {row.block: row.hash for row in connection.execute(_BLOCKS, wanted)}

@@ -115,7 +115,7 @@ class Database:
 
     @contextmanager
     def _used(self, engine: Engine) -> Iterator[Connection]:
-        with self._uses.one(), _telling(self.name):
+        with self._uses.one(), _converting_errors(self.name):
             try:
                 with engine.begin() as connection, self._in_time(connection):
                     yield connection
@@ -356,7 +356,7 @@ def _looking_at(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _telling(name: str) -> Iterator[None]:
+def _converting_errors(name: str) -> Iterator[None]:
     """Translate errors of the database into messages for the user."""
     try:
         yield

@@ -172,8 +172,8 @@ def account_of_refused(
         ),
     )
     inputs, limits = record_inputs(solution.source), assessment.limits
-    told = calibration_record(calibration, inputs, "joint", limits)
-    text = json_bytes(told).decode()
+    record = calibration_record(calibration, inputs, "joint", limits)
+    text = json_bytes(record).decode()
     return ExtractedEvent(replace(event, record_sha256=text_sha256(text)), text)
 
 

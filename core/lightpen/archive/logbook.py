@@ -310,8 +310,8 @@ class Logbook:
                 if taken:
                     self.enter_owed()
             elif waiting := newer_elsewhere(*found):
-                told = message("library.share-waits", n=len(waiting))
-                self.shared += () if told in self.shared else (told,)
+                notice = message("library.share-waits", n=len(waiting))
+                self.shared += () if notice in self.shared else (notice,)
 
     def close(self) -> None:
         """Close the archive, and seal its file unless another process has it open.

@@ -24,7 +24,7 @@ from lightpen.messages import Message, message
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.calibrations.recomputing import recompute
 
-SAMPLE = 3  # tips, unless told otherwise
+SAMPLE = 3  # tips, by default
 TOLERANCE = 0.1  # of U, by which another version of the program may differ
 
 

@@ -58,7 +58,7 @@ def close_sealed(database: Database) -> None:
     archive = database.file
     try:
         ends = sealed_heads(heads(database))
-        is_due = archive is not None and not _tells_of_change(database, archive)
+        is_due = archive is not None and not _seal_disagrees(database, archive)
     finally:
         database.close()
     if archive is None or not is_due or is_open(archive):
@@ -125,7 +125,7 @@ def sealed_heads(ends: tuple[ChainHead, ...]) -> tuple[SealedHead, ...]:
     return tuple(SealedHead(head.chain, head.number, head.sha256) for head in ends)
 
 
-def _tells_of_change(database: Database, archive: Path) -> bool:
+def _seal_disagrees(database: Database, archive: Path) -> bool:
     try:
         seal = read_seal(archive)
     except FileError:

@@ -42,7 +42,7 @@ class AravisFeatures:
 
     Parameters
     ----------
-    told : callable
+    converting_errors : callable
         Returns the context that raises errors as messages.
     """
 
@@ -50,11 +50,11 @@ class AravisFeatures:
         self,
         aravis: Aravis,
         camera: int,
-        told: Callable[[], AbstractContextManager[None]],
+        converting_errors: Callable[[], AbstractContextManager[None]],
     ) -> None:
         self._aravis = aravis
         self._camera = camera
-        self._told = told
+        self._converting_errors = converting_errors
         self._device = aravis.camera_get_device(camera)
 
     def has(self, name: str) -> bool:
@@ -121,7 +121,7 @@ class AravisFeatures:
         self._call(self._aravis.camera_execute_command, name.encode())
 
     def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        with self._told():
+        with self._converting_errors():
             return function(self._camera, *arguments)
 
     def _is_integer(self, name: str) -> bool:
@@ -175,7 +175,7 @@ class AravisDevice:
         with suppress(AravisError):  # not every camera shows its serial number
             serial = aravis.camera_get_device_serial_number(camera)
             self._serial = serial.decode("utf-8", "replace") or self._serial
-        self._features = AravisFeatures(aravis, camera, self._told)
+        self._features = AravisFeatures(aravis, camera, self._converting_errors)
 
     def close(self) -> None:
         """Close the camera."""
@@ -188,7 +188,7 @@ class AravisDevice:
     def start(self) -> None:
         """Start streaming."""
         aravis, camera = self._open_ones()
-        with self._told():
+        with self._converting_errors():
             payload = aravis.camera_get_payload(camera)
             if aravis.camera_is_gv_device(camera):
                 self._stream = stream = self._gige_stream(aravis, camera)
@@ -223,12 +223,12 @@ class AravisDevice:
     def probe(self) -> None:
         """Raise an error unless the camera responds."""
         aravis, camera = self._open_ones()
-        with self._told():
+        with self._converting_errors():
             aravis.camera_get_integer(camera, b"Width")
         self._require_control(aravis, camera, is_new=False)
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _converting_errors(self) -> Iterator[None]:
         """Convert the errors of the library."""
         try:
             yield

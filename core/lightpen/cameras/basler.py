@@ -70,7 +70,7 @@ class BaslerDevice:
             nodes.GetNode,
             str.capitalize,
             lambda node: node.GetAccessMode(),
-            partial(_told, self._serial),
+            partial(_converting_errors, self._serial),
         )
 
     def close(self) -> None:
@@ -89,7 +89,7 @@ class BaslerDevice:
         """Start streaming."""
         from pypylon import pylon
 
-        with _told(self._serial):
+        with _converting_errors(self._serial):
             self._camera.StartGrabbing(pylon.GrabStrategy_OneByOne)
 
     def stop(self) -> None:
@@ -104,7 +104,7 @@ class BaslerDevice:
         from pypylon import pylon
 
         timeout_ms, returns = round(1000 * timeout_s), pylon.TimeoutHandling_Return
-        with _told(self._serial):
+        with _converting_errors(self._serial):
             result = self._camera.RetrieveResult(timeout_ms, returns)
             if not result.IsValid():
                 return None
@@ -132,7 +132,7 @@ def _delivery(result: Any) -> DeliveredFrame:
     )
 
 
-def _told(serial: str) -> AbstractContextManager[None]:
+def _converting_errors(serial: str) -> AbstractContextManager[None]:
     from pypylon import genicam
 
     return in_sentences(serial, refusals(genicam), (genicam.GenericException,))

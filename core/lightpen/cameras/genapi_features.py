@@ -20,7 +20,7 @@ class GenapiFeatures:
         Returns the name of an attribute of a node as this library spells it.
     access : callable
         Returns the access mode of a node.
-    told : callable
+    converting_errors : callable
         Returns a context that converts errors.
     """
 
@@ -29,16 +29,16 @@ class GenapiFeatures:
         find: Callable[[str], Any],
         spell: Callable[[str], str],
         access: Callable[[Any], int],
-        told: Callable[[], AbstractContextManager[None]],
+        converting_errors: Callable[[], AbstractContextManager[None]],
     ) -> None:
         self._find = find
         self._spell = spell
         self._access = access
-        self._told = told
+        self._converting_errors = converting_errors
 
     def has(self, name: str) -> bool:
         """Return whether the camera has a feature that is available now."""
-        with self._told():
+        with self._converting_errors():
             node = self._find(name)
             return node is not None and self._access(node) in (WRITE_ONLY, READ_WRITE)
 
@@ -76,15 +76,15 @@ class GenapiFeatures:
 
     def execute(self, name: str) -> None:
         """Execute a command."""
-        with self._told():
+        with self._converting_errors():
             getattr(self._find(name), self._spell("execute"))()
 
     def _read(self, name: str, what: str) -> Any:
-        with self._told():
+        with self._converting_errors():
             return getattr(self._find(name), self._spell(what))
 
     def _write(self, name: str, value: float | str | bool) -> None:
-        with self._told():
+        with self._converting_errors():
             setattr(self._find(name), self._spell("value"), value)
 
 

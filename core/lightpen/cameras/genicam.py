@@ -90,7 +90,7 @@ class GenicamDevice:
             lambda key: nodes.get_node(key) if nodes.has_node(key) else None,
             lambda attribute: attribute,
             lambda node: int(node.get_access_mode()),
-            partial(_told, name),
+            partial(_converting_errors, name),
         )
 
     def close(self) -> None:
@@ -106,7 +106,7 @@ class GenicamDevice:
 
     def start(self) -> None:
         """Start streaming."""
-        with _told(self.serial):
+        with _converting_errors(self.serial):
             self._acquirer.start()
 
     def stop(self) -> None:
@@ -116,7 +116,7 @@ class GenicamDevice:
     def fetch(self, timeout_s: float) -> DeliveredFrame | None:
         """Return the next image; None after the timeout."""
         end = time.monotonic() + timeout_s
-        with _told(self.serial):
+        with _converting_errors(self.serial):
             while (buffer := self._acquirer.try_fetch(timeout=POLL)) is None:
                 if time.monotonic() >= end:
                     return None
@@ -149,7 +149,7 @@ def _delivery(module: Any) -> DeliveredFrame:
     )
 
 
-def _told(serial: str) -> AbstractContextManager[None]:
+def _converting_errors(serial: str) -> AbstractContextManager[None]:
     from genicam import genapi, gentl
 
     losses = (genapi.GenericException, gentl.GenericException)

@@ -28,13 +28,13 @@ class LinkWatch:
         Counts at the beginning of the window.
     began : float
         s.
-    is_told : bool
+    is_reported : bool
         Whether a fault was reported; once for each set of settings.
     """
 
     since: Stats | None = None
     began: float = 0.0
-    is_told: bool = False
+    is_reported: bool = False
 
     def after(
         self, stats: Stats, now: float, settings: CameraSettings
@@ -51,11 +51,11 @@ class LinkWatch:
         if self.since is None:
             return replace(self, since=stats, began=now), None
         seconds = now - self.began
-        if self.is_told or seconds < WATCHED:
+        if self.is_reported or seconds < WATCHED:
             return self, None
         fault = _fault(stats.since(self.since), seconds, settings)
-        is_told = fault is not None
-        return replace(self, since=stats, began=now, is_told=is_told), fault
+        is_reported = fault is not None
+        return replace(self, since=stats, began=now, is_reported=is_reported), fault
 
 
 def _fault(

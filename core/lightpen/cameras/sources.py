@@ -19,5 +19,5 @@ def source_named(key: str) -> Source | None:
 
 def absent_sources() -> dict[str, Message]:
     """Return what must be installed first, by the keys of the sources; slow."""
-    told = ((source.key, source.why_absent()) for source in SOURCES)
-    return {key: why_absent for key, why_absent in told if why_absent is not None}
+    reasons = ((source.key, source.why_absent()) for source in SOURCES)
+    return {key: why_absent for key, why_absent in reasons if why_absent is not None}

@@ -114,7 +114,7 @@ class CameraWorker:
         self._stats = Stats()
         self._n_skipped = 0
         self._n_offered = self._n_missed = 0  # since measuring began
-        self._told_of_skipping = False
+        self._skipping_reported = False
         self._skipped_ns = 0
         self._heard_ns = 0
         self._link = LinkWatch()
@@ -233,7 +233,7 @@ class CameraWorker:
         """Run the camera for one image, or reconnect."""
         try:
             self._serve_requests()
-            self._tell_of_keeping_up()
+            self._report_keeping_up()
             if self._is_wanted():
                 self._read()
         except DeviceLost as error:
@@ -274,7 +274,7 @@ class CameraWorker:
         except FrameIncomplete as error:
             self._hear()
             self._count()
-            if not self._camera.caps.has_link:  # else it is told of many: see `_count`
+            if not self._camera.caps.has_link:  # else many are reported: see `_count`
                 self._on_event(FaultRaised(error))
         else:
             self._hear()
@@ -309,18 +309,18 @@ class CameraWorker:
         self._n_missed += 1
         self._skipped_ns = self._clock.now_ns()
         is_slow = is_too_slow(self._n_missed, self._n_offered)
-        if is_slow and not self._told_of_skipping:  # once is enough until it is over
-            self._told_of_skipping = True
+        if is_slow and not self._skipping_reported:  # once is enough until it is over
+            self._skipping_reported = True
             self._on_event(FaultRaised(_too_slow(self._n_missed, self._n_offered)))
 
-    def _tell_of_keeping_up(self) -> None:
+    def _report_keeping_up(self) -> None:
         """Report that no image is skipped any more."""
-        if not self._told_of_skipping:
+        if not self._skipping_reported:
             return
         is_slow = is_too_slow(self._n_missed, self._n_offered)
         since_ns = self._clock.now_ns() - self._skipped_ns
         if not is_slow or since_ns >= KEEPING_UP * 1e9:
-            self._told_of_skipping = False
+            self._skipping_reported = False
             self._n_offered = self._n_missed = 0
             self._on_event(ProcessingKeepsUp())
 
@@ -366,7 +366,7 @@ class CameraWorker:
         """Open the camera; wait briefly while another program uses it."""
         self._change(Connection.OPENING)
         limit_ns = self._clock.now_ns() + round(LONGEST_BUSY * 1e9)
-        is_told = False
+        is_reported = False
         while True:
             try:
                 self._connect()
@@ -374,8 +374,8 @@ class CameraWorker:
             except DeviceBusy as error:
                 if self._clock.now_ns() >= limit_ns:
                     raise
-                if not is_told:
-                    is_told = True
+                if not is_reported:
+                    is_reported = True
                     self._on_event(FaultRaised(error))
             if self._clock.wait(BUSY_PAUSE, self._stopping):
                 return

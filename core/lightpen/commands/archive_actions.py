@@ -48,13 +48,13 @@ def _check(options: argparse.Namespace) -> int:
                 checked, database, data, options.recompute, report
             )
             checked = with_timestamps(checked, database, data, options.certificate)
-        findings, told = checked.findings, ""
+        findings, delivery = checked.findings, ""
         if options.server:
             with _looked_into(data) as database, _server() as server:
                 there = check_server(database, server)
             findings += there.findings
-            told = f" On the server: {there.n_entries} entries"
-            told += f", {there.n_waiting} not delivered yet."
+            delivery = f" On the server: {there.n_entries} entries"
+            delivery += f", {there.n_waiting} not delivered yet."
         for finding in findings:
             print(shown(str(finding)))
         for note in checked.notes:
@@ -65,7 +65,8 @@ def _check(options: argparse.Namespace) -> int:
         n_tips = f", tips recomputed: {checked.n_tips}" if checked.n_tips else ""
         if checked.n_timestamps:
             n_tips += f", timestamps: {checked.n_timestamps}"
-        print(f"{outcome}: {checked.n_entries} entries, {n_files} files{n_tips}.{told}")
+        counts = f"{checked.n_entries} entries, {n_files} files{n_tips}"
+        print(f"{outcome}: {counts}.{delivery}")
 
     return run(options) or (CHANGED if has_findings else 0)
 
@@ -83,11 +84,11 @@ def _list(options: argparse.Namespace) -> None:
     with _looked_into(_data(options)) as database:
         if options.csv:
             home = chain_at_home(database)
-            told = entries_csv(newest(database, wanted, options.most), home)
+            text = entries_csv(newest(database, wanted, options.most), home)
         else:
             found = lines(database, wanted, 0, options.most)
-            told = "\n".join(map(_line, found))
-    print(shown(told.removesuffix("\n")))
+            text = "\n".join(map(_line, found))
+    print(shown(text.removesuffix("\n")))
 
 
 @printing
@@ -118,8 +119,8 @@ def _deliver(options: argparse.Namespace) -> None:
         shared = deliver(database, chain, server)
     n_new = copied.n_new + shared.n_new
     print(f"{n_new} entries are new, {copied.n_known} were there already.")
-    for told in logbook.shared:
-        print(shown(str(told)))
+    for each in logbook.shared:
+        print(shown(str(each)))
 
 
 @printing

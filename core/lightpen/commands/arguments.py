@@ -155,7 +155,7 @@ def chosen_limits(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def add_verdict(parser: argparse.ArgumentParser) -> None:
-    """Add how a verdict is made and told; `limits_by` reads the rule."""
+    """Add the options of the verdict and its output; `limits_by` reads the rule."""
     parser.add_argument(
         "--decision-rule",
         choices=tuple(RULE_WORDS),

@@ -103,15 +103,15 @@ def are_same(one: Path, other: Path) -> bool:
 def progress(title: str) -> Iterator[Callable[[float], None]]:
     """Show a progress bar on a terminal, and elsewhere a line now and then."""
     if not sys.stderr.isatty():
-        told = monotonic()
+        reported = monotonic()
 
-        def tell(fraction: float) -> None:
-            nonlocal told
-            if monotonic() - told > LINE_INTERVAL and sys.stderr is not None:
-                told = monotonic()
+        def report(fraction: float) -> None:
+            nonlocal reported
+            if monotonic() - reported > LINE_INTERVAL and sys.stderr is not None:
+                reported = monotonic()
                 print(f"{title}: {fraction:.0%}", file=sys.stderr, flush=True)
 
-        yield tell
+        yield report
         return
     from tqdm import tqdm
 

@@ -82,7 +82,7 @@ def keep_record(
     if options.no_entry or data is None:
         print("This result is not entered in an archive.")
         if data is not None and not is_simulated:
-            _tell_overdue(data, names)
+            _print_overdue(data, names)
         return
     # A fifth of a second, which a result without an entry need not take.
     from lightpen.archive.lazy_logbook import server_address
@@ -93,11 +93,11 @@ def keep_record(
         for fault in logbook.enter_owed():
             print(shown(str(fault)))
     if not is_simulated:
-        _tell_overdue(data, names)
+        _print_overdue(data, names)
     print(shown(f"Entered in the archive: {kept}"))
 
 
-def _tell_overdue(data: Path, names: Names) -> None:
+def _print_overdue(data: Path, names: Names) -> None:
     from lightpen.archive.tip_status import folder_statuses
 
     rule = FolderArchive(data).supervision().limits_at(names.station, StationLimits())

@@ -57,12 +57,12 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         default="",
         help=f"for dcc: where it was calibrated ({PLACES[0]})",
     )
-    for name, told in (LABORATORY | MORE_OF_IT).items():
+    for name, help_text in (LABORATORY | MORE_OF_IT).items():
         parser.add_argument(
             f"--{name}",
             default="",
             metavar="TEXT",
-            help=f"for dcc: {told} (default: of the settings of this computer)",
+            help=f"for dcc: {help_text} (default: of the settings of this computer)",
         )
 
 

@@ -108,7 +108,7 @@ def _add_entries(action: argparse.ArgumentParser) -> None:
     of_tips = action.add_argument_group(
         "tips", f"'{NOTHING}' instead of a value clears the field"
     )
-    for name, kind, unit, told in (
+    for name, kind, unit, help_text in (
         ("--ball-diameter", finite, "MM", "ball diameter"),
         ("--max-change", finite, "MM", "maximum change since the last calibration"),
         ("--max-days", whole_number, "N", "calibration interval in days"),
@@ -120,13 +120,13 @@ def _add_entries(action: argparse.ArgumentParser) -> None:
         ),
         ("--picture", Path, "FILE", "picture of the tip"),
     ):
-        of_tips.add_argument(name, type=_or_nothing(kind), metavar=unit, help=told)
-    for name, told in (
+        of_tips.add_argument(name, type=_or_nothing(kind), metavar=unit, help=help_text)
+    for name, help_text in (
         ("--nominal", "nominal tip centre, pen frame, mm"),
         ("--axis", "stylus axis from the ball into the pen, pen frame"),
     ):
         of_tips.add_argument(
-            name, type=_or_nothing(finite), nargs="+", metavar="X Y Z", help=told
+            name, type=_or_nothing(finite), nargs="+", metavar="X Y Z", help=help_text
         )
 
 

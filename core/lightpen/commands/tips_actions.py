@@ -85,7 +85,9 @@ def _list(options: argparse.Namespace) -> None:
 @printing
 def _add(options: argparse.Namespace) -> None:
     item = _with_entries(MADE[ItemKind(options.kind)](id=options.id), options)
-    _tell(options, item, add_item(_data(options), item, _author(options), local_now()))
+    _enter_and_print(
+        options, item, add_item(_data(options), item, _author(options), local_now())
+    )
 
 
 @printing
@@ -94,7 +96,7 @@ def _change(options: argparse.Namespace) -> None:
     there = known_item(read_library(data), ItemKind(options.kind), options.id)
     item = _with_entries(there, options)
     library = change_item(data, item, _author(options), local_now(), there)
-    _tell(options, item, library)
+    _enter_and_print(options, item, library)
 
 
 @printing
@@ -144,7 +146,7 @@ def _spin(options: argparse.Namespace) -> None:
             f"{_degrees(found.expanded_uncertainty)}, turned by "
             f"{_degrees(found.turn)}, tilted by {_degrees(found.wobble)} rms."
         )
-    _tell(options, spun, library)
+    _enter_and_print(options, spun, library)
 
 
 ACTIONS: dict[str, Command] = {
@@ -177,7 +179,7 @@ def _set_retired(options: argparse.Namespace, *, is_retired: bool) -> None:
         local_now(),
         is_retired=is_retired,
     )
-    _tell(options, known_item(library, kind, options.id), library)
+    _enter_and_print(options, known_item(library, kind, options.id), library)
 
 
 def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:
@@ -185,15 +187,15 @@ def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:
     for name in ("note", "certificate", "due", "certified"):
         value = getattr(options, name)
         if value is not None:
-            item = structs.replace(item, **{name: _said(value)})
+            item = structs.replace(item, **{name: _or_none(value)})
     if options.value is not None:
         if not isinstance(item, ListedReference):
             raise UsageError("library.only-references", id=item.id)
-        item = structs.replace(item, certified_mm=_said(options.value))
-    said = dict(_entries_of_tip(options))
-    if said and not isinstance(item, ListedTip):
+        item = structs.replace(item, certified_mm=_or_none(options.value))
+    entries = dict(_entries_of_tip(options))
+    if entries and not isinstance(item, ListedTip):
         raise UsageError("library.only-tips", id=item.id)
-    return structs.replace(item, **said)
+    return structs.replace(item, **entries)
 
 
 def _entries_of_tip(options: argparse.Namespace) -> Iterator[tuple[str, Any]]:
@@ -205,12 +207,12 @@ def _entries_of_tip(options: argparse.Namespace) -> Iterator[tuple[str, Any]]:
             value = _point(option, value)
         elif option == "picture" and value is not FORGOTTEN:
             value = keep_picture(_data(options), value)
-        yield entry, _said(value)
+        yield entry, _or_none(value)
         if option == "axis":
             yield "axis_origin", None if value is FORGOTTEN else AxisOrigin.GIVEN
 
 
-def _said(value: Any) -> Any:
+def _or_none(value: Any) -> Any:
     return None if value is FORGOTTEN else value
 
 
@@ -231,7 +233,9 @@ def _author(options: argparse.Namespace) -> Author:
     return Author(options.station, options.operator, options.reason, signature)
 
 
-def _tell(options: argparse.Namespace, item: AnyItem, library: Library) -> None:
+def _enter_and_print(
+    options: argparse.Namespace, item: AnyItem, library: Library
+) -> None:
     """Enter a change in the archive and print the new state."""
     data = _data(options)
     try:

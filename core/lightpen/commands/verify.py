@@ -258,9 +258,9 @@ def _print_lamp_drift(
     measured: MeasuredRuns, judged: VerificationAssessment | None = None
 ) -> None:
     """Print the drift of fixed lamps, unless it is the verdict."""
-    told = None if measured.lamp_drift is None else measured.lamp_drift.assessment
-    if told is not None and told is not judged:
-        print(shown(str(told.reason)))
+    drift = None if measured.lamp_drift is None else measured.lamp_drift.assessment
+    if drift is not None and drift is not judged:
+        print(shown(str(drift.reason)))
 
 
 def _record(

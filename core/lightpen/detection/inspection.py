@@ -39,14 +39,14 @@ class Exposure:
     @property
     def dark_leds(self) -> tuple[int, ...]:
         """Numbers of the LEDs below `DARK_PEAK`."""
-        return tuple(led for led, peak in self._told() if peak < DARK_PEAK)
+        return tuple(led for led, peak in self._led_peaks() if peak < DARK_PEAK)
 
     @property
     def saturated_leds(self) -> tuple[int, ...]:
         """Numbers of the LEDs that reach the full scale."""
-        return tuple(led for led, peak in self._told() if peak >= SATURATED_LEVEL)
+        return tuple(led for led, peak in self._led_peaks() if peak >= SATURATED_LEVEL)
 
-    def _told(self) -> Iterator[tuple[int, float]]:
+    def _led_peaks(self) -> Iterator[tuple[int, float]]:
         return zip(self.leds, self.peaks, strict=False)
 
     @property

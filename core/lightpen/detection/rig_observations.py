@@ -123,10 +123,10 @@ def _responsive(seen: Observations, images: IntArray) -> Observations:
 
 def _with_exchange(rig: Rig, c: int, fault: Message) -> Message:
     """Return the error of a camera's images, and the camera with that size."""
-    told = of_camera(rig.names[c], fault)
+    finding = of_camera(rig.names[c], fault)
     size = fault.values.get("size")
     if not isinstance(size, Message):
-        return told
+        return finding
     theirs = size.values["width"], size.values["height"]
     others = [
         name
@@ -134,5 +134,5 @@ def _with_exchange(rig: Rig, c: int, fault: Message) -> Message:
         if camera.image_size == theirs
     ]
     if not others:
-        return told
-    return message("rig.size-of-another", told=told, other=others[0])
+        return finding
+    return message("rig.size-of-another", told=finding, other=others[0])

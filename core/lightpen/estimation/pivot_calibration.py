@@ -165,8 +165,8 @@ def _warnings(
 ) -> list[Message]:
     warnings = []
     if groups is not None:
-        told = _MINORITY_LEFT_OUT if left_out.any() else _BOTH_TAKEN
-        warnings.append(_parted(groups, told, MAX_RUNS))
+        consequence = _MINORITY_LEFT_OUT if left_out.any() else _BOTH_TAKEN
+        warnings.append(_parted(groups, consequence, MAX_RUNS))
     scattered = ~fit.used & ~left_out
     if scattered.mean() > MANY_LEFT_OUT:
         warnings.append(

@@ -71,7 +71,7 @@ def fit_spin(rotations: FloatArray, upwards: FloatArray = UPRIGHT_AXIS) -> SpinF
     ------
     CalibrationError
         There are too few poses, they turn too little, or the axis was not held still
-        enough to be told.
+        enough to be determined.
     """
     n = len(rotations)
     if n < MIN_POSES:

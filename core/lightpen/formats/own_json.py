@@ -19,7 +19,7 @@ from msgspec import Meta, convert
 CHECKSUM = b', "checksum": "'  # no text in JSON holds quotation marks as they are
 MOST_VALUES = 2_000_000  # 5000 images of four cameras take less; some 300 MB
 _BEFORE_VALUES = (b",", b"[", b"{")
-FIRST_YEAR, LAST_YEAR = 1970, 9998  # of dates that can be told in any time zone
+FIRST_YEAR, LAST_YEAR = 1970, 9998  # of dates that exist in any time zone
 
 ZonedTime: TypeAlias = Annotated[datetime, Meta(tz=True)]
 Length: TypeAlias = Annotated[float, Meta(ge=-1e7, le=1e7)]  # mm or px

@@ -28,10 +28,10 @@ class StoredMessage(Struct, frozen=True):
     values: Mapping[str, StoredValue]
 
     @classmethod
-    def of(cls, told: Message) -> Self:
+    def of(cls, message: Message) -> Self:
         """Return the stored form of a message."""
-        values = {name: _stored(value) for name, value in told.values.items()}
-        return cls(told.code, str(told), values)
+        values = {name: _stored(value) for name, value in message.values.items()}
+        return cls(message.code, str(message), values)
 
     def worded(self, translate: Translate = in_english) -> str:
         """Return the words in the language of a translation.

@@ -315,7 +315,7 @@ class Live:
             return False
         return self._seen_seq - self._pass_seq >= caps.n_images
 
-    def _tell_others(self, image: LiveImage) -> None:
+    def _notify_others(self, image: LiveImage) -> None:
         """Send detections to the clients of the stream."""
         if self._stream is not None:
             self._stream.take(image.frame, image.detection)
@@ -332,7 +332,7 @@ class Live:
             image = self._look(frame, self._region, c)
             if c == 0:
                 self._notice(image)
-                self._tell_others(image)
+                self._notify_others(image)
                 self._hand_over(frame, image.detection, None)
             self._listener.on_image(image)
 
@@ -358,7 +358,7 @@ class Live:
             for c, each in enumerate(frames)
         ]
         self._notice(images[0])
-        self._tell_others(images[0])
+        self._notify_others(images[0])
         detections = [i.detection for i in images if i.detection is not None]
         detection = None
         if len(detections) == len(images):

@@ -36,7 +36,7 @@ class RuleStatus(StrEnum):
 
     MET = "met"
     BROKEN = "broken"
-    OPEN = "open"  # cannot be told, or is not requested
+    OPEN = "open"  # cannot be determined, or is not requested
 
 
 @dataclass(frozen=True)

@@ -390,6 +390,6 @@ def _exchanged(leds: FloatArray, one: Shift, other: Shift) -> str:
     if not np.all(swapped | stay) or not np.any(chosen):
         return ""
     either = 2 * chosen.sum() == differ.sum()
-    told = differ if either else chosen
-    names = [name for name, is_it in zip("xyz", told, strict=True) if is_it]
+    axes = differ if either else chosen
+    names = [name for name, is_it in zip("xyz", axes, strict=True) if is_it]
     return ("/" if either else ", ").join(names)

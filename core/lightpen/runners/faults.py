@@ -15,47 +15,47 @@ class FaultListener(Protocol):
     """Listener to faults; must return quickly."""
 
     def on_fault(self, message: Message) -> None:
-        """Take a sentence to be read: something could not be done."""
+        """Receive a fault as a message to be shown."""
 
     def on_fault_cleared(self, message: Message) -> None:
         """Receive the end of a fault."""
 
 
 class FaultReporter:
-    """Tells one fault at a time, and when it is over.
+    """Reports one fault at a time, and its end.
 
     A fault that can end automatically has a cause, of whatever kinds its owner knows.
     """
 
     def __init__(self, listener: FaultListener) -> None:
         self._listener = listener
-        self._told: Message | None = None
+        self._fault: Message | None = None
         self._cause: Enum | None = None
 
     @property
     def is_any(self) -> bool:
         """Whether a fault is active."""
-        return self._told is not None
+        return self._fault is not None
 
     def trying(self, act: Act) -> None:
         """Run a function; if it fails, report the fault and keep the state."""
         try:
             act()
         except LightpenError as error:
-            self.tell(error.message)
+            self.report(error.message)
 
-    def tell(self, fault: Message, cause: Enum | None = None) -> None:
-        """Tell a fault in place of the one before."""
-        self._told, self._cause = fault, cause
+    def report(self, fault: Message, cause: Enum | None = None) -> None:
+        """Report a fault in place of the one before."""
+        self._fault, self._cause = fault, cause
         _logger.warning("fault raised: %s: %s", fault.code, fault)
         self._listener.on_fault(fault)
 
     def end(self) -> None:
-        """State that the fault is over, whatever its cause."""
-        told, self._told = self._told, None
-        if told is not None:
-            _logger.info("fault cleared: %s", told.code)
-            self._listener.on_fault_cleared(told)
+        """Clear the fault, whatever its cause."""
+        fault, self._fault = self._fault, None
+        if fault is not None:
+            _logger.info("fault cleared: %s", fault.code)
+            self._listener.on_fault_cleared(fault)
 
     def end_of(self, cause: Enum) -> None:
         """State that the fault is over, if this was its cause."""

@@ -45,13 +45,13 @@ class SerialQueue:
         """Have something done, and return when it is, or when the queue has ended."""
         is_done = Event()
 
-        def act_and_tell() -> None:
+        def act_and_signal() -> None:
             try:
                 act()
             finally:
                 is_done.set()
 
-        self.ask(act_and_tell)
+        self.ask(act_and_signal)
         while not is_done.wait(LONGEST_WAIT) and not self._ending.is_set():
             pass
 

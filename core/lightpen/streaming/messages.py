@@ -49,13 +49,13 @@ class StreamedTip:
 
 def tip_metadata(file: CalibrationFile) -> dict[str, str]:
     """Return origin, verdict, due date and status of a tip, as far as known."""
-    told = {
+    entries = {
         "Origin": file.origin or "",
         "Verdict": file.grade.value,
         "Due": "" if file.due is None else file.due.isoformat(),
         "Status": ", ".join(status_of(file)),
     }
-    return {key: words for key, words in told.items() if words}
+    return {key: words for key, words in entries.items() if words}
 
 
 def pose_messages(
@@ -72,7 +72,7 @@ def pose_messages(
     at : float
         Time of exposure, s since 1970 (UTC).
     """
-    told = {"Image": str(number), "Units": "mm rad"}
+    basic = {"Image": str(number), "Units": "mm rad"}
     sigma = detection.sigma if tip is None else _sigma(detection, tip.instrument)
     covariance = detection.cofactors * sigma**2
     R = detection.rotation
@@ -81,14 +81,14 @@ def pose_messages(
         R,
         detection.translation,
         at,
-        {**told, **_covariance(covariance, "rx ry rz x y z")},
+        {**basic, **_covariance(covariance, "rx ry rz x y z")},
     )
     if tip is None:
         return sent
     place, spread = _place_of_tip(detection, tip.instrument)
     named = {"Pen": tip.names.pen, "Tip": tip.names.tip, **tip.metadata}
     return sent + _transform(
-        TIP, R, place, at, {**told, **named, **_covariance(spread, "x y z")}
+        TIP, R, place, at, {**basic, **named, **_covariance(spread, "x y z")}
     )
 
 
@@ -117,7 +117,7 @@ def _covariance(covariance: FloatArray, order: str) -> dict[str, str]:
 
 
 def _transform(
-    name: str, R: FloatArray, t: FloatArray, at: float, told: Mapping[str, str]
+    name: str, R: FloatArray, t: FloatArray, at: float, metadata: Mapping[str, str]
 ) -> bytes:
     # Not there without the extra "stream", and not needed before a client connects.
     from pyigtl import TransformMessage
@@ -129,6 +129,6 @@ def _transform(
     # WORKAROUND for pyigtl 0.3.4: it fails on texts that are not ASCII.
     message.metadata = {
         key: text.encode("ascii", "backslashreplace").decode()
-        for key, text in told.items()
+        for key, text in metadata.items()
     }
     return bytes(message.pack())

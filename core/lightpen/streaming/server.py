@@ -203,7 +203,7 @@ class PoseStream:
             each.setblocking(False)
         self._waker = waker
         bound = StreamPlace(place.address, listener.getsockname()[1])
-        self._tell(StreamStatus(bound))
+        self._report(StreamStatus(bound))
         self._thread = Thread(
             target=self._serve, args=(listener, woken), name="stream", daemon=True
         )
@@ -240,7 +240,7 @@ class PoseStream:
 
     def _serve(self, listener: socket.socket, woken: socket.socket) -> None:
         with ExitStack() as stack:
-            stack.callback(self._tell, StreamStatus())
+            stack.callback(self._report, StreamStatus())
             selector = stack.enter_context(selectors.DefaultSelector())
             stack.callback(_dismiss_all, selector)
             selector.register(listener, selectors.EVENT_READ)
@@ -263,7 +263,7 @@ class PoseStream:
                 n_slow = sum(client.is_slow for client in clients)
                 status = StreamStatus(self._status.place, len(clients), n_slow)
                 if status != self._status:
-                    self._tell(status)
+                    self._report(status)
                 for client in clients:
                     selector.modify(client.connection, client.awaited, client)
 
@@ -279,7 +279,7 @@ class PoseStream:
             client.offer(sent)
             client.add_points(self._points, seen.at)
 
-    def _tell(self, status: StreamStatus) -> None:
+    def _report(self, status: StreamStatus) -> None:
         self._status = status
         _logger.info(
             "stream at %s, %d clients, %d slow",

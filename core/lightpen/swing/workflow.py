@@ -103,7 +103,7 @@ class SwingWorkflow:
         self._listener = listener
         self._now = now
         self._faults = FaultReporter(listener)
-        self._entries = _LogbookEntries(logbook, start, self._faults.tell)
+        self._entries = _LogbookEntries(logbook, start, self._faults.report)
         self._status = SwingStatus()
         self._presence = OperatorPresence()
         self._recorder: SwingRecorder | None = None
@@ -129,7 +129,7 @@ class SwingWorkflow:
         try:
             self.pause()
             self._republish()
-            self._faults.tell(message("swing.bug"))
+            self._faults.report(message("swing.bug"))
         finally:
             self._stopped_at = self._status
 
@@ -208,7 +208,7 @@ class SwingWorkflow:
             self._enter(read_resumable(folder))  # so with the files as recorded
         except LightpenError as error:
             self._presence = replace(self._presence, refusal=error.message)
-            self._faults.tell(error.message)
+            self._faults.report(error.message)
             self._republish()
 
     def _enter(self, swing: Resumable) -> None:
@@ -247,7 +247,7 @@ class SwingWorkflow:
             return
         is_other = self._presence.has_other_choices or choices.names != first.names
         if is_other or choices.missing_inputs():
-            self._faults.tell(message("press-test.other-choices"))
+            self._faults.report(message("press-test.other-choices"))
             return
         limits = replace(
             choices.limits, min_images=PRESS_IMAGES, max_uncertainty=PRESS_UNCERTAINTY
@@ -324,7 +324,7 @@ class SwingWorkflow:
             )
         except LightpenError as error:
             self._become(Transition(pause(before)), has_fault=True)
-            self._faults.tell(error.message)
+            self._faults.report(error.message)
             return
         if transition is None:
             return
@@ -428,7 +428,7 @@ class SwingWorkflow:
             self._on_unread(error.message)
 
     def _on_unread(self, why: Message) -> None:
-        self._faults.tell(why)
+        self._faults.report(why)
         self._publish(replace(self._status, activity=Activity.NONE))
 
     def _close_record(self) -> None:
@@ -537,7 +537,7 @@ class SwingWorkflow:
 
     def _on_unsolved(self, why: Message) -> None:
         if self._first is not None:
-            self._faults.tell(message("press-test.unsolved", why=why))
+            self._faults.report(message("press-test.unsolved", why=why))
             self._end_press(None)
             return
         solution = self._status.solution
@@ -559,7 +559,7 @@ class SwingWorkflow:
             self._solve_again(solution)
             return
         self._wanted = solution.taken_out
-        self._faults.tell(why)
+        self._faults.report(why)
         self._publish(replace(self._status, activity=Activity.NONE))
 
     def _conclude(self, status: SwingStatus, reason: Message, passed: bool) -> None:
@@ -665,11 +665,11 @@ class _LogbookEntries:
         self,
         logbook: LazyLogbook | None,
         start: StartThread,
-        tell_fault: Callable[[Message], None],
+        report_fault: Callable[[Message], None],
     ) -> None:
         self._logbook = logbook
         self._start = start
-        self._tell_fault = tell_fault
+        self._report_fault = report_fault
         self._catching_up: Task | None = None
 
     def catch_up(self) -> None:
@@ -678,14 +678,14 @@ class _LogbookEntries:
             self._catching_up = self._start(
                 self._logbook.enter_owed,
                 self._on_caught_up,
-                self._tell_fault,
+                self._report_fault,
                 lambda: None,
                 lambda fraction: None,
             )
 
     def _on_caught_up(self, faults: tuple[Message, ...]) -> None:
         for fault in faults:
-            self._tell_fault(fault)
+            self._report_fault(fault)
 
     def enter_owed(self) -> None:
         """Enter events in the archive that only files hold so far."""

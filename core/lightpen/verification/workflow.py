@@ -124,7 +124,7 @@ class VerificationWorkflow:
         status = replace(self._status, reading=ReadingState.NOTHING, is_paused=True)
         refusal = BUG if status.tip is None else status.refusal
         self._publish(replace(status, refusal=refusal))
-        self._faults.tell(BUG)
+        self._faults.report(BUG)
 
     # Commands
 
@@ -179,7 +179,7 @@ class VerificationWorkflow:
         try:
             self._keeping.images.follow(before, SessionTransition(after))
         except FileError as error:
-            self._faults.tell(error.message)
+            self._faults.report(error.message)
             return
         self._publish(replace(self._status, state=after))
 
@@ -234,7 +234,7 @@ class VerificationWorkflow:
         try:
             self._keeping.images.follow(status.state, transition)
         except FileError as error:
-            self._faults.tell(error.message)
+            self._faults.report(error.message)
             return
         self._become(transition)
 
@@ -269,10 +269,10 @@ class VerificationWorkflow:
         if preparation is None or under_way is None or self._task.is_there:
             return
         if status.began is not None and not status.is_done:
-            self._faults.tell(ANOTHER)
+            self._faults.report(ANOTHER)
             return
         if preparation.missing_inputs():
-            self._faults.tell(NOT_READY)
+            self._faults.report(NOT_READY)
             return
         chosen = replace(under_way.choices, limits=self._choices.limits)
         again = with_entries(under_way, choices=chosen)
@@ -341,7 +341,7 @@ class VerificationWorkflow:
         try:
             transition = self._live.take(setup, state, frame, detection, region)
         except FileError as error:  # an image that is not kept does not count
-            self._faults.tell(error.message, Cause.IMAGES)
+            self._faults.report(error.message, Cause.IMAGES)
             return
         self._faults.end_of(Cause.IMAGES)
         self._become(transition)
@@ -466,7 +466,7 @@ class VerificationWorkflow:
         self._publish(self._status, ending(self._status))
 
     def _on_runs_unread(self, why: Message) -> None:
-        self._faults.tell(why)
+        self._faults.report(why)
         self._publish(replace(self._status, reading=ReadingState.NOTHING))
 
     def _start(
@@ -509,7 +509,7 @@ class VerificationWorkflow:
             self._keeping.write()
             self._faults.end()
         except LightpenError as error:
-            self._faults.tell(error.message)
+            self._faults.report(error.message)
         self._status = replace(self._status, files=self._keeping.files)
 
     def _note_under_way(self) -> None:
@@ -518,7 +518,7 @@ class VerificationWorkflow:
             self._keeping.note(self._status)
         except FileError as error:
             if not self._faults.is_any:  # it may be reported already
-                self._faults.tell(error.message, Cause.NOTE)
+                self._faults.report(error.message, Cause.NOTE)
             return
         self._faults.end_of(Cause.NOTE)
 

@@ -1,4 +1,4 @@
-"""What the operator is told, in few words and by his own sides."""
+"""What is shown to the operator, in few words and by his own sides."""
 
 import math
 from string import Formatter
@@ -53,12 +53,12 @@ DURING_A_SWING = (
         (AWAY, math.pi / 2, "Tilt right"),
     ],
 )
-def test_a_posture_is_told_by_the_operators_own_sides(
+def test_a_posture_is_reported_by_the_operators_own_sides(
     direction: float, heading: float, words: str
 ) -> None:
-    told = lean_phrase(Posture(FAR, direction, 0.0), None, heading)
+    reported = lean_phrase(Posture(FAR, direction, 0.0), None, heading)
 
-    assert told.short == words
+    assert reported.short == words
 
 
 def test_the_hint_tells_how_far_and_which_way_to_turn() -> None:
@@ -86,7 +86,7 @@ def test_some_missing_sides_are_named_and_many_are_not() -> None:
     assert "tilt to most sides." in phrase(too_little_tilt(9, range(7)), math.pi).hint
 
 
-def test_what_to_do_at_the_screen_is_told_there_alone() -> None:
+def test_what_to_do_at_the_screen_is_reported_there_alone() -> None:
     good = tip_is_good(0.00412)
 
     assert str(good) == "U (k = 2) of the tip is 0.0041 mm."

@@ -1,4 +1,4 @@
-"""The look: read on every ground, told apart by the colour-blind."""
+"""The look: read on every ground, distinguished by the colour-blind."""
 
 import re
 import shutil

@@ -66,12 +66,12 @@ def result(stated: dict[str, Any]) -> Result:
 @pytest.fixture
 def doubted(result: Result) -> Result:
     """Return one of a recording that was accepted with a reason."""
-    told = tip_changed(0.0312, "2026-01-01", "y", 0.0301, 0.0142)
+    reported = tip_changed(0.0312, "2026-01-01", "y", 0.0301, 0.0142)
     return replace(
         result,
         grade=Grade.CHECK,
         origin=Origin.RECORDED,
-        why=StoredMessage.of(told),
+        why=StoredMessage.of(reported),
         reason="New ball mounted.",
     )
 

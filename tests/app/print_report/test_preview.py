@@ -59,7 +59,7 @@ def test_it_is_saved_where_it_is_wanted(
     assert path.read_bytes().startswith(b"%PDF-1.4")
 
 
-def test_where_it_cannot_be_saved_is_told(
+def test_where_it_cannot_be_saved_is_reported(
     qtbot: QtBot, window: PrintReportWindow, tmp_path: Path
 ) -> None:
     with qtbot.waitSignal(window.failed) as failed:

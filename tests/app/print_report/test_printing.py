@@ -71,32 +71,32 @@ def test_every_page_says_that_a_tip_is_retired_or_overdue(
         assert {"RETIRED", "OVERDUE"} <= set(page)
 
 
-def test_a_tip_that_is_in_force_again_is_told_to_be_so(
+def test_a_tip_that_is_in_force_again_is_reported_as_such(
     result: Result, printed: Printed, words: Words
 ) -> None:
     again = replace(result, restores="0" * 64, reason="The new ball is bent.")
 
-    told = " ".join(words(printed(again))[0])
+    reported = " ".join(words(printed(again))[0])
 
     assert "reinstated from an earlier calibration. Reason: The new ball is bent." in (
-        told
+        reported
     )
-    assert "The tip was accepted" not in told
+    assert "The tip was accepted" not in reported
 
 
-def test_the_tip_is_told_to_the_second_digit_of_its_uncertainty(
+def test_the_tip_is_reported_to_the_second_digit_of_its_uncertainty(
     result: Result, stated: dict[str, Any], printed: Printed, words: Words
 ) -> None:
     lines = [line for page in words(printed(result)) for line in page]
     at = lines.index("Tip / mm")
-    told, within = lines[at + 1 : at + 4], lines[at + 5 : at + 8]
+    reported, within = lines[at + 1 : at + 4], lines[at + 5 : at + 8]
 
     for i in range(3):
         digits = within[i].replace(".", "").lstrip("0")
         assert len(digits) == 2
-        assert len(told[i].partition(".")[2]) == len(within[i].partition(".")[2])
-        decimals = len(told[i].partition(".")[2])
-        assert float(told[i]) == round(stated["tip_pen_mm"][i], decimals)
+        assert len(reported[i].partition(".")[2]) == len(within[i].partition(".")[2])
+        decimals = len(reported[i].partition(".")[2])
+        assert float(reported[i]) == round(stated["tip_pen_mm"][i], decimals)
 
 
 def test_certificates_laboratory_and_conditions_are_on_the_report(
@@ -150,7 +150,7 @@ def test_what_an_auditor_asks_for_is_there(
     )
     entered = ArchivePlace(number=41, sha256=64 * "a", previous=64 * "b")
 
-    told = " ".join(
+    reported = " ".join(
         " ".join(page)
         for page in words(printed(replace(doubted, change=since), entered))
     )
@@ -177,7 +177,7 @@ def test_what_an_auditor_asks_for_is_there(
         "1 too few LEDs",
         "Calibrated by",
     ):
-        assert text in told, text
+        assert text in reported, text
 
 
 def test_each_image_that_was_left_out_is_named_with_its_reason(
@@ -203,11 +203,11 @@ def test_stored_messages_are_printed_in_chinese_from_code_and_values_alone(
         doubts=(structs.replace(drift, text=""),),
     )
 
-    told = "".join("".join(page) for page in words(printed(without_text)))
+    reported = "".join("".join(page) for page in words(printed(without_text)))
 
     for each, number in ((why, "0.0301"), (drift, "0.0123")):
         in_chinese = worded(each)
-        assert in_chinese.replace(" ", "") in told.replace(" ", "")
+        assert in_chinese.replace(" ", "") in reported.replace(" ", "")
         assert number in in_chinese
         assert re.search("[\u4e00-\u9fff]", in_chinese)
 
@@ -233,20 +233,20 @@ def test_in_chinese_no_word_is_left_in_english(
     assert "\u6807\u5b9a\u62a5\u544a" in lines
 
 
-def test_a_character_that_no_font_has_is_told_by_its_number(
+def test_a_character_that_no_font_has_is_reported_by_its_number(
     result: Result, printed: Printed, words: Words
 ) -> None:
     second_level, unassigned = "\u946b\u65fb", "\u0378"  # of GB 2312; of nobody
     names = replace(result.names, operator=f"{second_level} {unassigned}")
 
-    told = " ".join(words(printed(replace(result, names=names)))[0])
+    reported = " ".join(words(printed(replace(result, names=names)))[0])
 
-    assert second_level in told
-    assert "U+0378]" in told
+    assert second_level in reported
+    assert "U+0378]" in reported
     assert (
         "[U+...] is the Unicode number of a character missing in the fonts of "
         "this report."
-    ) in told
+    ) in reported
     plain = " ".join(words(printed(result))[0])
     assert "U+" not in plain
 
@@ -256,14 +256,14 @@ def test_it_is_whole_without_the_curves_where_the_file_does_not_hold_enough(
 ) -> None:
     other = replace(result, calibration=record_of({**stated, "rig": {"cameras": []}}))
 
-    told = " ".join(" ".join(page) for page in words(printed(other)))
+    reported = " ".join(" ".join(page) for page in words(printed(other)))
 
     assert (
         "The plot of the tip per image is available only for one camera and one "
         "cone, and for complete files."
-    ) in told
-    assert "Images per field" in told
-    assert "End of report" in told
+    ) in reported
+    assert "Images per field" in reported
+    assert "End of report" in reported
 
 
 def test_the_pdf_holds_all_that_an_archive_asks_of_it(

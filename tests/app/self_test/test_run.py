@@ -26,7 +26,7 @@ def installed(tmp_path: Path) -> Path:
     return files
 
 
-def test_files_as_they_were_built_are_not_told_of(installed: Path) -> None:
+def test_files_as_they_were_built_are_not_reported(installed: Path) -> None:
     assert damaged_files(installed) == ()
 
 
@@ -37,7 +37,7 @@ def test_a_damaged_file_and_a_missing_one_are_named(installed: Path) -> None:
     assert damaged_files(installed) == ("runtime/python.dll", "runtime/Lib/模块.py")
 
 
-def test_a_damaged_program_is_told_of_before_anything_is_imported(
+def test_a_damaged_program_is_reported_before_anything_is_imported(
     installed: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (installed.parent / "runtime" / "python.dll").write_text("other")
@@ -53,7 +53,7 @@ def test_a_damaged_program_is_told_of_before_anything_is_imported(
     assert "runtime/python.dll" in check["found"]
 
 
-def test_a_report_that_cannot_be_written_is_told_of(
+def test_a_report_that_cannot_be_written_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run_self_test(tmp_path / "missing" / "report.json") == 2

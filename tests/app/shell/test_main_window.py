@@ -511,7 +511,7 @@ def test_the_operator_view_names_pen_origin_notice_and_the_key_that_leaves_it(
     view = shell.window.operator_view()
 
     shell.window.set_subject(Subject(Names(pen="LP-04", tip="T-10"), Origin.RECORDED))
-    shell.notifications.tell("The disk is full.", "The disk is full.")
+    shell.notifications.notify("The disk is full.", "The disk is full.")
 
     words = [text.text() for text in view.findChildren(FittedText) if text.isVisible()]
     subject = "Pen LP-04  \u00b7  Tip T-10  \u00b7  RECORDED"
@@ -527,8 +527,8 @@ def test_the_operator_view_names_pen_origin_notice_and_the_key_that_leaves_it(
 def test_nobody_looks_at_images_on_a_page_without_them_or_at_a_window_put_away(
     shell: Shell, qtbot: QtBot
 ) -> None:
-    told: list[bool] = []
-    shell.window.attention_changed.connect(told.append)
+    reported: list[bool] = []
+    shell.window.attention_changed.connect(reported.append)
     shell.pages[1].shows_images = True
 
     shell.window.go_to(1)
@@ -538,7 +538,7 @@ def test_nobody_looks_at_images_on_a_page_without_them_or_at_a_window_put_away(
     shell.window.showNormal()
     shell.window.go_to(0)
 
-    assert told == [True, False, True, False, True, False]
+    assert reported == [True, False, True, False, True, False]
 
 
 def test_what_must_be_pressed_at_the_screen_is_not_pressed_from_afar(
@@ -613,7 +613,7 @@ def test_a_page_speaks_through_the_window(shell: Shell) -> None:
     page = shell.pages[0]
     shell.notifications.show_status("21 images a second")
     shell.window.set_subject(Subject(Names(pen="LP-04", tip="T-10"), Origin.SIMULATED))
-    shell.notifications.tell(page.key, "The file holds no LED.")
+    shell.notifications.notify(page.key, "The file holds no LED.")
     page.operator_value_changed.emit(OperatorValue(instruction="Tilt right"))
 
     words = shell.window.words()
@@ -677,7 +677,7 @@ def test_every_choice_has_a_name(shell: Shell) -> None:
     assert ["1 m", "2 m", "3 m", "4 m", "6 m"] in names
 
 
-def test_a_crash_is_told_in_a_sentence_with_the_place_of_the_report(
+def test_a_crash_is_reported_in_a_sentence_with_the_place_of_the_report(
     shell: Shell,
 ) -> None:
     shell.window.show_crash_report("/data/crash-1.txt")
@@ -690,7 +690,7 @@ def test_a_crash_is_told_in_a_sentence_with_the_place_of_the_report(
 
 
 def test_an_error_of_a_page_goes_with_it_but_a_crash_stays(shell: Shell) -> None:
-    shell.notifications.tell(shell.pages[0].key, "The file holds no LED.")
+    shell.notifications.notify(shell.pages[0].key, "The file holds no LED.")
     shell.window.go_to(1)
     assert "The file holds no LED." not in shell.window.words()
 
@@ -701,42 +701,42 @@ def test_an_error_of_a_page_goes_with_it_but_a_crash_stays(shell: Shell) -> None
 
 
 def test_a_notice_goes_with_its_cause_and_no_other_does(shell: Shell) -> None:
-    shell.notifications.tell("The disk is full.", "The disk is full.")
+    shell.notifications.notify("The disk is full.", "The disk is full.")
     shell.notifications.withdraw("The disk is full.")
     assert "The disk is full." not in shell.window.words()
 
-    shell.notifications.tell("The disk is full.", "The disk is full.")
+    shell.notifications.notify("The disk is full.", "The disk is full.")
     shell.window.show_crash_report("/data/crash-1.txt")
     shell.notifications.withdraw("The disk is full.")
 
     assert any("/data/crash-1.txt" in each for each in shell.window.words())
 
 
-def test_what_is_told_of_an_unwritable_data_folder_says_where_another_is_chosen(
+def test_what_is_reported_an_unwritable_data_folder_says_where_another_is_chosen(
     shell: Shell,
 ) -> None:
-    def told() -> str:
+    def reported() -> str:
         return shell.window.words()[0]
 
     way = "Choose the data folder at Set up station or in the options (F10)."
     shell.window.set_unwritable("/data", "Nothing can be kept in /data.")
-    assert told() == f"Nothing can be kept in /data. {way}"
-    shell.notifications.tell(
+    assert reported() == f"Nothing can be kept in /data. {way}"
+    shell.notifications.notify(
         "The archive /data/a is not there.", "The archive /data/a is not there."
     )
-    assert told() == f"Nothing can be kept in /data. {way}"
-    shell.notifications.tell("The camera is lost.", "The camera is lost.")
-    assert told() == "The camera is lost."
-    shell.notifications.tell(
+    assert reported() == f"Nothing can be kept in /data. {way}"
+    shell.notifications.notify("The camera is lost.", "The camera is lost.")
+    assert reported() == "The camera is lost."
+    shell.notifications.notify(
         "The archive /data/a is not there.", "The archive /data/a is not there."
     )
-    assert told() == f"The archive /data/a is not there. {way}"
+    assert reported() == f"The archive /data/a is not there. {way}"
 
     shell.window.set_unwritable("", "")
-    shell.notifications.tell(
+    shell.notifications.notify(
         "The archive /data/a is not there.", "The archive /data/a is not there."
     )
-    assert told() == "The archive /data/a is not there."
+    assert reported() == "The archive /data/a is not there."
 
 
 def test_the_present_step_is_always_in_view(qtbot: QtBot, settings: Settings) -> None:
@@ -810,7 +810,7 @@ def test_a_notice_pushes_the_page_down_and_covers_nothing(shell: Shell) -> None:
     page.field.setFocus()
     before = page.mapTo(window, QPoint()).y()
 
-    shell.notifications.tell("cause", "The disk is full. " * 12)
+    shell.notifications.notify("cause", "The disk is full. " * 12)
     QApplication.processEvents()
 
     notice = notice_of(window)
@@ -856,8 +856,8 @@ def test_that_someone_must_be_at_the_screen_is_said_until_they_need_not(
 
 
 def test_a_page_takes_no_notice_away_that_another_page_raised(shell: Shell) -> None:
-    shell.notifications.tell(shell.pages[1].key, "There is no camera.")
-    shell.notifications.tell(shell.pages[0].key, "The file holds no LED.")
+    shell.notifications.notify(shell.pages[1].key, "There is no camera.")
+    shell.notifications.notify(shell.pages[0].key, "The file holds no LED.")
     shell.notifications.withdraw(shell.pages[1].key)
     assert "The file holds no LED." in shell.window.words()
 
@@ -866,8 +866,8 @@ def test_a_page_takes_no_notice_away_that_another_page_raised(shell: Shell) -> N
 
 
 def test_a_page_takes_no_notice_away_that_is_not_of_a_page(shell: Shell) -> None:
-    shell.notifications.tell(shell.pages[0].key, "The file holds no LED.")
-    shell.notifications.tell("The disk is full.", "The disk is full.")
+    shell.notifications.notify(shell.pages[0].key, "The file holds no LED.")
+    shell.notifications.notify("The disk is full.", "The disk is full.")
 
     shell.notifications.withdraw(shell.pages[0].key)
 

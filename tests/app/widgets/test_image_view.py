@@ -99,7 +99,7 @@ def test_what_is_left_out_is_crossed(view: ImageView) -> None:
 @pytest.mark.parametrize(
     ("angle", "dx", "dy"), [(0.0, 1, 0), (np.pi / 2, 0, 1), (np.pi, -1, 0)]
 )
-def test_a_label_stands_where_it_is_told(
+def test_a_label_stands_where_it_is_reported(
     view: ImageView, angle: float, dx: int, dy: int
 ) -> None:
     view.set_image(dark_image(), [Marker(1200, 1000, 1, "8", label_angle=angle)])

@@ -16,12 +16,12 @@ def test_nothing_is_made_before_it_is_seen(qtbot: QtBot) -> None:
     assert made.isVisible()
 
 
-def test_what_is_asked_for_is_made_once_and_told(qtbot: QtBot) -> None:
+def test_what_is_asked_for_is_made_once_and_reported(qtbot: QtBot) -> None:
     late = LazyWidget(QLabel)
     qtbot.addWidget(late)
-    told: list[QLabel] = []
-    late.made.connect(told.append)
+    reported: list[QLabel] = []
+    late.made.connect(reported.append)
     first = late.content()
     late.show()
     assert late.content() is first
-    assert told == [first]
+    assert reported == [first]

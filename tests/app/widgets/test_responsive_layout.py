@@ -36,7 +36,9 @@ def test_a_widget_is_arranged_anew_only_when_its_room_changes(qtbot: QtBot) -> N
     ]
 
 
-def test_plenty_of_room_is_told_where_there_is_plenty_both_ways(qtbot: QtBot) -> None:
+def test_plenty_of_room_is_reported_where_there_is_plenty_both_ways(
+    qtbot: QtBot,
+) -> None:
     widget = Arranged()
     qtbot.addWidget(widget)
     widget.resize(300, 200)

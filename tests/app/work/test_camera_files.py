@@ -25,8 +25,8 @@ class Bench:
 
     def __init__(self, workbench: Workbench, folder: Path) -> None:
         self.selection, self.folder = workbench.selection, folder
-        self.told: list[str] = []
-        workbench.notifications.raised.connect(lambda text: self.told.append(text))
+        self.reported: list[str] = []
+        workbench.notifications.raised.connect(lambda text: self.reported.append(text))
         now = self.selection.preparation
         self.selection.observe(replace(now, source=WEBCAM, camera_file=None))
 
@@ -76,7 +76,7 @@ def test_each_camera_has_its_intrinsics_and_mask_again(bench: Bench) -> None:
     assert bench.file == ""
     assert (
         "one.yaml is the intrinsics file of camera S1, not of camera S2"
-        in (bench.told[-1])
+        in (bench.reported[-1])
     )
     now = bench.selection.preparation
     bench.selection.set_preparation(replace(now, mask=np.zeros((0, 3))))

@@ -59,7 +59,7 @@ def test_a_cancelled_job_stops_and_tells_only_that_it_ended(qtbot: QtBot) -> Non
     assert QThreadPool.globalInstance().waitForDone(60_000)
 
 
-def test_an_outcome_on_its_way_is_not_told_once_cancelled(qtbot: QtBot) -> None:
+def test_an_outcome_on_its_way_is_not_reported_once_cancelled(qtbot: QtBot) -> None:
     done = Event()
 
     def finish(report: Report) -> int:
@@ -115,7 +115,7 @@ def test_a_bug_reaches_the_crash_hook_and_ends_the_job(
     assert isinstance(caught[0], ZeroDivisionError)
 
 
-def test_the_progress_of_a_cancelled_job_is_not_told(qtbot: QtBot) -> None:
+def test_the_progress_of_a_cancelled_job_is_not_reported(qtbot: QtBot) -> None:
     job = Job(lambda report: report(0.5))
     with qtbot.assertNotEmitted(job.progressed):
         job.start()

@@ -156,7 +156,7 @@ def test_a_gui_that_was_busy_is_shown_the_newest_image_only(
     assert new[0].seen.frame.seq >= newest
 
 
-def test_the_connection_is_told_as_it_changes(
+def test_the_connection_is_reported_as_it_changes(
     view: LiveView, stage: Stage, diary: Diary, qtbot: QtBot
 ) -> None:
     assert (view.is_open, view.connection) == (False, Connection.CLOSED)
@@ -175,7 +175,7 @@ def test_the_connection_is_told_as_it_changes(
     assert view.stats.delivered == 0
 
 
-def test_exposure_and_gain_are_told_when_they_are_in_force(
+def test_exposure_and_gain_are_reported_when_they_are_in_force(
     view: LiveView, stage: Stage, qtbot: QtBot
 ) -> None:
     with qtbot.waitSignal(view.settings_applied):
@@ -190,7 +190,7 @@ def test_exposure_and_gain_are_told_when_they_are_in_force(
         view.set_gain(6.0)
 
 
-def test_a_camera_that_is_not_there_is_told_and_another_can_be_opened(
+def test_a_camera_that_is_not_there_is_reported_and_another_can_be_opened(
     view: LiveView, stage: Stage, qtbot: QtBot
 ) -> None:
     with qtbot.waitSignal(view.failed):
@@ -213,14 +213,14 @@ def test_images_that_are_skipped_are_counted_in_the_status_line_alone(
     notifications.status_changed.connect(shown.append)
     notifications.raised.connect(lambda text, _: pytest.fail(text))
 
-    view._on_told(FaultRaised(skipped), 0)
-    view._on_told(ProcessingKeepsUp(), 0)
+    view._on_event_received(FaultRaised(skipped), 0)
+    view._on_event_received(ProcessingKeepsUp(), 0)
 
     assert shown[0].startswith("Processing cannot keep up: 7 of 20 images skipped.")
     assert shown[1:] == [""]
 
 
-def test_a_lost_camera_is_told_and_comes_back(
+def test_a_lost_camera_is_reported_and_comes_back(
     view: LiveView,
     stage: Stage,
     diary: Diary,
@@ -276,18 +276,18 @@ def test_closing_does_not_wait_for_the_device(
     assert view.await_closed()
 
 
-def test_nothing_is_told_of_a_closed_camera(
+def test_nothing_is_reported_a_closed_camera(
     view: LiveView, stage: Stage, diary: Diary, qtbot: QtBot
 ) -> None:
     for _ in range(4):
         stage.open()
         stage.hold_up(3)  # all of it waits
         view.close()
-        told = len(diary.entries)
+        reported = len(diary.entries)
         view.await_closed()
         QApplication.processEvents()
 
-        assert len(diary.entries) == told
+        assert len(diary.entries) == reported
 
 
 def test_after_another_camera_was_opened_only_its_images_are_shown(

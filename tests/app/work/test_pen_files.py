@@ -23,8 +23,8 @@ class Bench:
     def __init__(self, workbench: Workbench, folder: Path) -> None:
         self.workbench, self.folder = workbench, folder
         self.pens, self.selection = workbench.pens, workbench.selection
-        self.told: list[str] = []
-        workbench.notifications.raised.connect(lambda text: self.told.append(text))
+        self.reported: list[str] = []
+        workbench.notifications.raised.connect(lambda text: self.reported.append(text))
         source = SourceChoice(SourceKind.RECORDED, str(folder))
         now = self.selection.preparation.with_source(source)
         self.selection.set_preparation(now)
@@ -126,7 +126,7 @@ def test_a_file_that_was_changed_since_is_not_used(bench: Bench) -> None:
     bench.choose("LP-04")
 
     assert bench.path is None
-    assert "was changed since it was stored with pen LP-04" in bench.told[-1]
+    assert "was changed since it was stored with pen LP-04" in bench.reported[-1]
 
 
 def test_a_pen_brings_its_expansion(bench: Bench) -> None:

@@ -124,7 +124,7 @@ def test_what_the_administrator_set_is_below_what_the_user_chose(
     assert machine.read_bytes() == before
 
 
-def test_wrong_settings_of_the_administrator_are_told_and_left_out(
+def test_wrong_settings_of_the_administrator_are_reported_and_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CONFIG_DIRS", str(tmp_path / "all"))
@@ -189,7 +189,7 @@ def test_a_value_that_makes_no_sense_gives_the_default(
 
 
 @pytest.mark.parametrize("content", RUBBISH)
-def test_a_damaged_file_gives_the_defaults_is_told_and_kept(
+def test_a_damaged_file_gives_the_defaults_is_reported_and_kept(
     settings: Settings, content: bytes
 ) -> None:
     settings.file.parent.mkdir()
@@ -210,16 +210,16 @@ def test_a_file_damaged_meanwhile_costs_nothing_that_is_known(
     assert settings.await_saved(TIMEOUT)
     settings.file.write_bytes(b"{")
 
-    with qtbot.waitSignal(settings.troubled) as told:
+    with qtbot.waitSignal(settings.troubled) as reported:
         settings.set_last_station("Hall 3")
 
     assert ". Restore them from a copy, or enter the settings again." in str(
-        told.args[0]
+        reported.args[0]
     )
     assert reopened(settings).station("Hall 3") == STATION
 
 
-def test_a_pipe_in_place_of_the_file_is_told_and_waited_for_by_nobody(
+def test_a_pipe_in_place_of_the_file_is_reported_and_waited_for_by_nobody(
     settings: Settings, qtbot: QtBot
 ) -> None:
     settings.file.parent.mkdir()
@@ -261,13 +261,13 @@ def test_a_stopped_program_that_holds_the_settings_keeps_nobody_from_saving(
         assert holder.stdout.readline() == b"held\n"
         holder.send_signal(signal.SIGSTOP)
 
-        with qtbot.waitSignal(settings.troubled) as told:
+        with qtbot.waitSignal(settings.troubled) as reported:
             settings.set_station("Hall 3", STATION)
             is_waited_for = settings.file.exists()
 
         assert not is_waited_for
         assert "s. End that program if it hangs; it may overwrite the settings." in str(
-            told.args[0]
+            reported.args[0]
         )
         assert reopened(settings).station("Hall 3") == STATION
         holder.kill()
@@ -315,15 +315,15 @@ def test_a_window_comes_back_where_it_was(qtbot: QtBot, settings: Settings) -> N
     assert windows[1].geometry() == place
 
 
-def test_settings_that_cannot_be_saved_are_told_and_saved_when_they_can_be(
+def test_settings_that_cannot_be_saved_are_reported_and_saved_when_they_can_be(
     tmp_path: Path, qtbot: QtBot
 ) -> None:
     (tmp_path / "file").write_text("not a folder")
     settings = Settings(tmp_path / "file" / "lightpen.json")
 
-    with qtbot.waitSignal(settings.troubled) as told:
+    with qtbot.waitSignal(settings.troubled) as reported:
         settings.set_preferences(PREFERENCES)
-    assert re.search(r"Settings not saved: .*lightpen\.json", str(told.args[0]))
+    assert re.search(r"Settings not saved: .*lightpen\.json", str(reported.args[0]))
 
     (tmp_path / "file").unlink()
     settings.set_last_station("Hall 3")
@@ -336,15 +336,15 @@ def test_what_could_not_be_saved_is_tried_again_and_taken_back(
     monkeypatch.setattr("lightpen_app.work.settings.AGAIN_MS", 50)
     (tmp_path / "file").write_text("not a folder")
     settings = Settings(tmp_path / "file" / "lightpen.json")
-    told: list[object] = []
-    settings.troubled.connect(told.append)
+    reported: list[object] = []
+    settings.troubled.connect(reported.append)
     with qtbot.waitSignal(settings.troubled):
         settings.set_preferences(PREFERENCES)
 
     with qtbot.waitSignal(settings.relieved) as relieved:
         (tmp_path / "file").unlink()
 
-    assert relieved.args == told
+    assert relieved.args == reported
     assert reopened(settings).preferences() == PREFERENCES
 
 

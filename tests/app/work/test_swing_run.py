@@ -1,4 +1,4 @@
-"""The GUI is told of a swing on its own thread: every event, and the newest status."""
+"""The GUI gets every event and the newest status of a swing on its own thread."""
 
 import threading
 from collections.abc import Callable
@@ -39,7 +39,7 @@ class Diary:
         return [name for name, _ in self.entries]
 
     def of(self, name: str) -> list[Any]:
-        return [values[0] for told, values in self.entries if told == name]
+        return [values[0] for reported, values in self.entries if reported == name]
 
     def event_kinds(self) -> list[SwingEventKind]:
         return [event.what for event in self.of("happened")]
@@ -85,7 +85,7 @@ def test_records_and_results_are_kept_in_the_folder(
     assert "2031" in run.status.record_folder.name
 
 
-def test_what_changed_is_known_when_it_is_told(
+def test_what_changed_is_known_when_it_is_reported(
     run: SwingRun, diary: Diary, interrupted: Path, qtbot: QtBot
 ) -> None:
     run.runner.go_on(read_resumable(interrupted))
@@ -99,7 +99,7 @@ def test_what_changed_is_known_when_it_is_told(
     assert run.status.record_folder == interrupted
 
 
-def test_a_gui_that_was_busy_is_told_every_event_and_then_the_newest_status(
+def test_a_gui_that_was_busy_gets_every_event_and_then_the_newest_status(
     run: SwingRun, diary: Diary, prepared: Preparation
 ) -> None:
     for _ in range(2):
@@ -107,7 +107,7 @@ def test_a_gui_that_was_busy_is_told_every_event_and_then_the_newest_status(
         hold_up_until(lambda: run.runner.status.is_capturing)
         run.runner.finish()  # without an image there is no tip
         hold_up_until(lambda: phase(run) is Phase.VERDICT)
-    run.runner.pause()  # does nothing; all that was told before is on its way
+    run.runner.pause()  # does nothing; all that was reported before is on its way
     run.runner.shut_down()
     assert run.runner.await_end(TIMEOUT)
     QApplication.processEvents()
@@ -138,7 +138,7 @@ def test_an_event_comes_before_the_status_after_it(
     assert diary.names()[-1] == "changed"
 
 
-def test_all_is_told_on_the_thread_of_the_gui(
+def test_all_is_reported_on_the_thread_of_the_gui(
     run: SwingRun,
     diary: Diary,
     prepared: Preparation,
@@ -147,8 +147,8 @@ def test_all_is_told_on_the_thread_of_the_gui(
     qapp: QApplication,
     qtbot: QtBot,
 ) -> None:
-    told, withdrawn = list[str](), list[str]()
-    notifications.raised.connect(lambda text, _: told.append(text))
+    reported, withdrawn = list[str](), list[str]()
+    notifications.raised.connect(lambda text, _: reported.append(text))
     notifications.withdrawn.connect(withdrawn.append)
     run.records_folder.rename(run.records_folder.with_name("old"))
     run.records_folder.write_text("not a folder")
@@ -167,9 +167,9 @@ def test_all_is_told_on_the_thread_of_the_gui(
     fractions = diary.of("progressed")
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
-    assert len(told) == 1
-    assert "cannot be written" in told[0]
-    assert withdrawn == told
+    assert len(reported) == 1
+    assert "cannot be written" in reported[0]
+    assert withdrawn == reported
 
 
 def test_a_follower_sees_every_state_though_the_gui_is_busy(

@@ -213,7 +213,7 @@ def test_a_first_start_has_the_files_of_the_simulated_pen(
 # Files
 
 
-def test_a_file_that_cannot_be_read_is_told_and_must_be_chosen_again(
+def test_a_file_that_cannot_be_read_is_reported_and_must_be_chosen_again(
     stage: Stage,
 ) -> None:
     pen_file = stage.workbench.selection.preparation.pen_file
@@ -228,7 +228,7 @@ def test_a_file_that_cannot_be_read_is_told_and_must_be_chosen_again(
     assert "pen.json" in stage.sentences[0]
 
 
-def test_files_that_are_gone_are_told_one_by_one(
+def test_files_that_are_gone_are_reported_one_by_one(
     stage: Stage, tmp_path: Path, recording: Path
 ) -> None:
     source = SourceChoice(SourceKind.RECORDED, str(recording))
@@ -275,7 +275,7 @@ def test_files_of_the_simulated_pen_that_come_late_are_not_those_of_another_sour
     assert (now.camera_file, now.pen_file) == (None, None)
 
 
-def test_sample_files_that_cannot_be_written_are_told(
+def test_sample_files_that_cannot_be_written_are_reported(
     tmp_path: Path, workbench: Workbench, qtbot: QtBot
 ) -> None:
     (tmp_path / "a file").write_text("")
@@ -307,7 +307,7 @@ def test_why_a_file_cannot_be_read_is_taken_back_when_another_is_chosen(
     assert relieved.args == stage.sentences[-1:]
 
 
-def test_choices_that_cannot_be_saved_are_told_and_in_force_all_the_same(
+def test_choices_that_cannot_be_saved_are_reported_and_in_force_all_the_same(
     stage: Stage,
 ) -> None:
     assert stage.settings.await_saved(120.0)
@@ -413,7 +413,7 @@ def test_the_same_source_stays_open(stage: Stage) -> None:
     assert stage.workbench.selection.preparation.image_size == (1224, 1024)
 
 
-def test_a_source_that_is_not_there_is_told_and_can_be_tried_again(
+def test_a_source_that_is_not_there_is_reported_and_can_be_tried_again(
     stage: Stage, recording: Path
 ) -> None:
     moved = recording.rename(recording.with_name("moved"))
@@ -503,35 +503,35 @@ def test_shutting_down_twice_does_no_harm(stage: Stage) -> None:
     assert not stage.workbench.live.is_open
 
 
-def test_what_other_stations_shared_is_told_once_and_read(stage: Stage) -> None:
+def test_what_other_stations_shared_is_reported_once_and_read(stage: Stage) -> None:
     library, notices = stage.workbench.library, stage.workbench.notifications
     logbook = stage.workbench.run.logbook.opened()
     raised: list[str] = []
     notices.raised.connect(lambda text, tone: raised.append(text))
-    told = message("library.share-waits", n=2)
-    logbook.shared += (told,)
+    reported = message("library.share-waits", n=2)
+    logbook.shared += (reported,)
 
     with stage.qtbot.waitSignal(library.changed):
         library.look_at_shared()
     library.look_at_shared()
-    assert raised == [str(told)]
+    assert raised == [str(reported)]
 
 
-def test_what_is_told_after_shutting_down_begins_nothing(stage: Stage) -> None:
+def test_what_is_reported_after_shutting_down_begins_nothing(stage: Stage) -> None:
     workbench = stage.workbench
     workbench.streaming.want(StreamPlace(port=0))  # a job that tells of its end later
     workbench.library.refresh()
     workbench.shut_down()
-    told: list[str] = []
-    workbench.run.changed.connect(lambda: told.append("swing"))
-    workbench.library.changed.connect(lambda: told.append("library"))
-    workbench.run.tell(SwingStatus(), ())
+    reported: list[str] = []
+    workbench.run.changed.connect(lambda: reported.append("swing"))
+    workbench.library.changed.connect(lambda: reported.append("library"))
+    workbench.run.post(SwingStatus(), ())
     workbench.library.refresh()
     for _ in range(3):
         QCoreApplication.processEvents()
         assert QThreadPool.globalInstance().waitForDone(0)
 
-    assert told == []
+    assert reported == []
 
 
 def test_a_new_station_keeps_no_file_that_was_being_read_for_another(
@@ -557,7 +557,7 @@ def test_why_a_rig_file_cannot_be_read_is_taken_back_with_the_second_camera(
         OTHER.station, replace(there, second=StoredCamera(), files=FilePaths(rig=lost))
     )
     stage.choose_station(OTHER.station)
-    (told,) = (each for each in stage.sentences if "lost.json" in each)
+    (reported,) = (each for each in stage.sentences if "lost.json" in each)
     found = sample_files(stage.workbench.around, stage.folder / "rig").rig_file
     assert found is not None
     with qtbot.waitSignal(stage.workbench.notifications.withdrawn) as relieved:
@@ -565,10 +565,10 @@ def test_why_a_rig_file_cannot_be_read_is_taken_back_with_the_second_camera(
             stage.workbench.selection.preparation.with_rig(found)
         )
 
-    assert relieved.args == [told]
+    assert relieved.args == [reported]
 
 
-def test_what_could_not_be_saved_is_taken_back_in_the_language_it_was_told_in(
+def test_what_could_not_be_saved_is_taken_back_in_the_language_it_was_reported_in(
     stage: Stage, qapp: QApplication, qtbot: QtBot
 ) -> None:
     assert stage.settings.await_saved(120.0)

@@ -139,8 +139,8 @@ def test_a_copy_does_not_go_on_with_another_history(
 
     (_, second) = nameless.enter(2)
     records = records_of(nameless.database, [second])
-    told = f"not continue with entry 2 of chain {nameless.chain[:8]}"
-    with pytest.raises(ArchiveError, match=told):
+    reported = f"not continue with entry 2 of chain {nameless.chain[:8]}"
+    with pytest.raises(ArchiveError, match=reported):
         copy_entries(there.database, nameless.chain, [second], records)
 
 

@@ -165,7 +165,7 @@ def test_an_archive_that_is_not_there_is_said_to_be_missing(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("opening", [look_into, open_file])
-def test_an_archive_that_may_not_be_looked_at_is_told(
+def test_an_archive_that_may_not_be_looked_at_is_reported(
     tmp_path: Path, opening: Callable[[Path], Database]
 ) -> None:
     path = tmp_path / (300 * "x") / "archive.sqlite"  # no system has names so long
@@ -263,7 +263,7 @@ def test_what_is_read_while_the_archive_is_closed_is_let_go_of_after(
     assert [path.name for path in tmp_path.iterdir()] == ["archive.sqlite"]
 
 
-def test_an_archive_of_which_sqlite_speaks_in_no_text_is_told_to_be_damaged(
+def test_an_archive_of_which_sqlite_speaks_in_no_text_is_reported_to_be_damaged(
     tmp_path: Path,
 ) -> None:
     file = tmp_path / "archive.sqlite"

@@ -132,7 +132,7 @@ def test_nothing_is_taken_up_of_the_chains_before_a_damaged_one(
     assert [head.number for head in heads(third.database)] == [0]
 
 
-def test_a_server_with_another_last_entry_is_told_though_nothing_is_new(
+def test_a_server_with_another_last_entry_is_reported_though_nothing_is_new(
     make_station: Callable[[str], Station],
 ) -> None:
     here, server = make_station("Hall 2"), make_station("server")

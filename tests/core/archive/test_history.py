@@ -143,7 +143,7 @@ def test_what_follows_a_clock_that_was_ahead_is_found_by_the_days_it_says(
     assert states(station) == [IN_FORCE, REPLACED, REPLACED, REPLACED]
 
 
-def test_a_changed_entry_is_told_of_and_nothing_it_says_is_shown(
+def test_a_changed_entry_is_reported_and_nothing_it_says_is_shown(
     station: Station,
 ) -> None:
     station.enter(3)

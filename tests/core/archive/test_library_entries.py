@@ -99,7 +99,7 @@ def test_a_changed_file_of_the_library_is_found(
     assert [each.code for each in findings(tmp_path)] == 2 * ["archive.vouched-changed"]
 
 
-def test_a_damaged_file_of_the_library_stays_owed_and_is_told(
+def test_a_damaged_file_of_the_library_stays_owed_and_is_reported(
     tmp_path: Path, logbook: Logbook
 ) -> None:
     add_item(tmp_path, ListedCone(id="C-1"), ANN, NOON)

@@ -1,4 +1,4 @@
-"""Where a result is entered, told by the archive beside it."""
+"""Where a result is entered, by the archive beside it."""
 
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -52,7 +52,7 @@ def results(tmp_path: Path) -> list[Path]:
     return sorted(archive.folder.glob("*.json"))
 
 
-def test_an_entry_is_told_with_the_one_before(results: list[Path]) -> None:
+def test_an_entry_is_reported_with_the_one_before(results: list[Path]) -> None:
     first, second = (entry_of_file(file, digest(file)) for file in results)
 
     assert first is not None
@@ -61,7 +61,7 @@ def test_an_entry_is_told_with_the_one_before(results: list[Path]) -> None:
     assert (second.number, second.previous) == (2, first.sha256)
 
 
-def test_a_result_that_was_changed_since_is_told(results: list[Path]) -> None:
+def test_a_result_that_was_changed_since_is_reported(results: list[Path]) -> None:
     with pytest.raises(FileError, match="is not the one that was entered"):
         entry_of_file(results[0], 64 * "0")
 
@@ -76,7 +76,7 @@ def test_what_is_in_no_archive_has_no_entry(results: list[Path]) -> None:
     assert entry_of_file(new, digest(new)) is None
 
 
-def test_an_archive_that_cannot_be_read_is_told(results: list[Path]) -> None:
+def test_an_archive_that_cannot_be_read_is_reported(results: list[Path]) -> None:
     (results[0].parents[1] / ARCHIVE).write_bytes(b"precious" * 100)
 
     with pytest.raises(ArchiveError):

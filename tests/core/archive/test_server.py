@@ -53,9 +53,9 @@ def test_wrong_credentials_are_said_without_the_password(postgres: Postgres) -> 
     with pytest.raises(ArchiveError) as caught:
         open_server(postgres.address("postgres", wrong))
 
-    told = str(caught.value.message)
-    assert "password authentication failed" in told
-    assert PASSWORD not in told
+    reported = str(caught.value.message)
+    assert "password authentication failed" in reported
+    assert PASSWORD not in reported
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_wrong_credentials_are_said_without_the_password(postgres: Postgres) -> 
         f"postgresql://127.0.0.1:1/plant?user=plant&password={PASSWORD}",
     ],
 )
-def test_no_way_of_giving_a_password_has_it_told(address: str) -> None:
+def test_no_way_of_giving_a_password_reveals_it(address: str) -> None:
     with pytest.raises(ArchiveError) as caught:
         open_server(address)
 

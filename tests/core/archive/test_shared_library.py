@@ -144,9 +144,9 @@ def test_a_running_station_takes_over_by_itself_and_tells_whose_change_is_replac
         change_item(each.data, changed, each.by, NOON + hours * HOUR)
     one.share()
 
-    (told,) = shared_since_start(other)
-    assert told.startswith("Taken over from another station: tip T-10, one Ann, ")
-    assert "It replaces the earlier change by other Ann, " in told
+    (reported,) = shared_since_start(other)
+    assert reported.startswith("Taken over from another station: tip T-10, one Ann, ")
+    assert "It replaces the earlier change by other Ann, " in reported
     assert other.tip().note == "one, changed"
 
 
@@ -159,8 +159,8 @@ def test_a_running_station_with_a_password_tells_that_changes_wait(
     add_item(one.data, TIP, one.by, NOON)
     one.share()
 
-    (told,) = shared_since_start(guarded)
-    assert told.startswith("1 changes of other stations")
+    (reported,) = shared_since_start(guarded)
+    assert reported.startswith("1 changes of other stations")
     assert read_library(guarded.data).tips == {}
 
 

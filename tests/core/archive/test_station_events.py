@@ -56,12 +56,12 @@ def events(logbook: Logbook) -> list[Event]:
 
 def keep(data: Path, grade: Grade, folder: str = VERIFICATIONS) -> Path:
     """Keep a verification as the step Verify does."""
-    told = message("file.image")
+    reported = message("file.image")
     record = verification_record(
         "circle",
         {"station": "Hall 2", "operator": "Ann", "pen": "LP-04", "tip": "T-10"}
         | {"origin": Origin.SIMULATED if SIMULATED in folder else Origin.LIVE},
-        VerificationAssessment(grade, told, told),
+        VerificationAssessment(grade, reported, reported),
         {"radius": 0.01},
         {"images": [{"file": "7", "sha256": HASH}]},
     )

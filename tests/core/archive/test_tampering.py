@@ -303,7 +303,7 @@ def test_a_rolled_back_folder_delivers_nothing_and_says_what_to_do(
 
 
 @pytest.mark.slow
-def test_a_rolled_back_folder_that_went_on_is_told_from_its_first_new_entry(
+def test_a_rolled_back_folder_that_went_on_is_reported_from_its_first_new_entry(
     plant: Plant,
 ) -> None:
     roll_back_folder(plant)

@@ -181,7 +181,7 @@ def test_entries_written_anew_with_the_key_of_the_station_are_found(
     assert "is not of entry 2 of chain" in findings(station, tsa.root)
 
 
-def test_a_clock_that_is_ahead_is_told_and_an_earlier_timestamp_found(
+def test_a_clock_that_is_ahead_is_reported_and_an_earlier_timestamp_found(
     station: Station, tsa: Tsa
 ) -> None:
     event, record = accepted(1)
@@ -203,7 +203,7 @@ def test_a_clock_that_is_ahead_is_told_and_an_earlier_timestamp_found(
 
 
 @pytest.mark.parametrize("address", ["http://127.0.0.1:1", "file:///etc/passwd", ""])
-def test_an_authority_that_does_not_answer_is_told(
+def test_an_authority_that_does_not_answer_is_reported(
     station: Station, tsa: Tsa, address: str
 ) -> None:
     station.enter(1)

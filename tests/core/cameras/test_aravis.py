@@ -178,7 +178,7 @@ def test_a_camera_that_another_program_controls_is_busy(gige: GigeSimulator) -> 
     first.close()
 
 
-def test_an_address_without_a_camera_is_told(gige: GigeSimulator) -> None:
+def test_an_address_without_a_camera_is_reported(gige: GigeSimulator) -> None:
     gige.unplug()
     with pytest.raises(DeviceNotFound, match=r"no camera 127\.0\.0\.1 \(.*address"):
         camera().open()

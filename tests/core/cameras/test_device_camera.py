@@ -1,4 +1,4 @@
-"""A camera that a library drives, when what it is told does not arrive."""
+"""A camera that a library drives, when commands do not arrive."""
 
 import pytest
 from typing_extensions import override

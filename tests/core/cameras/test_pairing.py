@@ -100,7 +100,7 @@ def test_frames_that_come_all_at_once_at_first_are_paired_rightly() -> None:
 
 
 @pytest.mark.parametrize("ahead_ms", [0.0, 3.6e6])
-def test_a_camera_held_up_for_long_is_told_and_paired_rightly_afterwards(
+def test_a_camera_held_up_for_long_is_reported_and_paired_rightly_afterwards(
     ahead_ms: float,
 ) -> None:
     n_held_up = 20
@@ -113,13 +113,13 @@ def test_a_camera_held_up_for_long_is_told_and_paired_rightly_afterwards(
     moved_ms = pairs.moved_ms()
     assert moved_ms is not None
     assert moved_ms == pytest.approx(1.5 * PERIOD_MS)
-    assert pairs.moved_ms() is None  # told once
+    assert pairs.moved_ms() is None  # reported once
     assert pairs.lag_ms == pytest.approx(0.0, abs=0.1)
     assert "75 ms apart" in str(held_up(moved_ms))
 
 
 @pytest.mark.slow
-def test_clocks_that_drift_apart_are_not_told_as_held_up() -> None:
+def test_clocks_that_drift_apart_are_not_reported_as_held_up() -> None:
     pairs = FramePairs()
     for seq in range(2000):
         for c, clock in enumerate((1.0, 1.001)):  # 100 ms by the end
@@ -186,7 +186,7 @@ def test_recordings_are_paired_by_number_wherever_each_began() -> None:
 def test_what_a_lag_costs_is_said_at_the_pens_speed() -> None:
     assert not_synchronised(None, None) is None
     assert not_synchronised(0.4, 2.0) is None
-    told = str(not_synchronised(-12.5, None))
-    assert "12.5 ms apart" in told
-    assert "1.25 mm" in told
+    reported = str(not_synchronised(-12.5, None))
+    assert "12.5 ms apart" in reported
+    assert "1.25 mm" in reported
     assert "2.5 px" in str(not_synchronised(12.5, 2.0))

@@ -66,20 +66,20 @@ def test_a_library_that_is_not_installed_is_a_line_that_says_what_to_install(
     aravis_library.load_aravis.cache_clear()
     try:
         absent = absent_sources()
-        told = {key: str(why_absent) for key, why_absent in absent.items()}
+        reported = {key: str(why_absent) for key, why_absent in absent.items()}
         for key in absent:
             with pytest.raises(DeviceNotFound, match="is not installed"):
                 camera(key, NOWHERE).open()
     finally:
         aravis_library.load_aravis.cache_clear()
 
-    assert set(told) == {"aravis", "genicam", "basler"}
-    assert "apt-get install libaravis-0.8-0" in told["aravis"]
-    assert "pip install harvesters genicam" in told["genicam"]
-    assert "pip install pypylon" in told["basler"]
+    assert set(reported) == {"aravis", "genicam", "basler"}
+    assert "apt-get install libaravis-0.8-0" in reported["aravis"]
+    assert "pip install harvesters genicam" in reported["genicam"]
+    assert "pip install pypylon" in reported["basler"]
 
 
-def test_where_nothing_can_be_installed_another_way_to_the_camera_is_told(
+def test_where_nothing_can_be_installed_another_way_to_the_camera_is_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(basler, "find_spec", no_module)
@@ -87,7 +87,7 @@ def test_where_nothing_can_be_installed_another_way_to_the_camera_is_told(
     assert "also work as GenICam cameras" in str(absent_sources()["basler"])
 
 
-def test_a_serial_number_that_no_camera_has_is_told(genicam: SourcePlace) -> None:
+def test_a_serial_number_that_no_camera_has_is_reported(genicam: SourcePlace) -> None:
     place = SourcePlace(NOWHERE.name, genicam.producer)
     with pytest.raises(DeviceNotFound, match="no camera none-of-this-name"):
         camera("genicam", place).open()
@@ -102,7 +102,7 @@ def test_the_cameras_of_a_producer_are_found(genicam: SourcePlace) -> None:
     assert "Viky" in found[0].label
 
 
-def test_a_producer_that_does_not_load_is_told_with_its_message(
+def test_a_producer_that_does_not_load_is_reported_with_its_message(
     genicam: SourcePlace, tmp_path: Path
 ) -> None:
     producer = tmp_path / "vendor.cti"
@@ -128,7 +128,7 @@ def test_producers_are_found_where_the_system_says(
     assert len(source.find("")) == 3
 
 
-def test_a_webcam_that_is_not_there_is_told() -> None:
+def test_a_webcam_that_is_not_there_is_reported() -> None:
     with pytest.raises(DeviceNotFound, match="no camera none-of-this-name"):
         camera("webcam", NOWHERE).open()
 

@@ -421,7 +421,7 @@ def test_a_computer_is_slow_when_many_images_and_a_good_share_are_missed(
     assert is_too_slow(n_missed, n_offered) is is_slow
 
 
-def test_a_reader_that_falls_behind_again_and_again_is_told_once_a_measurement(
+def test_a_reader_that_falls_behind_again_and_again_is_reported_once_a_measurement(
     benches: Benches,
 ) -> None:
     workbench = benches.live(n_queued=1)
@@ -438,7 +438,7 @@ def test_a_reader_that_falls_behind_again_and_again_is_told_once_a_measurement(
     assert len(workbench.events.faults(FramesSkipped)) == 2
 
 
-def test_it_is_told_when_no_image_is_skipped_any_more(benches: Benches) -> None:
+def test_it_is_reported_when_no_image_is_skipped_any_more(benches: Benches) -> None:
     workbench = benches.live(n_queued=1)
     workbench.worker.measure(True)
     workbench.worker.start()
@@ -548,7 +548,7 @@ def test_measuring_anew_forgets_what_was_left(benches: Benches) -> None:
     assert workbench.worker.next_frame(TIMEOUT).seq >= before
 
 
-def test_settings_are_applied_and_told(benches: Benches) -> None:
+def test_settings_are_applied_and_reported(benches: Benches) -> None:
     workbench, _ = benches.spied(CameraSettings(exposure_us=1e9, gain_db=3))
     workbench.worker.start()
     first = workbench.events.all[workbench.wait_for(SettingsApplied)]
@@ -635,9 +635,9 @@ def test_a_busy_camera_is_waited_for(benches: Benches) -> None:
     workbench.wait_until(Connection.STREAMING)
 
     assert camera.opened_at[-1] == pytest.approx(3.0)
-    told = workbench.events.faults(DeviceBusy)
-    assert len(told) == 1
-    assert "Another program" in told[0]
+    reported = workbench.events.faults(DeviceBusy)
+    assert len(reported) == 1
+    assert "Another program" in reported[0]
 
 
 def test_a_camera_that_stays_busy_is_given_up(benches: Benches) -> None:
@@ -671,16 +671,16 @@ def test_impossible_settings_at_first_end_the_worker(benches: Benches) -> None:
     assert "BayerRG8" in workbench.events.faults(ConfigError)[0]
 
 
-def test_kept_settings_that_are_impossible_now_are_told_when_images_come(
+def test_kept_settings_that_are_impossible_now_are_reported_when_images_come(
     benches: Benches,
 ) -> None:
     camera = FaultyCamera(SCENE)
     kept = {camera.serial: CameraSettings(pixel_format="BayerRG8")}
     workbench = benches.make(camera, known=kept)
     workbench.worker.start()
-    told = workbench.wait_for_fault(ConfigError)
+    reported = workbench.wait_for_fault(ConfigError)
 
-    assert workbench.wait_until(Connection.STREAMING) < told
+    assert workbench.wait_until(Connection.STREAMING) < reported
     assert "BayerRG8" in workbench.events.faults(ConfigError)[0]
     workbench.wait_for_frames(2)
 
@@ -699,7 +699,7 @@ def test_one_image_that_a_link_damaged_is_counted_but_disturbs_nobody(
     assert workbench.events.faults(FrameIncomplete) == []
 
 
-def test_a_damaged_image_is_told_and_the_next_one_comes(benches: Benches) -> None:
+def test_a_damaged_image_is_reported_and_the_next_one_comes(benches: Benches) -> None:
     workbench, camera = benches.spied()
     camera.spoil_frames(1)
     workbench.worker.start()

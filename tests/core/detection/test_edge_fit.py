@@ -109,7 +109,7 @@ def test_the_area_is_that_of_the_rim_however_blurred(leds: str, blur: float) -> 
             assert which is not None
             true_area = 4 * np.pi * np.sqrt(np.linalg.det(shape))
             ratios.append(spots.areas[which] / true_area)
-    # A wrong disc diameter is told from it.
+    # A wrong disc diameter is recognised by it.
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.005)
     assert np.std(ratios) < 0.01
 
@@ -161,7 +161,7 @@ def test_nothing_is_fitted_to_a_smear_or_to_darkness() -> None:
 
 @pytest.mark.parametrize("leds", ["even", "hot-spot", "dome"])
 @pytest.mark.parametrize("sliver", [1.0, 3.0, 8.0])
-def test_a_finger_over_an_led_as_it_is_is_told(leds: str, sliver: float) -> None:
+def test_a_finger_over_an_led_as_it_is_is_reported(leds: str, sliver: float) -> None:
     wanted = scene(leds)
     plan = plan_scene(wanted).image_plans[0]
     discs = show(wanted, plan).discs

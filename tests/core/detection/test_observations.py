@@ -184,7 +184,7 @@ def test_two_images_of_a_pen_at_rest_count_twice(plan: ScenePlan) -> None:
     assert observe([loader(image) for image in shown]).reasons == (Reason.NONE,) * 3
 
 
-def test_leds_that_are_too_small_are_told_with_what_is_needed() -> None:
+def test_leds_that_are_too_small_are_reported_with_what_is_needed() -> None:
     scene = replace(
         SCENE,
         pen=replace(PEN, diameter=0.5),

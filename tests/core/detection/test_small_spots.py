@@ -108,7 +108,7 @@ def test_leds_among_foreign_light_count_less_than_such_in_the_dark() -> None:
     assert np.median(found_on(HARD).sigmas) > 2 * np.median(found_on(CLEAN).sigmas)
 
 
-def test_a_hidden_half_is_told() -> None:
+def test_a_hidden_half_is_reported() -> None:
     y, x = np.mgrid[:40, :40]
     light = np.where(np.hypot(x - 20, y - 20) < 3.5, 200.0, 0.0)
     light += np.where(np.hypot(x - 27, y - 20) < 3.5, 90.0, 0.0)  # keeps it from alone

@@ -299,7 +299,7 @@ def test_leds_in_front_of_a_bright_window_are_found_and_the_window_is_not() -> N
     ],
 )
 @pytest.mark.parametrize("background", ["gradient", "glow", "wall"])
-def test_leds_before_an_uneven_background_are_found_and_told_if_saturated(
+def test_leds_before_an_uneven_background_are_found_and_reported_if_saturated(
     background: str, level: float, full_scale: int, flaw: SpotFlaw
 ) -> None:
     lamps = grid_of_lamps(level=level)
@@ -433,7 +433,7 @@ def test_discs_that_leave_the_image_are_flagged_as_cut() -> None:
     ("radius", "sliver", "sigmas"),
     [(6.0, 1.0, 60.0), (21.0, 1.5, 20.0), (40.0, 2.0, 20.0)],
 )
-def test_cut_discs_are_told_in_noise_whatever_their_size(
+def test_cut_discs_are_reported_in_noise_whatever_their_size(
     radius: float, sliver: float, sigmas: float
 ) -> None:
     lamp = Lamp(100.3, 100.4, radius, radius, level=3.0 * sigmas)
@@ -466,7 +466,7 @@ def test_a_disc_just_inside_the_border_is_whole() -> None:
 
 @pytest.mark.parametrize("sigma", [0.8, 2.5])
 def test_area_and_shape_are_those_of_one_ellipse_however_blurred(sigma: float) -> None:
-    """What is cut or merged is told by their disagreement."""
+    """What is cut or merged is recognised by their disagreement."""
     spots = detect_spots(expose(render(grid_of_lamps(), sigma)))
     of_shape = 4 * np.pi * np.sqrt(np.linalg.det(spots.shapes))
     # Without the allowance for blur they are 0.1 % and 0.9 % apart.

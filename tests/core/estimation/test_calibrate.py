@@ -104,8 +104,8 @@ def test_a_tip_slightly_off_in_a_smeared_image_is_no_slip() -> None:
 
     result = calibrate(CAMERA, PEN, observations)
 
-    told = {i: reason for i, reason in enumerate(result.reasons) if reason}
-    assert told == {5: Reason.BLURRED, 15: Reason.SLIPPED, 25: Reason.SLIPPED}
+    reported = {i: reason for i, reason in enumerate(result.reasons) if reason}
+    assert reported == {5: Reason.BLURRED, 15: Reason.SLIPPED, 25: Reason.SLIPPED}
 
 
 def test_the_rms_is_that_in_the_fit_and_of_a_dropped_image_about_its_own_pose() -> None:
@@ -118,7 +118,7 @@ def test_the_rms_is_that_in_the_fit_and_of_a_dropped_image_about_its_own_pose() 
     assert result.rms[7] < 0.05  # in the fit it would be 8 px
 
 
-def test_an_led_left_out_in_one_image_is_told() -> None:
+def test_an_led_left_out_in_one_image_is_reported() -> None:
     pixels = centers(swing(), 0.02)
     pixels[7, 3] += 2.0
     result = calibration(pixels)

@@ -129,8 +129,8 @@ def test_a_difference_from_the_budget_is_explained_if_it_is_real_and_matters(
     errors = 0.001 * np.repeat(signs[:, None], 3, axis=1)
     linear = np.array([0.001, ratio * 0.001, 0.001])
 
-    told = MonteCarlo(errors, linear, 0).explanation
+    reported = MonteCarlo(errors, linear, 0).explanation
 
-    assert told.code == code
-    assert told.values["percent"] == pytest.approx(100 * abs(ratio - 1))
-    assert told.values["axis"] == "y"
+    assert reported.code == code
+    assert reported.values["percent"] == pytest.approx(100 * abs(ratio - 1))
+    assert reported.values["axis"] == "y"

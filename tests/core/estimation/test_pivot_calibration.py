@@ -98,7 +98,7 @@ def test_scattered_outliers_are_named() -> None:
     assert "11-40" in str(warning)
 
 
-def test_inverted_poses_are_told() -> None:
+def test_inverted_poses_are_reported() -> None:
     R, t = poses()
     inverse = np.swapaxes(R, 1, 2)
 

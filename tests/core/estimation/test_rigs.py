@@ -244,7 +244,7 @@ def test_a_rig_file_in_another_convention_is_refused_by_name(
     assert words in said
 
 
-def test_exchanged_images_are_told_with_the_order_that_is_needed() -> None:
+def test_exchanged_images_are_reported_with_the_order_that_is_needed() -> None:
     assert "those of left and right are swapped" in refusal(SEEN[:, ::-1])
 
 
@@ -264,7 +264,7 @@ def test_lenses_tell_exchanged_images_from_an_inverted_file() -> None:
     ("shift", "words"),
     [(1, "its image 2 matches image 1"), (-2, "its image 1 matches image 3")],
 )
-def test_images_paired_with_those_of_other_moments_are_told(
+def test_images_paired_with_those_of_other_moments_are_reported(
     shift: int, words: str
 ) -> None:
     pixels = SEEN.copy()
@@ -280,7 +280,7 @@ def test_images_of_another_swing_are_refused() -> None:
     assert "another rotation of the pen" in refusal(pixels)
 
 
-def test_a_single_image_of_another_moment_is_left_out_and_told() -> None:
+def test_a_single_image_of_another_moment_is_left_out_and_reported() -> None:
     pixels = SEEN.copy()
     pixels[[4, 20], 1] = pixels[[20, 4], 1]
     result = calibrated(pixels)
@@ -320,7 +320,7 @@ def test_a_camera_that_lags_is_named_with_its_lag_and_corrected() -> None:
     assert not none.is_noticeable
 
 
-def test_a_moment_that_one_camera_saw_is_used_and_the_missing_image_told() -> None:
+def test_a_moment_that_one_camera_saw_is_used_and_the_missing_image_reported() -> None:
     pixels = SEEN.copy()
     pixels[[3, 7], 1] = pixels[11, 0] = np.nan
     result = calibrated(pixels)

@@ -89,7 +89,7 @@ def test_noise_alone_exceeds_the_limit_rarely() -> None:
     assert sum(not each.is_passed for each in drawn if each is not None) <= 4
 
 
-def test_leds_that_wander_with_the_lean_are_told() -> None:
+def test_leds_that_wander_with_the_lean_are_reported() -> None:
     swing, pixels, _ = good()
     found = calibrated(pixels + wandering(swing))
     assert found.self_check is not None

@@ -1,4 +1,4 @@
-"""A displaced LED leaves two frames, and both tips are told."""
+"""A displaced LED leaves two frames, and both tips are reported."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -335,7 +335,7 @@ def test_standard_deviations_leave_the_ratio_of_the_focal_lengths_well_known(
         ("calibration_time: [2025, 3]", None),
     ],
 )
-def test_a_date_is_kept_if_it_can_be_told(
+def test_a_date_is_kept_if_it_exists_in_any_time_zone(
     tmp_path: Path, text: str, day: date | None
 ) -> None:
     assert read_camera(saved(tmp_path, OPENCV + text)).calibrated_on == day

@@ -283,7 +283,7 @@ def test_a_file_open_to_all_is_replaced_by_anyone(open_folder: Path) -> None:
     assert path.read_bytes() == b"new"
 
 
-def test_an_unforeseen_reason_is_told(
+def test_an_unforeseen_reason_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(descriptor: int) -> None:

@@ -20,6 +20,6 @@ def test_files_are_hashed_in_their_order(tmp_path: Path, n_files: int) -> None:
     assert [f.sha256 for f in hashed] == [sha256(c).hexdigest() for c in contents]
 
 
-def test_a_file_that_has_gone_is_told(tmp_path: Path) -> None:
+def test_a_file_that_has_gone_is_reported(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"gone\.png cannot be read"):
         all_hashed([tmp_path / "gone.png"])

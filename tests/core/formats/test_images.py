@@ -246,7 +246,7 @@ def test_a_folder_that_may_not_be_looked_into_is_refused(
 ) -> None:
     folder.chmod(0)
     python = [sys.executable, "-X", "utf8", "-c", TOLD, str(folder / place)]
-    told = subprocess.run(
+    reported = subprocess.run(
         [*obedient, *python], capture_output=True, encoding="utf-8", check=True
     )
     folder.chmod(0o700)
@@ -255,7 +255,7 @@ def test_a_folder_that_may_not_be_looked_into_is_refused(
         f"The source of images {folder / place} cannot be read: Permission denied. "
         "Check the read permission and the disk connection."
     )
-    assert told.stdout.splitlines() == [sentence, sentence]
+    assert reported.stdout.splitlines() == [sentence, sentence]
 
 
 def test_names_with_digits_that_are_no_numbers_have_an_order(tmp_path: Path) -> None:

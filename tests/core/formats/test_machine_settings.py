@@ -70,7 +70,7 @@ def test_an_update_is_a_version_that_is_newer(
 
 
 @pytest.mark.parametrize("content", [{}, {"version": "new"}, {"version": 2}])
-def test_a_file_that_names_no_version_is_told(
+def test_a_file_that_names_no_version_is_reported(
     tmp_path: Path, content: dict[str, object]
 ) -> None:
     file = tmp_path / "newest.json"

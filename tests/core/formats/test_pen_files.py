@@ -576,7 +576,7 @@ def test_what_was_known_of_a_pen_found_from_images_is_read_back(tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    ("line", "other", "told"),
+    ("line", "other", "reported"),
     [
         ('"diameter": 9.5', '"width": 9.5', 'unknown key "width"'),
         ('"diameter": 9.5', '"diameter": -9.5', "discs"),
@@ -585,7 +585,7 @@ def test_what_was_known_of_a_pen_found_from_images_is_read_back(tmp_path: Path) 
     ],
 )
 def test_a_flaw_of_what_was_known_of_a_pen_is_named(
-    tmp_path: Path, line: str, other: str, told: str
+    tmp_path: Path, line: str, other: str, reported: str
 ) -> None:
     path = tmp_path / "pen.json"
     found = FoundPen(np.array([[1.0, 2.0]]), 9.5, np.eye(3 * len(LEDS)))
@@ -594,5 +594,5 @@ def test_a_flaw_of_what_was_known_of_a_pen_is_named(
     assert line in text
     path.write_text(text.replace(line, other))
 
-    with pytest.raises(FileError, match=told):
+    with pytest.raises(FileError, match=reported):
         read_pen(path)

@@ -23,14 +23,14 @@ ADVICE = message("share.temperature")
 SHOUTED = str.upper
 
 
-def stored(told: Message) -> StoredMessage:
+def stored(original: Message) -> StoredMessage:
     """Return a message as it is read back from JSON, without its text."""
-    written = json.dumps(to_builtins(StoredMessage.of(told)))
+    written = json.dumps(to_builtins(StoredMessage.of(original)))
     return structs.replace(in_shape(json.loads(written), StoredMessage), text="")
 
 
 @pytest.mark.parametrize(
-    "told",
+    "original",
     [
         tip_changed(0.03, "2026-01-02", "y", 0.02, 0.01),
         halves_differ(0.02, 0.01),
@@ -41,12 +41,12 @@ def stored(told: Message) -> StoredMessage:
         file_uncertain(0.02, 0.01, 0.015, ADVICE, assumed=True),
         halves_differ(math.nan, 0.01),
     ],
-    ids=lambda told: told.code,
+    ids=lambda original: original.code,
 )
-def test_it_is_worded_as_if_it_had_never_been_written_down(told: Message) -> None:
-    assert StoredMessage.of(told).text == str(told)
-    assert stored(told).worded() == str(told)
-    assert stored(told).worded(mark) == told.text(mark) != str(told)
+def test_it_is_worded_as_if_it_had_never_been_written_down(original: Message) -> None:
+    assert StoredMessage.of(original).text == str(original)
+    assert stored(original).worded() == str(original)
+    assert stored(original).worded(mark) == original.text(mark) != str(original)
 
 
 def mark(template: str) -> str:
@@ -60,9 +60,9 @@ def mark(template: str) -> str:
 def test_its_text_stands_where_the_catalogue_does_not_fit_any_more(
     changes: dict[str, object],
 ) -> None:
-    told = StoredMessage.of(led_displaced(7, 0.05))
+    original = StoredMessage.of(led_displaced(7, 0.05))
 
-    assert structs.replace(told, **changes).worded(mark) == told.text
+    assert structs.replace(original, **changes).worded(mark) == original.text
 
 
 @pytest.mark.parametrize("entries", [{"code": "x", "text": "y"}, {"values": [[]]}])

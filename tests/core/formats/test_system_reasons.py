@@ -1,4 +1,4 @@
-"""What the system says of a file is told in any language, where it is known."""
+"""What the system says of a file is reported in any language, where it is known."""
 
 import errno
 import os
@@ -15,7 +15,7 @@ def test_a_known_reason_is_worded_as_the_system_does_and_can_be_translated() -> 
     assert said.code == "system.denied"
 
 
-def test_any_other_reason_is_told_as_the_system_words_it() -> None:
+def test_any_other_reason_is_reported_as_the_system_words_it() -> None:
     assert strerror(OSError(errno.EXDEV, "Invalid cross-device link")) == (
         "Invalid cross-device link"
     )

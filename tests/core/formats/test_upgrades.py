@@ -61,10 +61,10 @@ def test_what_is_not_of_the_format_that_it_names_is_damaged(
         read(**entries)
 
 
-def test_a_later_format_is_told_apart() -> None:
-    with pytest.raises(LaterFormatError) as told:
+def test_a_later_format_is_distinguished() -> None:
+    with pytest.raises(LaterFormatError) as reported:
         read(format=4, length_mm=5)
-    assert told.value.number == 4
+    assert reported.value.number == 4
 
 
 def test_a_text_without_a_checksum_is_damaged() -> None:

@@ -79,7 +79,7 @@ def test_frames_larger_than_those_of_cameras_do_not_fill_the_memory(
     assert int(done.stdout.split()[-1]) < 450  # 1250 without
 
 
-def test_a_decoder_that_is_gone_is_told(tmp_path: Path) -> None:
+def test_a_decoder_that_is_gone_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "swing.avi"
     code = cv2.VideoWriter.fourcc(*"MJPG")
     writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, 20.0, (640, 480))

@@ -18,7 +18,7 @@ WORDS = (
 
 
 @pytest.mark.parametrize("word", WORDS)
-def test_a_board_is_told_by_the_word_that_names_it(word: str) -> None:
+def test_a_board_is_reported_by_the_word_that_names_it(word: str) -> None:
     assert parse_board(word).name == word
 
 

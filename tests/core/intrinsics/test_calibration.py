@@ -186,7 +186,7 @@ def test_points_of_another_board_are_refused(make_views: MakeViews) -> None:
 
 
 @pytest.mark.slow
-def test_what_the_views_do_not_reach_is_said(make_views: MakeViews) -> None:
+def test_what_the_views_do_not_reach_is_reported(make_views: MakeViews) -> None:
     views = make_views()
     left = views.pixels[:, 0, :, 0].max(axis=1) < 520
     some = views.chosen(left)
@@ -222,7 +222,7 @@ def test_more_views_lessen_the_uncertainty_over_the_image(
     assert before.center < before.typical < before.worst
 
 
-def test_residuals_are_told_by_region(found: CameraCalibration) -> None:
+def test_residuals_are_reported_by_region(found: CameraCalibration) -> None:
     regions = measure_regions(found.adjustment, found.camera)
 
     assert regions.n_points.sum() == found.views.seen.sum()

@@ -139,7 +139,7 @@ def test_cameras_whose_files_are_given_keep_to_them(camera: Camera) -> None:
 
 
 @pytest.mark.slow
-def test_cameras_out_of_step_are_told_with_what_that_costs(camera: Camera) -> None:
+def test_cameras_out_of_step_are_reported_with_what_that_costs(camera: Camera) -> None:
     found = calibrate_pair(
         both_see(camera, late=0.04), BoardTolerances(), NAMES, (), 500.0
     )

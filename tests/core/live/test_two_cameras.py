@@ -175,7 +175,9 @@ def test_each_camera_is_followed_by_itself_and_anew_with_each_pen(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     cameras = [replace(TINY, serial=str(n)) for n in range(4)]
-    told_before: dict[str, list[PenDetection | None]] = {c.serial: [] for c in cameras}
+    reported_before: dict[str, list[PenDetection | None]] = {
+        c.serial: [] for c in cameras
+    }
     found: dict[str, list[PenDetection]] = {c.serial: [] for c in cameras}
 
     def look(
@@ -188,7 +190,7 @@ def test_each_camera_is_followed_by_itself_and_anew_with_each_pen(
         *,
         is_followed: bool,
     ) -> PenDetection:
-        told_before[camera.serial].append(before)
+        reported_before[camera.serial].append(before)
         found[camera.serial].append(unseen(pen, Reason.EMPTY))
         return found[camera.serial][-1]
 
@@ -208,7 +210,7 @@ def test_each_camera_is_followed_by_itself_and_anew_with_each_pen(
     live.stop()
 
     for serial, detections in found.items():
-        first, *rest = told_before[serial]
+        first, *rest = reported_before[serial]
         assert first is None
         assert all(a is b for a, b in zip(rest, detections[:-1], strict=True))
 
@@ -228,7 +230,7 @@ class HeldUpCamera(PunctualCamera):
         )
 
 
-def test_images_held_up_at_first_are_told_and_paired_rightly_afterwards(
+def test_images_held_up_at_first_are_reported_and_paired_rightly_afterwards(
     simulated: tuple[FaultyCamera, FaultyCamera], make_live: MakeLive, screen: Screen
 ) -> None:
     first, _ = simulated

@@ -125,7 +125,7 @@ def test_exact_touches_give_the_exact_part(exact: MeasuredPart) -> None:
     assert values == pytest.approx(EXPECTED, abs=1e-6)
 
 
-def test_features_are_told_in_the_frame_of_the_part(exact: MeasuredPart) -> None:
+def test_features_are_reported_in_the_frame_of_the_part(exact: MeasuredPart) -> None:
     top, hole, dome = (exact.features[name].in_part for name in ("top", "hole", "dome"))
 
     assert top.values[[2, 3, 4, 5]] == pytest.approx([0, 0, 0, 1], abs=1e-9)
@@ -216,19 +216,21 @@ def test_missing_touches_are_named(plan: Plan) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "told"),
+    ("kind", "reported"),
     [
         ("line", "Feature {}: The points are up to .* mm off a line."),
         ("cone", "Feature {}: The points do not determine a cone."),
         ("cylinder", "Feature {}: The points do not determine a cylinder."),
     ],
 )
-def test_touches_of_another_kind_are_refused(plan: Plan, kind: str, told: str) -> None:
+def test_touches_of_another_kind_are_refused(
+    plan: Plan, kind: str, reported: str
+) -> None:
     flat = next(each for each in plan.features if each.kind is FeatureKind.CIRCLE)
     wrong = structs.replace(flat, kind=FeatureKind(kind), touches=None)
     plan = Plan("Wrong", (wrong,))
 
-    with pytest.raises(CalibrationError, match=told.format(flat.name)):
+    with pytest.raises(CalibrationError, match=reported.format(flat.name)):
         measure_part(plan, touched())
 
 

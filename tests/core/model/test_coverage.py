@@ -83,9 +83,7 @@ def test_a_good_swing_misses_no_direction() -> None:
     assert measure_coverage(swing.rotations).missing == []
 
 
-def test_a_pen_that_hardly_moved_is_told_apart_from_one_that_moved_about_one_axis() -> (
-    None
-):
+def test_a_pen_that_hardly_moved_and_one_turned_about_one_axis_differ() -> None:
     def turned(about: FloatArray, rms: float) -> FloatArray:
         vectors = np.concatenate([rms * about, -rms * about])
         return rotation_from_vector(np.sqrt(len(about)) * vectors)

@@ -122,7 +122,7 @@ def test_the_led_farthest_from_its_place_is_named() -> None:
     assert "LED 4 is 3.60 mm from its nominal position" in text  # 180 mm times 0.02
 
 
-def test_a_mirrored_pen_in_raw_coordinates_is_told_apart() -> None:
+def test_a_mirrored_pen_in_raw_coordinates_is_distinguished() -> None:
     text = refusal(replace(PEN, leds=moved(LEDS, 1) * [1, 1, -1]))
     assert "mirror image of the pen, in another frame" in text
 

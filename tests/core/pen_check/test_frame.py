@@ -88,7 +88,7 @@ def test_a_pen_upside_down_breaks_the_axis() -> None:
     assert check.can_be_moved
 
 
-def test_deviations_are_told_in_mm() -> None:
+def test_deviations_are_reported_in_mm() -> None:
     leds = PEN.leds.copy()
     leds[2, 0] += 0.3
     leds[5, 2] -= 0.2
@@ -100,7 +100,7 @@ def test_deviations_are_told_in_mm() -> None:
     assert amounts[Rule.ORIGIN] == 0.0
 
 
-def test_discs_that_face_away_are_told() -> None:
+def test_discs_that_face_away_are_reported() -> None:
     normals = PEN.normals.copy()
     normals[3] *= -1
 

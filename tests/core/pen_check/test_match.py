@@ -224,7 +224,7 @@ def test_a_file_with_twenty_leds_too_many_is_judged_as_fast_as_any() -> None:
     assert found == {MatchFinding.SHIFTED: 2, MatchFinding.UNSEEN: 18}
 
 
-def test_a_mirrored_file_is_told_as_such() -> None:
+def test_a_mirrored_file_is_reported_as_such() -> None:
     mirrored = with_leds(PEN.leds * np.array([-1.0, 1.0, 1.0]))
 
     finding = the_finding(match_pen(CAMERA, mirrored, SWUNG))
@@ -233,7 +233,7 @@ def test_a_mirrored_file_is_told_as_such() -> None:
     assert "mirror image" in str(finding.advice)
 
 
-def test_another_pen_is_told_as_such() -> None:
+def test_another_pen_is_reported_as_such() -> None:
     other = with_leds(np.random.default_rng(3).uniform(-60, 60, (10, 3)))
 
     match = match_pen(CAMERA, other, SWUNG)
@@ -249,7 +249,7 @@ def test_leds_that_are_all_a_little_off_are_a_misfit_of_none() -> None:
     assert match_pen(CAMERA, pen, SWUNG).findings == (Finding(MatchFinding.MISFIT),)
 
 
-def test_without_views_nothing_is_said() -> None:
+def test_without_views_nothing_is_reported() -> None:
     match = match_pen(CAMERA, PEN, ())
 
     assert (match.n_views, match.findings, match.fits) == (0, (), False)

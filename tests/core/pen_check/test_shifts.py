@@ -54,7 +54,7 @@ def test_leds_in_place_are_left_alone() -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 2, 3])
-def test_a_shift_that_two_leds_would_explain_is_told_with_both(seed: int) -> None:
+def test_a_shift_that_two_leds_would_explain_is_reported_with_both(seed: int) -> None:
     # Four LEDs in a plane hold the two behind it together, hardly each alone.
     pen = six_led_pen()
     rng = np.random.default_rng(seed)

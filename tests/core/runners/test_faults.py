@@ -1,4 +1,4 @@
-"""A fault is told until its cause is gone, and logged."""
+"""A fault is reported until its cause is gone, and logged."""
 
 import logging
 from enum import Enum, auto
@@ -20,11 +20,11 @@ class Cause(Enum):
 
 class Listener:
     def __init__(self) -> None:
-        self.told: list[Message] = []
+        self.reported: list[Message] = []
         self.over: list[Message] = []
 
     def on_fault(self, message: Message) -> None:
-        self.told.append(message)
+        self.reported.append(message)
 
     def on_fault_cleared(self, message: Message) -> None:
         self.over.append(message)
@@ -41,16 +41,16 @@ def faults(listener: Listener) -> FaultReporter:
 
 
 def test_a_fault_is_over_once(faults: FaultReporter, listener: Listener) -> None:
-    faults.tell(FULL)
+    faults.report(FULL)
     assert faults.is_any
     faults.end()
     faults.end()
 
     assert not faults.is_any
-    assert (listener.told, listener.over) == ([FULL], [FULL])
+    assert (listener.reported, listener.over) == ([FULL], [FULL])
 
 
-def test_what_fails_is_told_and_what_does_not_is_not(
+def test_what_fails_is_reported_and_what_does_not_is_not(
     faults: FaultReporter, listener: Listener
 ) -> None:
     def fail() -> None:
@@ -59,19 +59,19 @@ def test_what_fails_is_told_and_what_does_not_is_not(
     faults.trying(lambda: None)
     faults.trying(fail)
 
-    assert listener.told == [FULL]
+    assert listener.reported == [FULL]
 
 
 def test_a_fault_ends_with_its_own_cause_only(
     faults: FaultReporter, listener: Listener
 ) -> None:
-    faults.tell(FULL, Cause.DISK)
+    faults.report(FULL, Cause.DISK)
     faults.end_of(Cause.CAMERA)
     assert faults.is_any
     faults.end_of(Cause.DISK)
     assert not faults.is_any
 
-    faults.tell(OTHER)
+    faults.report(OTHER)
     faults.end_of(Cause.DISK)  # of the fault before
     assert faults.is_any
 
@@ -81,7 +81,7 @@ def test_faults_are_logged_as_they_come_and_go(
 ) -> None:
     caplog.set_level(logging.INFO, "lightpen")
 
-    faults.tell(FULL)
+    faults.report(FULL)
     faults.end()
 
     assert [(each.levelname, each.message) for each in caplog.records] == [

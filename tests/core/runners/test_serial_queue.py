@@ -261,7 +261,7 @@ def test_why_a_task_could_not_be_done_comes_in_turn(outcomes: Outcomes) -> None:
     assert outcomes.threads == {"clerk"}
 
 
-def test_a_bug_of_a_task_is_reported_and_told(
+def test_a_bug_of_a_task_is_reported_and_reported(
     diary: Diary, outcomes: Outcomes, crashes: "SimpleQueue[type[BaseException]]"
 ) -> None:
     outcomes.start(fail)
@@ -337,4 +337,4 @@ def test_the_end_cancels_the_tasks_and_waits_for_them(
     may_go_on.set()
     assert queue.await_end(TIMEOUT)
     assert outcomes.came.empty()
-    assert outcomes.fractions == []  # it ended where it would have told
+    assert outcomes.fractions == []  # it ended where it would have reported

@@ -23,16 +23,16 @@ ASKED = Posture(tilt=0.3, direction=2.0, turn=0.1)
 
 
 class ToldOperator(Operator):
-    """Notes what it is told."""
+    """Notes what is requested."""
 
     def __init__(self) -> None:
         self.clock = SkippingClock()
         super().__init__(self.clock, seated=True)
-        self.told: list[Posture] = []
+        self.requested: list[Posture] = []
 
     @override
     def lean_towards(self, tilt: float, direction: float, turn: float) -> None:
-        self.told.append(Posture(tilt, direction, turn))
+        self.requested.append(Posture(tilt, direction, turn))
         super().lean_towards(tilt, direction, turn)
 
 
@@ -61,7 +61,7 @@ def test_the_pen_is_leant_to_the_target(
     assert held.directions[0] == pytest.approx(ASKED.direction, abs=0.06)
 
 
-def test_a_target_is_told_once_and_the_next_one_anew(
+def test_a_target_is_reported_once_and_the_next_one_anew(
     operator: ToldOperator, state: SwingState
 ) -> None:
     follower = GuidedOperator(operator)
@@ -69,7 +69,7 @@ def test_a_target_is_told_once_and_the_next_one_anew(
     for target in (ASKED, ASKED, other, other):
         follower.follow(replace(state, target=target))
 
-    assert operator.told == [ASKED, other]
+    assert operator.requested == [ASKED, other]
 
 
 def test_the_first_lean_goes_to_the_operators_right(
@@ -79,7 +79,7 @@ def test_the_first_lean_goes_to_the_operators_right(
         replace(state, heading=None, was_upright=True)
     )
 
-    assert operator.told == [replace(FIRST_LEAN, direction=np.pi / 2)]
+    assert operator.requested == [replace(FIRST_LEAN, direction=np.pi / 2)]
 
 
 def test_without_a_target_the_hand_stays(
@@ -87,7 +87,7 @@ def test_without_a_target_the_hand_stays(
 ) -> None:
     GuidedOperator(operator).follow(replace(state, target=None))
 
-    assert operator.told == []
+    assert operator.requested == []
 
 
 @pytest.mark.parametrize("phase", [p for p in Phase if p is not Phase.CAPTURING])
@@ -96,7 +96,7 @@ def test_the_hand_is_led_only_while_images_are_captured(
 ) -> None:
     GuidedOperator(operator).follow(replace(state, phase=phase))
 
-    assert operator.told == []
+    assert operator.requested == []
 
 
 @pytest.fixture
@@ -112,7 +112,7 @@ def test_asked_to_swing_gently_the_pen_goes_round_upright(
     for time in np.arange(0.0, 2.0, 0.05):
         follower.follow(replace(seeking, time=float(time)))
 
-    assert operator.told == [*GENTLE_LEANS, GENTLE_LEANS[0]]
+    assert operator.requested == [*GENTLE_LEANS, GENTLE_LEANS[0]]
 
 
 def test_asked_to_put_the_tip_in_only_the_hand_stays(
@@ -120,7 +120,7 @@ def test_asked_to_put_the_tip_in_only_the_hand_stays(
 ) -> None:
     GuidedOperator(operator).follow(replace(seeking, message=SEAT_TIP))
 
-    assert operator.told == []
+    assert operator.requested == []
 
 
 def test_after_the_gentle_swing_the_pen_is_held_upright_until_it_is_led(
@@ -132,7 +132,7 @@ def test_after_the_gentle_swing_the_pen_is_held_upright_until_it_is_led(
         follower.follow(replace(seeking, phase=phase, message=HOLD_STILL))
     follower.follow(replace(seeking, phase=Phase.CAPTURING))
 
-    assert operator.told == [GENTLE_LEANS[0], UPRIGHT, ASKED]
+    assert operator.requested == [GENTLE_LEANS[0], UPRIGHT, ASKED]
 
 
 def test_after_a_pause_the_hand_is_led_anew(
@@ -143,4 +143,4 @@ def test_after_a_pause_the_hand_is_led_anew(
     follower.follow(replace(state, phase=Phase.PAUSED))
     follower.follow(state)
 
-    assert operator.told == [ASKED, ASKED]
+    assert operator.requested == [ASKED, ASKED]

@@ -294,7 +294,7 @@ def test_a_long_pause_costs_no_time() -> None:
     np.testing.assert_array_equal(held.offsets, 0)
 
 
-def test_a_tip_rests_where_it_is_told_to_touch() -> None:
+def test_a_tip_rests_where_it_is_to_touch() -> None:
     place = np.array([40.0, -10.0, 5.0])
 
     seen = seen_after(lambda operator: operator.touch(place), 4.0)

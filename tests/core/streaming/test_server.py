@@ -1,4 +1,4 @@
-"""Whoever listens is told the newest pose, as 3D Slicer does by pyigtl's client."""
+"""Every listener receives the newest pose, as 3D Slicer does by pyigtl's client."""
 
 import socket
 import threading
@@ -59,18 +59,18 @@ class Statuses:
     """Hears how a stream is, and lets a test wait for it."""
 
     def __init__(self) -> None:
-        self.told: list[StreamStatus] = []
+        self.reported: list[StreamStatus] = []
         self._changed = threading.Condition()
 
     def note(self, status: StreamStatus) -> None:
         with self._changed:
-            self.told.append(status)
+            self.reported.append(status)
             self._changed.notify_all()
 
     def wait_for_clients(self, n_clients: int) -> None:
         with self._changed:
             assert self._changed.wait_for(
-                lambda: self.told[-1].n_clients == n_clients, LONGEST
+                lambda: self.reported[-1].n_clients == n_clients, LONGEST
             )
 
 
@@ -204,8 +204,8 @@ def test_origin_verdict_due_date_and_status_of_the_tip_are_in_the_metadata(
     calibration = replace(
         read_calibration(file), origin=Origin.SIMULATED, due=date(2027, 1, 31)
     )
-    told = tip_metadata(calibration)
-    stream.set_tip(StreamedTip(Names(), instrument, told))
+    reported = tip_metadata(calibration)
+    stream.set_tip(StreamedTip(Names(), instrument, reported))
     stream.take(frame(), detection)
 
     metadata = received(client, "TipToCamera").metadata
@@ -351,7 +351,7 @@ def test_it_is_closed_until_it_is_opened_and_after_it_is_closed(
         socket.create_connection(place)
 
 
-def test_it_listens_on_the_loopback_unless_told(stream: PoseStream) -> None:
+def test_it_listens_on_the_loopback_by_default(stream: PoseStream) -> None:
     assert StreamPlace().address == LOOPBACK
     assert StreamPlace().is_local
     with socket.socket() as other:  # of the same port, elsewhere on this computer
@@ -366,20 +366,20 @@ def test_a_place_of_a_network_is_not_local() -> None:
     assert str(StreamPlace("::1", 5)) == "[::1]:5"
 
 
-def test_a_taken_port_is_said(stream: PoseStream) -> None:
+def test_a_taken_port_is_reported(stream: PoseStream) -> None:
     port = port_of(stream)
 
     with pytest.raises(StreamError, match=f"Port {port} is in use already"):
         PoseStream().open(StreamPlace(port=port))
 
 
-def test_an_address_of_another_computer_is_said() -> None:
+def test_an_address_of_another_computer_is_reported() -> None:
     for address in ("192.0.2.1", "no such place"):
         with pytest.raises(StreamError, match="is not an address of this computer"):
             PoseStream().open(StreamPlace(address, 0))
 
 
-def test_an_impossible_port_is_said() -> None:
+def test_an_impossible_port_is_reported() -> None:
     with pytest.raises(StreamError, match="Choose a free port from 1024 to 65535"):
         PoseStream().open(StreamPlace(port=70_000))
 

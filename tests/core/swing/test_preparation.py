@@ -215,7 +215,7 @@ def test_a_record_of_an_older_program_gets_the_usual_limits(
     assert recorded_names(record) == replace(NAMES, pen="", ball_diameter=None)
 
 
-def test_a_file_that_vanished_since_is_told_when_a_record_begins(
+def test_a_file_that_vanished_since_is_reported_when_a_record_begins(
     whole: Preparation, tmp_path: Path
 ) -> None:
     assert whole.pen_file is not None

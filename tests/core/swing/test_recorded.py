@@ -150,9 +150,9 @@ def test_the_verdict_is_that_on_the_same_files(
 
     assert station.n_recorded == on_files.used.sum() == 14
     assert station.tip == on_files.joint.tip_pen.tolist()
-    told = judge(station.solution.calibration, limits)
-    assert told == judge(on_files, limits)
-    assert told.grade is Grade.PASS
+    reported = judge(station.solution.calibration, limits)
+    assert reported == judge(on_files, limits)
+    assert reported.grade is Grade.PASS
 
 
 @pytest.mark.slow
@@ -194,8 +194,8 @@ def test_the_postures_that_are_missing_are_named_at_the_end(
 
     assessment = station.status.assessment
     assert assessment is not None
-    told = [assessment.verdict.reason, *assessment.doubts]
-    (tilt,) = [each for each in told if each.code == Code.TOO_LITTLE_TILT]
+    reported = [assessment.verdict.reason, *assessment.doubts]
+    (tilt,) = [each for each in reported if each.code == Code.TOO_LITTLE_TILT]
     assert "camera" in str(tilt)  # which side, the hand of the operator decides
 
 

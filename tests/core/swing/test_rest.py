@@ -69,7 +69,7 @@ def test_a_still_pen_without_a_nominal_tip_has_none() -> None:
     assert steady_seat(unknown, state_after(STILL)) is None
 
 
-def test_images_out_of_the_seat_are_told_from_those_in_it() -> None:
+def test_images_out_of_the_seat_are_distinguished_from_those_in_it() -> None:
     state = state_after(STILL, seat=True)
     assert seat_of(state) is not None
     assert in_place(state, state.recent).all()

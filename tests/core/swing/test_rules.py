@@ -93,7 +93,7 @@ class Station:
         self.cone = PAPER_CONE
         self.events: list[SwingEvent] = []
         self.phases = [self.state.phase]
-        self.told: object = None
+        self.wished: object = None
         self.taken: list[Transition] = []
 
     def sight(self) -> PenDetection:
@@ -135,9 +135,9 @@ class Station:
             wish: object = "right"
         else:
             wish = target
-        if wish is None or wish is self.told:
+        if wish is None or wish is self.wished:
             return
-        self.told = wish
+        self.wished = wish
         if target is None:
             self.operator.lean_towards(np.radians(20), 0.0, 0.0)
         else:
@@ -304,8 +304,8 @@ def test_the_countdown_counts_three_two_one() -> None:
     while station.state.phase is Phase.COUNTDOWN:
         station.run(PERIOD)
         counted.append(station.state.message.values)
-    told = [values.get("seconds") for values in counted]
-    assert list(dict.fromkeys(told)) == [3, 2, 1, None]
+    reported = [values.get("seconds") for values in counted]
+    assert list(dict.fromkeys(reported)) == [3, 2, 1, None]
     assert station.state.n_kept <= 1
 
 
@@ -315,7 +315,7 @@ def test_the_first_lean_teaches_the_operators_side() -> None:
     station.run(60.0, until=Phase.CAPTURING)
     assert station.state.message == LEAN_TO_YOUR_RIGHT
     assert station.state.target is None
-    station.told = "right"
+    station.wished = "right"
     station.operator.lean_towards(np.radians(20), np.pi, 0.0)  # facing the camera
     station.run(2.0)
     assert station.state.heading == np.pi
@@ -327,7 +327,7 @@ def test_a_pen_that_is_tilted_at_the_start_does_not_teach_the_operators_side() -
     station = Station()
     station.operator.seat()
     station.operator.lean_towards(np.radians(20), np.pi, 0.0)
-    station.told = "right"
+    station.wished = "right"
     station.run(60.0, until=Phase.CAPTURING).run(2.0)
     assert station.state.message == HOLD_UPRIGHT
     assert station.state.heading is None
@@ -599,7 +599,7 @@ def test_fields_the_camera_cannot_see_are_not_asked_for() -> None:
     assert station.state.counts[2, 0] < 2
 
 
-def test_the_verdict_is_told(whole: Station) -> None:
+def test_the_verdict_is_reported(whole: Station) -> None:
     good = tip_is_good(0.004)
     transition = conclude(whole.state, good, passed=True)
     assert transition.state.phase is Phase.VERDICT
@@ -625,7 +625,7 @@ def test_an_upright_and_still_pen_is_noticed() -> None:
     assert station.state.still_since is not None
     assert station.now - station.state.still_since > 0.5
     station.operator.swing()
-    station.told = "right"
+    station.wished = "right"
     station.run(3.0)
     assert station.state.still_since is None or (
         station.now - station.state.still_since < 1.0
@@ -678,7 +678,7 @@ def test_whatever_happens_the_events_tell_what_is_kept(seed: int, drops: bool) -
     assert station.tip_error < 2 * station.state.kept.uncertainty
 
 
-def test_an_uncertainty_that_is_not_known_yet_is_not_told_as_a_number() -> None:
+def test_an_uncertainty_that_is_not_known_yet_is_not_reported_as_a_number() -> None:
     station = Station()
     station.operator.seat()
     station.run(60.0, until=Phase.CAPTURING)

@@ -183,7 +183,7 @@ def test_the_swing_is_captured_with_the_files_as_they_are_recorded(
     assert station.status.setup.pen.n_leds == 6
 
 
-def test_files_that_are_gone_are_told_before_anything_begins(
+def test_files_that_are_gone_are_reported_before_anything_begins(
     station: "Station", tmp_path: Path
 ) -> None:
     pen_file = station.preparation.pen_file
@@ -216,7 +216,7 @@ def test_commands_without_a_swing_do_nothing(station: "Station") -> None:
     runner.put_back([1])
     station.see()
 
-    assert station.witness.told == []
+    assert station.witness.reported == []
     assert station.witness.faults == []
     assert not station.records.exists()
 
@@ -358,16 +358,16 @@ def test_a_record_is_not_free_while_it_is_captured(
         station.is_free(interrupted)
 
 
-def test_an_image_that_is_kept_is_on_the_disk_when_it_is_told(
+def test_an_image_that_is_kept_is_on_the_disk_when_it_is_reported(
     station: "Station", interrupted: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     on_disk: list[int] = []
     on_swing = station.witness.on_swing
 
-    def look_at_disk(*told: Any) -> None:
-        if any(event.what is SwingEventKind.KEPT for event in told[1]):
+    def look_at_disk(*reported: Any) -> None:
+        if any(event.what is SwingEventKind.KEPT for event in reported[1]):
             on_disk.append(station.n_recorded)
-        on_swing(*told)
+        on_swing(*reported)
 
     monkeypatch.setattr(station.witness, "on_swing", look_at_disk)
     station.go_on(interrupted)
@@ -376,7 +376,7 @@ def test_an_image_that_is_kept_is_on_the_disk_when_it_is_told(
     assert on_disk == [N_IMAGES + 1, N_IMAGES + 2]
 
 
-def test_every_status_is_told_in_order_with_its_events_by_one_thread(
+def test_every_status_is_reported_in_order_with_its_events_by_one_thread(
     station: "Station", interrupted: Path
 ) -> None:
     station.go_on(interrupted)
@@ -389,7 +389,7 @@ def test_every_status_is_told_in_order_with_its_events_by_one_thread(
 
     (thread,) = station.witness.threads
     assert thread is not threading.current_thread()
-    for status, events in station.witness.told:
+    for status, events in station.witness.reported:
         n_kept += sum(event.what is SwingEventKind.KEPT for event in events)
         if status.state is not None and status.state.n_kept:
             assert status.state.next_number == n_kept + 1
@@ -561,10 +561,10 @@ def test_an_image_that_comes_after_the_end_is_not_waited_for(
     station.go_on(interrupted)
     station.runner.shut_down()
     assert station.runner.await_end(TIMEOUT)
-    n_told = len(station.witness.told)
+    n_reported = len(station.witness.reported)
     station.see(2)
     station.runner.begin(station.preparation)
     station.see()
 
-    assert len(station.witness.told) == n_told
+    assert len(station.witness.reported) == n_reported
     assert station.status.state is None

@@ -62,7 +62,7 @@ def test_no_swing_begins_while_nobody_is_there(station: "Station") -> None:
     assert not station.records.exists()
 
 
-def test_a_record_that_cannot_be_made_is_told_once_and_tried_again_when_asked_for(
+def test_a_record_that_cannot_be_made_is_reported_once_and_tried_again_when_asked_for(
     present: "Station",
 ) -> None:
     present.records.write_text("not a folder")

@@ -70,7 +70,7 @@ def test_a_bug_while_an_image_is_taken_pauses_the_swing_and_costs_nothing_else(
     assert station.solution.numbers.tolist() == list(range(1, N_IMAGES + 3))
 
 
-def test_a_bug_when_a_swing_begins_is_told_once_and_tried_again_when_asked_for(
+def test_a_bug_when_a_swing_begins_is_reported_once_and_tried_again_when_asked_for(
     present: "Station", crashes: Crashes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as broken:
@@ -226,7 +226,7 @@ def test_a_bug_of_the_listener_ends_neither_the_swing_nor_the_runner(
     with monkeypatch.context() as broken:
         broken.setattr(station.witness, "on_swing", fail)
         station.see(4)
-    for _ in range(2):  # with the image, and when that was to be told
+    for _ in range(2):  # with the image, and when that was to be reported
         assert crashes.get(timeout=TIMEOUT) is MistakeError
     assert crashes.empty()
 

@@ -1,4 +1,4 @@
-"""What becomes of each swing of a runner is entered before it is told."""
+"""What becomes of each swing of a runner is entered before it is reported."""
 
 import time
 from collections.abc import Callable, Iterator

@@ -173,7 +173,7 @@ def test_a_lost_image_of_the_second_camera_costs_that_image_alone(
     assert not second.used[2]
 
 
-def test_a_copy_of_the_rig_that_was_changed_is_told(by_two: Path) -> None:
+def test_a_copy_of_the_rig_that_was_changed_is_reported(by_two: Path) -> None:
     file = by_two / "rig.json"
     file.write_bytes(file.read_bytes() + b" ")
     with pytest.raises(

@@ -73,7 +73,7 @@ def test_so_it_is_after_taking_images_out_and_putting_some_back(
     assert solved.tip == before == command(solved.record_folder)["tip_pen_mm"]
 
 
-def test_how_far_the_tip_is_computed_is_told_from_0_to_1(solved: "Station") -> None:
+def test_how_far_the_tip_is_computed_is_reported_from_0_to_1(solved: "Station") -> None:
     fractions = solved.witness.fractions
 
     assert fractions == sorted(fractions)
@@ -95,7 +95,7 @@ def test_images_taken_out_in_quick_succession_all_count(
     assert solved.tip == command(solved.record_folder)["tip_pen_mm"]
     event_kinds = solved.witness.event_kinds
     assert event_kinds[-1] in (SwingEventKind.DONE, SwingEventKind.FAILED)
-    assert event_kinds.count(event_kinds[-1]) == 1  # the verdict is told once
+    assert event_kinds.count(event_kinds[-1]) == 1  # the verdict is reported once
 
 
 @pytest.mark.slow
@@ -227,7 +227,7 @@ def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
 
 
 @pytest.mark.slow
-def test_holding_the_pen_upright_and_still_after_the_verdict_is_told_once(
+def test_holding_the_pen_upright_and_still_after_the_verdict_is_reported_once(
     solved: "Station",
 ) -> None:
     solved.operator.lean(0.4, 0.0, 0.0)

@@ -114,7 +114,7 @@ def test_no_images_are_asked_for_where_the_files_leave_too_much_open() -> None:
     assert measure_shortfall(setup, state).n_for_uncertainty == 0
 
 
-def test_what_no_image_can_mend_is_told_with_its_file() -> None:
+def test_what_no_image_can_mend_is_reported_with_its_file() -> None:
     swing = swing_poses(60, np.random.default_rng(0))
     vague = replace(PEN, scale_sigma=1e-3)
     setup = SwingSetup(CAMERA, vague, SwingLimits(max_uncertainty=0.02))
@@ -123,11 +123,11 @@ def test_what_no_image_can_mend_is_told_with_its_file() -> None:
 
     short = measure_shortfall(setup, state)
 
-    told = out_of_reach(setup.limits, state, short)
+    reported = out_of_reach(setup.limits, state, short)
 
     words = f"the lowest achievable U (k = 2) is {floor:.1f} \N{MICRO SIGN}m"
-    assert words in str(told)
-    assert told in missing(setup, state)
+    assert words in str(reported)
+    assert reported in missing(setup, state)
     assert out_of_reach(SwingLimits(max_uncertainty=1.0), state, short) is None
 
 

@@ -88,7 +88,7 @@ def test_one_led_that_moved_is_named(swing: Swing) -> None:
     assert found.assessment.reason.values["distance"] == pytest.approx(0.05, abs=0.01)
 
 
-def test_a_warm_pen_is_told_from_a_knocked_one(swing: Swing) -> None:
+def test_a_warm_pen_is_distinguished_from_a_knocked_one(swing: Swing) -> None:
     pen = true_pen()
     swings = [swing(pen, 1), swing(pen, 2), swing(pen, 3, growth=WARMTH)]
 

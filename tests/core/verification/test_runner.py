@@ -115,7 +115,7 @@ def test_what_is_found_is_kept_before_the_next_task_begins(at_it: Verifier) -> N
     assert [each["verification"] for each in at_it.records] == ["fixed point"]
 
 
-def test_what_cannot_be_kept_is_told_and_kept_later(
+def test_what_cannot_be_kept_is_reported_and_kept_later(
     at_it: Verifier, recorded: Path
 ) -> None:
     in_the_way = at_it.folder / SIMULATED / VERIFICATIONS
@@ -336,7 +336,7 @@ def test_a_task_read_before_a_kill_still_waits_for_its_witness(
     )
 
 
-def test_a_folder_without_images_is_told(at_it: Verifier, tmp_path: Path) -> None:
+def test_a_folder_without_images_is_reported(at_it: Verifier, tmp_path: Path) -> None:
     empty = tmp_path / "empty"
     empty.mkdir()
     at_it.read(FIXED_POINT, empty)

@@ -47,7 +47,7 @@ class BoardCalibration(QObject):
     -------
     found_changed()
         `found` is different.
-    told()
+    remark_changed()
         `remark` is different.
     saved(str)
         A camera file was written.
@@ -56,7 +56,7 @@ class BoardCalibration(QObject):
     """
 
     found_changed = Signal()
-    told = Signal()
+    remark_changed = Signal()
     saved = Signal(str)
     concluded = Signal(object)
 
@@ -77,10 +77,10 @@ class BoardCalibration(QObject):
         """Return the result of the last step, in the present language."""
         return self._remark()
 
-    def tell(self, remark: Callable[[], StatusMessage]) -> None:
+    def set_remark(self, remark: Callable[[], StatusMessage]) -> None:
         """State a result, again in each language."""
         self._remark = remark
-        self.told.emit()
+        self.remark_changed.emit()
 
     def calibrate_by_capture(self) -> None:
         """Calibrate from the captured views."""
@@ -123,7 +123,9 @@ class BoardCalibration(QObject):
         job = Job(lambda _: write_whole(path, board_page(board)), self)
 
         # Connections
-        job.succeeded.connect(lambda _: self.tell(partial(self._printed_message, path)))
+        job.succeeded.connect(
+            lambda _: self.set_remark(partial(self._printed_message, path))
+        )
         job.failed.connect(self._on_refused)
         job.start()
 
@@ -158,7 +160,7 @@ class BoardCalibration(QObject):
         job.start()
 
     def _on_progressed(self, fraction: float) -> None:
-        self.tell(partial(self._progress_message, fraction))
+        self.set_remark(partial(self._progress_message, fraction))
 
     def _progress_message(self, fraction: float) -> StatusMessage:
         words = self.tr("Calibrating: {0:.0%}").format(fraction)
@@ -166,12 +168,12 @@ class BoardCalibration(QObject):
 
     def _on_refused(self, sentence: str) -> None:
         self._job = None
-        self.tell(partial(StatusMessage, sentence, Sign.CROSS, Tone.BAD))
+        self.set_remark(partial(StatusMessage, sentence, Sign.CROSS, Tone.BAD))
 
     def _on_found(self, computed: ComputedCamera) -> None:
         self._job, self._computed, self._is_saved = None, computed, False
         self.found_changed.emit()
-        self.tell(partial(self._found_message, computed.found))
+        self.set_remark(partial(self._found_message, computed.found))
 
     def _found_message(self, found: CameraCalibration) -> StatusMessage:
         words = " ".join(map(worded, found.remarks))
@@ -179,7 +181,7 @@ class BoardCalibration(QObject):
         return StatusMessage(words or self.tr("Camera calibrated."), sign, tone)
 
     def _on_saved(self, trial: CameraTrial, file: InputFile) -> None:
-        self.tell(partial(self._saved_message, file))
+        self.set_remark(partial(self._saved_message, file))
         self.concluded.emit(replace(trial, camera_file=file))
         self.saved.emit(str(file.path))
 
@@ -188,7 +190,7 @@ class BoardCalibration(QObject):
         return StatusMessage(words, Sign.CHECK, Tone.GOOD)
 
     def _on_save_refused(self, trial: CameraTrial, sentence: str) -> None:
-        self.tell(partial(StatusMessage, sentence, Sign.CROSS, Tone.BAD))
+        self.set_remark(partial(StatusMessage, sentence, Sign.CROSS, Tone.BAD))
         if trial.found is self.found:
             self._is_saved = False
         else:  # it was left meanwhile

@@ -107,7 +107,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         # Connections
         live.image_shown.connect(self._on_image_shown)
         self._capture.changed.connect(self._refresh)
-        self._calibration.told.connect(self._refresh)
+        self._calibration.remark_changed.connect(self._refresh)
         self._calibration.found_changed.connect(self._on_found_changed)
         self._calibration.saved.connect(self.saved)
         self._calibration.concluded.connect(self.concluded)
@@ -127,7 +127,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._calibration.conclude()
         self._capture.start(None)
         self._hold_simulated(None)
-        self._calibration.tell(StatusMessage)
+        self._calibration.set_remark(StatusMessage)
         super().closeEvent(event)
 
     @property
@@ -172,9 +172,9 @@ class BoardWindow(FittedWindow, Translated, QWidget):
             if measured and self._measured.text().strip():
                 board = ScaleCheck.parse(self._measured.text()).scaled(board)
         except UsageError as error:
-            self._calibration.tell(partial(fault_message, error.message))
+            self._calibration.set_remark(partial(fault_message, error.message))
             return None
-        self._calibration.tell(StatusMessage)
+        self._calibration.set_remark(StatusMessage)
         return board
 
     def _on_image_shown(self, shown: DisplayedImage) -> None:

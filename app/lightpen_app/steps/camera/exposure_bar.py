@@ -56,12 +56,12 @@ class ExposureBar(Translated, QWidget):
         else:
             n_meant, meant = value.n_good, ()
             words = self.tr("OK: {0} LEDs") if of_leds else self.tr("OK: {0} spots")
-        told = words.format(n_meant, len(value.peaks))
+        text = words.format(n_meant, len(value.peaks))
         if not meant or len(meant) == len(value.peaks):
-            return told
+            return text
         named = ", ".join(map(str, meant[:MOST_NAMED]))
         more = "\u2026" if len(meant) > MOST_NAMED else ""
-        return f"{told}: {named}{more}"
+        return f"{text}: {named}{more}"
 
     def levels(self) -> str:
         """Return the level of each LED, as text."""

@@ -162,9 +162,9 @@ class IntrinsicsPanel(Translated, QGroupBox):
     def _refresh(self) -> None:
         camera = None if self._file is None else self._file.camera
         self._check.set_value(self._checked(camera))
-        self._doubt.set_value(self._doubted(camera))
+        self._doubt.set_value(self._doubt_message(camera))
         self._by_pen.set_value(self._checked_by_pen(camera))
-        facts = [""] * N_FACTS if camera is None else self._told(camera)
+        facts = [""] * N_FACTS if camera is None else self._fact_texts(camera)
         for name, label, fact in zip(self._names, self._facts, facts, strict=True):
             label.setText(fact)
             _let_select(label, bool(fact))
@@ -193,7 +193,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         sent = self._size_text(*self._image_size)
         return StatusMessage(words.format(sent, made_for), Sign.WARNING, Tone.BAD)
 
-    def _doubted(self, camera: Camera | None) -> StatusMessage:
+    def _doubt_message(self, camera: Camera | None) -> StatusMessage:
         """Return why the file may not hold any more."""
         if camera is None:
             return StatusMessage()
@@ -214,7 +214,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         words = self.tr("Checked by a swing: file and camera agree.")
         return StatusMessage(words, Sign.CHECK, Tone.GOOD)
 
-    def _told(self, camera: Camera) -> list[str]:
+    def _fact_texts(self, camera: Camera) -> list[str]:
         """Return the content of the file, one text for each name."""
         assert self._file is not None
         stated = camera.covariance

@@ -58,7 +58,7 @@ class LivePanel(Translated, QWidget):
         # Widgets
         self._switch = CameraSwitch()
         self._state = SignLabel(wraps=False)
-        self._told: tuple[str, ...] = ()  # the most important first
+        self._parts: tuple[str, ...] = ()  # the most important first
         self._figures = text_label(TextSize.SMALL, Tone.QUIET)
         self._figures.setWordWrap(False)
         self._figures.setAlignment(
@@ -116,7 +116,7 @@ class LivePanel(Translated, QWidget):
         free = (ring for ring in rings if not self._is_found(ring))
         markers = (*free, *self._extra)
         self._view.set_half(shown.half, shown.size, markers)
-        self._tell()
+        self._show_figures()
 
     def set_extra_markers(self, markers: Sequence[Marker]) -> None:
         """Draw additional markers."""
@@ -141,7 +141,7 @@ class LivePanel(Translated, QWidget):
         self._seen = None
         self._arrivals.clear()
         self._n_lost.clear()
-        self._told = ()
+        self._parts = ()
         self._fit_figures()
 
     @override
@@ -151,12 +151,12 @@ class LivePanel(Translated, QWidget):
 
     def _fit_figures(self) -> None:
         """Show as much as there is room for; all of it is in the tool tip."""
-        parts, metrics = self._told, self._figures.fontMetrics()
+        parts, metrics = self._parts, self._figures.fontMetrics()
         room = self.width() - self._state.sizeHint().width() - HEAD_GAP
         while len(parts) > 1 and metrics.horizontalAdvance(PARTED.join(parts)) > room:
             parts = parts[:-1]
         self._figures.setText(PARTED.join(parts))
-        self._figures.setToolTip(PARTED.join(self._told))
+        self._figures.setToolTip(PARTED.join(self._parts))
 
     def _retranslate(self) -> None:
         self._view.setToolTip(
@@ -170,7 +170,7 @@ class LivePanel(Translated, QWidget):
         self._state.set_value(self._remark())
         self._view.set_message(self._message())
         if self._seen is not None:
-            self._tell()
+            self._show_figures()
 
     def _remark(self) -> StatusMessage:
         match self._connection:
@@ -204,23 +204,23 @@ class LivePanel(Translated, QWidget):
             case Connection.CLOSED:
                 return self._sentence
 
-    def _tell(self) -> None:
+    def _show_figures(self) -> None:
         """Describe the last image and the frame rate."""
         seen = self._seen
         assert seen is not None
         height, width = seen.frame.image.shape
         parts = [
-            self._leds_told(seen),
+            self._leds_text(seen),
             self.tr("{0} fps").format(f"{self._rate():.0f}"),
         ]
         n_lost = self._n_lost[-1] - self._n_lost[0]
         if n_lost > 0:
             parts.append(self.tr("Lost: {0}").format(n_lost))
         parts.append(self.tr("{0} x {1} px").format(width, height))
-        self._told = tuple(parts)
+        self._parts = tuple(parts)
         self._fit_figures()
 
-    def _leds_told(self, seen: LiveImage) -> str:
+    def _leds_text(self, seen: LiveImage) -> str:
         detection = seen.detection
         if detection is None:
             return self.tr("Bright spots: {0}").format(len(seen.spots))

@@ -170,7 +170,7 @@ class CameraPage(Page):
         inspection = inspect(seen.spots, labels)
         self._view.images.set_image(shown, self._live.stats)
         self._view.settings.set_stats(self._live.stats)
-        self._view.second.tell_step(seen)
+        self._view.second.show_step(seen)
         self._view.exposure.set_value(inspection.exposure)
         self._view.focus.add(inspection)
         outcome = self._view.stray_light.outcome().value()

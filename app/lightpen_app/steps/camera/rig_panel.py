@@ -46,12 +46,17 @@ class RigPanel(Translated, QGroupBox):
         self._open = PushButton()
         self._path.add_button(self._open)
         self._problem = SignLabel()
-        self._told = SignLabel()
+        self._remark_label = SignLabel()
         self._step = SignLabel()
 
         # Layout
         vertical_layout(
-            self, self._second, self._path, self._problem, self._told, self._step
+            self,
+            self._second,
+            self._path,
+            self._problem,
+            self._remark_label,
+            self._step,
         )
 
         # Connections
@@ -64,7 +69,7 @@ class RigPanel(Translated, QGroupBox):
 
     def remark(self) -> StatusMessage:
         """Return the remarks on the file in use."""
-        return self._told.value()
+        return self._remark_label.value()
 
     def problem(self) -> StatusMessage:
         """Return why the file that was chosen last is not the one in use."""
@@ -129,7 +134,7 @@ class RigPanel(Translated, QGroupBox):
         is_wanted = self._second.isChecked()
         for widget in (self._path, self._open):
             widget.setVisible(is_wanted)
-        self._told.set_value(self._checked() if is_wanted else StatusMessage())
+        self._remark_label.set_value(self._checked() if is_wanted else StatusMessage())
         self._refresh_step()
 
     def _checked(self) -> StatusMessage:

@@ -54,7 +54,7 @@ class SecondCameraChoice(QWidget):
         """Return the choice of its source."""
         return self._source
 
-    def tell_step(self, seen: LiveImage) -> None:
+    def show_step(self, seen: LiveImage) -> None:
         """Return whether two cameras take their images at the same moment.
 
         Parameters

@@ -22,7 +22,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
-LARGEST = 100_000  # px or bytes, of a field before the camera told its range
+LARGEST = 100_000  # px or bytes, of a field before the range of the camera is known
 
 
 class SettingsPanel(Translated, QGroupBox):
@@ -210,13 +210,13 @@ class SettingsPanel(Translated, QGroupBox):
 
     def _retranslate_counts(self) -> None:
         stats = self._stats
-        told = (
+        counts = (
             self.tr("Received: {0}").format(stats.delivered),
             self.tr("Incomplete: {0}").format(stats.incomplete),
             self.tr("Lost: {0}").format(stats.missed),
             self.tr("Not processed: {0}").format(stats.skipped),
         )
-        self._counts.setText(PARTED.join(told))
+        self._counts.setText(PARTED.join(counts))
 
     def _retranslate_triggers(self) -> None:
         words = {

@@ -84,7 +84,7 @@ class SourcePanel(Translated, QGroupBox):
         self._producer.add_button(self._open_producer)
         self._device = DeviceField()
         self._search = PushButton()
-        self._told = SignLabel()
+        self._remark_label = SignLabel()
         self._samples = PushButton()
         self._retry = PushButton()
         self._beside = FilesBeside()
@@ -96,7 +96,7 @@ class SourcePanel(Translated, QGroupBox):
         horizontal_layout(layout, (self._kind, 1), self._samples)
         fill(layout, self._place, self._producer)
         horizontal_layout(layout, (self._device, 1), self._search)
-        fill(layout, self._told, self._found, self._use_found, self._retry)
+        fill(layout, self._remark_label, self._found, self._use_found, self._retry)
 
         # Connections
         self._kind.activated.connect(self._on_kind_chosen)
@@ -251,7 +251,7 @@ class SourcePanel(Translated, QGroupBox):
         )
         is_simulated = self._value.kind == SourceKind.SIMULATED
         self._samples.setVisible(is_simulated and not self._is_second)
-        self._told.set_value(self._remark(absent))
+        self._remark_label.set_value(self._remark(absent))
         self._refresh_beside()
 
     def _remark(self, absent: Message | None) -> StatusMessage:

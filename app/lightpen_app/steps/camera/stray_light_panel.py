@@ -189,9 +189,9 @@ class StrayLightPanel(Translated, QGroupBox):
         self._start.set_why_not(why_not_start)
         self._mask.set_why_not("" if n_found else self.tr("No spots to mask"))
         self._clear.set_why_not("" if self._n_masked else self.tr("No mask is set."))
-        self._outcome.set_value(self._told())
+        self._outcome.set_value(self._outcome_message())
 
-    def _told(self) -> StatusMessage:
+    def _outcome_message(self) -> StatusMessage:
         search, n_found = self._search, len(self._found)
         if search is None:
             if not self._n_masked:

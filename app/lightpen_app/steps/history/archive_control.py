@@ -98,8 +98,8 @@ class ArchiveControl(QObject):
 
     def _on_imported(self, copied: CopyResult) -> None:
         self.imported.emit()
-        told = self.tr("{0} new entries, {1} already present.")
-        self._notices.show_status(told.format(copied.n_new, copied.n_known))
+        text = self.tr("{0} new entries, {1} already present.")
+        self._notices.show_status(text.format(copied.n_new, copied.n_known))
 
     def _ask_save(self, saving: SaveFormat) -> None:
         name = f"lightpen-{self._clock():%Y-%m-%d}{saving.suffix}"
@@ -117,9 +117,9 @@ class ArchiveControl(QObject):
                 return export_entries(database, path)
             return save_entries(database, wanted, path)
 
-        told = self.tr("{0} entries saved in {1}")
+        text = self.tr("{0} entries saved in {1}")
         self._do(
-            save, lambda n_saved: self._notices.show_status(told.format(n_saved, path))
+            save, lambda n_saved: self._notices.show_status(text.format(n_saved, path))
         )
 
     def _do(
@@ -139,7 +139,7 @@ class ArchiveControl(QObject):
         job.start()
 
     def _on_failed(self, sentence: str) -> None:
-        self._notices.tell(NOTICE, sentence)
+        self._notices.notify(NOTICE, sentence)
 
     def _on_done(self) -> None:
         self._work = None

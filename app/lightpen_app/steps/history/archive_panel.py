@@ -17,7 +17,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
-MOST_TOLD = 100  # findings; the rest is counted
+MOST_SHOWN = 100  # findings; the rest is counted
 
 
 class SaveFormat(Enum):
@@ -119,7 +119,7 @@ class ArchivePanel(Translated, QWidget):
         self._delivery = delivery
         self._show_delivery()
 
-    def told(self) -> Sequence[StatusMessage]:
+    def messages(self) -> Sequence[StatusMessage]:
         """Return the texts on server and check."""
         labels = (self._delivered, self._outcome, *self._findings)
         return [label.value() for label in labels if label.value().text]
@@ -142,13 +142,13 @@ class ArchivePanel(Translated, QWidget):
     def _refresh_buttons(self) -> None:
         is_working = not self._working.isHidden()
         why_not = self.tr("Another operation is in progress.") if is_working else ""
-        told = (
+        tooltips = (
             self.tr("Read and compare every entry, record, result and image"),
             self.tr("For other programs or another station"),
             self.tr("Import the entries from a file saved at another station"),
         )
         buttons = (self._check, self._save, self._import)
-        for button, words in zip(buttons, told, strict=True):
+        for button, words in zip(buttons, tooltips, strict=True):
             button.set_why_not(why_not, words)
 
     def _show_delivery(self) -> None:
@@ -174,32 +174,32 @@ class ArchivePanel(Translated, QWidget):
         checked = self._checked
         findings = () if checked is None else checked.findings
         notes = () if checked is None else checked.notes
-        told = [
+        messages = [
             StatusMessage(worded(each), Sign.CROSS, Tone.BAD)
-            for each in findings[:MOST_TOLD]
+            for each in findings[:MOST_SHOWN]
         ]
-        if len(findings) > MOST_TOLD:
-            n_more = len(findings) - MOST_TOLD
+        if len(findings) > MOST_SHOWN:
+            n_more = len(findings) - MOST_SHOWN
             text = self.tr("{0} more findings").format(n_more)
-            told.append(StatusMessage(text, Sign.CROSS, Tone.BAD))
-        told += [
+            messages.append(StatusMessage(text, Sign.CROSS, Tone.BAD))
+        messages += [
             StatusMessage(worded(each), Sign.WARNING, Tone.QUIET)
-            for each in notes[:MOST_TOLD]
+            for each in notes[:MOST_SHOWN]
         ]
-        while len(self._findings) < len(told):
+        while len(self._findings) < len(messages):
             label = SignLabel()
             self._findings.append(label)
             self._layout.insertWidget(self._layout.count() - 1, label)
         for i, label in enumerate(self._findings):
-            label.set_value(told[i] if i < len(told) else StatusMessage(""))
+            label.set_value(messages[i] if i < len(messages) else StatusMessage(""))
         self._outcome.set_value(self._outcome_of(checked))
 
     def _outcome_of(self, checked: ArchiveCheckResult | None) -> StatusMessage:
         if checked is None:
             return StatusMessage(self.tr("Not checked since program start"))
-        told = (checked.n_entries, checked.n_files)
+        counts = (checked.n_entries, checked.n_files)
         if checked.findings:
             text = self.tr("Changes detected. {0} entries and {1} files checked.")
-            return StatusMessage(text.format(*told), Sign.WARNING, Tone.WARN)
+            return StatusMessage(text.format(*counts), Sign.WARNING, Tone.WARN)
         text = self.tr("No changes in {0} entries and {1} files")
-        return StatusMessage(text.format(*told), Sign.CHECK, Tone.GOOD)
+        return StatusMessage(text.format(*counts), Sign.CHECK, Tone.GOOD)

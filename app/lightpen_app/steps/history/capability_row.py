@@ -39,13 +39,13 @@ class CapabilityRow(Translated, QWidget):
         self._label.setBuddy(self._tolerance)
         self._has_reference = QCheckBox()
         self._reference = tuple(NumberField("mm", (-REACH, REACH), 4) for _ in AXES)
-        self._told = SignLabel()
+        self._message = SignLabel()
 
         # Layout
         layout = vertical_layout(self, spacing=GRID // 2)
         horizontal_layout(layout, self._label, self._tolerance, self._has_reference, 1)
         horizontal_layout(layout, *self._reference, 1)
-        fill(layout, self._told)
+        fill(layout, self._message)
 
         # Connections
         self._has_reference.toggled.connect(self._on_changed)
@@ -72,7 +72,7 @@ class CapabilityRow(Translated, QWidget):
 
     def words(self) -> str:
         """Return the text on the study."""
-        return self._told.value().text
+        return self._message.value().text
 
     def _on_changed(self) -> None:
         self._refresh()
@@ -96,7 +96,7 @@ class CapabilityRow(Translated, QWidget):
         self._has_reference.setVisible(self.tolerance() is not None)
         found, n_tips = self._shown
         if found is None:
-            self._told.set_value(StatusMessage())
+            self._message.set_value(StatusMessage())
             return
         words = [self._of_each("Cg", found.cg)]
         if found.cgk is not None:
@@ -113,7 +113,7 @@ class CapabilityRow(Translated, QWidget):
         mark = (
             (Sign.CHECK, Tone.GOOD) if found.is_capable else (Sign.WARNING, Tone.WARN)
         )
-        self._told.set_value(StatusMessage(" ".join(words), *mark))
+        self._message.set_value(StatusMessage(" ".join(words), *mark))
 
     def _of_each(self, name: str, values: FloatArray) -> str:
         each = zip(AXES, values.tolist(), strict=True)

@@ -91,7 +91,7 @@ class HistoryContent(Translated, QWidget):
 
         # Connections
         reader = self._reader
-        reader.failed.connect(self._tell)
+        reader.failed.connect(self._show_fault)
         reader.opened.connect(self._on_opened)
         reader.block_read.connect(self._table.put_block)
         reader.block_passed.connect(self._table.forget_block)
@@ -105,7 +105,7 @@ class HistoryContent(Translated, QWidget):
         self._entry.restore_requested.connect(self._restore)
         self._entry.paper_requested.connect(self._show_paper)
         self._paper.saved.connect(self._on_paper_saved)
-        self._paper.failed.connect(self._tell)
+        self._paper.failed.connect(self._show_fault)
         self._selection.adjust_requested.connect(self._adjust_together)
         self._selection.report_requested.connect(self._report_study)
         self._due.rule_changed.connect(self._on_rule_changed)
@@ -135,8 +135,8 @@ class HistoryContent(Translated, QWidget):
         self._paper.shut_down()
         self._whole.shut_down()
 
-    def _tell(self, sentence: str) -> None:
-        self._notices.tell(NOTICE, sentence)
+    def _show_fault(self, sentence: str) -> None:
+        self._notices.notify(NOTICE, sentence)
 
     def _panels(self) -> tuple[QWidget, ...]:
         return (
@@ -282,17 +282,17 @@ class HistoryContent(Translated, QWidget):
 
         # Connections
         job.succeeded.connect(on_succeeded)
-        job.failed.connect(self._tell)
+        job.failed.connect(self._show_fault)
         job.start()
 
     def _on_restored(self, result: Result) -> None:
         self.read_anew()
         self._tips.refresh()
         self._streaming.read_tip()
-        told = self.tr("Tip {0} of pen {1} reinstated from the earlier calibration.")
+        text = self.tr("Tip {0} of pen {1} reinstated from the earlier calibration.")
         names = result.names
         words = (shortened(names.tip), shortened(names.pen))
-        self._notices.show_status(told.format(*words))
+        self._notices.show_status(text.format(*words))
 
     # What is printed
 
@@ -324,7 +324,7 @@ class HistoryContent(Translated, QWidget):
         # Connections
         job.succeeded.connect(self._paper.show_verification)
         job.succeeded.connect(lambda _: self.read_anew())
-        job.failed.connect(self._tell)
+        job.failed.connect(self._show_fault)
         job.start()
 
     def _on_paper_saved(self, path: Path) -> None:

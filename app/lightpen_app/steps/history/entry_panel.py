@@ -118,8 +118,8 @@ class EntryPanel(Translated, QWidget):
 
     def words(self) -> tuple[str, ...]:
         """Return the texts on the entry."""
-        said = (self._changed.value().text, *(text.text() for text in self._texts))
-        return tuple(filter(None, said))
+        texts = (self._changed.value().text, *(text.text() for text in self._texts))
+        return tuple(filter(None, texts))
 
     def _ask(self, *, restores: bool) -> None:
         line = self._line
@@ -170,7 +170,7 @@ class EntryPanel(Translated, QWidget):
                 "Restore the archive from a copy."
             ).format(line.number)
             self._changed.set_value(StatusMessage(text, Sign.CROSS, Tone.BAD))
-        for label, text in zip(self._texts, self._told(line), strict=True):
+        for label, text in zip(self._texts, self._label_texts(line), strict=True):
             label.setText(breakable(text))
             label.setVisible(bool(text))
         self._note.setText(self.tr("Add comment..."))
@@ -191,7 +191,7 @@ class EntryPanel(Translated, QWidget):
             self.tr("Preview, save as PDF, or print"),
         )
 
-    def _told(self, line: Line | None) -> tuple[str, ...]:
+    def _label_texts(self, line: Line | None) -> tuple[str, ...]:
         """Return the words of each label."""
         if line is None:
             return (self.tr("No entry selected"), *[""] * (len(self._texts) - 1))
@@ -222,8 +222,8 @@ class EntryPanel(Translated, QWidget):
             event = each.entry.event
             when = moment_text(event.at, "yyyy-MM-dd hh:mm")
             head = [kind_text(event.kind, event.grade), when, event.names.operator]
-            told = PARTED.join(filter(None, head))
-            lines.append(f"{told}: {event.reason}" if event.reason else told)
+            heading = PARTED.join(filter(None, head))
+            lines.append(f"{heading}: {event.reason}" if event.reason else heading)
         return "\n".join(lines)
 
     def _why_not_restored(self, line: Line | None) -> str:
@@ -255,6 +255,6 @@ def _why_of(event: Event) -> str:
         return PARTED.join(filter(None, (item_text(event), event.reason)))
     why = worded(event.why)
     settings = event.settings.items() if event.kind in BESIDE_SWINGS else ()
-    said = (f"{name} {value}" for name, value in settings)
-    words = (verdict_text(event.grade), why, event.reason, *said)
+    values = (f"{name} {value}" for name, value in settings)
+    words = (verdict_text(event.grade), why, event.reason, *values)
     return PARTED.join(filter(None, words))

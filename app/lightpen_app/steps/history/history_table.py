@@ -283,10 +283,10 @@ class HistoryTable(Translated, RowTable):
 
     def _widths(self, letters: QFontMetrics, longer: int) -> dict[int, int]:
         """Return the width of each column but the last, by short or longer words."""
-        told = (*usual_words(), *rare_words()) if longer else usual_words()
+        texts = (*usual_words(), *rare_words()) if longer else usual_words()
         samples = {
             WHEN: MOMENT,
-            WHAT: max(told, key=letters.horizontalAdvance),
+            WHAT: max(texts, key=letters.horizontalAdvance),
             VERDICT: max(map(grade_text, Grade), key=letters.horizontalAdvance),
             **dict.fromkeys((X, Y, Z), COORDINATE),
             U: UNCERTAINTY,

@@ -116,9 +116,9 @@ class SelectionPanel(Translated, QWidget):
         """Return the selected entries with a tip."""
         return self._selected
 
-    def set_adjusted(self, told: StatusMessage) -> None:
+    def set_adjusted(self, message: StatusMessage) -> None:
         """Show what the adjustment of the selected swings came to."""
-        self._adjusted.set_value(told)
+        self._adjusted.set_value(message)
 
     def comparison(self) -> Comparison | None:
         """Return the comparison; None unless two tips are selected."""
@@ -138,13 +138,13 @@ class SelectionPanel(Translated, QWidget):
 
     def words(self) -> tuple[str, ...]:
         """Return the texts on the selection."""
-        said = (
+        texts = (
             *(head.text() for head in self._heads),
             *(remark.value().text for remark in (self._change, self._verdict)),
             self._touched.text(),
             self._study.words(),
         )
-        return tuple(filter(None, said))
+        return tuple(filter(None, texts))
 
     def _retranslate(self) -> None:
         self._adjust.setText(self.tr("Adjust together"))
@@ -182,8 +182,8 @@ class SelectionPanel(Translated, QWidget):
             text = self.tr("The entries belong to different pens or tips.")
             self._change.set_value(StatusMessage(text, Sign.WARNING, Tone.WARN))
         elif found.change.is_unexplained:
-            told = worded(found.change.told(dates[0].partition(" ")[0]))
-            self._change.set_value(StatusMessage(told, Sign.WARNING, Tone.WARN))
+            text = worded(found.change.message(dates[0].partition(" ")[0]))
+            self._change.set_value(StatusMessage(text, Sign.WARNING, Tone.WARN))
         else:
             text = self.tr("The change is within the combined uncertainty.")
             self._change.set_value(StatusMessage(text, Sign.CHECK, Tone.GOOD))
@@ -216,12 +216,12 @@ class SelectionPanel(Translated, QWidget):
         cells = tuple(_scattered_row(found, axis) for axis in range(3))
         self._scattered.set_value(Figures(columns, AXES, cells))
         assessment = found.assessment
-        told = worded(assessment.reason)
+        text = worded(assessment.reason)
         if not assessment.is_accepted:
-            told += " " + worded(assessment.next_step)
-        told += " " + worded(rule_in_words(self._limits))
+            text += " " + worded(assessment.next_step)
+        text += " " + worded(rule_in_words(self._limits))
         mark = GRADE_MARKS[Grade(assessment.grade)]
-        self._verdict.set_value(StatusMessage(told, *mark))
+        self._verdict.set_value(StatusMessage(text, *mark))
 
     def _show_touched(self, touched: RepeatedPoint | None) -> None:
         """Show the scatter of a fixed point beside that of the tips."""

@@ -89,9 +89,9 @@ class LedFileControl(QObject):
             self._panel.ask_units("")
             self._panel.set_value(now.path)
         self._panel.set_exchange(leds_to_exchange(now.check.frame))
-        self._tell(self._frame_error)
+        self._set_problem(self._frame_error)
 
-    def _tell(self, problem: Callable[[], str]) -> None:
+    def _set_problem(self, problem: Callable[[], str]) -> None:
         """Show a message on the file in the selected language."""
         self._problem = problem
         self.retranslate()
@@ -149,17 +149,19 @@ class LedFileControl(QObject):
             self._use(opened.file)
         elif opened.draft is not None:  # those in use stay in use
             self._leds.open(opened.draft, opened.path)
-            self._tell(partial(worded, opened.problem))
+            self._set_problem(partial(worded, opened.problem))
         elif opened.needs_units:
-            self._tell(str)
+            self._set_problem(str)
             self._panel.ask_units(opened.path.name)
         else:
-            self._tell(partial(self._refusal, opened.problem, self._panel.value()))
+            self._set_problem(
+                partial(self._refusal, opened.problem, self._panel.value())
+            )
 
     def _use(self, file: PenFile) -> None:
         self._leds.use(file)
         self._pens.keep(file)
-        self._tell(str)
+        self._set_problem(str)
 
     def _doubting(self, file: PenFile) -> tuple[str, str]:
         words = self.tr("{0} Use it for this pen from now on?")
@@ -190,7 +192,7 @@ class LedFileControl(QObject):
         self._leds.use(file, keeps_changes=not is_same)
         self._pens.keep(file)
         if is_same:
-            self._tell(str)
+            self._set_problem(str)
         words = self.tr("LEDs saved as {0} and in use.")
         self.status_changed.emit(words.format(file.path.name))
 
@@ -207,4 +209,4 @@ class LedFileControl(QObject):
         job.start()
 
     def _on_failed(self, sentence: str) -> None:
-        self._tell(lambda: sentence)
+        self._set_problem(lambda: sentence)

@@ -243,8 +243,8 @@ class LedFilePanel(Translated, QWidget):
         self._refresh_save_words()
 
     def _refresh_save_words(self) -> None:
-        told = self.tr("Save the LEDs and use the saved file")
-        self._save.set_why_not(self._why_no_save, told)
+        tooltip = self.tr("Save the LEDs and use the saved file")
+        self._save.set_why_not(self._why_no_save, tooltip)
 
 
 class _UnitsRow(Translated, QWidget):

@@ -187,17 +187,17 @@ class _DraftModel(QAbstractTableModel):
             self.endRemoveRows()
         elif n_after > n_before:
             self.endInsertRows()
-        self._tell(0, MISFIT)
+        self._emit_data_changed(0, MISFIT)
 
     def set_misfits(self, misfits: Mapping[int, float]) -> None:
         if misfits != self._misfits:
             self._misfits = misfits
-            self._tell(MISFIT, MISFIT)
+            self._emit_data_changed(MISFIT, MISFIT)
 
     def set_marked(self, reasons: Mapping[int, str]) -> None:
         if reasons != self._reasons:
             self._reasons = reasons
-            self._tell(0, 0)
+            self._emit_data_changed(0, 0)
 
     def retranslate(self) -> None:
         self.headerDataChanged.emit(Qt.Orientation.Horizontal, 0, N_COLUMNS - 1)
@@ -297,7 +297,7 @@ class _DraftModel(QAbstractTableModel):
         flaw = self._flaws.get((row, column - 1))
         return "" if flaw is None else worded(flaw.message)
 
-    def _tell(self, first: int, last: int) -> None:
+    def _emit_data_changed(self, first: int, last: int) -> None:
         """Have columns shown again; a cell among them that is typed in starts over."""
         end = self.index(self.rowCount() - 1, last)
         self.dataChanged.emit(self.index(0, first), end)

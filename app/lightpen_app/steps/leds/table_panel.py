@@ -184,18 +184,18 @@ class LedTablePanel(Translated, QGroupBox):
             why_not = self.tr("A pen needs at least {0} LEDs.").format(MIN_LEDS)
         else:
             why_not = ""
-        told = self.tr("Remove LED {0}; the following LEDs are renumbered.").format(
+        tooltip = self.tr("Remove LED {0}; the following LEDs are renumbered.").format(
             chosen
         )
-        self._remove.set_why_not(why_not, told)
+        self._remove.set_why_not(why_not, tooltip)
         unchanged = self._changes is Changes.NONE
         why_not = self.tr("No changes") if unchanged else ""
-        told = (
+        tooltip = (
             self.tr("Restore the coordinates of the file")
             if self._changes is Changes.EDITED
             else self.tr("Restore the file in use")
         )
-        self._discard.set_why_not(why_not, told)
+        self._discard.set_why_not(why_not, tooltip)
         text = self.tr("Nominal tip in use (step Start): {0} mm")
         self._override_label.setText(text.format(self._override))
         self._override_label.setVisible(bool(self._override))

@@ -46,7 +46,7 @@ class MonteCarloRow(Translated, QWidget):
         self._progress = QProgressBar()
         self._progress.setRange(0, PROGRESS_STEPS)
         self._progress.setTextVisible(False)
-        self._told = SignLabel()
+        self._label = SignLabel()
         self._table = NumberTable()
 
         # Layout
@@ -58,7 +58,7 @@ class MonteCarloRow(Translated, QWidget):
             self._label,
             self._trials,
             (self._progress, 1),
-            (self._told, 1),
+            (self._label, 1),
         )
         layout.addWidget(self._table)
 
@@ -149,8 +149,8 @@ class MonteCarloRow(Translated, QWidget):
             field.setVisible(not is_busy)
         self._cancel.setVisible(is_busy)
         self._progress.setVisible(is_busy)
-        self._told.set_value(self._told_message())
-        self._told.setVisible(not is_busy)
+        self._label.set_value(self._message())
+        self._label.setVisible(not is_busy)
         self._table.setVisible(self._found is not None)
         if self._found is not None:
             self._table.set_value(self._figures(self._found))
@@ -160,15 +160,15 @@ class MonteCarloRow(Translated, QWidget):
             return self.tr("Available for swings with one camera only.")
         return ""
 
-    def _told_message(self) -> StatusMessage:
+    def _message(self) -> StatusMessage:
         if self._fault:
             return StatusMessage(self._fault, Sign.CROSS, Tone.BAD)
         if self._found is None:
             return StatusMessage()
         text = self.tr("{0} trials successful, {1} failed.")
         n_solved = len(self._found.errors)
-        told = text.format(n_solved, self._found.n_failed)
-        return StatusMessage(f"{told} {worded(self._found.explanation)}", Sign.RING)
+        outcome = text.format(n_solved, self._found.n_failed)
+        return StatusMessage(f"{outcome} {worded(self._found.explanation)}", Sign.RING)
 
     def _figures(self, found: MonteCarlo) -> Figures:
         """Return U by both, and their difference by what so many trials know."""

@@ -84,10 +84,12 @@ class NextTipsRow(Translated, QWidget):
             name = self.tr("Next tip {0}").format(tip)
             button.setAccessibleName(name)
             button.setAccessibleDescription(mark.text)
-            told = self.tr(
+            tooltip = self.tr(
                 "Calibrate tip {0} next with its ball diameter and nominal centre"
             )
-            button.setToolTip(PARTED.join(filter(None, (told.format(tip), mark.text))))
+            button.setToolTip(
+                PARTED.join(filter(None, (tooltip.format(tip), mark.text)))
+            )
 
     def _mark_of(self, each: NextTip) -> StatusMessage:
         """Return why a tip needs attention: overdue, or not calibrated."""

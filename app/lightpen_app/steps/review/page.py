@@ -78,10 +78,10 @@ class ReviewPage(Page):
         view.verify.clicked.connect(self._on_verify_clicked)
         view.tabs.images_made.connect(self._on_images_made)
         view.tabs.saved.connect(notices.show_status)
-        view.tabs.failed.connect(partial(notices.tell, self.key))
+        view.tabs.failed.connect(partial(notices.notify, self.key))
         self._along.follow(view.tools)
-        self._along.told.connect(notices.show_status)
-        self._along.failed.connect(partial(notices.tell, self.key))
+        self._along.message_sent.connect(notices.show_status)
+        self._along.failed.connect(partial(notices.notify, self.key))
 
         self._retranslate()
 

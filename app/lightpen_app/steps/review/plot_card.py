@@ -120,8 +120,8 @@ class PlotCard(Translated, QFrame):
         job = Job(lambda _: write_whole(path, data), self)
 
         # Connections
-        told = self.tr("Saved as {0}").format(path)
-        job.succeeded.connect(lambda _: self.saved.emit(told))
+        text = self.tr("Saved as {0}").format(path)
+        job.succeeded.connect(lambda _: self.saved.emit(text))
         job.failed.connect(self.failed)
         job.start()
 

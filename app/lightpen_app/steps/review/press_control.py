@@ -54,4 +54,4 @@ class PressTestControl(QObject):
             self._job = None
 
     def _on_failed(self, why: str) -> None:
-        self._notices.tell(self, why)
+        self._notices.notify(self, why)

@@ -39,13 +39,13 @@ class ResultExport(QObject):
 
     Signals
     -------
-    told(str)
+    message_sent(str)
         What was done.
     failed(str)
         The sentence why something was not.
     """
 
-    told = Signal(str)
+    message_sent = Signal(str)
     failed = Signal(str)
 
     def __init__(
@@ -60,7 +60,7 @@ class ResultExport(QObject):
         self._paper = PrintReportControl(place, page)
 
         # Connections
-        self._paper.saved.connect(lambda path: self._tell_saved(path.parent))
+        self._paper.saved.connect(lambda path: self._report_saved(path.parent))
         self._paper.failed.connect(self.failed)
 
     def follow(self, tools: ResultTools) -> None:
@@ -79,7 +79,7 @@ class ResultExport(QObject):
     def _open_folder(self) -> None:
         folder = self._run.status.record_folder
         if folder is not None:
-            self.told.emit(open_folder(folder))
+            self.message_sent.emit(open_folder(folder))
 
     def _copy_tip(self) -> None:
         status = self._run.status
@@ -87,7 +87,7 @@ class ResultExport(QObject):
             tip = status.solution.calibration.joint.tip_pen
             line = copied_tip(tip, status.origin)
             QApplication.clipboard().setText(line)
-            self.told.emit(self.tr("Tip copied: x, y, z in mm."))
+            self.message_sent.emit(self.tr("Tip copied: x, y, z in mm."))
 
     def _ask_laboratory(self, export: Export) -> None:
         """Ask for the laboratory where a format names it, then for the folder."""
@@ -140,7 +140,7 @@ class ResultExport(QObject):
         self._saving = job = Job(write, self)
 
         # Connections
-        job.succeeded.connect(lambda _: self._tell_saved(folder))
+        job.succeeded.connect(lambda _: self._report_saved(folder))
         job.failed.connect(self.failed)
         job.start()
 
@@ -150,5 +150,5 @@ class ResultExport(QObject):
         if result is not None:
             self._paper.show(lambda: archive.file_of(result))
 
-    def _tell_saved(self, folder: Path) -> None:
-        self.told.emit(self.tr("Saved in {0}").format(folder))
+    def _report_saved(self, folder: Path) -> None:
+        self.message_sent.emit(self.tr("Saved in {0}").format(folder))

@@ -83,26 +83,26 @@ class ResultTools(Translated, QWidget):
 
     def set_why_not(self, why_not: str) -> None:
         """Disable all with a reason, or enable them."""
-        told = (
+        tooltips = (
             self.tr("Open the folder of the swing"),
             self.tr("Copy x, y, z in mm, separated by tabs"),
             self.tr("Save results and plots, named by pen, tip and date"),
         )
-        for button, words in zip(self._buttons, told, strict=True):
+        for button, words in zip(self._buttons, tooltips, strict=True):
             button.set_why_not(why_not, words)
 
     def set_paper_why_not(self, why_not: str) -> None:
         """Disable the report with a reason, or enable it."""
         self._paper.setEnabled(not why_not)
-        told = self.tr("Preview, save as PDF, or print")
-        self._paper.setToolTip(why_not or told)
+        tooltip = self.tr("Preview, save as PDF, or print")
+        self._paper.setToolTip(why_not or tooltip)
 
     def set_press_why_not(self, why_not: str) -> None:
         """Disable the press test with a reason, or enable it."""
-        told = self.tr(
+        tooltip = self.tr(
             "Swing again with firm pressure and compare: shows a stylus that gives way"
         )
-        self._press.set_why_not(why_not, told)
+        self._press.set_why_not(why_not, tooltip)
 
     def _retranslate(self) -> None:
         self._press.setText(self.tr("Press test"))

@@ -202,18 +202,18 @@ def review_state(status: SwingStatus) -> State:
         return _accepted_state(status.result)
     if status.failure is not None:
         assert status.state is not None
-        said = phrase(status.state.message, status.state.heading)
-        return State(phase_text(Phase.VERDICT), said.hint, Sign.CROSS, Tone.BAD)
+        instruction = phrase(status.state.message, status.state.heading)
+        return State(phase_text(Phase.VERDICT), instruction.hint, Sign.CROSS, Tone.BAD)
     if status.verdict is None:
         text = translate("ReviewPage", "The tip appears here after the swing.")
         word = translate("ReviewPage", "NO TIP YET")
         return State(word, text, Sign.WAIT, Tone.QUIET)
     heading = None if status.state is None else status.state.heading
-    said = phrase(status.verdict.reason, heading)
+    instruction = phrase(status.verdict.reason, heading)
     sign, tone = GRADE_MARKS[status.verdict.grade]
     form = translate("ReviewPage", "{0}: {1}")
-    word = form.format(grade_text(status.verdict.grade), said.short)
-    return State(word, said.hint, sign, tone)
+    word = form.format(grade_text(status.verdict.grade), instruction.short)
+    return State(word, instruction.hint, sign, tone)
 
 
 def remarks(status: SwingStatus, named: Names) -> tuple[StatusMessage, ...]:
@@ -324,7 +324,7 @@ def step_of_file(reason: Message) -> str:
 def _accepted_state(result: Result) -> State:
     translate = QCoreApplication.translate
     since = f"{local_time(result.accepted):%Y-%m-%d %H:%M:%S}"
-    told = accepted_phrase(result.origin)
+    accepted = accepted_phrase(result.origin)
     text = translate(
         "ReviewPage", "Current since {0}. Earlier results stay in the archive."
     ).format(since)
@@ -333,7 +333,9 @@ def _accepted_state(result: Result) -> State:
             "ReviewPage", "Current since {0}, check needed. Reason for acceptance: {1}"
         ).format(since, result.reason)
     sign, tone = GRADE_MARKS[result.grade]
-    return State(told.short, " ".join(filter(None, (told.hint, text))), sign, tone)
+    return State(
+        accepted.short, " ".join(filter(None, (accepted.hint, text))), sign, tone
+    )
 
 
 def _other_names(swung: Names, named: Names) -> str:

@@ -183,8 +183,8 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
             field.setAccessibleName(text)
             usual = getattr(USUAL, kind.name)
             if usual is not None:
-                told = f"{kind.times * usual:g} {kind.unit}"
-                field.setToolTip(self.tr("Default: {0}.").format(told))
+                default = f"{kind.times * usual:g} {kind.unit}"
+                field.setToolTip(self.tr("Default: {0}.").format(default))
 
 
 class AssumptionsPanel(Translated, QGroupBox):

@@ -117,7 +117,7 @@ class InterruptedControl(QObject):
 
         self._search = Job(search, self)
         self._search.succeeded.connect(self._on_found)
-        self._search.failed.connect(self._tell)
+        self._search.failed.connect(self._show_fault)
         self._search.start()
 
     def _on_found(self, found: "Interrupted") -> None:
@@ -149,11 +149,11 @@ class InterruptedControl(QObject):
         self._work.ended.connect(partial(self._on_work_ended, self._work))
         self._work.start()
 
-    def _tell(self, sentence: str) -> None:
-        self._notices.tell(NOTICE, sentence)
+    def _show_fault(self, sentence: str) -> None:
+        self._notices.notify(NOTICE, sentence)
 
     def _on_work_failed(self, sentence: str) -> None:
-        self._tell(sentence)
+        self._show_fault(sentence)
         self._on_work_crashed()
 
     def _on_work_crashed(self) -> None:
@@ -200,7 +200,7 @@ class InterruptedControl(QObject):
             self._camera.open()
         size = self._selection.preparation.image_size
         if not live.is_open:
-            self._notices.tell(
+            self._notices.notify(
                 self,
                 self.tr(
                     "No camera is open. Choose the image source of this swing at "
@@ -208,7 +208,7 @@ class InterruptedControl(QObject):
                 ).format(_source_text(swing)),
             )
         elif not swing.is_of(self._selection.preparation.sources):
-            self._notices.tell(
+            self._notices.notify(
                 self,
                 self.tr(
                     "The swing was captured with another image source: {0}. Choose "
@@ -217,7 +217,7 @@ class InterruptedControl(QObject):
             )
         elif size is not None and not swing.fits(size):
             camera = swing.setup.camera
-            self._notices.tell(
+            self._notices.notify(
                 self,
                 self.tr(
                     "The image size is {0} x {1} px; the swing was captured with "
@@ -298,7 +298,7 @@ class InterruptedControl(QObject):
         selection.set_choices(again.with_moves(()))  # which the session has
         missing_inputs = selection.preparation.missing_inputs()
         if missing_inputs:
-            self._notices.tell(NOTICE, missing_input_text(missing_inputs[0]))
+            self._notices.notify(NOTICE, missing_input_text(missing_inputs[0]))
             return
         self._continued = under_way
         self._panel.set_waiting(self.tr("Reading the verification"))
@@ -347,5 +347,5 @@ def _source_text(swing: Resumable) -> str:
     choices = swing.source_choices
     if not choices:
         return origin_text(recorded_origin(swing.record))
-    said = [(worded(each.source.name), printable(each.place)) for each in choices]
-    return listed(text for each in said for text in each if text)
+    pairs = [(worded(each.source.name), printable(each.place)) for each in choices]
+    return listed(text for each in pairs for text in each if text)

@@ -72,8 +72,8 @@ class InterruptedRow(InterruptedItem):
             return self.tr("In use by another program")
         names, n_images = recorded_names(self._swing), len(self._swing.images)
         called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
-        told = (*called, n_images_text(n_images))
-        return PARTED.join(filter(None, told))
+        parts = (*called, n_images_text(n_images))
+        return PARTED.join(filter(None, parts))
 
 
 class VerificationRow(InterruptedItem):

@@ -87,7 +87,7 @@ class ItemForm(Translated, QWidget):
         self._spin = PushButton()
         self._spin.setCheckable(True)
         self._spun: tuple[float, float, float] | None = None
-        self._spin_told = text_label(TextSize.SMALL, Tone.QUIET)
+        self._spin_text = text_label(TextSize.SMALL, Tone.QUIET)
         self._picture = PathField()
         self._browse = PushButton()
         self._picture.add_button(self._browse)
@@ -125,7 +125,7 @@ class ItemForm(Translated, QWidget):
         for name, field in zip(AXES, self._axis, strict=True):
             fill(axis, QLabel(name), (field, 1))
         fill(axis, self._spin)
-        inner.addWidget(self._spin_told, 4, 0, 1, 3)
+        inner.addWidget(self._spin_text, 4, 0, 1, 3)
         self._add(inner, self._picture, at=(5, 0, 1, 3))
         inner.addWidget(self._preview, 1, 3, 5, 1, Qt.AlignmentFlag.AlignCenter)
         for layout in (grid, inner):
@@ -178,10 +178,10 @@ class ItemForm(Translated, QWidget):
             axis_origin=item.axis_origin if same else AxisOrigin.GIVEN,
         )
 
-    def tell_spin(self, text: str) -> None:
+    def show_spin(self, text: str) -> None:
         """Show the progress of a spin."""
-        self._spin_told.setText(text)
-        self._spin_told.setVisible(bool(text))
+        self._spin_text.setText(text)
+        self._spin_text.setVisible(bool(text))
 
     def set_spun_axis(self, axis: tuple[float, float, float]) -> None:
         """Show the axis that a spin has found."""
@@ -201,7 +201,7 @@ class ItemForm(Translated, QWidget):
         """Show an item."""
         self.stop_spin()
         self._item, self._spun = item, None
-        self.tell_spin("")
+        self.show_spin("")
         self._id.setText(item.id)
         self._id.setReadOnly(not is_new)
         self._due.set_value(item.due)
@@ -248,7 +248,7 @@ class ItemForm(Translated, QWidget):
         self._axis_row.setVisible(has_axis)
         if not has_axis:
             self.stop_spin()
-            self.tell_spin("")
+            self.show_spin("")
 
     def _on_spin_toggled(self, spins: bool) -> None:
         self._name_spin()

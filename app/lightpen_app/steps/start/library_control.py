@@ -116,12 +116,12 @@ class LibraryControl(QObject):
         dialog = LibraryDialog(self._folder, self._page)
 
         # Connections
-        self._watch.change_kept.connect(dialog.tell_kept)
+        self._watch.change_kept.connect(dialog.show_kept)
         self._watch.change_failed.connect(self._on_change_failed)
         dialog.chosen.connect(self.chosen)
         dialog.change_asked.connect(self._on_change_asked)
         dialog.form.spin_toggled.connect(self._on_spin_toggled)
-        self._spin.told.connect(dialog.form.tell_spin)
+        self._spin.message_sent.connect(dialog.form.show_spin)
         return dialog
 
     def _on_spin_toggled(self, spins: bool) -> None:
@@ -135,7 +135,7 @@ class LibraryControl(QObject):
             x, y, z = self._spin.fit().axis_pen.tolist()
         except CalibrationError as error:
             if form is not None:
-                form.tell_spin(worded(error.message))
+                form.show_spin(worded(error.message))
         else:
             if form is not None:
                 form.set_spun_axis((x, y, z))
@@ -189,7 +189,7 @@ class LibraryControl(QObject):
 
     def _on_change_failed(self, asked: RequestedChange, why: str) -> None:
         """Say it in the dialog, or on the page if that was left meanwhile."""
-        if self._dialog is None or not self._dialog.tell_refused(asked, why):
+        if self._dialog is None or not self._dialog.show_refused(asked, why):
             self._notices.show_status(why)
 
 

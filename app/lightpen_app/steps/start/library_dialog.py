@@ -220,12 +220,12 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         made = structs.replace(MADE[self.kind()](id="?"), id=name)
         self._start_editing(made, self.tr("New item"), is_new=True)
 
-    def tell_kept(self, asked: RequestedChange) -> None:
+    def show_kept(self, asked: RequestedChange) -> None:
         """Show that the requested change is done, if still pending."""
         if asked is self._asked:
             self._stop_editing()
 
-    def tell_refused(self, asked: RequestedChange, fault: str) -> bool:
+    def show_refused(self, asked: RequestedChange, fault: str) -> bool:
         """Say why it was not; return whether that is still waited for."""
         if asked is not self._asked:
             return False

@@ -104,7 +104,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         self._retranslate()
         self._refresh()
 
-    def tell(self, fault: str) -> None:
+    def show_fault(self, fault: str) -> None:
         """Say why nothing was set."""
         self._is_signed = False
         self._fault.set_value(StatusMessage(fault, Sign.CROSS, Tone.BAD))
@@ -238,7 +238,7 @@ class LimitsControl(QObject):
     def _on_failed(self, why: str) -> None:
         """Report it, and read the limits again: another window may have set them."""
         folder = self._folder
-        self._dialog.tell(why)
+        self._dialog.show_fault(why)
         job = Job(lambda _: read_supervision(folder), self)
 
         # Connections

@@ -90,7 +90,7 @@ class StartPage(ResponsiveLayout, Page):
         self._unfinished.step_requested.connect(self.step_requested)
         self._last.verification_requested.connect(self._on_verification_requested)
         workbench.folder_watch.counted.connect(setup.folder.set_others)
-        workbench.folder_watch.doubted.connect(setup.folder.set_fault)
+        workbench.folder_watch.fault_changed.connect(setup.folder.set_fault)
         workbench.library.changed.connect(self._refresh)
         workbench.selection.changed.connect(self._on_selected)
         workbench.run.changed.connect(self._show_trial)

@@ -60,7 +60,7 @@ class Pictures(Translated, QWidget):
 
     def _retranslate(self) -> None:
         self._heading.setText(translate("Introduction", "Where is the tip of the pen?"))
-        told = (
+        texts = (
             translate(
                 "Introduction",
                 "The pen carries LEDs that a camera observes. To measure points "
@@ -73,7 +73,7 @@ class Pictures(Translated, QWidget):
                 "only point of the pen that does not move is the tip centre.",
             ),
         )
-        for label, text in zip(self._words, told, strict=True):
+        for label, text in zip(self._words, texts, strict=True):
             label.setText(text)
         rows = "".join(
             f"<li><b>{name}</b> \N{EN DASH} {what}</li>" for name, what in _steps()

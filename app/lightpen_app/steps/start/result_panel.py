@@ -52,7 +52,7 @@ class LastResult:
     is_named : bool
         Whether pen and tip are named at all.
     fault : str
-        Why it cannot be told; else empty.
+        Why it is unknown; else empty.
     is_simulated : bool
         Whether the pen is simulated.
     """
@@ -174,8 +174,8 @@ class LastResultPanel(Translated, QGroupBox):
 
     def set_why_unverified(self, why_not: str) -> None:
         """Say why the tip cannot be verified now, or let it."""
-        told = self.tr("Verify the tip on reference artefacts within minutes.")
-        self._verify.set_why_not(why_not, told)
+        tooltip = self.tr("Verify the tip on reference artefacts within minutes.")
+        self._verify.set_why_not(why_not, tooltip)
 
     def words(self) -> tuple[str, ...]:
         """Return the texts, line by line."""

@@ -30,7 +30,7 @@ class SoundTest(Translated, QWidget):
         super().__init__(parent)
         self._sounds = sounds
         self._waiting: list[Sound] = []
-        self._is_silent = False  # as was told last
+        self._is_silent = False  # as last reported
 
         # Widgets
         self._button = PushButton()
@@ -64,12 +64,12 @@ class SoundTest(Translated, QWidget):
         self.stop()
         self._is_silent = bool(self._silence())
         if self._is_silent:
-            self._tell_silence()
+            self._report_silence()
             return
         self._waiting = list(Sound)
         self._play_next()
 
-    def _tell_silence(self) -> None:
+    def _report_silence(self) -> None:
         """Report why audio is unavailable, as long as it is."""
         silence = self._silence()
         self._words.set_value(
@@ -81,7 +81,7 @@ class SoundTest(Translated, QWidget):
 
     def _play_next(self) -> None:
         if self._is_silent:
-            self._tell_silence()
+            self._report_silence()
             return
         if not self._waiting:
             self._words.set_value(StatusMessage())

@@ -19,11 +19,11 @@ class SpinRecorder(QObject):
 
     Signals
     -------
-    told(str)
+    message_sent(str)
         How far the spin is, or why it does not show the axis yet.
     """
 
-    told = Signal(str)
+    message_sent = Signal(str)
 
     def __init__(self, live: LiveView, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -37,7 +37,7 @@ class SpinRecorder(QObject):
         self._rotations.clear()
         self._is_on = True
         self._live.image_shown.connect(self._on_image_shown)
-        self.told.emit(
+        self.message_sent.emit(
             self.tr("Press the tip into the cone and turn the pen about its stylus.")
         )
 
@@ -75,11 +75,11 @@ class SpinRecorder(QObject):
         try:
             found = self.fit()
         except CalibrationError as error:
-            self.told.emit(worded(error.message))
+            self.message_sent.emit(worded(error.message))
         else:
-            told = self.tr("Rotation {0}°; U (k = 2) of the axis {1}°")
-            self.told.emit(
-                told.format(
+            text = self.tr("Rotation {0}°; U (k = 2) of the axis {1}°")
+            self.message_sent.emit(
+                text.format(
                     f"{np.degrees(found.turn):.0f}",
                     f"{np.degrees(found.expanded_uncertainty):.2f}",
                 )

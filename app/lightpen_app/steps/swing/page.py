@@ -239,7 +239,7 @@ class SwingPage(Page):
 
     def _start_anew(self) -> None:
         if why_not := self._missing_input():
-            self._notices.tell(self.key, why_not)
+            self._notices.notify(self.key, why_not)
             return
         self._runner.start_over()
         self._face.dial.setFocus()  # Enter would restart

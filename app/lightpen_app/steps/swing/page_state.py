@@ -112,16 +112,16 @@ def advance_progress(
         return before
     short = measure_shortfall(setup, state)
     swing = status.record_folder, setup.limits
-    told = None
+    to_go = None
     if before is not None and swing == (before.record_folder, before.limits):
-        told = before.to_go
+        to_go = before.to_go
     if not isfinite(state.kept.uncertainty):
-        told = None
-    elif told is None:
-        told = RemainingImages.first(short.n_more, state.n_kept)
+        to_go = None
+    elif to_go is None:
+        to_go = RemainingImages.first(short.n_more, state.n_kept)
     else:
-        told = told.after(short.n_more, state.n_kept)
-    return SwingProgress(state.kept, *swing, short, told)
+        to_go = to_go.after(short.n_more, state.n_kept)
+    return SwingProgress(state.kept, *swing, short, to_go)
 
 
 class SwingPresenter(QObject):

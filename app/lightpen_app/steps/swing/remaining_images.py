@@ -13,8 +13,8 @@ LEAST_RISE = 2  # by which a small figure must be wrong before it is reported
 class RemainingImages:
     """Displayed number of remaining images.
 
-    What is estimated again with each image goes up and down. Told is the least of it,
-    but for a rise that is more than chance, and after images were dropped.
+    The estimate is renewed with each image and fluctuates. Its minimum is displayed,
+    except after a significant rise and after images were dropped.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class RemainingImages:
     fraction : float
         Of all images, that are there; it goes back only when images are dropped.
     has_risen : bool
-        Whether more are to go than was told before, though none were dropped.
+        Whether more remain than were displayed before, though none were dropped.
     """
 
     n_images: int

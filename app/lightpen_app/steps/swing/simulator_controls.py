@@ -33,7 +33,7 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         super().__init__(live, parent)
         self.setProperty("area", "panel")
         self._room = NO_ROOM  # so that its least size at first widens no window
-        self._led: Operator | None = None  # who was told to seat the tip and follow
+        self._led: Operator | None = None  # that was set to seat the tip and follow
 
         # Widgets
         self._follow = PushButton(checkable=True)
@@ -100,8 +100,8 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
             (self.tr("Slip"), slip),
             (self.tr("Cover"), self.tr("Covers the LEDs for a moment")),
         )
-        for button, (text, told) in zip(self._buttons, words, strict=True):
-            set_words(button, text, told)
+        for button, (text, tooltip) in zip(self._buttons, words, strict=True):
+            set_words(button, text, tooltip)
 
     def _lead_by_hand(self) -> None:
         self._follow.setChecked(False)

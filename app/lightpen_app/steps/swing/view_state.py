@@ -40,14 +40,14 @@ from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.state_banner import State
 
 ENDED = (Phase.SOLVING, Phase.VERDICT)
-PRESSED = (  # told where the tip is to be pressed into the cone
+PRESSED = (  # shown where the tip is to be pressed into the cone
     *(Code.SEAT_TIP, Code.SWING_TO_SEAT, Code.HOLD_STILL),
     *(Code.STARTS_IN, Code.FOLLOW_ARROW),
 )
 FLAWS = (Code.FEW_LEDS, Code.TOO_FAST, Code.BAD_FIT)  # images that are not kept
 UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
 PACE_S, N_PACING = 15.0, 6  # last seconds and images for the remaining time
-LONG_S = 90.0  # told in minutes
+LONG_S = 90.0  # shown in minutes
 FEW = 5  # images by which a misfit is reported
 
 _LOOKS: dict[Phase, tuple[Sign, Tone]] = {
@@ -142,10 +142,10 @@ class SwingWords(QObject):
 
     def operator_value(self, moment: SwingViewState) -> OperatorValue:
         """Return the content of page and operator view."""
-        told = self._told(moment)
+        instruction = self._current_instruction(moment)
         return OperatorValue(
-            instruction=told.short,
-            hint=told.hint,
+            instruction=instruction.short,
+            hint=instruction.hint,
             state=self._banner(moment),
             count=self._count(moment),
             time_left=self._time_left(moment),
@@ -156,12 +156,12 @@ class SwingWords(QObject):
 
     def resting_value(self) -> OperatorValue:
         """Return the content without a swing, while another step is shown."""
-        told = Instruction(
+        instruction = Instruction(
             self.tr("No swing yet"),
             self.tr("The swing starts when the step Swing is opened at the computer."),
         )
         state = State(phase_text(Phase.WAIT), "", *_LOOKS[Phase.WAIT])
-        return OperatorValue(told.short, told.hint, state)
+        return OperatorValue(instruction.short, instruction.hint, state)
 
     def waiting_value(self, refusal: Message | None, *, is_near: bool) -> OperatorValue:
         """Return the content before a swing.
@@ -174,16 +174,18 @@ class SwingWords(QObject):
             Whether images come, so that a swing begins at any moment.
         """
         if is_near and refusal is None:
-            told = phrase(SHOW_PEN)
+            instruction = phrase(SHOW_PEN)
             state = State(phase_text(Phase.WAIT), "", *_LOOKS[Phase.WAIT])
-            return OperatorValue(told.short, told.hint, state, dial=DialValue())
-        told = self._no_images()
+            return OperatorValue(
+                instruction.short, instruction.hint, state, dial=DialValue()
+            )
+        instruction = self._no_images()
         if refusal is not None:
-            told = Instruction(self.tr("No swing"), worded(refusal))
+            instruction = Instruction(self.tr("No swing"), worded(refusal))
         return OperatorValue(
-            instruction=told.short,
-            hint=told.hint,
-            state=State(told.short, "", Sign.CROSS, Tone.BAD),
+            instruction=instruction.short,
+            hint=instruction.hint,
+            state=State(instruction.short, "", Sign.CROSS, Tone.BAD),
             dial=DialValue(),
         )
 
@@ -233,7 +235,7 @@ class SwingWords(QObject):
         dial = moment.dial
         return DisplayedPosture(pen, tip, dial.posture, dial.target, dial.heading)
 
-    def _told(self, moment: SwingViewState) -> Instruction:
+    def _current_instruction(self, moment: SwingViewState) -> Instruction:
         state = moment.state
         message, heading = state.message, state.heading
         if moment.lacks_images and state.pause is Pause.BY_USER:
@@ -249,7 +251,7 @@ class SwingWords(QObject):
                 self.tr("Not computed"),
                 self.tr("The images are saved. Compute the tip again or start over."),
             )
-        told = phrase(message, heading)
+        instruction = phrase(message, heading)
         if moment.is_accepted:
             return Instruction(
                 self.tr("Accepted"), self.tr("You can put the pen down.")
@@ -257,30 +259,30 @@ class SwingWords(QObject):
         if moment.verdict is not None:
             return self._next_step(moment, moment.verdict)
         if state.phase is Phase.VERDICT:
-            return Instruction(told.short)  # the banner has the reason
+            return Instruction(instruction.short)  # the banner has the reason
         if moment.is_away and state.pause is Pause.BY_USER:
             hint = self.tr("Return to the step Swing at the computer to continue.")
-            return Instruction(told.short, hint)
+            return Instruction(instruction.short, hint)
         if moment.has_fault and state.pause is Pause.BY_USER:
             hint = self.tr(
                 "An image could not be recorded (see the message at the top). "
                 "Correct the cause, then press Space."
             )
-            return Instruction(told.short, hint)
+            return Instruction(instruction.short, hint)
         if message.code == Code.SOLVING and moment.setup.is_recording:
-            return Instruction(told.short, self.tr("Computing the tip"))
+            return Instruction(instruction.short, self.tr("Computing the tip"))
         if message.code == Code.SHOW_PEN and moment.is_simulated:
             hint = self.tr(
                 "Let the simulated operator swing; or press Seat and tilt the pen "
                 "by dragging the dial."
             )
-            return Instruction(told.short, hint)
+            return Instruction(instruction.short, hint)
         if message.code == Code.FOLLOW_ARROW and state.target and heading is not None:
-            told = lean_phrase(state.target, _posture(moment), heading)
+            instruction = lean_phrase(state.target, _posture(moment), heading)
         if moment.setup.is_press_test and message.code in PRESSED:
             hint = self.tr("Press test: press the tip firmly into the cone.")
-            return replace(told, hint=hint)
-        return told
+            return replace(instruction, hint=hint)
+        return instruction
 
     def _next_step(self, moment: SwingViewState, verdict: Verdict) -> Instruction:
         steps = {
@@ -343,15 +345,15 @@ class SwingWords(QObject):
                 *_LOOKS[Phase.VERDICT],
             )
         if moment.is_accepted:
-            told = accepted_phrase(moment.origin)
-            words = told.hint or self.tr("The tip is now in use.")
-            return State(told.short, words, *GRADE_MARKS[moment.verdict.grade])
-        told = phrase(moment.verdict.reason, moment.state.heading)
+            instruction = accepted_phrase(moment.origin)
+            words = instruction.hint or self.tr("The tip is now in use.")
+            return State(instruction.short, words, *GRADE_MARKS[moment.verdict.grade])
+        instruction = phrase(moment.verdict.reason, moment.state.heading)
         grade = moment.verdict.grade
         sign, tone = GRADE_MARKS[grade]
         word = grade_text(grade)
         fraction = moment.stillness if moment.asks_upright else 0.0
-        return State(word, told.hint, sign, tone, fraction or None)
+        return State(word, instruction.hint, sign, tone, fraction or None)
 
     def _count(self, moment: SwingViewState) -> str:
         state, n_kept = moment.state, moment.state.n_kept

@@ -73,7 +73,7 @@ class PenPanel(Translated, QWidget):
         self._progress = QProgressBar()
         self._progress.setRange(0, PROGRESS_STEPS)
         self._progress.setTextVisible(False)
-        self._told = SignLabel()
+        self._label = SignLabel()
         self._use = PushButton()
 
         # Layout
@@ -85,7 +85,7 @@ class PenPanel(Translated, QWidget):
             (self._improve, 0, Qt.AlignmentFlag.AlignTop),
             (self._cancel, 0, Qt.AlignmentFlag.AlignTop),
             (self._progress, 1),
-            (self._told, 1, Qt.AlignmentFlag.AlignTop),
+            (self._label, 1, Qt.AlignmentFlag.AlignTop),
             (self._use, 0, Qt.AlignmentFlag.AlignTop),
         )
         fill(layout, self._head, self._table, (self._plot, 1))
@@ -258,17 +258,17 @@ class PenPanel(Translated, QWidget):
         self._improve.set_why_not(self._why_not_improve())
         self._cancel.setVisible(is_busy)
         self._progress.setVisible(is_busy)
-        self._told.set_value(self._told_message())
-        self._told.setVisible(not is_busy)
+        self._label.set_value(self._message())
+        self._label.setVisible(not is_busy)
         self._use.setVisible(self._new is not None and not is_busy)
 
     def _health_message(self, health: PenHealth | None) -> StatusMessage:
         if self._unread:
             return StatusMessage(self._unread, Sign.CROSS, Tone.BAD)
         if health is not None:
-            told = health.assessment
-            words = f"{worded(told.reason)} {worded(BY_SIMPLE_ACCEPTANCE)}"
-            return StatusMessage(words, *GRADE_MARKS[told.grade])
+            assessment = health.assessment
+            words = f"{worded(assessment.reason)} {worded(BY_SIMPLE_ACCEPTANCE)}"
+            return StatusMessage(words, *GRADE_MARKS[assessment.grade])
         if self._shown is None and self._reading is None:
             return StatusMessage()
         if self._shown is None:
@@ -300,7 +300,7 @@ class PenPanel(Translated, QWidget):
             return self.tr("An LED has moved: no LED file fits all swings.")
         return ""
 
-    def _told_message(self) -> StatusMessage:
+    def _message(self) -> StatusMessage:
         if self._new is None:
             return (
                 StatusMessage(self._fault, Sign.CROSS, Tone.BAD)
@@ -320,13 +320,13 @@ class PenPanel(Translated, QWidget):
         """Return the shift of each LED and the growth of the pen, by swing."""
         heads = *map(str, range(1, len(found.pen.leds) + 1)), self.tr("size")
         names, cells = [], []
-        for swing, told in list(zip(found.swings, health.swings, strict=True))[
+        for swing, judged in list(zip(found.swings, health.swings, strict=True))[
             -LATEST:
         ]:
             names.append(moment_text(swing.when, "yyyy-MM-dd hh:mm"))
-            lengths = np.linalg.norm(told.shifts, axis=1) * MICROMETRES
+            lengths = np.linalg.norm(judged.shifts, axis=1) * MICROMETRES
             moves = (number_text(x, 0) if np.isfinite(x) else "" for x in lengths)
-            growth = told.growth
+            growth = judged.growth
             size = "" if growth is None else number_text(PPM * growth.relative, 0)
             cells.append((*moves, size))
         return Figures(heads, tuple(names), tuple(cells))

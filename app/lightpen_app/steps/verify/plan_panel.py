@@ -185,7 +185,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         # Connections
         job.succeeded.connect(self.choose)
         job.succeeded.connect(lambda _: self._notices.withdraw(self))
-        job.failed.connect(partial(self._notices.tell, self))
+        job.failed.connect(partial(self._notices.notify, self))
         job.start()
 
     def _folder(self) -> str:
@@ -262,7 +262,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         job = Job(work, self)
 
         # Connections
-        job.failed.connect(partial(self._notices.tell, self))
+        job.failed.connect(partial(self._notices.notify, self))
         job.succeeded.connect(lambda _: self._on_saved(path))
         job.start()
 

@@ -90,15 +90,15 @@ class VerifyPresenter(QObject):
 
     def operator_value(self) -> OperatorValue:
         """Return the content of page and operator view."""
-        status, said, banner = self._status, self._instruction(), self._banner()
+        status, instruction, banner = self._status, self._instruction(), self._banner()
         setup, state, task = status.setup, status.state, status.task
         if setup is None or state is None or task is None:
-            return OperatorValue(said.short, said.hint, banner)
+            return OperatorValue(instruction.short, instruction.hint, banner)
         options = setup.choices.options_of(task)
         shown = task.shows_postures
         return OperatorValue(
-            instruction=said.short,
-            hint=said.hint,
+            instruction=instruction.short,
+            hint=instruction.hint,
             state=banner,
             count=worded(task.counted(options, state.progress(setup, task))),
             fraction=fraction_done(setup, state),

@@ -101,7 +101,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._question.agreed.connect(self._begin_anew)
         self._accept.clicked.connect(self._ask_reason)
         self._report.clicked.connect(self._on_report_clicked)
-        self._paper.failed.connect(partial(workbench.notifications.tell, self))
+        self._paper.failed.connect(partial(workbench.notifications.notify, self))
         self._paper.saved.connect(self._on_saved)
         self._reason.given.connect(self._on_reason_given)
         self._reason.declined.connect(self._accept.setFocus)

@@ -84,13 +84,17 @@ class TaskPanel(Translated, QWidget):
             progress = state.progress(setup, task)
             has_points = bool(progress.points or progress.runs)
         self._anew.setEnabled(found is not None or has_points)
-        said = None if found is None else found.assessment
-        if status.is_done and said is status.assessment:  # it stands above all tasks
-            said = None
+        assessment = None if found is None else found.assessment
+        if (
+            status.is_done and assessment is status.assessment
+        ):  # it stands above all tasks
+            assessment = None
         self._verdict.set_value(
             StatusMessage()
-            if said is None
-            else StatusMessage(worded(said.reason), *GRADE_MARKS[said.grade])
+            if assessment is None
+            else StatusMessage(
+                worded(assessment.reason), *GRADE_MARKS[assessment.grade]
+            )
         )
         self._images.set_progress(reading)
 

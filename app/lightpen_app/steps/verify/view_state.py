@@ -70,7 +70,7 @@ def is_held(state: SessionState) -> bool:
 
 def lamps_message(status: VerificationStatus) -> StatusMessage:
     """Return the drift of fixed lamps, unless it is the verdict."""
-    said = None if status.lamp_drift is None else status.lamp_drift.assessment
-    if said is None or (status.is_done and said is status.assessment):
+    assessment = None if status.lamp_drift is None else status.lamp_drift.assessment
+    if assessment is None or (status.is_done and assessment is status.assessment):
         return StatusMessage()
-    return StatusMessage(worded(said.reason), *GRADE_MARKS[said.grade])
+    return StatusMessage(worded(assessment.reason), *GRADE_MARKS[assessment.grade])

@@ -28,7 +28,7 @@ from lightpen.model.ellipse import conic_images
 MAX_SPOTS = 14  # of which triples are made
 MAX_GAP = 1.15  # between two LEDs, over the size of the pen
 MIN_AREA = 0.1  # of a triangle of spots over that of the pen's largest, seen face on
-RANGE_SIGMA = 0.02  # of the distance told by one spot, relative
+RANGE_SIGMA = 0.02  # of the distance known from one spot, relative
 SCALE_SIGMA = 0.1  # of all distances alike: blur, threshold, disc diameter
 COARSE_SHAPE_TOLERANCE = 0.25  # difference of shapes over their trace
 TINY = 1e-12  # px^2, keeps the shape of a point from dividing by zero

@@ -222,15 +222,15 @@ class FileFit:
     def _solved(self, released: tuple[int, ...]) -> _Estimate:
         key = tuple(sorted(released))
         if key not in self._solutions:
-            freed = self.stated
+            covariance = self.stated
             for i in key:
                 each = self.numbers[i]
                 change = abs(float(each.by @ self._as_stated.values))
                 width = RELEASED_WIDTH * max(
                     change, float(np.sqrt(self._prior_variance(i)))
                 )
-                freed = freed + width**2 * np.outer(each.along, each.along)
-            self._solutions[key] = self._solved_with(freed)
+                covariance = covariance + width**2 * np.outer(each.along, each.along)
+            self._solutions[key] = self._solved_with(covariance)
         return self._solutions[key]
 
     def _solved_with(self, stated: FloatArray) -> _Estimate:

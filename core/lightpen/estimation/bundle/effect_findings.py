@@ -72,12 +72,12 @@ class FoundEffect:
     def message(self) -> Message:
         """The message to the user: what it is, how large, what to do."""
         if self.name in _TIMES:
-            told = _TIMES[self.name](self.size, self.interval_ms)
+            finding = _TIMES[self.name](self.size, self.interval_ms)
         else:
-            told = _LENGTHS[self.name](self.size)
+            finding = _LENGTHS[self.name](self.size)
         if not self.camera:
-            return told
-        return message("rig.of-camera", camera=self.camera, fault=told)
+            return finding
+        return message("rig.of-camera", camera=self.camera, fault=finding)
 
 
 def found_effects(

@@ -68,11 +68,11 @@ def find_led_noise(
     weighed = float(np.sum(squares / weights**2))
     freedom = min(weighed / (sigma**2 * max(counts.sum(), 1.0)), 1.0)
     free = counts * freedom
-    told = free >= MIN_FREE
-    if told.sum() < 2:
+    known = free >= MIN_FREE
+    if known.sum() < 2:
         return None
-    logs = np.log(np.maximum(squares[told] / free[told], LEAST))
-    by_chance = 2 / free[told]
+    logs = np.log(np.maximum(squares[known] / free[known], LEAST))
+    by_chance = 2 / free[known]
     mean = np.sum(logs / by_chance) / np.sum(1 / by_chance)
     misfit = float(np.sum((logs - mean) ** 2 / by_chance))
     if misfit < chi_square_quantile(len(logs) - 1, CERTAIN):
@@ -80,5 +80,5 @@ def find_led_noise(
     middle = float(np.median(logs))  # a few noisy LEDs are the usual case
     spread = max(float(np.mean((logs - middle) ** 2 - by_chance)), 0.0)
     noise = np.ones(counts.shape)
-    noise[told] = np.exp(0.5 * (logs - middle) * spread / (spread + by_chance))
+    noise[known] = np.exp(0.5 * (logs - middle) * spread / (spread + by_chance))
     return noise if noise.max() > WORTH_IT * noise.min() else None

@@ -25,7 +25,7 @@ class SeatModes(NamedTuple):
     Attributes
     ----------
     lean : (N, 7) array
-        Of the seat, see `lean_modes`.
+        Of the seat, see `tilt_modes`.
     oval : (21, 2) array
         Moves in these modes by an oval seat, see `oval_seat`.
     drift : (N, D) array
@@ -45,7 +45,7 @@ def seat_modes_of(rotations: FloatArray, shifts: FloatArray | None = None) -> Se
     shifts : (N, k) array, optional
         Shifts of fixed lamps, see `drift_modes`.
     """
-    lean, oval = lean_modes(rotations), oval_seat(rotations)
+    lean, oval = tilt_modes(rotations), oval_seat(rotations)
     return SeatModes(lean, oval, drift_modes(len(rotations), shifts))
 
 
@@ -66,8 +66,8 @@ def drift_modes(n_images: int, shifts: FloatArray | None = None) -> FloatArray:
     return np.column_stack([time, shifts[:, ranges > 0] / ranges[ranges > 0]])
 
 
-def lean_modes(rotations: FloatArray) -> FloatArray:
-    """Return the seat modes by the lean of the pen, (N, 7).
+def tilt_modes(rotations: FloatArray) -> FloatArray:
+    """Return the seat modes as functions of the tilt of the pen, (N, 7).
 
     Cosine and sine of one to three waves round the cone, and the tilt, less their
     means, each of mean square 1 (or 0).
@@ -82,7 +82,7 @@ def lean_modes(rotations: FloatArray) -> FloatArray:
 
 
 def oval_seat(rotations: FloatArray) -> FloatArray:
-    """Return the moves in the modes of `lean_modes` by an oval seat, (21, 2).
+    """Return the moves in the modes of `tilt_modes` by an oval seat, (21, 2).
 
     A ball or cone with two lobes, 1 mm off the circle, moves the tip away from the axis
     by equation (7) with a = 1 mm: one wave and three waves round the cone. The two

@@ -41,7 +41,7 @@ class _PoseMistake:
     """A usual mistake: how it is undone, and its message."""
 
     undo: Callable[[FloatArray, FloatArray], Poses]
-    said: Callable[[float, float], Message]
+    message: Callable[[float, float], Message]
 
 
 def require_usual_reading(rotations: FloatArray, translations: FloatArray) -> None:
@@ -69,7 +69,7 @@ def require_usual_reading(rotations: FloatArray, translations: FloatArray) -> No
     likeliest = int(np.argmin(undone))
     closer = undone[likeliest] < MUCH_CLOSER * as_read
     if closer and as_read > ROUNDING * typical:
-        raise CalibrationError(_MISTAKES[likeliest].said(as_read, undone[likeliest]))
+        raise CalibrationError(_MISTAKES[likeliest].message(as_read, undone[likeliest]))
     _require_tip(R, t, as_read)
 
 
@@ -121,7 +121,7 @@ def _flipped(axis: int) -> _PoseMistake:
     )
 
 
-def _said_of_quaternions(as_read: float, undone: float) -> Message:
+def _quaternion_message(as_read: float, undone: float) -> Message:
     return message("poses.quaternion-order", as_read=as_read, undone=undone)
 
 
@@ -132,7 +132,7 @@ _MISTAKES = (
             "poses.transposed", as_read=as_read, undone=undone
         ),
     ),
-    _PoseMistake(lambda R, t: (_with_scalar_moved(R, 1), t), _said_of_quaternions),
-    _PoseMistake(lambda R, t: (_with_scalar_moved(R, -1), t), _said_of_quaternions),
+    _PoseMistake(lambda R, t: (_with_scalar_moved(R, 1), t), _quaternion_message),
+    _PoseMistake(lambda R, t: (_with_scalar_moved(R, -1), t), _quaternion_message),
     *(_flipped(axis) for axis in range(3)),
 )

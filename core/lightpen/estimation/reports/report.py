@@ -362,8 +362,8 @@ def _frames_of(images: CameraImages | SecondCone) -> Iterator[FrameRecord]:
     rms, widths = plain(images.rms), plain(observations.edge_widths)
     leds_used, lamps = images.leds_used.tolist(), plain(observations.lamps)
     for i, reason in enumerate(images.reasons):
-        told = observations.details[i]
-        detail = None if told is None else StoredMessage.of(told)
+        finding = observations.details[i]
+        detail = None if finding is None else StoredMessage.of(finding)
         yield FrameRecord(
             file=observations.names[i],
             used=reason is Reason.NONE,

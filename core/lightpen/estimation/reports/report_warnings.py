@@ -25,11 +25,11 @@ def lamp_warnings(calibration: Calibration) -> list[Message]:
         if path is None or path.moved == 0:
             continue
         if path.is_followed:
-            told = message("warning.camera-moved", shift=path.moved)
+            warning = message("warning.camera-moved", shift=path.moved)
         else:
             x, y = path.lamps[0]
-            told = message("warning.lamp-moved", x=x, y=y, shift=path.moved)
-        warnings.append(of_camera(rig.names[c], told) if rig.names else told)
+            warning = message("warning.lamp-moved", x=x, y=y, shift=path.moved)
+        warnings.append(of_camera(rig.names[c], warning) if rig.names else warning)
     return warnings
 
 

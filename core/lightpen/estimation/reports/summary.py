@@ -246,9 +246,9 @@ def _lamp_lines(calibration: Calibration) -> list[str]:
         path = images.path
         if path is None:
             continue
-        told = f"they stay in place to {path.noise:.3f} px"
+        motion = f"they stay in place to {path.noise:.3f} px"
         if path.moved > 0:
-            told = f"they move by {path.moved:.2f} px, "
-            told += "which is taken out" if path.is_followed else "the pen does not"
-        lines.append(f"Fixed lamps  {len(path.lamps)} in view; {told}")
+            motion = f"they move by {path.moved:.2f} px, "
+            motion += "which is taken out" if path.is_followed else "the pen does not"
+        lines.append(f"Fixed lamps  {len(path.lamps)} in view; {motion}")
     return lines

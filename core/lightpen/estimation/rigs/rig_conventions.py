@@ -49,7 +49,7 @@ class _RigMistake:
     """A usual mistake: how it is undone, and its message."""
 
     undo: Callable[[_Places], _Places]
-    said: Message
+    description: Message
 
 
 class _Distance(NamedTuple):
@@ -106,10 +106,10 @@ def require_usual_rig(
             "rig.either-mistaken",
             where=where,
             one=_exchange(rig, *pair),
-            other=mistake.said,
+            other=mistake.description,
         )
     if are_exchanged or is_mistaken:
-        cause = _exchange(rig, *pair) if are_exchanged else mistake.said
+        cause = _exchange(rig, *pair) if are_exchanged else mistake.description
         raise CalibrationError("rig.mistaken", where=where, cause=cause)
     if as_read.size > FAR_OFF:
         raise CalibrationError("rig.of-others", where=where)
@@ -204,7 +204,7 @@ def _in_unit(unit: Message) -> Message:
 
 
 def _in_unit_too(mistake: _RigMistake, unit: Message) -> Message:
-    return message("rig.direction-and-unit", direction=mistake.said, unit=unit)
+    return message("rig.direction-and-unit", direction=mistake.description, unit=unit)
 
 
 _MISTAKES = (

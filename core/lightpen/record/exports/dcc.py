@@ -88,8 +88,8 @@ def _add_administrative_data(
             _value(person, "mainSigner", str(is_main).lower())
     _add_contact(_sub(data, "customer"), laboratory)
     statements = _sub(data, "statements")
-    said = _sub(_sub(statements, "statement"), "declaration")
-    _content(said, NO_CERTIFICATE)
+    declaration = _sub(_sub(statements, "statement"), "declaration")
+    _content(declaration, NO_CERTIFICATE)
 
 
 def _add_result(result: Element, file: CalibrationFile, laboratory: Laboratory) -> None:

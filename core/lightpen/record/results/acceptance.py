@@ -130,8 +130,8 @@ def takes_supervisor(
 
     It is beyond the limit, or its station has no limits.
     """
-    told = assessment.verdict.reason, *assessment.doubts
-    is_beyond = any(each.code in BEYOND_LIMIT for each in told)
+    findings = assessment.verdict.reason, *assessment.doubts
+    is_beyond = any(each.code in BEYOND_LIMIT for each in findings)
     return supervision.is_guarded and (is_beyond or supervision.is_unknown(station))
 
 

@@ -320,8 +320,8 @@ def recorded_names(record: Record) -> Names:
 
 def recorded_origin(record: Record) -> Origin | None:
     """Return the origin of the images of a record; None if not stated."""
-    said = record.header.settings.get("origin")
-    return Origin(said) if said in set(Origin) else None
+    stated = record.header.settings.get("origin")
+    return Origin(stated) if stated in set(Origin) else None
 
 
 def is_of_recording(record: Record) -> bool:

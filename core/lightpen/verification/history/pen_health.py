@@ -112,7 +112,7 @@ def examine_pen(
     require_one_pen(calibrations)
     if len(calibrations) < MIN_SWINGS:
         raise CalibrationError("pen-health.too-few")
-    first, sized = calibrations[0], next(filter(_tells_size, calibrations), None)
+    first, sized = calibrations[0], next(filter(_has_size, calibrations), None)
     swings = [
         SwingOfPen(
             name=each.path.name,
@@ -179,7 +179,7 @@ def _growth(
     first: CalibrationFile, now: CalibrationFile, camera: Camera
 ) -> Growth | None:
     is_other = now.camera_sha256 != first.camera_sha256
-    if now is first or is_other or not _tells_size(now):
+    if now is first or is_other or not _has_size(now):
         return None
     one, other = _cone_seen(first, camera), _cone_seen(now, camera)
     if one is None or other is None:
@@ -192,7 +192,7 @@ def _growth(
     return Growth(float(np.log(one[2] / other[2])), spread)
 
 
-def _tells_size(swing: CalibrationFile) -> bool:
+def _has_size(swing: CalibrationFile) -> bool:
     """Return whether its distance is that of the files, which then cancel."""
     return not (swing.is_of_rig or swing.calibration.adjusted.contradictions)
 

@@ -137,22 +137,22 @@ def _assessment(change: FloatArray, covariance: FloatArray) -> VerificationAsses
     along, variance = change[ALONG_PEN], covariance[ALONG_PEN, ALONG_PEN]
     uncertainty = COVERAGE_FACTOR * float(np.sqrt(variance))
     if along**2 > chi_square_quantile(1, BY_CHANCE) * variance:
-        told = message(
+        reason = message(
             "press-test.gives-way", change=abs(float(along)), uncertainty=uncertainty
         )
-        return check(told, STIFFEN)
+        return check(reason, STIFFEN)
     moved, spread = change[CONE], covariance[CONE, CONE]
     known = np.linalg.solve(spread, moved)
     if float(moved @ known) > chi_square_quantile(3, BY_CHANCE):
         distance = float(np.linalg.norm(moved))
         across = moved / distance
-        told = message(
+        reason = message(
             "press-test.cone-moved",
             distance=distance,
             uncertainty=COVERAGE_FACTOR * float(np.sqrt(across @ spread @ across)),
         )
-        return check(told, CLAMP)
+        return check(reason, CLAMP)
     if uncertainty > RESOLVED:
         return check(message("press-test.coarse", uncertainty=uncertainty), MORE_IMAGES)
-    told = message("press-test.steady", change=float(along), uncertainty=uncertainty)
-    return accepted(told, KEEP)
+    reason = message("press-test.steady", change=float(along), uncertainty=uncertainty)
+    return accepted(reason, KEEP)

@@ -107,7 +107,7 @@ class ProbingState:
     ----------
     held : tuple of TipObservation
         Through which the pen is still; at rest the first and the last one.
-    doubted : TipObservation or None
+    deviating : TipObservation or None
         The last one, if it disagrees.
     rejected : tuple of RejectedFrame
         Between those that are held.
@@ -125,7 +125,7 @@ class ProbingState:
 
     phase: ProbingPhase = ProbingPhase.MOVING
     held: tuple[TipObservation, ...] = ()
-    doubted: TipObservation | None = None
+    deviating: TipObservation | None = None
     rejected: tuple[RejectedFrame, ...] = ()
     n_lost: int = 0
     path: tuple[FloatArray, ...] = ()
@@ -171,21 +171,26 @@ def advance_touch(
     state = replace(state, n_lost=0)
     if state.phase is ProbingPhase.AT_REST and not _has_left(state.held, seen):
         rest = (*state.held[:1], seen)
-        return ProbingTransition(replace(state, held=rest, doubted=None))
+        return ProbingTransition(replace(state, held=rest, deviating=None))
     if not state.held or rules.n_frames == 1:
         return _moved_to(rules, state, (seen,))
     if _agrees(state.held, seen):
         rejected = state.rejected
-        if state.doubted is not None:
-            rejected = (*rejected, RejectedFrame(_name(state.doubted), Reason.SLIPPED))
-        state = replace(state, doubted=None, rejected=rejected)
+        if state.deviating is not None:
+            rejected = (
+                *rejected,
+                RejectedFrame(_name(state.deviating), Reason.SLIPPED),
+            )
+        state = replace(state, deviating=None, rejected=rejected)
         if state.phase is not ProbingPhase.HOLDING:
             return ProbingTransition(state)
         return _held(rules, replace(state, held=(*state.held, seen)))
-    if state.doubted is None:
-        return ProbingTransition(replace(state, doubted=seen))
-    both_elsewhere = _agrees((state.doubted,), seen)
-    return _moved_to(rules, state, (state.doubted, seen) if both_elsewhere else (seen,))
+    if state.deviating is None:
+        return ProbingTransition(replace(state, deviating=seen))
+    both_elsewhere = _agrees((state.deviating,), seen)
+    return _moved_to(
+        rules, state, (state.deviating, seen) if both_elsewhere else (seen,)
+    )
 
 
 def at_rest(state: ProbingState) -> ProbingState:
@@ -304,7 +309,7 @@ def _let_go(state: ProbingState) -> ProbingTransition:
             state,
             phase=ProbingPhase.MOVING,
             held=(),
-            doubted=None,
+            deviating=None,
             rejected=(),
             path=path,
         ),

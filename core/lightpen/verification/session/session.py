@@ -79,7 +79,7 @@ def advance_session(
         return SessionTransition(state)
     rules = rules_of(setup, state, task)
     touched = advance_touch(setup.instrument, rules, state.touching, name, detection)
-    events = tuple(each for each in touched.events if _is_worth_telling(rules, each))
+    events = tuple(each for each in touched.events if _is_reported(rules, each))
     happened = {event.what for event in events}
     state = replace(state, touching=touched.state)
     if ProbingEventKind.BROKEN_OFF in happened:
@@ -342,7 +342,7 @@ def _screened(setup: SessionSetup, state: SessionState, task: AnyTask) -> Screen
     return task.screen(options, setup.conditions, state.progress(setup, task))
 
 
-def _is_worth_telling(rules: ProbingRules, event: ProbingEvent) -> bool:
+def _is_reported(rules: ProbingRules, event: ProbingEvent) -> bool:
     """Return whether an event is reported: small motions of a resting hand are not."""
     needed = rules.n_settling + WORTH_TELLING * rules.n_frames
     return event.what is ProbingEventKind.RECORDED or len(event.names) >= needed

@@ -159,9 +159,9 @@ class PointImages:
             if event.what is ProbingEventKind.RECORDED:
                 names.update(event.names)
         if not has_ended:
-            doubted = () if touching.doubted is None else (touching.doubted,)
+            deviating = () if touching.deviating is None else (touching.deviating,)
             held = touching.held if touching.phase is ProbingPhase.HOLDING else ()
-            names.update(seen.frame.name for seen in (*held, *doubted))
+            names.update(seen.frame.name for seen in (*held, *deviating))
         if any(event.what is ProbingEventKind.RECORDED for event in transition.events):
             self._touch += 1
         self._take_out([name for name in self._numbers if name not in names])

@@ -351,10 +351,10 @@ def _assessment(
     if against is not None:
         return against
     worst = max(runs, key=lambda run: run.form / max(limits.form, run.form_by_noise))
-    allowed = max(limits.form, worst.form_by_noise)
-    if worst.form > allowed:
+    form_limit = max(limits.form, worst.form_by_noise)
+    if worst.form > form_limit:
         return refused(
-            message("circle.form", run=worst.name, form=worst.form, limit=allowed),
+            message("circle.form", run=worst.name, form=worst.form, limit=form_limit),
             VERIFY_AGAIN,
         )
     lifted = [touch for run in runs for touch in run.left_out]

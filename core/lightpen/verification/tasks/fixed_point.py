@@ -232,16 +232,16 @@ def _assessment(
     deviation = found.calibrated.deviation
     n_free = len(found.touches) - 1
     by_chance = np.sqrt(chi_square_quantile(n_free, UNUSUAL) / n_free)
-    allowed = np.array([limits.across, limits.across, limits.along])
-    allowed = np.maximum(allowed, by_chance * found.expected_deviation)
-    axis = int(np.argmax(deviation / allowed))
-    if deviation[axis] > allowed[axis]:
+    limit = np.array([limits.across, limits.across, limits.along])
+    limit = np.maximum(limit, by_chance * found.expected_deviation)
+    axis = int(np.argmax(deviation / limit))
+    if deviation[axis] > limit[axis]:
         return refused(
             message(
                 "fixed-point.scatters",
                 deviation=float(deviation[axis]),
                 axis="uvw"[axis],
-                limit=float(allowed[axis]),
+                limit=float(limit[axis]),
             ),
             VERIFY_AGAIN,
         )

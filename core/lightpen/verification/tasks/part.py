@@ -161,12 +161,12 @@ def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) ->
     for position, motion in part.ties.items():
         if not motion.is_consistent:
             residual = float(motion.residuals.max())
-            said = message("part.datums-moved", position=position, residual=residual)
-            doubt = refused(said, message("part.probe-again"))
+            reason = message("part.datums-moved", position=position, residual=residual)
+            doubt = refused(reason, message("part.probe-again"))
             assessment = worst((doubt, assessment))
     if refinement is not None and not refinement.is_used:
-        said = _refined(refinement, conditions.instrument)
-        assessment = worst((assessment, check(said, message("part.check-known"))))
+        reason = _refined(refinement, conditions.instrument)
+        assessment = worst((assessment, check(reason, message("part.check-known"))))
     return Part(assessment, part, tuple(found), missing, refinement)
 
 
@@ -216,26 +216,26 @@ def _assessment(part: MeasuredPart, missing: tuple[str, ...]) -> VerificationAss
     n_judged = len(out) + len(unclear) + len(named(Decision.ACCEPTED))
     name = part.plan.name
     if out:
-        said = message(
+        reason = message(
             "part.out", n_out=len(out), names=_listed(out), part=name, n_judged=n_judged
         )
-        return refused(said, message("part.rework"))
+        return refused(reason, message("part.rework"))
     if missing and n_judged:
-        said = message("part.incomplete", part=name, names=_listed(missing))
-        return check(said, message("part.complete"))
+        reason = message("part.incomplete", part=name, names=_listed(missing))
+        return check(reason, message("part.complete"))
     if unclear:
-        said = message(
+        reason = message(
             "part.unclear",
             n_open=len(unclear),
             names=_listed(unclear),
             part=name,
             n_judged=n_judged,
         )
-        return check(said, message("part.more-points"))
+        return check(reason, message("part.more-points"))
     if not n_judged:
         n_features = len(part.features)
-        said = message("part.measured", part=part.plan.name, n_features=n_features)
-        return accepted(said, message("part.done"))
+        reason = message("part.measured", part=part.plan.name, n_features=n_features)
+        return accepted(reason, message("part.done"))
     return accepted(
         message("part.good", part=name, n_judged=n_judged), message("part.done")
     )

@@ -289,31 +289,31 @@ def _assessment(
     if against is not None:
         return against
     if error > max(limit, largest):
-        said = message(
+        reason = message(
             "plane.off",
             flatness=flatness,
             uncertainty=uncertainty,
             certified=certified,
             limit=limit,
         )
-        return refused(said, CALIBRATE_AGAIN)
+        return refused(reason, CALIBRATE_AGAIN)
     if left_out:
-        said = message(
+        reason = message(
             "plane.lifted", n_left_out=len(left_out), first=left_out[0].label
         )
-        return check(said, VERIFY_AGAIN)
+        return check(reason, VERIFY_AGAIN)
     if uncertainty > limit:
-        said = message("plane.uncertain", uncertainty=uncertainty, limit=limit)
-        return check(said, MORE_POINTS)
+        reason = message("plane.uncertain", uncertainty=uncertainty, limit=limit)
+        return check(reason, MORE_POINTS)
     if limits.decision(error, uncertainty, limit) is not Decision.ACCEPTED:
-        said = message(
+        reason = message(
             "plane.off",
             flatness=flatness,
             uncertainty=uncertainty,
             certified=certified,
             limit=limit,
         )
-        return check(said, MORE_POINTS)
+        return check(reason, MORE_POINTS)
     return with_power(
         message(
             "plane.good",

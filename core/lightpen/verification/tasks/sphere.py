@@ -296,9 +296,11 @@ def _assessment(
     if against is not None:
         return against
     found, by_noise = form
-    allowed = max(limits.form, by_noise)
-    if found > allowed:
-        return refused(message("sphere.form", form=found, limit=allowed), VERIFY_AGAIN)
+    form_limit = max(limits.form, by_noise)
+    if found > form_limit:
+        return refused(
+            message("sphere.form", form=found, limit=form_limit), VERIFY_AGAIN
+        )
     if left_out:
         first = left_out[0].label
         lifted = message("sphere.lifted", n_left_out=len(left_out), first=first)

@@ -232,14 +232,14 @@ def test_another_board_held_before_the_camera_is_named(
 ) -> None:
     window.board.set_board(parse_board("chessboard:8x6:20"))
     press(window, "Start")
-    told = []
+    reported = []
     for count in range(6):  # in 4 s
         workbench.live.image_shown.emit(_shown(images[0], 2 * count))
         qtbot.waitUntil(lambda: not window.is_searching)
-        told.append(remark(window))
+        reported.append(remark(window))
 
-    assert "not detected" in told[0]
-    assert "No image shows a chessboard of 8 x 6 inner corners;" in told[-1]
+    assert "not detected" in reported[0]
+    assert "No image shows a chessboard of 8 x 6 inner corners;" in reported[-1]
     press(window, "Stop")
 
 
@@ -251,8 +251,8 @@ def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
     tmp_path: Path,
     qtbot: QtBot,
 ) -> None:
-    told: list[CameraTrial] = []
-    window.concluded.connect(told.append)
+    reported: list[CameraTrial] = []
+    window.concluded.connect(reported.append)
     names = workbench.selection.preparation.names
     window.concluded.connect(
         lambda trial: workbench.archive_writer.keep_camera_trial(trial, names)
@@ -265,12 +265,12 @@ def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
         window.save(tmp_path / "camera.yaml")
     window.close()
 
-    assert [each.outcome for each in told] == [
+    assert [each.outcome for each in reported] == [
         TrialOutcome.REFUSED,
         TrialOutcome.ACCEPTED,
     ]
     first = sha256((tmp_path / "0.png").read_bytes()).hexdigest()
-    assert told[1].images["0.png"] == first
+    assert reported[1].images["0.png"] == first
     kept = workbench.folder / CAMERA_CALIBRATIONS
     qtbot.waitUntil(lambda: kept.is_dir() and len(list(kept.glob("*.json"))) == 2)
     record = json.loads((kept / "000002.json").read_bytes())
@@ -293,8 +293,8 @@ def test_a_camera_file_that_is_still_being_saved_is_that_of_its_attempt(
     qtbot: QtBot,
     slow_disk: Event,
 ) -> None:
-    told: list[CameraTrial] = []
-    window.concluded.connect(told.append)
+    reported: list[CameraTrial] = []
+    window.concluded.connect(reported.append)
     folder = written(tmp_path, images)
     for path, outcome in (
         (tmp_path / "camera.yaml", TrialOutcome.ACCEPTED),
@@ -306,11 +306,11 @@ def test_a_camera_file_that_is_still_being_saved_is_that_of_its_attempt(
         qtbot.waitUntil(lambda: views_listed(window) == 7)
         window.save(path)
         window.close()
-        assert told == []
+        assert reported == []
         slow_disk.set()
-        qtbot.waitUntil(lambda: told != [])
+        qtbot.waitUntil(lambda: reported != [])
 
-        trial = told.pop()
+        trial = reported.pop()
         assert trial.outcome is outcome
         assert trial.found is not None
         assert len(trial.images) == 7
@@ -319,15 +319,15 @@ def test_a_camera_file_that_is_still_being_saved_is_that_of_its_attempt(
 def test_views_that_were_kept_and_never_computed_are_abandoned(
     window: BoardWindow, images: list[Image], workbench: Workbench, qtbot: QtBot
 ) -> None:
-    told: list[CameraTrial] = []
-    window.concluded.connect(told.append)
+    reported: list[CameraTrial] = []
+    window.concluded.connect(reported.append)
     press(window, "Start")
     for count in range(1, 4):
         workbench.live.image_shown.emit(_shown(images[0], count))
         qtbot.waitUntil(lambda: not window.is_searching)
     window.close()
 
-    (trial,) = told
+    (trial,) = reported
     pixels = sha256(images[0].tobytes()).hexdigest()
     assert (trial.outcome, trial.images) == (TrialOutcome.ABANDONED, {"1": pixels})
 
@@ -382,7 +382,7 @@ def test_a_calibration_under_way_ends_where_other_views_are_begun(
 
 
 @pytest.mark.slow
-def test_what_was_calibrated_is_told_in_the_language_that_is_chosen(
+def test_what_was_calibrated_is_reported_in_the_language_that_is_chosen(
     window: BoardWindow,
     images: list[Image],
     tmp_path: Path,
@@ -401,7 +401,7 @@ def test_what_was_calibrated_is_told_in_the_language_that_is_chosen(
 
 
 @pytest.mark.slow
-def test_a_scale_check_by_caliper_is_asked_for_and_its_form_is_told(
+def test_a_scale_check_by_caliper_is_asked_for_and_its_form_is_reported(
     window: BoardWindow, tmp_path: Path, images: list[Image], qtbot: QtBot
 ) -> None:
     (measured,) = window.findChildren(EnterEdit)

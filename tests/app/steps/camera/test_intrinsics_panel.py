@@ -33,7 +33,7 @@ def words(panel: IntrinsicsPanel) -> str:
     return " ".join(each.text() for each in labels if each.isVisibleTo(panel))
 
 
-def test_a_swing_that_agrees_with_the_file_is_told(
+def test_a_swing_that_agrees_with_the_file_is_reported(
     panel: IntrinsicsPanel, solution: Solution
 ) -> None:
     assert "agree" not in words(panel)
@@ -43,7 +43,7 @@ def test_a_swing_that_agrees_with_the_file_is_told(
     assert "agree" not in words(panel)
 
 
-def test_what_a_swing_denies_of_the_file_is_told(
+def test_what_a_swing_denies_of_the_file_is_reported(
     panel: IntrinsicsPanel, solution: Solution
 ) -> None:
     denied = Contradiction(FOCAL_LENGTH, "px", 2319.0, 0.5, 2326.0, 0.4, 21.0)

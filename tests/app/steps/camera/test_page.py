@@ -203,7 +203,7 @@ def test_a_second_camera_is_shown_set_and_masked_by_itself(
     live.until(lambda: workbench.live.n_cameras == 1)
 
 
-def test_a_rig_file_that_cannot_be_read_is_told_where_it_was_chosen(
+def test_a_rig_file_that_cannot_be_read_is_reported_where_it_was_chosen(
     live: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     ask_for_second(live)
@@ -224,7 +224,7 @@ def test_a_rig_file_that_cannot_be_read_is_told_where_it_was_chosen(
     assert not panel.problem().text
 
 
-def test_cameras_out_of_step_are_told_with_what_that_costs(live: "Seen") -> None:
+def test_cameras_out_of_step_are_reported_with_what_that_costs(live: "Seen") -> None:
     ask_for_second(live)
     live.wait("Baseline")
     panel = live.child(RigPanel)
@@ -242,7 +242,7 @@ def test_each_led_has_a_ring_with_its_number(live: "Seen") -> None:
     assert others(live) == []
 
 
-def test_size_and_rate_of_the_images_are_told(live: "Seen") -> None:
+def test_size_and_rate_of_the_images_are_reported(live: "Seen") -> None:
     assert "1224 x 1024 px" in live.words
     assert "fps" in live.words
     assert "Live" in live.words
@@ -425,9 +425,9 @@ def test_facts_that_are_not_known_take_no_focus(
 ) -> None:
     facts = live.child(IntrinsicsPanel).findChildren(QLabel)
     selectable = Qt.TextInteractionFlag.TextSelectableByMouse
-    told = [each for each in facts if each.textInteractionFlags() & selectable]
-    assert len(told) == 4
-    assert all(each.text() for each in told)
+    reported = [each for each in facts if each.textInteractionFlags() & selectable]
+    assert len(reported) == 4
+    assert all(each.text() for each in reported)
 
     workbench.selection.set_preparation(
         replace(workbench.selection.preparation, camera_file=None)
@@ -437,7 +437,7 @@ def test_facts_that_are_not_known_take_no_focus(
     assert focusable == []
 
 
-def test_a_file_for_images_of_another_size_is_told_and_stops_the_step(
+def test_a_file_for_images_of_another_size_is_reported_and_stops_the_step(
     live: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     path = intrinsics(workbench, tmp_path, width=612, height=512)
@@ -465,7 +465,7 @@ def test_a_file_for_images_of_another_size_is_told_and_stops_the_step(
         ("image_width: 1224\nimage_height: [", "Line 3 of other.yaml is not valid"),
     ],
 )
-def test_an_unfit_file_is_told_beside_the_field_and_the_one_before_stays(
+def test_an_unfit_file_is_reported_beside_the_field_and_the_one_before_stays(
     live: "Seen",
     workbench: Workbench,
     tmp_path: Path,
@@ -502,7 +502,7 @@ def test_the_complaint_goes_with_a_fit_file(
     assert workbench.selection.preparation.camera_file.path.name == "other.yaml"
 
 
-def test_what_is_wrong_with_a_file_is_told_in_the_language_of_the_wizard(
+def test_what_is_wrong_with_a_file_is_reported_in_the_language_of_the_wizard(
     live: "Seen", qapp: QApplication, tmp_path: Path
 ) -> None:
     broken = tmp_path / "broken.yaml"
@@ -645,7 +645,9 @@ def test_a_folder_is_picked_in_the_dialog(
     live.wait("80 x 64 px")
 
 
-def test_a_missing_folder_is_told_and_tried_again(live: "Seen", tmp_path: Path) -> None:
+def test_a_missing_folder_is_reported_and_tried_again(
+    live: "Seen", tmp_path: Path
+) -> None:
     folder = tmp_path / "swing"
     live.choose("Recorded images")
     live.enter("Folder, record or video", str(folder))
@@ -659,7 +661,7 @@ def test_a_missing_folder_is_told_and_tried_again(live: "Seen", tmp_path: Path) 
     assert "RECORDED" in live.words
 
 
-def test_a_folder_without_images_is_told(live: "Seen", tmp_path: Path) -> None:
+def test_a_folder_without_images_is_reported(live: "Seen", tmp_path: Path) -> None:
     folder = tmp_path / "empty"
     folder.mkdir()
     live.choose("Recorded images")
@@ -687,7 +689,9 @@ def test_a_damaged_image_is_counted_and_the_others_are_shown(
     assert "80 x 64 px" in live.words
 
 
-def test_a_recording_of_damaged_images_is_told(live: "Seen", tmp_path: Path) -> None:
+def test_a_recording_of_damaged_images_is_reported(
+    live: "Seen", tmp_path: Path
+) -> None:
     folder = recording(tmp_path / "swing")
     for image in folder.iterdir():
         image.write_bytes(b"no image")
@@ -757,7 +761,7 @@ def test_cameras_that_are_found_late_are_not_taken_for_another_source(
 # A camera that fails
 
 
-def test_a_camera_that_is_unplugged_is_told_and_comes_back(
+def test_a_camera_that_is_unplugged_is_reported_and_comes_back(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     camera = plugged(workbench, small_scene)
@@ -805,7 +809,7 @@ def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
     assert "are no longer readable." not in live.words
 
 
-def test_a_camera_that_is_not_there_is_told(
+def test_a_camera_that_is_not_there_is_reported(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     clock = workbench.around.clock
@@ -819,7 +823,7 @@ def test_a_camera_that_is_not_there_is_told(
     seen.wait("10 of 10 LEDs")
 
 
-def test_a_silent_camera_is_told(
+def test_a_silent_camera_is_reported(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     camera = plugged(workbench, small_scene)
@@ -863,8 +867,8 @@ def test_what_shines_beside_the_covered_pen_is_found_and_masked(
     seen.wait("too few LEDs")
     seen.click("Search")
     seen.wait("Stray spots: 2.")
-    told = next(x for x in seen.page.findChildren(QLabel) if "Stray sp" in x.text())
-    seen.until(lambda: told.visibleRegion().boundingRect() == told.rect())
+    reported = next(x for x in seen.page.findChildren(QLabel) if "Stray sp" in x.text())
+    seen.until(lambda: reported.visibleRegion().boundingRect() == reported.rect())
     seen.until(lambda: [m.label for m in seen.markers] == ["stray", "stray"])
 
     seen.click("Mask the spots: 2")
@@ -963,7 +967,7 @@ def test_a_pen_that_is_still_seen_is_not_masked(live: "Seen") -> None:
     assert not live.named("Mask the spots").isEnabled()
 
 
-def test_nothing_left_is_told(live: "Seen") -> None:
+def test_nothing_left_is_reported(live: "Seen") -> None:
     live.click("Cover the LEDs")
     live.wait("no LED seen")
 
@@ -1099,7 +1103,7 @@ def test_the_notice_of_a_lost_camera_goes_when_it_is_back(
 def test_the_fault_of_a_swing_is_not_taken_for_one_of_the_camera(
     window: MainWindow, live: "Seen", workbench: Workbench
 ) -> None:
-    workbench.notifications.tell("a swing", "The disk is full.")
+    workbench.notifications.notify("a swing", "The disk is full.")
 
     workbench.live.close()
     live.wait("No camera is open.")
@@ -1142,7 +1146,7 @@ def test_names_come_before_the_camera(page: CameraPage, workbench: Workbench) ->
     assert page.why_closed() == "Enter the name of the station."
 
 
-def test_a_swing_under_way_is_told(live: "Seen", workbench: Workbench) -> None:
+def test_a_swing_under_way_is_reported(live: "Seen", workbench: Workbench) -> None:
     assert "A swing is in progress." not in live.words
 
     workbench.run.runner.begin(workbench.selection.preparation)

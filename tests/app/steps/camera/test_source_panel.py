@@ -38,7 +38,7 @@ def choose(panel: SourcePanel, key: str) -> None:
     kinds.activated.emit(index)
 
 
-def told(panel: SourcePanel) -> SignLabel:
+def reported(panel: SourcePanel) -> SignLabel:
     (label,) = (each for each in panel.findChildren(SignLabel) if each.isVisible())
     return label
 
@@ -50,14 +50,14 @@ def test_choosing_a_kind_of_camera_looks_for_cameras_and_takes_the_first(
         choose(panel, "aravis")
     assert panel.value() == SourceChoice("aravis")
     panel.set_searching(True)
-    assert "Searching for cameras" in told(panel).value().text
+    assert "Searching for cameras" in reported(panel).value().text
     panel.set_searching(False)
     with qtbot.waitSignal(panel.value_changed):
         panel.set_found(FOUND)
 
     assert panel.value() == SourceChoice("aravis", "21877692")
     assert panel.findChildren(DeviceField)[0].currentText() == FOUND[0].label
-    assert told(panel).value().text == "Cameras found: 2"
+    assert reported(panel).value().text == "Cameras found: 2"
 
 
 def test_a_camera_that_was_chosen_stays_when_others_are_found(
@@ -73,7 +73,7 @@ def test_a_camera_that_was_chosen_stays_when_others_are_found(
 def test_an_address_can_be_typed(panel: SourcePanel, qtbot: QtBot) -> None:
     choose(panel, "aravis")
     panel.set_found(())
-    assert told(panel).value().tone is Tone.WARN
+    assert reported(panel).value().tone is Tone.WARN
     (field,) = panel.findChildren(DeviceField)
     edit = field.lineEdit()
     assert edit is not None
@@ -95,7 +95,7 @@ def test_a_library_that_is_absent_is_a_line_and_no_search(
     with qtbot.assertNotEmitted(panel.search_requested):
         choose(panel, "basler")
 
-    assert told(panel).value().text == str(absent)
+    assert reported(panel).value().text == str(absent)
     assert not panel.findChildren(DeviceField)[0].isVisible()
 
 
@@ -103,19 +103,19 @@ def test_why_a_producer_does_not_load_is_shown(panel: SourcePanel) -> None:
     choose(panel, "genicam")
     panel.set_search_problem("vendor.cti does not load: wrong ELF class.")
 
-    assert "wrong ELF class" in told(panel).value().text
-    assert told(panel).value().tone is Tone.BAD
+    assert "wrong ELF class" in reported(panel).value().text
+    assert reported(panel).value().tone is Tone.BAD
 
 
-def test_what_a_search_came_to_is_told_in_the_language_that_is_chosen(
+def test_what_a_search_came_to_is_reported_in_the_language_that_is_chosen(
     panel: SourcePanel, qapp: QApplication
 ) -> None:
     choose(panel, "aravis")
     panel.set_found(())
-    english = told(panel).value().text
+    english = reported(panel).value().text
 
     LanguageSwitch(qapp).set_language("zh_CN")
     QApplication.processEvents()
 
     assert english.startswith("No camera found.")
-    assert "No camera" not in told(panel).value().text
+    assert "No camera" not in reported(panel).value().text

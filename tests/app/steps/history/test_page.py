@@ -285,7 +285,7 @@ def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
     desk.until(lambda: limit in _words(desk))
 
 
-def test_a_server_that_cannot_be_reached_is_told_without_the_password(
+def test_a_server_that_cannot_be_reached_is_reported_without_the_password(
     desk: Desk,
 ) -> None:
     folder = desk.workbench.folder
@@ -296,19 +296,19 @@ def test_a_server_that_cannot_be_reached_is_told_without_the_password(
     desk.show_tab(WHOLE)
     panel = desk.child(ArchivePanel)
 
-    def told() -> str:
+    def reported() -> str:
         desk.page.entered()
-        return panel.told()[0].text
+        return panel.messages()[0].text
 
-    desk.until(lambda: "Entries not yet on the server;" in told())
-    assert "The archive postgresql" in told()
-    assert "secret-word" not in told()
+    desk.until(lambda: "Entries not yet on the server;" in reported())
+    assert "The archive postgresql" in reported()
+    assert "secret-word" not in reported()
     desk.workbench.run.logbook.close()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("language", languages())
-def test_at_the_usual_width_every_column_is_seen_and_told_whole(
+def test_at_the_usual_width_every_column_is_seen_and_reported_whole(
     desk: Desk, qapp: QApplication, language: str
 ) -> None:
     LanguageSwitch(qapp).set_language(language)
@@ -341,14 +341,14 @@ def test_a_block_that_is_read_computes_nothing_anew_of_what_is_selected(
     desk.enter(MANY)
     desk.open()
     desk.select(0)
-    told: list[None] = []
-    desk.table.selection_changed.connect(lambda: told.append(None))
+    reported: list[None] = []
+    desk.table.selection_changed.connect(lambda: reported.append(None))
     last = desk.table.model().index(MANY - 1, X, QModelIndex())
 
     desk.table.scrollToBottom()
     desk.until(lambda: last.data() == "0.0000")
 
-    assert told == []
+    assert reported == []
 
 
 def _words(desk: Desk) -> str:
@@ -416,7 +416,9 @@ def test_two_that_are_selected_are_compared(desk: Desk) -> None:
     assert "2 calibrations do not suffice for a verdict" in panel.words()[3]
 
 
-def test_it_is_told_what_scatter_of_tip_and_fixed_point_points_to(desk: Desk) -> None:
+def test_it_is_reported_what_scatter_of_tip_and_fixed_point_points_to(
+    desk: Desk,
+) -> None:
     desk.enter(5)  # at x of 0, 1, 2, 3 and 4 mm
     steady = {
         "program": {"name": "lightpen", "version": "1"},
@@ -558,9 +560,9 @@ def test_a_change_of_the_tip_library_is_shown_with_what_it_says(desk: Desk) -> N
     assert desk.column(WHAT) == ["Tip library"]
     assert (desk.column(TIP), desk.column(WORDS)) == (["T-10"], ["chipped"])
     desk.show_tab(ENTRY)
-    told = desk.child(EntryPanel).words()
+    reported = desk.child(EntryPanel).words()
     parts = ("T-10", "ball 6.0 mm", "max. change 0.02 mm", "retired", "chipped")
-    assert "  \N{MIDDLE DOT}  ".join(parts) in told
+    assert "  \N{MIDDLE DOT}  ".join(parts) in reported
 
 
 def store(folder: Path, n: int) -> Result:
@@ -641,9 +643,9 @@ def test_a_check_tells_notes_that_prove_no_change(desk: Desk) -> None:
     panel = desk.child(ArchivePanel)
     desk.until(lambda: panel.checked() is not None)
 
-    told = " ".join(remark.text for remark in panel.told())
-    assert "No changes in 2 entries" in told
-    assert "the clock of the station was set back" in told
+    reported = " ".join(remark.text for remark in panel.messages())
+    assert "No changes in 2 entries" in reported
+    assert "the clock of the station was set back" in reported
 
 
 def test_a_repeatability_is_kept_entered_and_put_on_paper(desk: Desk) -> None:
@@ -777,8 +779,8 @@ def test_what_was_changed_is_said_in_the_list_and_by_a_check(desk: Desk) -> None
     desk.show_tab(WHOLE)
     desk.click("Check the archive")
     desk.until(desk.page.is_doubtful)
-    told = [remark.text for remark in desk.child(ArchivePanel).told()]
-    assert any("Entry 2 of chain" in text for text in told)
+    reported = [remark.text for remark in desk.child(ArchivePanel).messages()]
+    assert any("Entry 2 of chain" in text for text in reported)
 
 
 @pytest.mark.slow

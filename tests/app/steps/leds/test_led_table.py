@@ -79,7 +79,7 @@ def test_what_is_typed_outlives_what_the_live_match_tells_meanwhile(
     assert shown(table, 3, MISFIT) == "0.80"
 
 
-def test_a_bad_cell_is_marked_and_told(table: LedTable) -> None:
+def test_a_bad_cell_is_marked_and_reported(table: LedTable) -> None:
     type_into(table, 3, 2, "12,4O")
 
     bad = cell(table, 3, 2)
@@ -113,8 +113,8 @@ def test_the_misfit_of_each_led_is_shown_where_it_is_known(table: LedTable) -> N
 def test_an_led_that_does_not_fit_is_marked_with_the_reason(table: LedTable) -> None:
     table.set_marked({7: "LED 7 sits off its place."})
 
-    told = cell(table, 7, 0).data(Qt.ItemDataRole.ToolTipRole)
-    assert told == "LED 7 sits off its place."
+    reported = cell(table, 7, 0).data(Qt.ItemDataRole.ToolTipRole)
+    assert reported == "LED 7 sits off its place."
     table.grab()
 
 

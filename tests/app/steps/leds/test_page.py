@@ -102,7 +102,7 @@ def cell_of_file(led: int, column: int) -> str:
     return f"{LEDS[led - 1, column - 1]:g}"
 
 
-def told_of(seen: "Seen", led: int) -> str:
+def reported(seen: "Seen", led: int) -> str:
     """Return what the table says of an LED."""
     index = led_table(seen).model().index(led - 1, 0)
     return str(index.data(Qt.ItemDataRole.ToolTipRole) or "")
@@ -298,7 +298,7 @@ def test_a_file_is_picked_in_a_dialog(
         ('{"leds": 3, "units": "mm"}', "leds in bad.csv is no list of LEDs."),
     ],
 )
-def test_an_error_in_a_file_is_told_and_the_one_before_stays(
+def test_an_error_in_a_file_is_reported_and_the_one_before_stays(
     seen: "Seen", workbench: Workbench, tmp_path: Path, content: str, sentence: str
 ) -> None:
     before = in_use(workbench)
@@ -313,7 +313,7 @@ def test_an_error_in_a_file_is_told_and_the_one_before_stays(
     assert seen.page.is_complete()
 
 
-def test_a_missing_file_is_told(
+def test_a_missing_file_is_reported(
     seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     before = in_use(workbench)
@@ -344,7 +344,7 @@ def test_units_are_asked_for_where_a_file_does_not_say_them(
     assert "does not state the unit of its coordinates." not in seen.words
 
 
-def test_wrong_units_are_told(
+def test_wrong_units_are_reported(
     seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     before = in_use(workbench)
@@ -434,7 +434,7 @@ def test_a_pen_in_its_frame_need_not_be_moved(seen: "Seen") -> None:
 # The table
 
 
-def test_a_cell_that_is_no_number_is_told(seen: "Seen") -> None:
+def test_a_cell_that_is_no_number_is_reported(seen: "Seen") -> None:
     type_cell(seen, 5, Y, "12,4O")
 
     assert 'LED 5, y: "12,4O" is not a number (letter O).' in seen.words
@@ -442,14 +442,14 @@ def test_a_cell_that_is_no_number_is_told(seen: "Seen") -> None:
     assert not seen.page.is_complete()
 
 
-def test_leds_that_cannot_be_a_pen_are_told_and_still_drawn(seen: "Seen") -> None:
+def test_leds_that_cannot_be_a_pen_are_reported_and_still_drawn(seen: "Seen") -> None:
     type_cell(seen, 7, Y, "16")
 
     assert "LEDs 5 and 7 are 4.00 mm apart, too close" in seen.words
     assert seen.child(PenView).value().pen is not None
 
 
-def test_a_number_that_no_pen_has_is_told(seen: "Seen") -> None:
+def test_a_number_that_no_pen_has_is_reported(seen: "Seen") -> None:
     type_cell(seen, 7, Y, "1e300")
 
     assert "LED 7 is 1e+297 m from the origin, which is implausible" in seen.words
@@ -517,7 +517,9 @@ def test_a_table_has_no_place_for_the_tip(seen: "Seen", tmp_path: Path) -> None:
     assert not (tmp_path / "leds.csv").exists()
 
 
-def test_a_file_that_cannot_be_written_is_told(seen: "Seen", tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_written_is_reported(
+    seen: "Seen", tmp_path: Path
+) -> None:
     type_cell(seen, 7, Y, "161")
 
     seen.child(LedFilePanel).save_chosen.emit(tmp_path / "no folder" / "leds.json")
@@ -706,7 +708,7 @@ def test_diameter_and_tip_are_edited_with_the_table(
     assert pen.nominal_tip.tolist() == [0.0, -95.5, -25.0]
 
 
-def test_a_diameter_or_tip_that_cannot_be_is_told(seen: "Seen") -> None:
+def test_a_diameter_or_tip_that_cannot_be_is_reported(seen: "Seen") -> None:
     seen.enter("Diameter of the LED discs, mm", "x")
     assert 'Diameter of the discs: "x" is not a number.' in seen.words
 
@@ -715,7 +717,7 @@ def test_a_diameter_or_tip_that_cannot_be_is_told(seen: "Seen") -> None:
     assert 'Nominal tip, y: "-9O" is not a number (letter O).' in seen.words
 
 
-def test_the_nominal_tip_of_the_first_step_is_told_where_it_rules(
+def test_the_nominal_tip_of_the_first_step_is_reported_where_it_rules(
     seen: "Seen", workbench: Workbench
 ) -> None:
     tip = np.array([1.0, -80.0, -20.0])
@@ -783,7 +785,7 @@ def test_a_displaced_led_is_named_and_marked_everywhere(live: "Seen") -> None:
     live.wait(
         "LED 7 is 0.50 mm from its file position. Measured: x 0.00, y -0.50, z 0.00 mm."
     )
-    assert "LED 7 is 0.50 mm from" in told_of(live, 7)
+    assert "LED 7 is 0.50 mm from" in reported(live, 7)
     assert float(cell(live, 7, MISFIT)) > 0.5
     assert live.child(PenView).value().marked == {7}
     assert live.child(StateBanner).value().tone is Tone.WARN
@@ -793,7 +795,7 @@ def test_a_displaced_led_is_named_and_marked_everywhere(live: "Seen") -> None:
 
     live.wait("All LEDs are within 0.1 mm of their table positions, in")
     assert float(cell(live, 7, Y)) == pytest.approx(160, abs=0.05)
-    assert told_of(live, 7) == ""
+    assert reported(live, 7) == ""
     assert not live.shows("Use measured position")
 
 
@@ -911,7 +913,7 @@ def test_raw_coordinates_are_matched_too(live: "Seen", tmp_path: Path) -> None:
     live.wait("The LEDs agree with the images but not with the pen frame.")
 
 
-def test_a_covered_led_is_told(
+def test_a_covered_led_is_reported(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     camera = plugged(workbench, small_scene)
@@ -949,7 +951,7 @@ def test_the_simulated_pen_is_leaned_and_covered_at_a_click(
 
 
 @pytest.mark.slow
-def test_another_pens_file_is_told(live: "Seen", tmp_path: Path) -> None:
+def test_another_pens_file_is_reported(live: "Seen", tmp_path: Path) -> None:
     leds = np.random.default_rng(3).uniform(-60, 60, (10, 3))
     open_file(live, write_table(tmp_path / "other.csv", leds))
 
@@ -1089,7 +1091,7 @@ def test_each_finding_has_its_sentence(
     assert set(panel.reasons()) == set(finding.leds)
 
 
-def test_what_is_missing_for_a_match_is_told(
+def test_what_is_missing_for_a_match_is_reported(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     seen.page.entered()
@@ -1204,7 +1206,7 @@ def test_a_question_about_changes_goes_with_the_changes(seen: "Seen") -> None:
     assert seen.child(QuestionBar).words() == ""
 
 
-def test_what_is_wrong_and_what_is_asked_is_told_in_the_language_that_is_chosen(
+def test_what_is_wrong_and_what_is_asked_is_reported_in_the_language_that_is_chosen(
     seen: "Seen", tmp_path: Path, qapp: QApplication
 ) -> None:
     path = write_table(tmp_path / "exchanged.csv", exchanged())

@@ -357,7 +357,7 @@ def readout(page: ReviewPage) -> TipValue:
     return value
 
 
-def told_of_result(page: ReviewPage) -> str:
+def reported_of_result(page: ReviewPage) -> str:
     """Return the messages below the figures."""
     signs = the(page, ResultPanel).findChildren(SignLabel)
     return " ".join(sign.value().text for sign in signs)
@@ -526,22 +526,24 @@ def test_a_tip_that_is_far_too_uncertain_cannot_be_accepted(bed: Bed) -> None:
     assert not button(page, "Accept...").isEnabled()
     assert button(page, "Accept...").toolTip().startswith("Result not acceptable.")
     workbench.run.runner.accept("whatever")
-    with bed.qtbot.waitSignal(workbench.notifications.raised) as told:
+    with bed.qtbot.waitSignal(workbench.notifications.raised) as reported:
         pass
-    assert told.args[0].startswith("The tip cannot be accepted.")
+    assert reported.args[0].startswith("The tip cannot be accepted.")
     assert not page.is_complete()
     assert in_force(workbench) is None
 
 
-def test_without_an_earlier_result_that_is_said(page: ReviewPage) -> None:
+def test_without_an_earlier_result_that_is_reported(page: ReviewPage) -> None:
     assert readout(page).previous == readout(page).change == ()
-    assert "No earlier result" in told_of_result(page)
+    assert "No earlier result" in reported_of_result(page)
     assert page.lead() == "Next: accept the tip."  # none is in force until then
     assert "Odd - even" in the(the(page, ResultPanel), NumberTable).value().rows
     assert remarks(page) == ""
 
 
-def test_a_small_change_since_the_last_result_is_told_in_micrometres(bed: Bed) -> None:
+def test_a_small_change_since_the_last_result_is_reported_in_micrometres(
+    bed: Bed,
+) -> None:
     u = u_x(bed.solve())
     bed.solve_after([1.0, 1.0, 1.0], pen="another")
     bed.solve_after([0.5 * u, 0.0, 0.0])
@@ -608,7 +610,7 @@ def test_a_tip_that_cannot_be_compared_is_to_be_checked(bed: Bed) -> None:
 
     assert banner(page).word == "CHECK: No comparison possible"
     assert "is damaged" in banner(page).detail
-    assert "No earlier result" in told_of_result(page)
+    assert "No earlier result" in reported_of_result(page)
 
 
 def test_what_comes_into_force_meanwhile_is_compared_before_it_is_replaced(
@@ -617,10 +619,10 @@ def test_what_comes_into_force_meanwhile_is_compared_before_it_is_replaced(
     workbench = bed.solve()
     page = bed.show()
     put_in_force(workbench, tip(workbench) - [0.42, 0.0, 0.0])
-    with bed.qtbot.waitSignal(workbench.notifications.raised) as told:
+    with bed.qtbot.waitSignal(workbench.notifications.raised) as reported:
         page.run_main_action()
 
-    assert "Enter a reason to accept it." in told.args[0]
+    assert "Enter a reason to accept it." in reported.args[0]
     bed.qtbot.waitUntil(lambda: banner(page).word == "CHECK: Tip has changed")
     assert not page.is_complete()
     assert button(page, "Accept...").isVisibleTo(page)
@@ -743,7 +745,7 @@ def test_a_tip_of_the_library_that_was_never_calibrated_can_be_next(bed: Bed) ->
     assert (names.tip, names.ball_diameter) == ("T-12", 3.0)
 
 
-def test_the_tip_as_found_is_told_against_its_limit(bed: Bed) -> None:
+def test_the_tip_as_found_is_reported_against_its_limit(bed: Bed) -> None:
     listed = ListedTip(id="T-10", max_change_mm=0.05)
     add_item(bed.workbench.folder, listed, Author(), THEN)
     bed.solve_after([0.0, 0.06, 0.08])
@@ -759,9 +761,9 @@ def test_the_tip_as_found_is_told_against_its_limit(bed: Bed) -> None:
 
 @pytest.mark.slow
 def test_of_practice_no_older_tip_is_said_to_stay_in_force(bed: Bed) -> None:
-    told = "Until then the previous result remains current."
+    reported = "Until then the previous result remains current."
     bed.solve_after([0.0, 0.0, 0.001])
-    assert told in bed.show().lead()
+    assert reported in bed.show().lead()
 
     practice = replace(bed, origin=Origin.SIMULATED)
     tip_then = tip(practice.solve())
@@ -770,7 +772,7 @@ def test_of_practice_no_older_tip_is_said_to_stay_in_force(bed: Bed) -> None:
     status = practice.workbench.run.status
     assert status.assessment is not None
     assert status.assessment.last is not None
-    assert told not in practice.show().lead()
+    assert reported not in practice.show().lead()
 
 
 # What is taken along
@@ -798,16 +800,16 @@ def test_the_folder_of_the_swing_is_opened(
     monkeypatch.setattr("PySide6.QtGui.QDesktopServices.openUrl", open_url)
     bed.solve()
     page = bed.show()
-    told: list[str] = []
-    bed.workbench.notifications.status_changed.connect(told.append)
+    reported: list[str] = []
+    bed.workbench.notifications.status_changed.connect(reported.append)
 
     click(page, "Open folder")
     assert opened == [str(bed.swing)]
-    assert told[-1] == ""
+    assert reported[-1] == ""
 
     can_show = False
     click(page, "Open folder")
-    assert told[-1] == f"No file manager found. Folder: {bed.swing}"
+    assert reported[-1] == f"No file manager found. Folder: {bed.swing}"
 
 
 def save(bed: Bed, page: ReviewPage, what: str, folder: Path) -> None:
@@ -1080,7 +1082,7 @@ def test_an_image_that_cannot_be_read_says_why(bed: Bed) -> None:
     assert the(page, ResidualView).image_size().isEmpty()
 
 
-def test_a_bug_while_an_image_is_read_is_told_and_other_images_are_shown(
+def test_a_bug_while_an_image_is_read_is_reported_and_other_images_are_shown(
     bed: Bed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     caught: list[BaseException] = []
@@ -1272,10 +1274,10 @@ def test_taking_out_too_many_is_refused_and_nothing_is_lost(
     before = tip(workbench).copy()
     table(page).selectAll()
 
-    with qtbot.waitSignal(workbench.notifications.raised) as told:
+    with qtbot.waitSignal(workbench.notifications.raised) as reported:
         click(page, "Exclude")
 
-    assert "at least 6" in told.args[0]
+    assert "at least 6" in reported.args[0]
     assert count(page) == f"{N_IMAGES} of {N_IMAGES} included"
     np.testing.assert_array_equal(tip(workbench), before)
     assert open_record(workbench.run.records_folder / "swing").taken_out == {}
@@ -1314,9 +1316,9 @@ def test_every_plot_is_saved_as_picture_and_as_numbers(
 
     for i, card in enumerate(cards):
         for suffix in ("png", "csv"):
-            with qtbot.waitSignal(workbench.notifications.status_changed) as told:
+            with qtbot.waitSignal(workbench.notifications.status_changed) as reported:
                 card.save(tmp_path / f"{i}.{suffix}")
-            assert told.args[0] == f"Saved as {tmp_path / f'{i}.{suffix}'}"
+            assert reported.args[0] == f"Saved as {tmp_path / f'{i}.{suffix}'}"
         lines = (tmp_path / f"{i}.csv").read_text().splitlines()
         assert len(lines) > 3
         assert (tmp_path / f"{i}.png").stat().st_size > 1000
@@ -1341,15 +1343,15 @@ def test_the_plot_beside_the_images_is_enlarged_over_all_about_it(
     assert the(panel, ImageTable).isVisible()
 
 
-def test_a_plot_that_cannot_be_saved_is_told(
+def test_a_plot_that_cannot_be_saved_is_reported(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot, tmp_path: Path
 ) -> None:
     card = page.findChildren(PlotCard)[0]
     for name in ("plot.csv", "plot.png"):
-        with qtbot.waitSignal(workbench.notifications.raised) as told:
+        with qtbot.waitSignal(workbench.notifications.raised) as reported:
             card.save(tmp_path / "nowhere" / name)
 
-        assert "cannot be written" in told.args[0]
+        assert "cannot be written" in reported.args[0]
 
 
 def test_a_file_is_chosen_in_a_dialog_that_stops_nothing(
@@ -1412,7 +1414,7 @@ def test_an_accepted_tip_is_in_force_and_said_to_be(
     assert f"{result.accepted.astimezone():%Y-%m-%d %H:%M:%S}" in state.detail
     assert page.is_complete()
     assert page.unsaved() == ""
-    assert "No earlier result" in told_of_result(page)  # not compared with itself
+    assert "No earlier result" in reported_of_result(page)  # not compared with itself
     assert open_record(workbench.run.records_folder / "swing").verdict == Grade.PASS
 
 
@@ -1448,7 +1450,7 @@ def test_a_press_test_begins_a_swing_and_stands_below_the_tip(
     panel = the(page, ResultPanel)
     assert not any("Press test" in each for each in texts_of(panel))
 
-    run.tell(replace(first, pressed=firm), ())
+    run.post(replace(first, pressed=firm), ())
     qtbot.waitUntil(lambda: any("no significant" in each for each in texts_of(panel)))
     shown = panel.value()
     assert shown is not None
@@ -1481,10 +1483,10 @@ def test_a_result_that_is_gone_is_not_put_on_paper(
     accept(page, qtbot)
     shutil.rmtree(bed.workbench.run.archive.folder)
 
-    with qtbot.waitSignal(bed.workbench.notifications.raised) as told:
+    with qtbot.waitSignal(bed.workbench.notifications.raised) as reported:
         the(page, ResultTools).paper_requested.emit()
 
-    assert "LP-04" in told.args[0]
+    assert "LP-04" in reported.args[0]
     assert page.findChildren(PrintReportWindow) == []
 
 
@@ -1517,15 +1519,15 @@ def test_after_acceptance_the_next_calibration_starts(
     qtbot.waitUntil(lambda: page.why_closed() == "Swing the pen first.")
 
 
-def test_a_result_that_cannot_be_stored_is_told_and_the_old_one_stays(
+def test_a_result_that_cannot_be_stored_is_reported_and_the_old_one_stays(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
     workbench.run.archive.folder.write_text("a file where a folder should be")
 
-    with qtbot.waitSignal(workbench.notifications.raised) as told:
+    with qtbot.waitSignal(workbench.notifications.raised) as reported:
         page.run_main_action()
 
-    assert "cannot be" in told.args[0]
+    assert "cannot be" in reported.args[0]
     assert not page.is_complete()
     assert banner(page).word == "PASS: Within limits"
     assert open_record(workbench.run.records_folder / "swing").verdict is None
@@ -1566,10 +1568,10 @@ def test_a_record_that_is_gone_cannot_be_captured_into(
 ) -> None:
     (workbench.run.records_folder / "swing" / "journal.jsonl").write_text("{}\n{}\n")
 
-    with qtbot.waitSignal(workbench.notifications.raised) as told:
+    with qtbot.waitSignal(workbench.notifications.raised) as reported:
         click(page, "Capture more")
 
-    assert "is damaged" in told.args[0]
+    assert "is damaged" in reported.args[0]
     assert workbench.run.status.solution is not None
     qtbot.waitUntil(lambda: page.main_action().why_not == "")
 
@@ -1604,16 +1606,16 @@ def test_a_repetition_sets_the_swing_aside_and_keeps_its_images(
     assert workbench.run.status.solution is None
 
 
-def test_a_swing_that_cannot_be_set_aside_is_told(
+def test_a_swing_that_cannot_be_set_aside_is_reported(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
     shutil.rmtree(workbench.run.records_folder / "swing")
     click(page, "Repeat swing")
 
-    with qtbot.waitSignal(workbench.notifications.raised) as told:
+    with qtbot.waitSignal(workbench.notifications.raised) as reported:
         answer(page, "Repeat swing")
 
-    assert "does not exist" in told.args[0]
+    assert "does not exist" in reported.args[0]
     assert workbench.run.status.solution is not None
 
 

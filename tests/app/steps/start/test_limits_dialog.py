@@ -82,13 +82,13 @@ def test_limits_are_laid_down_only_with_a_signature(
     assert not save.isEnabled()
     field(dialog, "Length: error").setValue(0.01)
     sign(dialog)
-    told: list[Any] = []
-    dialog.signed.connect(lambda *what: told.append(what))
+    reported: list[Any] = []
+    dialog.signed.connect(lambda *what: reported.append(what))
     save.click()
 
     wanted = replace(TIGHT.verification, length=0.01)
     expected = replace(TIGHT, verification=wanted), Signature("Eve", "secret"), ""
-    assert told == [expected]
+    assert reported == [expected]
 
 
 def enter_the_signature(dialog: LimitsDialog) -> None:
@@ -113,16 +113,16 @@ def test_limits_are_laid_down_once_however_often_enter_is_pressed(
 ) -> None:
     dialog.set_value(TIGHT, is_guarded=True)
     sign(dialog)
-    told: list[Any] = []
-    dialog.signed.connect(lambda *what: told.append(what))
+    reported: list[Any] = []
+    dialog.signed.connect(lambda *what: reported.append(what))
     for _ in range(2):
         enter(dialog)
-    assert len(told) == 1
+    assert len(reported) == 1
 
-    dialog.tell("The password is not that of the supervisors.")
+    dialog.show_fault("The password is not that of the supervisors.")
     sign(dialog)
     enter(dialog)
-    assert len(told) == 2
+    assert len(reported) == 2
 
 
 def test_what_is_laid_down_counts_for_its_station_alone(workbench: Workbench) -> None:
@@ -138,15 +138,15 @@ def test_what_is_laid_down_counts_for_its_station_alone(workbench: Workbench) ->
 def test_a_supervisor_is_asked_for_name_and_password(qtbot: QtBot) -> None:
     bar = ReasonBar()
     qtbot.addWidget(bar)
-    told: list[Any] = []
-    bar.given.connect(lambda *what: told.append(what))
+    reported: list[Any] = []
+    bar.given.connect(lambda *what: reported.append(what))
     bar.ask(of_supervisor=True)
     reason, name, password = bar.findChildren(QLineEdit)
     reason.setText("It will do.")
     password.setText("secret")
     password.returnPressed.emit()
-    assert told == []
+    assert reported == []
     name.setText("Eve")
     password.returnPressed.emit()
 
-    assert told == [("It will do.", Signature("Eve", "secret"))]
+    assert reported == [("It will do.", Signature("Eve", "secret"))]

@@ -79,9 +79,11 @@ def test_the_introduction_shows_pen_and_cone_and_leads_to_the_trial(
     (introduction,) = walker.window.findChildren(Introduction)
 
     pictures = introduction.findChildren(PenInSpace)
-    told = " ".join(label.text() for label in introduction.findChildren(QLabel))
+    reported = " ".join(label.text() for label in introduction.findChildren(QLabel))
     assert [each.value() is not None for each in pictures] == [True, True]
-    assert all(step in told for step in ("Start", "Camera", "LEDs", "Swing", "Review"))
+    assert all(
+        step in reported for step in ("Start", "Camera", "LEDs", "Swing", "Review")
+    )
 
     introduction.accept()
 

@@ -495,18 +495,18 @@ def test_what_was_typed_before_stays_with_the_station_before(
     assert start.text_of("Operator") == "Cy"
 
 
-def test_a_station_whose_files_are_gone_is_told(
+def test_a_station_whose_files_are_gone_is_reported(
     start: Opened, workbench: Workbench, settings: Settings
 ) -> None:
     gone = replace(settings.station("Hall 2"), files=FilePaths(pen="/gone/lp04.csv"))
     settings.set_station("Hall 3", gone)
-    told: list[str] = []
-    workbench.notifications.raised.connect(lambda text, _: told.append(text))
+    reported: list[str] = []
+    workbench.notifications.raised.connect(lambda text, _: reported.append(text))
 
     start.type_into("Station", "Hall 3")
     start.settle()
 
-    assert any("/gone/lp04.csv does not exist" in sentence for sentence in told)
+    assert any("/gone/lp04.csv does not exist" in sentence for sentence in reported)
     assert start.text_of("Station") == "Hall 3"
 
 
@@ -608,7 +608,7 @@ def test_a_nominal_centre_comes_back_with_its_station(
     np.testing.assert_array_equal(workbench.selection.preparation.nominal_tip, point)
 
 
-def test_without_an_led_file_no_centre_is_told(
+def test_without_an_led_file_no_centre_is_reported(
     show: Callable[[Workbench], Opened], fresh: Workbench
 ) -> None:
     start = show(fresh)
@@ -671,7 +671,7 @@ def test_the_tip_in_force_is_shown_with_age_verdict_and_uncertainty(
     assert table == ["x -1.3182 0.0031", "y -90.410 0.012", "z -23.85 0.10"]
 
 
-def test_on_a_large_screen_the_tip_in_force_is_told_in_larger_figures(
+def test_on_a_large_screen_the_tip_in_force_is_reported_in_larger_figures(
     show: Callable[[Workbench], Opened], workbench: Workbench
 ) -> None:
     accepted(workbench, timedelta(days=12))
@@ -729,7 +729,7 @@ def shown_below(start: Opened) -> set[str]:
         *((60, "2 months ago"), (729, "24 months ago"), (730, "2 years ago")),
     ],
 )
-def test_the_age_is_told_in_words(
+def test_the_age_is_reported_in_words(
     show: Callable[[Workbench], Opened], workbench: Workbench, days: int, age: str
 ) -> None:
     accepted(workbench, timedelta(days=days))
@@ -838,7 +838,7 @@ def test_a_result_accepted_meanwhile_is_shown_on_return(
     assert start.last()[0] == "Today"
 
 
-def test_a_damaged_result_is_told_where_the_result_would_be(
+def test_a_damaged_result_is_reported_where_the_result_would_be(
     show: Callable[[Workbench], Opened], workbench: Workbench
 ) -> None:
     accepted(workbench, timedelta(days=12))
@@ -866,9 +866,9 @@ def test_interrupted_swings_are_offered_the_newest_first(
     )
     interrupted(workbench, "c", hours_ago=50)
 
-    told = [row.words()[1] for row in show(workbench).rows()]
+    reported = [row.words()[1] for row in show(workbench).rows()]
 
-    assert told == [
+    assert reported == [
         *("LP-05  \u00b7  T-10  \u00b7  1 image",),
         *("LP-04  \u00b7  T-10  \u00b7  12 images",) * 2,
     ]
@@ -989,7 +989,7 @@ def test_a_closed_camera_is_opened_for_the_swing(
     assert workbench.live.is_open
 
 
-def test_without_a_camera_it_is_told_where_to_choose_one(
+def test_without_a_camera_it_is_reported_where_to_choose_one(
     show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
 ) -> None:
     interrupted(workbench, "a")
@@ -1077,7 +1077,7 @@ def test_a_swing_does_not_go_on_with_images_of_another_size(
     assert focused.text() == "Resume"
 
 
-def test_a_swing_that_was_damaged_since_is_told_and_no_longer_offered(
+def test_a_swing_that_was_damaged_since_is_reported_and_no_longer_offered(
     show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
 ) -> None:
     folder = interrupted(workbench, "a")
@@ -1121,7 +1121,7 @@ def remove_header(folder: Path) -> str:
 @pytest.mark.parametrize(
     "damage", [cut_header, remove_camera, damage_line, remove_header]
 )
-def test_a_damaged_swing_is_told_of_until_it_is_mended(
+def test_a_damaged_swing_is_reported_until_it_is_mended(
     show: Callable[[Workbench], Opened],
     workbench: Workbench,
     qtbot: QtBot,
@@ -1237,7 +1237,7 @@ def test_a_swing_that_another_program_took_meanwhile_is_not_resumed_or_discarded
 
 
 @pytest.mark.slow
-def test_a_record_that_cannot_be_written_is_told(
+def test_a_record_that_cannot_be_written_is_reported(
     show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
 ) -> None:
     folder = interrupted(workbench, "a")
@@ -1478,7 +1478,7 @@ def test_the_sound_test_plays_each_sound_with_its_word(qtbot: QtBot) -> None:
     ]
 
 
-def test_it_is_told_why_there_is_no_sound(
+def test_it_is_reported_why_there_is_no_sound(
     show: Callable[..., Opened], workbench: Workbench
 ) -> None:
     start = show(workbench, SilentSounds(["pw-play", "aplay"]))
@@ -1492,7 +1492,7 @@ def test_it_is_told_why_there_is_no_sound(
     )
 
 
-def test_it_is_told_that_sounds_are_off(
+def test_it_is_reported_that_sounds_are_off(
     show: Callable[..., Opened], workbench: Workbench
 ) -> None:
     recorder = Recorder()
@@ -1659,7 +1659,7 @@ def test_every_word_changes_with_the_language(
     assert [text for text in quiet if "Ann" not in text and ":" not in text] == []
 
 
-# What is told as long as it holds
+# What is reported as long as it holds
 
 
 def test_that_sounds_are_off_is_said_until_they_are_on(
@@ -1714,8 +1714,8 @@ def test_the_temperature_is_asked_once_a_day_where_a_camera_is_live(
     start.type_into(name, "21.5", Key.Key_Return)
     assert not asked.isVisible()
     assert selection.preparation.assumptions_today.temperature_c == 21.5
-    told = [item.message.text for item in view.readiness()]
-    assert "Pen at 21.5 \N{DEGREE SIGN}C" in told
+    reported = [item.message.text for item in view.readiness()]
+    assert "Pen at 21.5 \N{DEGREE SIGN}C" in reported
 
     # The next day the last answer is offered again, and none is one, too.
     old = replace(selection.preparation, temperature_day="2020-01-01")

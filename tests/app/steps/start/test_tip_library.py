@@ -59,8 +59,8 @@ class Desk:
         self.qtbot, self.workbench = qtbot, workbench
         with undressed():
             self.page = StartPage(workbench, SilentSounds())
-        self.told: list[str] = []
-        workbench.notifications.status_changed.connect(self.told.append)
+        self.reported: list[str] = []
+        workbench.notifications.status_changed.connect(self.reported.append)
         qtbot.addWidget(self.page)
         self.page.resize(1000, 640)
         self.page.show()
@@ -225,16 +225,18 @@ def test_a_tip_that_was_never_calibrated_is_marked_in_list_panel_and_side_bar(
     assert desk.subject().statuses.library.tips
     sidebar = Sidebar()
     desk.qtbot.addWidget(sidebar)
-    told: list[tuple[str, bool]] = []
-    sidebar.subject_told.connect(lambda text, marked: told.append((text, marked)))
+    reported: list[tuple[str, bool]] = []
+    sidebar.subject_changed.connect(
+        lambda text, marked: reported.append((text, marked))
+    )
     subject = desk.subject()
     sidebar.set_subject(replace(subject, names=replace(subject.names, cone="C-1")))
     assert cone
     assert sidebar.standing().text == (
         "Tip NOT CALIBRATED  \N{MIDDLE DOT}  Cone OVERDUE"
     )
-    assert sidebar.standing().text in told[-1][0]
-    assert told[-1][1]
+    assert sidebar.standing().text in reported[-1][0]
+    assert reported[-1][1]
 
 
 def test_a_simulated_tip_is_not_marked(desk: Desk) -> None:
@@ -262,9 +264,9 @@ def test_a_retired_tip_is_no_choice_and_typed_it_leads_no_further(desk: Desk) ->
 
 
 @pytest.mark.slow
-def test_a_damaged_library_is_told_and_told_off_once_it_is_mended(desk: Desk) -> None:
-    told, relieved = list[str](), list[str]()
-    desk.workbench.notifications.raised.connect(lambda text, _: told.append(text))
+def test_a_damaged_library_is_reported_until_it_is_mended(desk: Desk) -> None:
+    reported, relieved = list[str](), list[str]()
+    desk.workbench.notifications.raised.connect(lambda text, _: reported.append(text))
     desk.workbench.notifications.withdrawn.connect(relieved.append)
     desk.add(TIP)
     (file,) = library_files(desk.data)
@@ -272,12 +274,12 @@ def test_a_damaged_library_is_told_and_told_off_once_it_is_mended(desk: Desk) ->
     file.write_bytes(sound.replace(b"T-7", b"T-6"))
     desk.workbench.library.refresh()
     desk.settle()
-    assert "was modified or damaged after it was saved." in told[-1]
+    assert "was modified or damaged after it was saved." in reported[-1]
 
     file.write_bytes(sound)
     desk.workbench.library.refresh()
     desk.settle()
-    assert relieved == told[-1:]
+    assert relieved == reported[-1:]
 
 
 # The dialog
@@ -369,7 +371,7 @@ def test_a_change_that_is_asked_for_while_another_is_kept_is_kept_after_it(
     assert list(desk.library.tips) == ["T-11", "T-12"]
 
 
-def test_why_a_change_was_not_kept_is_told_though_the_dialog_was_left(
+def test_why_a_change_was_not_kept_is_reported_though_the_dialog_was_left(
     desk: Desk, slow_disk: Event
 ) -> None:
     keep_and_leave(desk, "T-11")
@@ -377,7 +379,7 @@ def test_why_a_change_was_not_kept_is_told_though_the_dialog_was_left(
     slow_disk.set()
     desk.settle()
 
-    assert "The tip T-11 is in the library already." in desk.told[-1]
+    assert "The tip T-11 is in the library already." in desk.reported[-1]
 
 
 def test_the_picture_of_a_tip_is_seen_where_it_is_chosen_and_where_it_is_kept(
@@ -426,7 +428,7 @@ def assert_red(picture: TipPicture) -> None:
     assert shown.pixelColor(shown.rect().center()) == QColor("red")
 
 
-def test_what_makes_no_sense_is_told_in_the_dialog_and_nothing_is_kept(
+def test_what_makes_no_sense_is_reported_in_the_dialog_and_nothing_is_kept(
     desk: Desk,
 ) -> None:
     desk.add(TIP)
@@ -520,7 +522,7 @@ def test_the_axis_of_a_stylus_is_found_by_a_spin(desk: Desk) -> None:
     assert isinstance(recorder, SpinRecorder)
     axis = np.array([0.0, 0.8, 0.6])
     said: list[str] = []
-    recorder.told.connect(said.append)
+    recorder.message_sent.connect(said.append)
     for rotation in rotation_from_vector(
         np.radians(np.arange(0, 90, 3))[:, None] * axis
     ):
@@ -553,7 +555,7 @@ def test_a_barcode_chooses_its_tip_wherever_the_focus_is(
     now = desk.workbench.selection.preparation.names
     assert (now.tip, now.ball_diameter, now.operator) == ("T-7", 6.0, before)
     assert desk.text_of("Operator") == before
-    assert desk.told[-1] == "Tip T-7 selected by barcode."
+    assert desk.reported[-1] == "Tip T-7 selected by barcode."
     assert field.hasFocus()
 
 
@@ -623,7 +625,7 @@ def test_the_barcode_of_a_retired_tip_chooses_nothing(desk: Desk) -> None:
     desk.scan("T-7")
 
     assert desk.workbench.selection.preparation.names.tip != "T-7"
-    assert desk.told[-1].startswith("Tip T-7 is retired")
+    assert desk.reported[-1].startswith("Tip T-7 is retired")
 
 
 def test_an_unknown_barcode_is_asked_about_no_more_once_its_tip_is_there(

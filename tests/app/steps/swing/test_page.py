@@ -159,7 +159,7 @@ class Desk:
         self.window.activateWindow()
         QTest.keyClick(self.window.focusWidget() or self.window, key)
 
-    def has_told(self, instruction: str) -> bool:
+    def has_reported(self, instruction: str) -> bool:
         return any(value.instruction == instruction for value in self.shown)
 
     def close(self) -> None:
@@ -326,7 +326,7 @@ def test_the_step_is_closed_while_something_is_missing(desk: Desk) -> None:
     assert "Open the LED geometry file." in desk.words()
 
 
-def test_a_record_that_cannot_be_made_is_told_and_tried_again(
+def test_a_record_that_cannot_be_made_is_reported_and_tried_again(
     qtbot: QtBot, desk: Desk
 ) -> None:
     blocker = desk.run.records_folder
@@ -377,7 +377,7 @@ def test_a_recording_ends_when_a_whole_pass_brought_nothing_new(
     desk.window.go_to(1)
 
     until_verdict(qtbot, desk)
-    assert not desk.offers("Seat")  # nobody is there to be told
+    assert not desk.offers("Seat")  # there is nobody to instruct
     assert desk.value.state.word in {"CHECK", "REPEAT", "NO TIP"}
 
 
@@ -397,7 +397,7 @@ def test_no_key_is_needed_from_the_seat_to_the_verdict(at_verdict: Desk) -> None
         ),
         *("Capture complete",),
     ):
-        assert desk.has_told(instruction), instruction
+        assert desk.has_reported(instruction), instruction
     verdict = desk.run.status.verdict
     assert verdict is not None
     assert desk.value.state.word == grade_text(verdict.grade)
@@ -506,13 +506,13 @@ def test_an_accepted_swing_is_left_alone_and_the_next_one_begins(
 # A long swing, disturbed
 
 
-def test_a_covered_pen_is_told_and_the_swing_goes_on_by_itself(
+def test_a_covered_pen_is_reported_and_the_swing_goes_on_by_itself(
     qtbot: QtBot, capturing: Desk
 ) -> None:
-    n_told, n_played = len(capturing.shown), len(capturing.recorder.played)
+    n_reported, n_played = len(capturing.shown), len(capturing.recorder.played)
 
     def lost() -> list[OperatorValue]:
-        return [v for v in capturing.shown[n_told:] if v.state.word == "PEN LOST"]
+        return [v for v in capturing.shown[n_reported:] if v.state.word == "PEN LOST"]
 
     capturing.click("Cover")
 
@@ -542,13 +542,15 @@ def test_a_slip_costs_only_the_images_that_slipped(
 ) -> None:
     keep_on(qtbot, capturing, 5)
     n_before = capturing.state.n_kept
-    n_told = len(capturing.shown)
+    n_reported = len(capturing.shown)
 
     capturing.click("Slip")
 
     until(
         qtbot,
-        lambda: any(v.instruction == "Tip slipped" for v in capturing.shown[n_told:]),
+        lambda: any(
+            v.instruction == "Tip slipped" for v in capturing.shown[n_reported:]
+        ),
     )
     assert Sound.LOST in capturing.recorder.sounds()
     keep_on(qtbot, capturing)
@@ -695,7 +697,7 @@ def test_other_choices_do_not_change_a_swing_that_is_under_way(
     keep_on(qtbot, capturing)
     capturing.window.go_to(0)
     capturing.window.go_to(1)
-    assert asked(capturing) == ""  # it was told once
+    assert asked(capturing) == ""  # it was reported once
     assert capturing.run.status.setup is setup
     assert capturing.run.status.names.operator == "Ann"
 

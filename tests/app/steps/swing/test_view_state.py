@@ -1,4 +1,4 @@
-"""What the operator is told, moment by moment."""
+"""What is shown to the operator, moment by moment."""
 
 from dataclasses import replace
 
@@ -72,7 +72,7 @@ def test_nobody_is_asked_to_hold_the_pen_upright_who_need_not(
     assert value.dial.target is None
 
 
-def test_at_the_end_of_a_recording_it_is_told_how_much_of_it_was_read(
+def test_at_the_end_of_a_recording_it_is_reported_how_much_of_it_was_read(
     words: SwingWords,
 ) -> None:
     done = at_verdict(setup=RECORDING)
@@ -81,7 +81,7 @@ def test_at_the_end_of_a_recording_it_is_told_how_much_of_it_was_read(
     assert words.note(replace(done, state=state)) == "60 of 60 images loaded"
 
 
-def test_away_from_the_swing_nobody_is_told_that_the_review_is_open(
+def test_away_from_the_swing_it_is_not_shown_that_the_review_is_open(
     words: SwingWords,
 ) -> None:
     hint = words.operator_value(at_verdict(is_away=True)).hint
@@ -109,13 +109,17 @@ def test_a_lost_pen_is_not_said_to_show_its_leds(words: SwingWords) -> None:
     assert shown.state.detail == "10 of 10 LEDs"
 
 
-def test_images_to_go_are_told_in_true_steps() -> None:
-    told = [in_true_steps(n_more) for n_more in (0, 1, 9, 10, 11, 16, 30, 31, 47, 240)]
+def test_images_to_go_are_reported_in_true_steps() -> None:
+    reported = [
+        in_true_steps(n_more) for n_more in (0, 1, 9, 10, 11, 16, 30, 31, 47, 240)
+    ]
 
-    assert told == [0, 1, 9, 10, 15, 20, 30, 40, 50, 240]
+    assert reported == [0, 1, 9, 10, 15, 20, 30, 40, 50, 240]
 
 
-def test_what_the_files_leave_open_is_told_during_the_swing(words: SwingWords) -> None:
+def test_what_the_files_leave_open_is_reported_during_the_swing(
+    words: SwingWords,
+) -> None:
     state = start_swing(SETUP)
     vague = replace(state.kept.predicted, uncertainty=0.02, floor=0.0042)
     state = replace(state, kept=replace(state.kept, predicted=vague))
@@ -125,9 +129,9 @@ def test_what_the_files_leave_open_is_told_during_the_swing(words: SwingWords) -
     short = replace(early.short, fields=np.zeros_like(early.short.fields))
     late = replace(early, short=short)
 
-    told = words.warning(late)
+    reported = words.warning(late)
 
-    assert "With this LED file the lowest achievable U (k =" in told.text
+    assert "With this LED file the lowest achievable U (k =" in reported.text
     assert words.warning(early) == StatusMessage()
     assert words.warning(replace(late, setup=SETUP)) == StatusMessage()
     is_read = replace(setup, is_recording=True)
@@ -140,9 +144,9 @@ def test_spots_that_do_not_match_the_pen_point_to_its_file_before_the_swing(
     waiting = moment(start_swing(SETUP))
     assert words.warning(waiting) == StatusMessage()
 
-    told = words.warning(replace(waiting, has_unfit_spots=True))
+    reported = words.warning(replace(waiting, has_unfit_spots=True))
 
-    assert told.text.endswith(
+    assert reported.text.endswith(
         "Check that the LED file belongs to this pen and the camera file to these "
         "images."
     )
@@ -159,8 +163,8 @@ def test_the_pen_in_space_stands_as_the_dial_has_it(words: SwingWords) -> None:
     assert words.stand(replace(at_verdict(), setup=nobody)) is None
 
 
-def told(*estimates: tuple[int, int]) -> list[int]:
-    """What is told to be to go after estimates of images to go, and kept."""
+def reported(*estimates: tuple[int, int]) -> list[int]:
+    """Return the displayed numbers of remaining images after estimates of them."""
     to_go = RemainingImages.first(*estimates[0])
     found = [to_go.n_images]
     for n_more, n_kept in estimates[1:]:
@@ -170,16 +174,18 @@ def told(*estimates: tuple[int, int]) -> list[int]:
 
 
 def test_what_is_to_go_does_not_creep_up() -> None:
-    assert told((24, 30), (26, 31), (29, 32), (14, 40), (4, 50), (6, 51)) == [
+    assert reported((24, 30), (26, 31), (29, 32), (14, 40), (4, 50), (6, 51)) == [
         *(25, 25, 25, 15, 4, 4)
     ]
 
 
 def test_more_is_to_go_after_images_were_dropped() -> None:
-    assert told((4, 50), (10, 44)) == [4, 10]
+    assert reported((4, 50), (10, 44)) == [4, 10]
 
 
-def test_a_rise_that_is_no_chance_is_told_with_its_reason(words: SwingWords) -> None:
+def test_a_rise_that_is_no_chance_is_reported_with_its_reason(
+    words: SwingWords,
+) -> None:
     to_go = RemainingImages.first(4, 50).after(4, 51).after(40, 52)
     assert (to_go.n_images, to_go.has_risen) == (40, True)
     capturing = replace(start_swing(SETUP), phase=Phase.CAPTURING)

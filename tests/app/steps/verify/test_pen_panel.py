@@ -1,4 +1,4 @@
-"""What is told of the pen is of the pen that is chosen now."""
+"""What is reported of the pen is of the pen that is chosen now."""
 
 from dataclasses import replace
 from threading import Event
@@ -27,15 +27,15 @@ def slow_machine(hold_back: "HoldBack") -> Event:
 
 def words(panel: PenPanel) -> str:
     labels = panel.findChildren(SignLabel)
-    told = (each.value().text for each in labels if each.isVisible())
-    return " ".join(filter(None, told))
+    reported = (each.value().text for each in labels if each.isVisible())
+    return " ".join(filter(None, reported))
 
 
 def button(panel: PenPanel, text: str) -> PushButton:
     return next(b for b in panel.findChildren(PushButton) if b.text() == text)
 
 
-def test_what_comes_of_the_pen_before_is_not_told_of_the_next_one(
+def test_what_comes_of_the_pen_before_is_not_shown_for_the_next_one(
     qtbot: QtBot, workbench: Workbench, slow_machine: Event
 ) -> None:
     for seed in (3, 4, 5, 6):

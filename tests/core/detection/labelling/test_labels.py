@@ -272,7 +272,7 @@ def test_hidden_leds_are_reported_missing(n_missing: int) -> None:
 
 
 @pytest.mark.parametrize("n_lamps", [1, 3, 5])
-def test_lamps_like_leds_are_told_from_leds(n_lamps: int) -> None:
+def test_lamps_like_leds_are_distinguished_from_leds(n_lamps: int) -> None:
     found = outcomes(
         lambda rng: random_view(rng, n_lamps=n_lamps), PEN, 50, 20 + n_lamps
     )

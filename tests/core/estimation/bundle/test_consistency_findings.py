@@ -197,7 +197,7 @@ def test_what_lies_far_beyond_the_files_own_uncertainty_is_named_with_both_value
     ],
     ids=str,
 )
-def test_several_wrong_numbers_are_told_as_the_images_want_them_together(
+def test_several_wrong_numbers_are_reported_as_the_images_want_them_together(
     changes: dict[str, float],
 ) -> None:
     file = wrong_file(**changes)
@@ -247,7 +247,7 @@ def test_the_camera_as_adjusted_is_nearer_to_the_truth_than_its_file() -> None:
     assert not result.contradictions
 
 
-def test_what_the_images_want_is_told_no_finer_than_they_know_it() -> None:
+def test_what_the_images_want_is_reported_no_finer_than_they_know_it() -> None:
     found = Contradiction(
         what=DIAMETER,
         unit="mm",

@@ -69,7 +69,7 @@ def calibrated(said: float, areas: FloatArray) -> Calibration:
 
 
 @pytest.mark.parametrize("said", [9.0, 10.0, 13.0])
-def test_exact_areas_give_the_exact_diameter_whatever_is_said(said: float) -> None:
+def test_exact_areas_give_the_exact_diameter_whatever_is_reported(said: float) -> None:
     widths = np.full((len(SWING), 1), RIM)
     reading = read_diameter(state_with(said), true_areas()[:, None], widths)
 

@@ -32,17 +32,17 @@ def drawn(sigmas: FloatArray, seed: int = 0, n_images: int = 100) -> FloatArray:
     return sigmas[:, None] * rng.standard_normal((n_images, 1, len(sigmas), 2))
 
 
-def test_leds_that_are_alike_are_not_told_apart() -> None:
-    told = [
+def test_leds_that_are_alike_are_not_distinguished() -> None:
+    reported = [
         find_led_noise(
             drawn(np.full(10, 0.03), seed), np.ones((100, 1, 10), bool), 0.03, EVEN
         )
         for seed in range(50)
     ]
-    assert all(noise is None for noise in told)
+    assert all(noise is None for noise in reported)
 
 
-def test_noisy_leds_are_told_from_usual_ones() -> None:
+def test_noisy_leds_are_distinguished_from_usual_ones() -> None:
     sigmas = np.full(10, 0.03)
     sigmas[[2, 7]] = 0.2
     together = float(np.sqrt(np.mean(sigmas**2)))

@@ -4,8 +4,8 @@ import pytest
 from lightpen.estimation.bundle.seat_modes import (
     FULL_LEAN,
     drift_modes,
-    lean_modes,
     oval_seat,
+    tilt_modes,
 )
 from lightpen.model.posture import rotations_of
 from lightpen.model.rigid import rotation_from_vector
@@ -17,7 +17,7 @@ ROUND = rotations_of(PEN, np.full(60, 0.4), ANGLES, np.zeros(60))
 
 
 def test_forms_of_the_seat_say_nothing_of_where_it_is_on_average() -> None:
-    forms = lean_modes(swing_poses(60, np.random.default_rng(0)).rotations)
+    forms = tilt_modes(swing_poses(60, np.random.default_rng(0)).rotations)
 
     np.testing.assert_allclose(forms.mean(axis=0), 0, atol=1e-12)
     np.testing.assert_allclose(np.mean(forms**2, axis=0), 1)
@@ -39,7 +39,7 @@ def test_an_oval_seat_moves_the_tip_to_the_axis_and_away_from_it(phase: float) -
     numbers = 0.01 * np.array([np.cos(phase), np.sin(phase)])
     moves = (oval_seat(ROUND) @ numbers).reshape(-1, 3)
 
-    found = lean_modes(ROUND) @ moves
+    found = tilt_modes(ROUND) @ moves
     np.testing.assert_allclose(found, radius[:, None] * away, atol=1e-12)
 
 
@@ -47,7 +47,7 @@ def test_a_camera_that_looks_down_sees_the_same_seat() -> None:
     looking = rotation_from_vector(np.array([0.6, 0.0, 0.0]))
 
     np.testing.assert_allclose(
-        lean_modes(looking @ ROUND), lean_modes(ROUND), atol=1e-12
+        tilt_modes(looking @ ROUND), tilt_modes(ROUND), atol=1e-12
     )
     np.testing.assert_allclose(
         oval_seat(looking @ ROUND).reshape(-1, 3, 2),
@@ -58,7 +58,7 @@ def test_a_camera_that_looks_down_sees_the_same_seat() -> None:
 
 def test_a_seat_has_forms_before_a_camera_that_lies_on_its_side() -> None:
     on_its_side = rotation_from_vector(np.array([0.0, 0.0, np.pi / 2]))
-    forms = lean_modes(on_its_side @ ROUND)
+    forms = tilt_modes(on_its_side @ ROUND)
 
     # Waves round the cone are independent of each other where the lean goes round.
     np.testing.assert_allclose(forms[:, :6].T @ forms[:, :6] / 60, np.eye(6), atol=1e-9)
@@ -67,5 +67,5 @@ def test_a_seat_has_forms_before_a_camera_that_lies_on_its_side() -> None:
 def test_a_pen_that_keeps_its_lean_has_no_forms() -> None:
     upright = np.tile(np.eye(3), (5, 1, 1))
 
-    assert not lean_modes(upright).any()
+    assert not tilt_modes(upright).any()
     assert not oval_seat(upright).any()

@@ -119,8 +119,10 @@ def test_a_late_camera_is_corrected_and_named() -> None:
     error = found.joint.tip_pen - swing_at(TIMES).tip_pen
     assert (np.abs(error) < found.budget.expanded_uncertainty[:3]).all()
     assert "verdict.not-simultaneous" not in [m.code for m in warnings_of(found)]
-    told = next(str(m) for m in warnings_of(found) if " ms late" in str(m))
-    assert float(told.split(" ms late")[0].split()[-1]) == pytest.approx(3.0, rel=0.05)
+    reported = next(str(m) for m in warnings_of(found) if " ms late" in str(m))
+    assert float(reported.split(" ms late")[0].split()[-1]) == pytest.approx(
+        3.0, rel=0.05
+    )
 
 
 def test_a_time_is_stated_in_ms_if_the_image_rate_is_known_with_its_sign() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
-from lightpen.estimation.bundle.seat_modes import lean_modes
+from lightpen.estimation.bundle.seat_modes import tilt_modes
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contact.joint import fit_joint
@@ -145,7 +145,7 @@ def test_the_tip_does_not_take_on_led_errors_and_its_covariance_is_honest(
         predicted.append(np.sum(variances, axis=0))
     ratio = np.sqrt(np.mean(np.square(errors), axis=0) / np.mean(predicted, axis=0))
 
-    # Only the pen's scale, which moves the tip along y, cannot be told from images.
+    # Only the pen's scale, which moves the tip along y, cannot be found from images.
     spread = np.std(errors, axis=0) / np.std(plain, axis=0)
     assert spread[0] < 0.7
     assert spread[2] < 0.4
@@ -333,7 +333,7 @@ def test_a_seat_of_more_lobes_is_covered_whatever_it_is_taken_for(
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_seat_that_goes_along_one_axis_alone_is_no_oval(axis: int) -> None:
     pen = replace(PEN, led_sigma=0.002)
-    sine_of_three_waves = lean_modes(SWING.rotations)[:, 5]
+    sine_of_three_waves = tilt_modes(SWING.rotations)[:, 5]
     seat = 0.01 * np.outer(sine_of_three_waves, np.eye(3)[axis])
     result = calibrated(pen, 0.03, 3, seat=seat)
 
@@ -348,12 +348,12 @@ def test_a_stated_covariance_tells_which_leds_may_be_off() -> None:
     measured = perturbed(0.002, 1, stated=0.002)
     variances = np.full((PEN.n_leds, 3), 0.002**2)
     variances[6] = 0.05**2
-    told = replace(measured, led_covariance=np.diag(variances.ravel()))
-    moved = told.leds.copy()
+    reported = replace(measured, led_covariance=np.diag(variances.ravel()))
+    moved = reported.leds.copy()
     moved[6] += [0.04, 0.0, -0.05]
-    told = replace(told, leds=moved)
+    reported = replace(reported, leds=moved)
 
-    result = calibrated(told, 0.03, 1)
+    result = calibrated(reported, 0.03, 1)
 
     # What the file allows for is put right, and is no contradiction.
     assert result.bundle.components.leds.sigma == 0

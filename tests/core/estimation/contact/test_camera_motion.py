@@ -116,7 +116,7 @@ def test_without_lamps_there_is_no_way() -> None:
 
 
 @pytest.mark.parametrize("way", [EVEN, BUMP], ids=["even", "bump"])
-def test_the_way_of_a_camera_is_taken_out_and_told(way: FloatArray) -> None:
+def test_the_way_of_a_camera_is_taken_out_and_reported(way: FloatArray) -> None:
     calibration = solved(way, way)
     path = calibration.cameras[0].path
     assert path is not None
@@ -134,7 +134,7 @@ def test_the_way_of_a_camera_is_taken_out_and_told(way: FloatArray) -> None:
 
 
 @pytest.mark.parametrize("bump", [12.0, 60.0])
-def test_a_hard_bump_of_the_camera_is_told_in_pixels(bump: float) -> None:
+def test_a_hard_bump_of_the_camera_is_reported_in_pixels(bump: float) -> None:
     turn = rotation_from_vector(np.array([0.0, bump / CAMERA.fx, 0.0]))
     is_after = (TIME > 0.6)[:, None]
     poses = (
@@ -150,9 +150,11 @@ def test_a_hard_bump_of_the_camera_is_told_in_pixels(bump: float) -> None:
     seen = observe_centers(centers, CAMERA, PEN)
     lamps = lamps_among(np.zeros((N_IMAGES, 0, 2)), list(noisy))
     calibration = calibrate(CAMERA, PEN, replace(seen, lamps=lamps))
-    told = [str(each) for each in warnings_of(calibration)]
+    reported = [str(each) for each in warnings_of(calibration)]
 
-    assert f"fixed lamps in view and the pen shifted by {bump:.0f}." in " ".join(told)
+    assert f"fixed lamps in view and the pen shifted by {bump:.0f}." in " ".join(
+        reported
+    )
     assert judge(calibration, SwingLimits()).reason.code == Code.CAMERA_MOVED
     assert calibration.used.all()
     assert errors_in_u(calibration).max() < 1.2

@@ -56,7 +56,9 @@ def test_a_good_pen_has_no_displaced_led() -> None:
 
 
 @pytest.mark.parametrize("n_seen", [1, 5, 40])
-def test_a_displacement_is_told_only_where_the_led_was_often_seen(n_seen: int) -> None:
+def test_a_displacement_is_reported_only_where_the_led_was_often_seen(
+    n_seen: int,
+) -> None:
     rng = np.random.default_rng(1)
     pixels = simulate_centers(
         CAMERA, PEN, SWING.rotations, SWING.translations, 0.02, rng

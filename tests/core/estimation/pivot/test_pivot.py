@@ -179,7 +179,7 @@ def test_a_slipped_pose_is_found_among_seven() -> None:
         np.testing.assert_array_equal(np.flatnonzero(~used), [3])
 
 
-def test_without_covariances_outliers_are_told_by_the_scatter_of_the_rest() -> None:
+def test_without_covariances_outliers_are_reported_by_the_scatter_of_the_rest() -> None:
     R, t = pivoting_poses(200, noise=0.1)
     slipped = np.arange(200) % 50 == 7
     t[slipped] += [1.2, 0.0, 0.0]

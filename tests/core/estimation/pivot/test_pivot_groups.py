@@ -54,7 +54,7 @@ def test_a_cone_that_moved_halfway_is_found() -> None:
 
 @pytest.mark.parametrize("distance", [10.0, 15.0])
 @pytest.mark.parametrize("kind", ["field", "operator"])
-def test_a_third_of_the_poses_that_agree_elsewhere_is_told_apart(
+def test_a_third_of_the_poses_that_agree_elsewhere_is_distinguished(
     kind: SwingKind, distance: float
 ) -> None:
     others = np.random.default_rng(1).random(N_POSES) < 0.3

@@ -351,9 +351,9 @@ def test_a_pivot_calibration_is_recorded_and_shown() -> None:
     assert found["uncertainty"]["leaves_out"] in text
 
 
-@pytest.mark.parametrize(("jitter", "is_told"), [(0.01, True), (0.0003, False)])
-def test_a_jitter_is_told_where_it_is_more_than_round_parts_make(
-    jitter: float, is_told: bool
+@pytest.mark.parametrize(("jitter", "is_reported"), [(0.01, True), (0.0003, False)])
+def test_a_jitter_is_reported_where_it_is_more_than_round_parts_make(
+    jitter: float, is_reported: bool
 ) -> None:
     rng = np.random.default_rng(7)
     swing = swing_poses(40, rng)
@@ -364,5 +364,5 @@ def test_a_jitter_is_told_where_it_is_more_than_round_parts_make(
     found = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
 
     assert found.bundle.components.jitter.covariance is not None
-    told = {warning.code for warning in warnings_of(found)}
-    assert ("warning.seat-jitter" in told) == is_told
+    reported = {warning.code for warning in warnings_of(found)}
+    assert ("warning.seat-jitter" in reported) == is_reported

@@ -153,7 +153,9 @@ def with_led_sigma(calibration: Calibration, sigma: float) -> Calibration:
     return replace(calibration, bundle=replace(bundle, budget_components=counted))
 
 
-def test_an_uncertainty_by_leds_that_are_off_is_told_as_such(good: Calibration) -> None:
+def test_an_uncertainty_by_leds_that_are_off_is_reported_as_such(
+    good: Calibration,
+) -> None:
     off = with_led_sigma(with_share(good, ContributionName.LEDS, 0.02), 0.1)
     by_leds = off.budget.weakest_share(off.budget.largest_share)
     assert by_leds == pytest.approx(0.02, rel=1e-2)
@@ -213,9 +215,9 @@ def test_the_reason_names_the_largest_share_and_what_would_shrink_it(
     verdict = judge(large, SwingLimits(max_uncertainty=0.015))
 
     assert verdict.grade is Grade.CHECK
-    told = str(verdict.next_step.message)
+    reported = str(verdict.next_step.message)
     named = ("intrinsics file", "LED file", "rig file", "cause")
-    assert [each for each in named if each in told] == [step]
+    assert [each for each in named if each in reported] == [step]
     assert f"{how} {words}" in str(verdict.reason)
     assert "More images hardly help." in str(verdict.reason)
 
@@ -271,7 +273,7 @@ def test_an_led_off_its_place_is_checked_though_the_tip_is_certain() -> None:
     assert verdict.reason.values["distance"] == pytest.approx(3.0, abs=0.05)
     doubts = [each for each in warnings_of(calibration) if "LED 9 is " in each.text()]
     assert len(doubts) == 1
-    assert repeats(doubts[0], verdict.reason)  # it is not told twice
+    assert repeats(doubts[0], verdict.reason)  # it is not reported twice
     assert not repeats(led_misplaced_too(doubts[0]), verdict.reason)
 
 
@@ -314,8 +316,8 @@ def test_images_of_the_pen_that_are_left_out_count(
     limits = SwingLimits(max_uncertainty=0.02, min_images=150)
     verdict = judge(replace(good, used=used, reasons=reasons), limits)
     is_by_user = reason is Reason.TAKEN_OUT
-    told = many_excluded(31) if is_by_user else many_dropped(31, 150)
-    assert verdict.reason == told
+    reported = many_excluded(31) if is_by_user else many_dropped(31, 150)
+    assert verdict.reason == reported
 
 
 def test_fewer_images_than_asked_for_are_checked_also_if_they_suffice(
@@ -414,7 +416,7 @@ def test_a_change_that_uncertainty_does_not_explain_is_to_be_checked(
     assert judge_change(PASSED, change(difference), "2026-01-02").grade is grade
 
 
-def test_a_change_of_3_8_um_at_a_u_of_0_5_um_is_told() -> None:
+def test_a_change_of_3_8_um_at_a_u_of_0_5_um_is_reported() -> None:
     u = np.full(3, 0.0005)
     found = change_since(np.array([0.0, 0.0038, 0.0005]), u, np.zeros(3), u)
     verdict = judge_change(PASSED, found, "2026-01-02")

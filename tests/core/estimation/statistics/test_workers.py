@@ -33,13 +33,13 @@ def scheduler() -> Iterator[str]:
 
 
 def test_processes_return_what_they_made_in_order_and_tell_how_far_they_are() -> None:
-    told: list[float] = []
+    reported: list[float] = []
 
     with local_workers(2) as in_workers:
-        found = in_workers(square, range(5), told.append)
+        found = in_workers(square, range(5), reported.append)
 
     assert found == [0, 1, 4, 9, 16]
-    assert told == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
+    assert reported == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
 
 
 def test_a_computation_that_is_cancelled_ends_and_begins_no_more(
@@ -56,17 +56,17 @@ def test_a_computation_that_is_cancelled_ends_and_begins_no_more(
 
 
 def test_a_dask_cluster_does_the_same(scheduler: str) -> None:
-    told: list[float] = []
+    reported: list[float] = []
 
     with cluster_workers(scheduler) as in_workers:
-        found = in_workers(square, range(5), told.append)
+        found = in_workers(square, range(5), reported.append)
 
     assert found == [0, 1, 4, 9, 16]
-    assert told[-1] == 1.0
+    assert reported[-1] == 1.0
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_does_not_answer_is_told(
+def test_a_scheduler_that_does_not_answer_is_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pytest.importorskip("distributed", reason=NO_CLUSTER)

@@ -98,7 +98,7 @@ def test_the_id_of_a_retired_tip_is_refused_with_what_to_do(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("entries", "told"),
+    ("entries", "reported"),
     [
         ({"ball_diameter_mm": 0.0}, "Ball diameter 0 mm is not valid"),
         ({"ball_diameter_mm": 5000.0}, "Ball diameter 5000 mm is not valid"),
@@ -114,9 +114,9 @@ def test_the_id_of_a_retired_tip_is_refused_with_what_to_do(tmp_path: Path) -> N
     ],
 )
 def test_what_makes_no_sense_of_a_tip_is_refused(
-    tmp_path: Path, entries: dict[str, object], told: str
+    tmp_path: Path, entries: dict[str, object], reported: str
 ) -> None:
-    with pytest.raises(UsageError, match=told):
+    with pytest.raises(UsageError, match=reported):
         add_item(tmp_path, structs.replace(TIP, **entries), ANN, NOON)
     assert library_files(tmp_path) == ()
 
@@ -161,7 +161,7 @@ def test_with_a_password_only_a_supervisor_changes_the_library(tmp_path: Path) -
     assert (change.operator, change.supervisor) == ("Ann", "Eve")
 
 
-def test_a_changed_file_is_told_and_nothing_older_counts(tmp_path: Path) -> None:
+def test_a_changed_file_is_reported_and_nothing_older_counts(tmp_path: Path) -> None:
     add_item(tmp_path, TIP, ANN, NOON)
     change_item(tmp_path, structs.replace(TIP, max_change_mm=0.02), ANN, NOON)
     _, newest = library_files(tmp_path)

@@ -215,13 +215,13 @@ def elsewhere(swing: Path) -> Iterator[Callable[[str, int, Path], int]]:
         assert process.stdin is not None
         assert process.stdout is not None
         orders: IO[str] = process.stdin
-        told: IO[str] = process.stdout
-        assert told.readline() == "solved\n"
+        reported: IO[str] = process.stdout
+        assert reported.readline() == "solved\n"
 
         def run(order: str, number: int, data: Path) -> int:
             orders.write(f"{order}|{number}|{data}\n")
             orders.flush()
-            return int(told.readline())
+            return int(reported.readline())
 
         yield run
         orders.close()
@@ -345,14 +345,14 @@ def test_a_change_beyond_the_limit_of_the_tip_is_accepted_only_with_a_reason(
     )
 
 
-def test_an_overdue_cone_is_told_with_the_result(case: Case) -> None:
+def test_an_overdue_cone_is_reported_with_the_result(case: Case) -> None:
     cone = recorded_names(open_record(case.folder)).cone
     data = case.archive.folder.parent
     add_item(data, ListedCone(id=cone, due=date(2020, 1, 1)), Author(), NOON)
 
     case.accept()
-    told = {doubt.code: doubt.text for doubt in case.in_force().doubts}
-    assert told["doubt.overdue"].startswith(f"The cone {cone} expired on")
+    reported = {doubt.code: doubt.text for doubt in case.in_force().doubts}
+    assert reported["doubt.overdue"].startswith(f"The cone {cone} expired on")
 
 
 def test_a_retired_tip_is_not_put_in_force(case: Case) -> None:

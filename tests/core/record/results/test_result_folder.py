@@ -258,7 +258,7 @@ def test_any_name_will_do(archive: FolderArchive, name: str) -> None:
         b'{"format": "two"}',
     ],
 )
-def test_a_damaged_result_is_told_and_not_passed_over(
+def test_a_damaged_result_is_reported_and_not_passed_over(
     archive: FolderArchive, content: bytes
 ) -> None:
     """An older tip must not come into force again in silence."""
@@ -375,7 +375,7 @@ def test_a_result_that_its_upgrade_does_not_fit_is_damaged(
         archive.in_force("LP-04", "T-10")
 
 
-def test_a_result_that_another_program_wrote_anew_is_told(
+def test_a_result_that_another_program_wrote_anew_is_reported(
     archive: FolderArchive,
 ) -> None:
     """Nobody can tell that from damage."""
@@ -388,7 +388,7 @@ def test_a_result_that_another_program_wrote_anew_is_told(
 
 
 @pytest.mark.parametrize("entry", ["checksum", "calibration_sha256"])
-def test_a_result_without_a_checksum_it_should_have_is_told(
+def test_a_result_without_a_checksum_it_should_have_is_reported(
     archive: FolderArchive, entry: str
 ) -> None:
     archive.store(result(3.0))
@@ -556,7 +556,7 @@ def test_a_thousand_results_of_other_pens_cost_little(archive: FolderArchive) ->
     assert middle - start < end - middle  # they were not read whole
 
 
-def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported(tmp_path: Path) -> None:
     (tmp_path / "data").write_text("no folder")
 
     with pytest.raises(FileError, match="cannot be created"):
@@ -597,7 +597,7 @@ def stored_elsewhere(
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of file sizes")
-def test_a_full_disk_is_told_and_keeps_the_old_tip_in_force(
+def test_a_full_disk_is_reported_and_keeps_the_old_tip_in_force(
     archive: FolderArchive,
 ) -> None:
     archive.store(result(3.0))
@@ -611,7 +611,7 @@ def test_a_full_disk_is_told_and_keeps_the_old_tip_in_force(
 
 
 @pytest.mark.slow
-def test_a_write_protected_folder_is_told_and_keeps_the_old_tip_in_force(
+def test_a_write_protected_folder_is_reported_and_keeps_the_old_tip_in_force(
     archive: FolderArchive, obedient: Sequence[str]
 ) -> None:
     archive.store(result(3.0))

@@ -145,7 +145,7 @@ def test_folders_that_are_no_records_are_passed_over(
     assert names_found(tmp_path / "nothing here") == []
 
 
-def test_a_folder_that_cannot_be_read_is_told(
+def test_a_folder_that_cannot_be_read_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(folder: Path) -> None:
@@ -236,38 +236,42 @@ def test_a_damaged_swing_cannot_go_on(preparation: Preparation, tmp_path: Path) 
         discard_swing(tmp_path / "a")
 
 
-def told(root: Path) -> str:
+def reported(root: Path) -> str:
     """Return what is said of the only damaged swing, which can be discarded."""
     (damaged,) = find_unfinished(root).damaged
     assert names_found(root) == []
     return str(damaged.message)
 
 
-def test_a_header_cut_in_half_is_told(preparation: Preparation, tmp_path: Path) -> None:
+def test_a_header_cut_in_half_is_reported(
+    preparation: Preparation, tmp_path: Path
+) -> None:
     recorded(preparation, tmp_path / "a", 1).close()
     header = tmp_path / "a" / "header.json"
     header.write_bytes(header.read_bytes()[:200])
 
-    assert told(tmp_path) == f"{header} is damaged. Restore it from a copy."
+    assert reported(tmp_path) == f"{header} is damaged. Restore it from a copy."
 
 
 @pytest.mark.parametrize("name", ["header.json", "journal.jsonl"])
-def test_images_without_a_header_or_journal_are_told(
+def test_images_without_a_header_or_journal_are_reported(
     preparation: Preparation, tmp_path: Path, name: str
 ) -> None:
     recorded(preparation, tmp_path / "a", 1).close()
     (tmp_path / "a" / name).unlink()
 
-    assert told(tmp_path).startswith(
+    assert reported(tmp_path).startswith(
         f"{tmp_path / 'a'} contains images of a swing, but no {name}."
     )
 
 
-def test_an_emptied_journal_is_told(preparation: Preparation, tmp_path: Path) -> None:
+def test_an_emptied_journal_is_reported(
+    preparation: Preparation, tmp_path: Path
+) -> None:
     recorded(preparation, tmp_path / "a", 3).close()
     (tmp_path / "a" / "journal.jsonl").write_bytes(b"")
 
-    assert "lists none of the 3 images in its folder." in told(tmp_path)
+    assert "lists none of the 3 images in its folder." in reported(tmp_path)
 
 
 def test_a_record_that_was_just_being_made_is_passed_over(
@@ -283,14 +287,14 @@ def test_a_record_that_was_just_being_made_is_passed_over(
 
 
 @pytest.mark.parametrize("name", ["header.json", "journal.jsonl", "camera.yaml"])
-def test_a_damaged_swing_that_was_discarded_is_not_told_again(
+def test_a_damaged_swing_that_was_discarded_is_not_reported_again(
     preparation: Preparation, tmp_path: Path, name: str
 ) -> None:
     recorded(preparation, tmp_path / "a", 3).close()
     damaged = tmp_path / "a" / name
     content = damaged.read_bytes()
     damaged.unlink()
-    assert told(tmp_path)
+    assert reported(tmp_path)
 
     discard_damaged(tmp_path / "a")
 
@@ -316,7 +320,7 @@ def test_a_torn_line_does_not_become_a_damage_by_discarding(
     assert (len(record.images), record.verdict) == (2, DISCARDED)
 
 
-def test_a_swing_under_way_in_another_program_is_told_apart_until_that_is_killed(
+def test_a_swing_under_way_in_another_program_is_distinguished_until_that_is_killed(
     preparation: Preparation,
     tmp_path: Path,
     holding: Callable[[Path], "subprocess.Popen[str]"],

@@ -60,8 +60,8 @@ def test_a_better_led_file_is_a_new_one_and_names_its_parent(
     before = old.read_bytes()
     mark_simulated(tmp_path / SIMULATED)
     found = read_pen_over_time(FolderArchive(tmp_path), off_file)
-    told: list[float] = []
-    first = improve_led_file(tmp_path, found, None, NOON, told.append)
+    reported: list[float] = []
+    first = improve_led_file(tmp_path, found, None, NOON, reported.append)
     second = improve_led_file(tmp_path, found, None, NOON)
 
     assert first.path != second.path
@@ -71,7 +71,7 @@ def test_a_better_led_file_is_a_new_one_and_names_its_parent(
     better = read_pen(first.path)
     assert better.led_covariance is not None
     assert first.improved.sigma_after < first.improved.sigma_before
-    assert told[-1] == 1.0
+    assert reported[-1] == 1.0
 
 
 def test_leds_that_are_right_already_are_not_written_anew(

@@ -80,7 +80,7 @@ def test_the_swings_exchanged_change_the_sign() -> None:
     np.testing.assert_allclose(back.change[:3], -there.change[:3], rtol=1e-6, atol=1e-9)
 
 
-def test_a_cone_that_was_moved_is_told_from_a_stylus() -> None:
+def test_a_cone_that_was_moved_is_distinguished_from_a_stylus() -> None:
     found = press_test(swung(0, 1), swung(0, 4, cone=0.05))
 
     assert found.assessment.reason.code == "press-test.cone-moved"

@@ -38,7 +38,7 @@ def test_lamps_that_stay_show_that_the_camera_stands_still() -> None:
     assert found.moved < 2 * found.uncertainty
 
 
-def test_a_camera_that_moved_is_told_by_how_much() -> None:
+def test_a_camera_that_moved_is_reported_by_how_much() -> None:
     found = drift_of_lamps(lamps(shift=0.5), SCALE, LIMITS)
 
     assert found is not None
@@ -47,7 +47,7 @@ def test_a_camera_that_moved_is_told_by_how_much() -> None:
     assert found.assessment.reason.code == "witness.moved"
 
 
-def test_a_hard_bump_of_the_camera_is_told_in_pixels() -> None:
+def test_a_hard_bump_of_the_camera_is_reported_in_pixels() -> None:
     images = LampImages(tuple(lamps(shift=60.0)), (1000.0,) * 48)
     found = drift_of_images(images, 5000.0, LIMITS)
 
@@ -69,13 +69,13 @@ def test_an_image_that_does_not_show_a_lamp_takes_no_part() -> None:
 def test_the_uncertainty_agrees_with_the_scatter_of_lamps_that_stay() -> None:
     found = [drift_of_lamps(lamps(seed=seed), SCALE, LIMITS) for seed in range(50)]
     moves = np.concatenate([each.moves[1:] for each in found if each is not None])
-    told = np.mean([each.uncertainty for each in found if each is not None])
+    reported = np.mean([each.uncertainty for each in found if each is not None])
 
     # U is two standard deviations; 500 moves tell theirs to 3 %, and share the first.
-    assert 2 * moves.std() == pytest.approx(told, rel=0.15)
+    assert 2 * moves.std() == pytest.approx(reported, rel=0.15)
 
 
-def test_without_a_lamp_or_with_few_images_nothing_is_told() -> None:
+def test_without_a_lamp_or_with_few_images_nothing_is_reported() -> None:
     assert drift_of_lamps(lamps(n_lamps=0), SCALE, LIMITS) is None
     assert drift_of_lamps(lamps(n_blocks=2), SCALE, LIMITS) is None
     assert drift_of_images(LampImages(), 4638.0, LIMITS) is None

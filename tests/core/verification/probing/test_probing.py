@@ -158,7 +158,7 @@ def test_an_image_without_the_pen_is_named_with_its_reason(
     assert (rejected.name, rejected.reason) == ("image 10", Reason.EMPTY)
 
 
-def test_a_pen_lifted_in_the_middle_is_told_and_nothing_taken(
+def test_a_pen_lifted_in_the_middle_is_reported_and_nothing_taken(
     instrument: Instrument,
 ) -> None:
     up: list[Place] = [

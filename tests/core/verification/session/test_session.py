@@ -216,7 +216,7 @@ def test_a_length_is_touched_at_each_of_its_places(session: Session) -> None:
     assert len(found_by(session.state, LENGTH).runs) == 2
 
 
-def test_a_pen_that_is_lifted_in_the_middle_of_a_touch_is_told_so(
+def test_a_pen_that_is_lifted_in_the_middle_of_a_touch_is_reported_so(
     session: Session,
 ) -> None:
     (first, *_) = leant(4)
@@ -242,7 +242,7 @@ def test_a_pen_that_was_laid_down_is_no_touch_of_the_cone(session: Session) -> N
     assert found_by(session.state, FIXED_POINT).assessment.grade is Grade.PASS
 
 
-def test_leds_that_are_not_those_of_the_pen_are_told_and_not_counted(
+def test_leds_that_are_not_those_of_the_pen_are_reported_and_not_counted(
     session: Session,
 ) -> None:
     rng = np.random.default_rng(1)
@@ -272,7 +272,7 @@ def test_less_than_270_degrees_are_said_and_do_not_end_the_ring(
     assert len(ended.state.touches) == len(session.state.touches)
 
 
-def test_points_that_are_no_circle_are_told(session: Session) -> None:
+def test_points_that_are_no_circle_are_reported(session: Session) -> None:
     session.choose(CIRCLE)
     ring = round_a_ring(12, 31.751)
     wide = [Hold((1.3 * x, y, z)) for x, y, z in (tuple(hold.place) for hold in ring)]
@@ -399,7 +399,7 @@ def test_a_witness_is_visited_before_between_and_after_the_tasks(
     assert witnessed.says() == "session.done"
 
 
-def test_a_camera_that_moved_between_visits_is_told_and_counts_in_what_was_touched(
+def test_a_camera_that_moved_between_visits_is_reported_and_counts_in_what_was_touched(
     witnessed: Session,
 ) -> None:
     moved = (0.06, 0.0, 0.0)

@@ -197,7 +197,7 @@ def test_killed_it_is_offered_and_keeps_every_touch(
         n_touches += len(process.stdout.readlines())
     state = go_on(verifying())
 
-    assert len(touched(state)) in (n_touches, n_touches + 1)  # one may not be told
+    assert len(touched(state)) in (n_touches, n_touches + 1)  # one may not be reported
 
 
 def test_a_part_goes_on_after_a_kill_and_gives_the_same_figures(
@@ -386,7 +386,7 @@ def test_with_another_tip_in_force_it_cannot_be_gone_on_with(
     assert interrupted_in(copy).under_way is not None
 
 
-def test_a_damaged_file_is_told_and_put_aside(
+def test_a_damaged_file_is_reported_and_put_aside(
     in_force: Path, verifying: Verifying, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     first = verifying()

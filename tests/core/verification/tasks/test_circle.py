@@ -138,7 +138,7 @@ def test_a_lifted_pen_is_left_out_and_named(
     assert abs(found.errors[0]) < 0.01
 
 
-def test_a_diameter_given_for_the_radius_is_told(
+def test_a_diameter_given_for_the_radius_is_reported(
     measured: Callable[..., Circle], ring: Ring
 ) -> None:
     found = measured(ring(), radius=2 * RADIUS)

@@ -34,7 +34,7 @@ def test_a_witness_that_stays_is_accepted(
     np.testing.assert_array_less(np.abs(found.moves[1]), 1.5 * found.uncertainties[1])
 
 
-def test_a_camera_that_moved_is_told_and_budgeted(
+def test_a_camera_that_moved_is_reported_and_budgeted(
     instrument: Instrument, touching: Touching
 ) -> None:
     places, moved = np.tile(PAPER_CONE, (4, 1)), np.array([0.1, 0.0, 0.0])

@@ -56,7 +56,7 @@ def test_a_camera_that_moved_makes_a_fixed_point_less_certain(
     )
 
 
-def test_an_exchanged_tip_is_told_with_how_far_off_it_is(
+def test_an_exchanged_tip_is_reported_with_how_far_off_it_is(
     instrument: Instrument, touching: Touching
 ) -> None:
     moved = np.array([0.3, 0.0, -0.2])

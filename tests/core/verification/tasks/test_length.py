@@ -76,7 +76,7 @@ def test_at_faces_the_ball_is_compensated_along_the_length(
     np.testing.assert_allclose(moved, ball_offset * outwards, atol=0.001)
 
 
-def test_a_pen_that_grew_is_told_by_the_length(
+def test_a_pen_that_grew_is_reported_by_the_length(
     instrument: Instrument, touching: Touching
 ) -> None:
     grown, larger = 5e-4, instrument.covariance.copy()

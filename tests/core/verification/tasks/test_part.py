@@ -274,7 +274,7 @@ def test_a_plan_that_is_ended_early_gives_what_was_probed(
     assert at_it.found.assessment.grade is Grade.CHECK
 
 
-def test_points_that_do_not_determine_their_feature_are_told_at_once(
+def test_points_that_do_not_determine_their_feature_are_reported_at_once(
     instrument: Instrument,
 ) -> None:
     line = plate_plan().features[1]
@@ -330,7 +330,7 @@ def test_a_part_moved_in_between_goes_on_after_three_datum_points(
     assert any(note.code == "part.moved" for note in notes)
 
 
-def test_other_datum_points_than_before_are_told(instrument: Instrument) -> None:
+def test_other_datum_points_than_before_are_reported(instrument: Instrument) -> None:
     holes = [structs.replace(each, touches=3) for each in plate_plan().features[2:6]]
     plan = Plan("Holes", tuple(holes))
     runs = probed_plate(instrument, plan)
