@@ -48,7 +48,7 @@ class Launchers:
         return install_entry()
 
     def remove_entry(self) -> int:
-        """Take it out of the menu again."""
+        """Remove it from the menu."""
         from lightpen_app.desktop_entry import remove_entry
 
         return remove_entry()

@@ -55,7 +55,7 @@ SWITCH_INTERVAL = 0.0005
 
 SETTLED_MS = 5000  # from the start until all is made and loaded
 
-UNSEEN_FRAME_RATE = 8.0  # 1/s; of a demo that nobody watches, enough to swing by
+UNSEEN_FRAME_RATE = 8.0  # 1/s; of an unwatched demo, enough for a swing
 
 MakePages: TypeAlias = Callable[[Workbench, Sounds], Iterable[Page]]
 
@@ -112,7 +112,7 @@ class Wizard(QObject):
         self._apply_appearance()
         self.workbench.live.set_watched(self.window.page().shows_images)
         self.crash_hook = CrashHook(folder / "crashes", self)
-        self._discovery: DiscoveryWindow | None = None  # made when it is asked for
+        self._discovery: DiscoveryWindow | None = None  # created on demand
 
         # Connections
         self.window.closing.connect(self._close_discovery)
@@ -169,7 +169,7 @@ class Wizard(QObject):
         self.window.set_unwritable(folder if fault else "", fault)
 
     def _on_others_counted(self, n_others: int) -> None:
-        """Say that other windows use the same data folder, while they do."""
+        """Show that other windows use the same data folder, while they do."""
         words = self.tr(
             "The program is open in other windows using the same data folder, {0}. "
             "Results are shared."

@@ -30,7 +30,7 @@ class Demo(QObject):
     workbench : Workbench
         Workbench with a simulated source.
     is_watched : bool
-        Whether somebody looks on, who needs time to read.
+        Whether it is watched, so that there is time to read.
 
     Signals
     -------
@@ -96,7 +96,7 @@ class Demo(QObject):
             self._window.press_main()
 
     def _go_on_accepted(self, key: str) -> None:
-        """Measure the simulated plate for somebody who looks on; else end."""
+        """Measure the simulated plate if watched; else end."""
         if self._is_watched and not self._is_measuring:
             self._is_measuring = True
             self._window.show_step("measure")
@@ -130,7 +130,7 @@ class Demo(QObject):
                 "Demo: the simulated operator measures a plate of ten features."
             ),
         }
-        if key in words:  # else somebody looks round
+        if key in words:  # else the user looks around
             self.message_sent.emit(words[key])
         operator = self._workbench.live.operator
         if operator is not None:

@@ -105,7 +105,7 @@ def end_log() -> None:
 def write_log_to(data: Path) -> None:
     """Write the lines from now on to a file in a data folder, while a log is running.
 
-    A folder that is missing is made. One that cannot be written stops nobody; it is the
+    A missing folder is created. A folder that cannot be written is only reported in the
     last line in memory.
     """
     intake = _intake()

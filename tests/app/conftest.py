@@ -114,9 +114,7 @@ def kept_to_one_thread() -> Iterator[None]:
 def collected(kept_to_one_thread: None) -> Iterator[None]:
     """What a test has closed is gone before the next one: each would be styled anew."""
     yield
-    QThreadPool.globalInstance().waitForDone(
-        PATIENCE_MS
-    )  # its jobs are reported of there
+    QThreadPool.globalInstance().waitForDone(PATIENCE_MS)  # its jobs report there
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     collect_if_due()
 

@@ -23,7 +23,7 @@ PLAYERS = (("pw-play",), ("paplay",), ("aplay", "-q"), ("afplay",))
 
 
 class Sound(StrEnum):
-    """What there is to hear."""
+    """A sound of the program."""
 
     SEATED = "seated"
     KEPT = "kept"
@@ -48,13 +48,13 @@ KEPT_STEPS = 12  # the tick rises by an octave in so many steps
 
 
 class Sounds(Protocol):
-    """Something that plays sounds, or does not."""
+    """Protocol of a player of sounds."""
 
     def play(self, sound: Sound, progress: float = 0.0) -> None:
         """Begin to play and return at once; KEPT rises with progress, 0 to 1."""
 
     def why_silent(self) -> str:
-        """Return why nothing can be heard, or nothing."""
+        """Return why audio is unavailable; empty if it is available."""
 
 
 class SilentSounds:
@@ -70,10 +70,10 @@ class SilentSounds:
         self._missing = tuple(missing)
 
     def play(self, sound: Sound, progress: float = 0.0) -> None:
-        """Do nothing."""
+        """No-op."""
 
     def why_silent(self) -> str:
-        """Return why nothing can be heard."""
+        """Return why audio is unavailable."""
         if not self._missing:
             return ""
         words = QCoreApplication.translate("sounds", "none of {0} is installed")
@@ -109,12 +109,12 @@ class FileSounds:
         self._play_file(path)
 
     def why_silent(self) -> str:
-        """Return nothing: it can be heard."""
+        """Return an empty text: audio is available."""
         return ""
 
 
 class MutedSounds:
-    """Passes sounds on unless it is muted."""
+    """Forwards sounds unless muted."""
 
     def __init__(self, sounds: Sounds, *, muted: bool = False) -> None:
         self._sounds = sounds
@@ -126,7 +126,7 @@ class MutedSounds:
             self._sounds.play(sound, progress)
 
     def why_silent(self) -> str:
-        """Return why nothing can be heard, muted or not."""
+        """Return why audio is unavailable, whether muted or not."""
         return self._sounds.why_silent()
 
 

@@ -19,7 +19,7 @@ import lightpen_resources
 RESOURCES = Path(lightpen_resources.__file__).parent
 FAMILIES = ("Lightpen Sans", "Lightpen Sans SC")
 GRID = 8  # px; every margin, gap and height is a multiple of it, or half of it
-# Points of the system's font where nobody has requested larger text.
+# Points of the system's font without a request for larger text.
 USUAL_POINTS = {"win32": 9.0, "darwin": 13.0}
 USUAL_POINTS_ELSEWHERE = 11.0
 LARGEST_SCALE = 1.4  # of the text; the window has no room for more

@@ -151,7 +151,7 @@ class PrintReportControl(QObject):
         job.start()
 
     def shut_down(self) -> None:
-        """Show nothing any more that is not shown yet."""
+        """Cancel previews that are not shown yet."""
         if self._reading is not None:
             self._reading.cancel()
 

@@ -242,7 +242,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._sidebar.set_subject(subject)
 
     def set_stream(self, state: StreamState) -> None:
-        """Show on every page where the pen can be followed live, if anywhere."""
+        """Show on every page on which page the live detection is, if any."""
         self._sidebar.set_stream(state.status)
         self._stream_dialog.set_state(state)
 

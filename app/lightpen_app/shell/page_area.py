@@ -79,7 +79,7 @@ class NoticeBar(Translated, QFrame):
             self._unwritable = self._fault = ""
 
     def clear(self) -> None:
-        """Say nothing."""
+        """Clear the message."""
         self._text.clear()
         self.hide()
         self.value_changed.emit("")

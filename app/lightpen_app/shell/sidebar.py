@@ -66,8 +66,8 @@ class Sidebar(Translated, QFrame):
     operator_view_chosen(), help_chosen(), options_chosen()
         The buttons.
     subject_changed(str, bool)
-        What is calibrated, and what its images are of, in one line; whether some of it
-        must not be measured with.
+        The item under calibration and the origin of its images, in one line; whether
+        some of it must not be used for measuring.
     """
 
     step_chosen = Signal(int)

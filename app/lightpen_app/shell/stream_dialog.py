@@ -98,7 +98,7 @@ class StreamDialog(FittedWindow, Translated, QDialog):
         self._refresh()
 
     def set_state(self, state: StreamState) -> None:
-        """Show how the stream is."""
+        """Show the state of the stream."""
         self._state = state
         self._refresh()
 

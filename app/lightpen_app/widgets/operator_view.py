@@ -150,12 +150,12 @@ class OperatorView(Translated, QWidget):
         self._resize_letters()
 
     def set_subject(self, text: str, is_marked: bool = False) -> None:
-        """Show the item, such as pen and tip.
+        """Show the item under calibration.
 
         Parameters
         ----------
         is_marked : bool
-            Whether it must not be measured with, which the text says.
+            Whether it must not be used for measuring, as the text states.
         """
         tone = Tone.WARN if is_marked else Tone.QUIET
         self._subject.set_text(text, tone, bold=is_marked)

@@ -116,7 +116,7 @@ class PathField(QWidget):
         return str(Path(text).expanduser()) if text.startswith("~") else text
 
     def _on_return_pressed(self) -> None:
-        """Take what was typed; the window has an Enter that is not of the path."""
+        """Accept the typed path; consume Enter, which the window uses otherwise."""
         if self._edit.isModified() or self._is_faulty:
             self.take(self._typed())
 

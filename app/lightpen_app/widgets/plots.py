@@ -376,7 +376,7 @@ class TracePlot(Plot):
         return self._n_covered(label.orthoPos, label.anchors[0])
 
     def _show_range(self) -> None:
-        """Show what must be in sight, with room for the words of the limit."""
+        """Set the range to show all that is required, and the label of the limit."""
         x, *values = map(np.asarray, self._columns.values())
         if not len(x):
             self._show_nothing()
@@ -424,7 +424,7 @@ class TracePlot(Plot):
         label.setPosition(place)
 
     def _make_room(self) -> None:
-        """Show so much below the limit that its words are under the curves."""
+        """Extend the range below the limit so that its label is under the curves."""
         assert self._limit is not None
         (_, _), (low, high) = self.ranges()
         words = self._limit.label.textItem.boundingRect()

@@ -41,9 +41,9 @@ NO_ROOM = SizeClass(is_narrow=True, is_low=True)
 
 
 class ResponsiveLayout(_Base):
-    """Put before the base of a widget, it arranges the widget anew as its room changes.
+    """Mixin before the base of a widget: rearranges it when its size changes.
 
-    The widget itself does so once in its constructor.
+    The constructor of the widget arranges it once.
 
     Attributes
     ----------

@@ -61,7 +61,7 @@ class StateBanner(QWidget):
     Signals
     -------
     announced(str)
-        What is said aloud where somebody listens.
+        Text for screen readers.
     """
 
     announced = Signal(str)

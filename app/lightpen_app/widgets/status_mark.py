@@ -67,7 +67,7 @@ def subject_message(
 ) -> StatusMessage:
     """Return what of pen, tip and cone must not be measured with, and why.
 
-    Simulated ones are never measured with.
+    Simulated ones are never used for measuring.
     """
     if origin is Origin.SIMULATED:
         return StatusMessage()

@@ -15,7 +15,7 @@ else:  # a class of Qt's cannot be a base twice
 class Translated(_Base):
     """Put before the base of a widget, it sets the texts again at a change of language.
 
-    The widget itself does so once in its constructor.
+    The constructor of the widget arranges it once.
     """
 
     def _retranslate(self) -> None:

@@ -12,7 +12,7 @@ from lightpen_app.widgets.translated import Translated
 
 
 class UndoableStep(QUndoCommand):
-    """Something that was done, and how it is undone."""
+    """An undoable step."""
 
     def __init__(self, do: Callable[[], object], undo: Callable[[], object]) -> None:
         super().__init__()
@@ -28,12 +28,12 @@ class UndoableStep(QUndoCommand):
 
 
 class UndoButtons(Translated, QWidget):
-    """Takes back the last step of a stack, and does it again.
+    """Undoes and redoes the last step of a stack.
 
     Parameters
     ----------
     scope : QWidget
-        While it is seen the keys do the same, wherever the focus is.
+        While it is visible its keys do the same, wherever the focus is.
     """
 
     def __init__(self, stack: QUndoStack, scope: QWidget) -> None:
@@ -63,7 +63,7 @@ class UndoButtons(Translated, QWidget):
         self._retranslate()
 
     def set_locked(self, why: str) -> None:
-        """Let nothing be undone or redone, for a reason, or let it."""
+        """Disable undo and redo with a reason; enable them with an empty one."""
         self._why_locked = why
         self._refresh()
 

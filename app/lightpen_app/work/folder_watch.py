@@ -38,17 +38,17 @@ class FolderWatch(QObject):
         self._timer.timeout.connect(self._look)
 
     def start(self) -> None:
-        """Look now, and from now on."""
+        """Check now and periodically."""
         self._check()
         self._count()
         self._timer.start()
 
     def stop(self) -> None:
-        """Look no more."""
+        """Stop."""
         self._timer.stop()
 
     def leave(self) -> None:
-        """Let the others know that this window is gone, on a thread of the pool."""
+        """Remove the announcement of this window, on a thread of the pool."""
         QThreadPool.globalInstance().start(self._presence.leave)
 
     def _look(self) -> None:

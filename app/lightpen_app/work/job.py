@@ -114,7 +114,7 @@ class Job(QObject):
             self.crashed.emit()
 
     def _on_finished(self) -> None:
-        self._over.wait()  # its thread may still be about to let go of it
+        self._over.wait()  # its thread may still release its reference
         self.ended.emit()
         self.deleteLater()
 

@@ -176,7 +176,7 @@ class LibraryWatch(QObject):
         job.start()
 
     def shut_down(self) -> None:
-        """Read nothing more."""
+        """Cancel reading."""
         self._is_over = True
         self._timer.stop()
         self._look.stop()

@@ -372,7 +372,7 @@ class LiveView(QObject):
         self._run.follower = GuidedOperator(operator) if follows and operator else None
 
     def set_touching(self, touches: bool) -> None:
-        """Set whether the simulated operator probes, where somebody is present."""
+        """Set whether the simulated operator probes."""
         operator = self._operator
         for run in self._verifications:
             is_led = touches and run.runner.status.is_here

@@ -79,7 +79,7 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
         return self._folder / RECORDS
 
     def on_swing(self, status: SwingStatus, events: tuple[SwingEvent, ...]) -> None:
-        """Hand on the newest status and every event, on a thread of the runner."""
+        """Forward the newest status and every event, on a thread of the runner."""
         follower = self.follower
         if follower is not None and status.state is not None:
             follower.follow(status.state)

@@ -55,7 +55,7 @@ class VerificationRun(RunView[VerificationStatus, SessionEventKind]):
     def on_verification(
         self, status: VerificationStatus, events: tuple[SessionEventKind, ...]
     ) -> None:
-        """Hand on the newest status and every event, on a thread of the runner."""
+        """Forward the newest status and every event, on a thread of the runner."""
         probing_operator, setup, state = (
             self.probing_operator,
             status.setup,

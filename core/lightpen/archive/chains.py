@@ -327,7 +327,7 @@ class ArchivedFiles:
                 self._n_read = row.number
 
     def __contains__(self, place: str) -> bool:
-        """Return whether a place was entered, as far as was read.
+        """Return whether a folder was entered, by the entries read.
 
         A swing whose result was revoked was not: it may still be abandoned.
         """

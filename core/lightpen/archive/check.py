@@ -33,7 +33,7 @@ Report = Callable[[float], None]
 
 @dataclass(frozen=True)
 class ArchiveCheckResult:
-    """What a check came to.
+    """Result of a check.
 
     Attributes
     ----------
@@ -42,11 +42,11 @@ class ArchiveCheckResult:
     findings : tuple of Message
         Differences from the entries; empty if there are none.
     notes : tuple of Message
-        What may be honest and is to be known, see `lightpen.archive.check_notes`.
+        Observations that prove no change, see `lightpen.archive.check_notes`.
     n_tips : int
-        Tips computed again, see `lightpen.archive.recompute_check`.
+        Tips recomputed, see `lightpen.archive.recompute_check`.
     n_timestamps : int
-        Timestamps found right, see `lightpen.archive.timestamps`.
+        Valid timestamps, see `lightpen.archive.timestamps`.
     """
 
     n_entries: int

@@ -1,4 +1,4 @@
-"""Notes of an archive check that are no evidence of a change.
+"""Observations of an archive check that prove no change.
 
 A power cut leaves files that are not entered yet, a clock may be set back, a data
 folder may move to another computer. None of it proves a change.

@@ -29,7 +29,7 @@ GROUP BY block""")
 
 @dataclass(frozen=True)
 class ServerCheckResult:
-    """What a comparison with a server came to.
+    """Result of a comparison with a server.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class ServerCheckResult:
     n_waiting : int
         Entries of this station that were not delivered yet.
     findings : tuple of Message
-        What is not as it should be on either side; empty where all is.
+        Discrepancies on either side; empty if there are none.
     """
 
     n_entries: int

@@ -52,8 +52,8 @@ MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrate
 LONGEST_FAREWELL_S = 2  # for those who use it when it closes
 MALFORMED = "database disk image is malformed"  # as SQLite says it
 LONGEST_WAIT_S = 10  # for another program to finish what it writes
-PAUSE_S = 0.02  # between two attempts where SQLite makes none by itself
-# A relay between may keep a line open though nobody is at its other end any more.
+PAUSE_S = 0.02  # between two attempts where SQLite does not retry
+# A proxy may keep a connection open whose other end is gone.
 LONGEST_ANSWER_S = 120.0
 
 _VERSION = Table(
@@ -124,7 +124,7 @@ class Database:
                     self.engine.pool.dispose()
 
     def _in_time(self, connection: Connection) -> AbstractContextManager[None]:
-        """Give up a server that answers no more."""
+        """Abandon a server that no longer responds."""
         return nullcontext() if self.file else _given_up_in_time(connection)
 
 

@@ -18,7 +18,7 @@ from lightpen.model.limits import DueRule
 from lightpen.record.library.tip_library import Library
 
 EMPTY = Library()
-CLOCKS_AGREE = timedelta(days=1)  # as far as need be to tell an age in days
+CLOCKS_AGREE = timedelta(days=1)  # enough for an age in days
 SWINGS = (Kind.ACCEPTED, Kind.REFUSED, Kind.ABANDONED)
 
 

@@ -118,7 +118,7 @@ def account_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
 
 
 def file_text(content: bytes) -> str:
-    """Return a file as it is entered beside its event, and fetched again from there."""
+    """Return a file as the text that is stored with its event, without loss."""
     return content.decode("utf-8", "surrogateescape")
 
 
@@ -172,8 +172,8 @@ def account_of_refused(
         ),
     )
     inputs, limits = record_inputs(solution.source), assessment.limits
-    record = calibration_record(calibration, inputs, "joint", limits)
-    text = json_bytes(record).decode()
+    written = calibration_record(calibration, inputs, "joint", limits)
+    text = json_bytes(written).decode()
     return ExtractedEvent(replace(event, record_sha256=text_sha256(text)), text)
 
 

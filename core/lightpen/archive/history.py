@@ -76,7 +76,7 @@ class KnownNames:
 def lines(
     database: Database, wanted: EntryFilter, first: int, n_lines: int
 ) -> tuple[Line, ...]:
-    """Return so many of the entries looked for, the newest first.
+    """Return a page of the entries that match a filter, the newest first.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ def entries_csv(entries: Iterable[StoredEntry], home: str | None) -> str:
 
 
 def entries_json(entries: Iterable[StoredEntry], home: str | None) -> str:
-    """Return entries as they are kept, each with its hash, as `entries_csv`."""
+    """Return stored entries with their hashes as JSON; see `entries_csv`."""
     listed = [
         {
             "sha256": each.sha256,

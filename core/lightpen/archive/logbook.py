@@ -327,7 +327,7 @@ class Logbook:
             close_sealed(self.database)
 
     def _renew_lost_key(self) -> None:
-        """Go on with a new key in a folder that was moved here, without a password."""
+        """Continue with a new key in a moved folder, without a password."""
         # Every acceptance reports these errors.
         with suppress(FileError, AcceptanceError):
             guard = self._results.supervision()

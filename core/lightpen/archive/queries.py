@@ -54,7 +54,7 @@ def n_wanted(database: Database, wanted: EntryFilter) -> int:
 def newest(
     database: Database, wanted: EntryFilter, n_entries: int, before: Entry | None = None
 ) -> tuple[StoredEntry, ...]:
-    """Return so many of the entries looked for, the newest first.
+    """Return a page of the entries that match a filter, the newest first.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def replaced(entries: FromClause) -> Exists:
 
 
 def condition_of(wanted: EntryFilter) -> ColumnElement[bool]:
-    """Return the condition on entries that are looked for."""
+    """Return the SQL condition of an entry filter."""
     condition: ColumnElement[bool] = true()
     names = {"pen": wanted.pen, "tip": wanted.tip, "station": wanted.station}
     for column, name in names.items():

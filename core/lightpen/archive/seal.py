@@ -25,7 +25,7 @@ from lightpen.messages import message
 
 
 class SealedHead(Struct, frozen=True):
-    """How far a chain had come."""
+    """Number and hash of the last entry of a chain."""
 
     chain: Chain
     number: Annotated[int, Meta(ge=0)]

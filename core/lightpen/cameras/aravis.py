@@ -26,7 +26,7 @@ from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlac
 from lightpen.messages import Message, message
 
 N_BUFFERS = 16  # images in transit; each buffer is returned once copied
-WAITING = 1 << 24  # bytes of packets that wait to be read, or fewer where so many may
+WAITING = 1 << 24  # receive buffer, bytes; less where the system limits it
 
 # Where this program may open packet sockets, which lose least on a loaded machine,
 # Aravis 0.8 opens one for each stream and lets in whatever packets pass this machine

@@ -162,7 +162,7 @@ class ReplayCamera:
         return frame
 
     def probe(self) -> None:
-        """Do nothing: files are checked when they are read."""
+        """No-op: files are checked when they are read."""
         if self._capabilities is None:
             raise ValueError("The camera is not open: call `open` first.")
 

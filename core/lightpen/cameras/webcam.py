@@ -102,10 +102,10 @@ class WebcamDevice:
             capture.release()
 
     def start(self) -> None:
-        """Do nothing: it streams once it is open."""
+        """No-op: it streams once it is open."""
 
     def stop(self) -> None:
-        """Do nothing."""
+        """No-op."""
 
     def fetch(self, timeout_s: float) -> DeliveredFrame | None:
         """Return the next image, however long it takes."""
@@ -119,7 +119,7 @@ class WebcamDevice:
         return DeliveredFrame(data, width, height, self._n_read)
 
     def probe(self) -> None:
-        """Do nothing: `fetch` reports failures."""
+        """No-op: `fetch` reports failures."""
 
 
 def _find(producer: str) -> tuple[FoundDevice, ...]:

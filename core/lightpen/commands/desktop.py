@@ -26,7 +26,7 @@ class Desktop(Protocol):
         """Put the program into the menu of the desktop."""
 
     def remove_entry(self) -> int:
-        """Take it out of the menu again."""
+        """Remove it from the menu."""
 
     def data_folder(self) -> Path:
         """Return where records, results and the archive are, as chosen."""

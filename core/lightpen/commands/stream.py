@@ -44,7 +44,7 @@ from lightpen.streaming.server import (
 from lightpen.verification.probing.image_locations import touch_place, viewers_of_camera
 from lightpen.verification.probing.sources import instrument_of
 
-LONGEST_WAIT = 0.5  # s for an image, before the keyboard is heard
+LONGEST_WAIT = 0.5  # s for an image, before the keyboard is read
 
 
 def add_stream(parser: argparse.ArgumentParser) -> None:

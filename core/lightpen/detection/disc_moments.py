@@ -410,7 +410,7 @@ def _corrects_shading(moments: DiscMoments) -> bool:
 
 
 def _without_hole(soft: MatLike) -> MatLike:
-    """Return a soft-thresholded region with all filled that is bright all round."""
+    """Return a soft-thresholded region with enclosed holes filled."""
     _, crest = cv2.threshold(soft, FULLY, 255, cv2.THRESH_BINARY)
     contours, _ = cv2.findContours(crest, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(crest, contours, -1, 255, cv2.FILLED)

@@ -172,7 +172,7 @@ def fit_edge(image: Image, center: FloatArray, shape: FloatArray) -> EdgeFit | N
 
 
 def fit_edges(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
-    """Fit the rims of discs by their edges alone, all at once.
+    """Fit ellipses to the edges of discs, all at once.
 
     Parameters
     ----------
@@ -182,9 +182,9 @@ def fit_edges(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]
     Returns
     -------
     list of EdgeFit or None
-        None where no sharp enough rim is found. The area is that of the rim, not
-        lessened by blur. A disc that is not found from the image before is looked for
-        again.
+        None without a sharp enough edge. The area is that within the edge, not reduced
+        by blur. A disc that is not found from its fit in the previous image is searched
+        without it.
     """
     found: list[EdgeFit | None] = [None] * len(starts)
     known = [i for i, start in enumerate(starts) if start.sigma is not None]
@@ -266,7 +266,7 @@ def _rays(ellipses: _Ellipses, spacing: float) -> _Rays:
 
 @lru_cache(maxsize=MAX_RAYS // 4)
 def _arms(n_rays: int) -> tuple[FloatArray, FloatArray]:
-    """Return unit vectors all round, (N, 2), and the ways to stretch there, (N, 3)."""
+    """Return unit vectors round the circle, (N, 2), and stretch directions, (N, 3)."""
     angles = 2 * pi / n_rays * np.arange(n_rays)
     arms = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     ways = [np.ones(n_rays), np.cos(2 * angles), np.sin(2 * angles)]

@@ -6,7 +6,7 @@ import cv2
 
 from lightpen.messages import Message, message
 
-# What arithmetic ends in on an image that nobody thought of. One such image is left
+# Exceptions of the arithmetic on unforeseen images. One such image is left
 # out, and says so; it does not end a swing or a calibration.
 MISHAPS = (ArithmeticError, ValueError, cv2.error)
 

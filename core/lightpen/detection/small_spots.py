@@ -114,7 +114,7 @@ class SmallSpots:
 
     @property
     def are_whole(self) -> BoolArray:
-        """Whether nothing hides the LED, nor merges with it, as far as windows tell."""
+        """Whether the LED is neither hidden nor merged, by the fit windows."""
         return np.asarray(self.lopsided < LOPSIDED)
 
 

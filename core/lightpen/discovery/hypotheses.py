@@ -56,7 +56,7 @@ ROUGH, FINER = 2.0, 0.5  # px: noise that residuals are measured by at first
 PROMISING = 30.0  # times the least misfit, within which all of the camera is adjusted
 FITTING = 0.7  # px: a start that fits
 ALIKE = 0.02  # of the pen's size, within which two shapes are one
-APART = 0.2  # of the misfit of all, that a part of them has by itself
+APART = 0.2  # of the misfit of all, allowed for a part of them alone
 DECIDED = 2.0  # times the misfit of the best that the mirrored one must have
 
 
@@ -267,7 +267,7 @@ class _Trial:
     def starts(
         self, shape: WeakShape, focal_lengths: Sequence[float], *, mirrored: bool
     ) -> list[tuple[Hypothesis, Start]]:
-        """Return what the adjustments of a shape come to."""
+        """Return the result of the adjustments of a shape."""
         width = self.size[0]
         first, second, unit = _longest(shape)
         length = (KnownLength(first, second, UNIT, 1e-4 * UNIT),)

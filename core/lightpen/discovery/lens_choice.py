@@ -59,16 +59,16 @@ def choose_lens(
     lengths: tuple[KnownLength, ...],
     needed: int | None = None,
 ) -> tuple[BundleState, Choice]:
-    """Return the start with the lens model that predicts images best, and why.
+    """Return the start with the lens model that predicts images best, and the choice.
 
     Parameters
     ----------
     start : Start
-        With 5 coefficients.
+        Model with 5 coefficients.
     pixels : (M, L, 2) array
-        Of its images, px; NaN where an LED was not seen.
+        LED centres in its images, px; NaN where an LED was not seen.
     needed : int, optional
-        Coefficients of the model that is taken, where they do not fold the image.
+        Number of coefficients to use, unless they fold the image.
     """
     if needed is not None and needed != FEW:
         only = _refitted(start, needed, pixels, lengths, worth=-np.inf)

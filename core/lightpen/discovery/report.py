@@ -95,7 +95,7 @@ def discovery_record(discovery: Discovery) -> dict[str, Any]:
 
 
 def discovery_text(discovery: Discovery) -> str:
-    """Return what a discovery came to, in English."""
+    """Return the result of a discovery as text, in English."""
     um = TO_MICROMETRES
     tip, U = discovery.tip_pen, discovery.expanded_uncertainty
     unit = "% of the largest LED distance" if discovery.is_relative else "mm"
@@ -156,7 +156,7 @@ def swings_record(together: Together) -> dict[str, Any]:
 
 
 def swings_text(together: Together) -> str:
-    """Return what the proof by the last swing came to, in English."""
+    """Return the result of the validation by the last swing as text, in English."""
     held_out, um = together.held_out, TO_MICROMETRES
     x, y, z = (um * held_out.tip).tolist()
     u = COVERAGE_FACTOR * um * held_out.tip_sigma

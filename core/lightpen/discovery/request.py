@@ -1,4 +1,4 @@
-"""What is known of pen and camera before the images are looked at."""
+"""Prior knowledge of pen and camera."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -64,7 +64,7 @@ class CameraPrior(NamedTuple):
 
 
 def held_camera(camera: Camera) -> CameraPrior:
-    """Return the prior of a camera that is taken as it is."""
+    """Return the prior of a camera that is held fixed."""
     return CameraPrior.of(camera, np.zeros((len(camera.intrinsics),) * 2))
 
 

@@ -131,7 +131,7 @@ def _pieces_of(spots: Sequence[FloatArray], links: Sequence[Link]) -> Pieces:
 
 
 def find_lamps(pieces: Pieces) -> FloatArray:
-    """Return the places of lamps that stay while most spots move, (K, 2), px."""
+    """Return the positions of lamps that stay while most spots move, (K, 2), px."""
     pixels = pieces.pixels
     moving = _range(pixels)
     lamps: list[FloatArray] = []

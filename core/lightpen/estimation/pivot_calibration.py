@@ -27,7 +27,7 @@ from lightpen.estimation.statistics.correlation import correlated_covariance
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.messages import Message, message
 
-LARGEST_MINORITY = 0.4  # of the poses; with more nobody knows which tip is meant
+LARGEST_MINORITY = 0.4  # of the poses; with more the tip is ambiguous
 MANY_LEFT_OUT = 0.1  # of the poses
 MAX_RUNS = 10  # of neighbouring poses, that a warning names; the record has all
 

@@ -93,7 +93,7 @@ def _sweep(part: Path) -> None:
     if os.name == "posix":
         with part.open("rb") as stream, contextlib.suppress(OSError):  # without locks
             if locked(stream.fileno()):
-                part.unlink()  # nobody else can lock it meanwhile
+                part.unlink()  # no other process can lock it meanwhile
             return
     if time.time() - part.stat().st_mtime > LONGEST_WRITE:
         part.unlink()

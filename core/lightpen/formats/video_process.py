@@ -27,7 +27,7 @@ from lightpen.formats.files import printable
 def limit_memory(more: int) -> None:
     """Limit this process to its present memory plus ``more`` bytes.
 
-    It stays as it is where the system has no such limit.
+    It is unchanged where the system has no such limit.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def _decoder(
 def _serve(
     to: "Connection", send: Callable[..., None], path: Path, *arguments: int
 ) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who asked hears it, and ends this
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent gets it and ends this
     with suppress(OSError):  # a program with a window may have no console
         _hush_decoders()
     keep_freed_memory()
@@ -185,7 +185,7 @@ def _serve(
         to.send(error)
     except (cv2.error, MemoryError):
         to.send(_too_much(path))
-    except OSError:  # nobody listens any more
+    except OSError:  # the other end is closed
         return
 
 

@@ -11,7 +11,7 @@ from lightpen.messages import Message, message
 
 CONTRADICTED = 3.0  # standard deviations
 STRETCHED = 1e-3  # relative: less is no printer's doing
-LET_GO, LET_GO_MM = 0.1, 5.0  # of a board that is not what it was said to be
+LET_GO, LET_GO_MM = 0.1, 5.0  # of a board that contradicts its description
 MOST_BENT = 0.02  # of the longer side of a board; paper in a hand bends less
 USUAL_SIDES = 10.0, 3000.0  # mm, of a board
 

@@ -202,7 +202,7 @@ def fit_camera(
     pull: float | None = None,
     offsets: FloatArray = EVEN,
 ) -> BoardFit:
-    """Return the fit of all, from a camera on; see `Choice` for the pull.
+    """Fit camera, poses and board from an initial camera; see `Choice` for the pull.
 
     Parameters
     ----------

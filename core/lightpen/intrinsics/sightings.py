@@ -1,8 +1,8 @@
 """Detection of the points of a board in one image.
 
-OpenCV finds the board [1]_, in a smaller image first where there is one; its corners
-are then placed by the gradients round them in the whole image and at its full depth
-[2]_, and circles by their rims, as LEDs are.
+OpenCV finds the board [1]_, in a reduced image first if there is one. Corners are then
+located by the gradients around them in the original image at its full bit depth [2]_,
+circles by their edges, like LEDs.
 
 References
 ----------

@@ -9,15 +9,15 @@ from lightpen.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class ViewScores:
-    """Scores of the views about all but poses and effects.
+    """Scores (gradients) of the views for all parameters but poses and effects.
 
     Attributes
     ----------
     scores : (V, s) array
     information : (V, q, s) array
-        Of each view, its columns of these.
+        Columns of the information matrix of each view.
     covariance : (q, q) array
-        Of these and of the effects of board and lens, by all views.
+        Of these parameters and the effects of board and lens, by all views.
     """
 
     scores: FloatArray

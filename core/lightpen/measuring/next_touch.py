@@ -104,7 +104,7 @@ def nominal_area(kind: FeatureKind, nominal: Nominal) -> ProbedArea | None:
 
 
 def _level_frame(z: FloatArray) -> FloatArray:
-    """Return axes about z of which x lies along that of the part as far as it can."""
+    """Return axes about z with x as close to the x axis of the part as possible."""
     z = z / np.linalg.norm(z)
     along = np.array([1.0, 0.0, 0.0])
     x = along - (along @ z) * z

@@ -19,7 +19,7 @@ def known_by(covariance: FloatArray) -> FloatArray:
 def inverse(matrix: FloatArray) -> FloatArray:
     """Return the inverse (k, k) of a covariance or an information (k, k).
 
-    By Cholesky's decomposition, scaled first, as the unknowns have different units.
+    By Cholesky decomposition after scaling, since the unknowns have different units.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from typing import Protocol, TypeAlias, TypeVar
 from lightpen.errors import Cancelled, LightpenError
 from lightpen.messages import Message
 
-LONGEST_WAIT = 0.1  # s, after which nobody waits any more for a queue that ended
+LONGEST_WAIT = 0.1  # s, longest wait for a queue that has ended
 
 T = TypeVar("T")
 Act: TypeAlias = Callable[[], None]

@@ -107,12 +107,12 @@ class Glare:
 
 @dataclass(frozen=True, eq=False)
 class Finger:
-    """A dark, straight, round-ended object before the pen.
+    """A dark capsule in front of the pen.
 
     Attributes
     ----------
     start, end : (2,) array
-        Of its axis, px.
+        Ends of its axis, px.
     radius : float
         px.
     softness : float

@@ -56,7 +56,7 @@ class AcceptedImages:
     prediction : UncertaintyPrediction or None
         Normal equations for the prediction of U, with the joint fit.
     predicted : PredictedUncertainty
-        U of the tip by the whole budget, and with endless images.
+        U of the tip by the whole budget, and its limit for infinitely many images.
     """
 
     numbers: IntArray

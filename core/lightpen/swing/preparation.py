@@ -175,7 +175,7 @@ class Preparation:
 
     @property
     def asks_temperature(self) -> bool:
-        """Whether nobody has said today how warm the pen is."""
+        """Whether the temperature of the pen has not been entered today."""
         return self.origin is Origin.LIVE and self.temperature_day != _today()
 
     @property

@@ -175,7 +175,7 @@ class SwingRunner:
         self._queue.ask(self._workflow.start_over)
 
     def abandon(self) -> None:
-        """Leave the swing, to be resumed later."""
+        """Suspend the swing; it can be resumed."""
         self._queue.ask(self._workflow.abandon)
 
     def open_logbook(self) -> None:

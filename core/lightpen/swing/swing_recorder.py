@@ -192,7 +192,7 @@ class FrameCounters:
     last: Stats | None = None
 
     def after(self, stats: Stats) -> Self:
-        """Return the tally after an image, by when the camera has counted so many."""
+        """Return the counters after an image, with those of the camera at that time."""
         last = self.last
         if last is None:
             return type(self)(self.total, stats)

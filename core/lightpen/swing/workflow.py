@@ -370,7 +370,7 @@ class SwingWorkflow:
             self.solve()
 
     def abandon(self) -> None:
-        """Leave the swing as it is on disk."""
+        """Suspend the swing; its record stays on disk."""
         if self._first is not None:
             self._end_press(None)
         self._task.drop()
@@ -617,7 +617,7 @@ class SwingWorkflow:
         self._entries.catch_up()
 
     def shut_down(self) -> None:
-        """Leave the swing as it is on disk, and close the archive."""
+        """Suspend the swing, whose record stays on disk, and close the archive."""
         self.abandon()
         self._entries.stop()
         self._faults.trying(self._entries.close)

@@ -1,7 +1,7 @@
-"""The course of a verification: what commands, images and folders do to it.
+"""Workflow of a verification: its response to commands, images and folders.
 
-Nothing here knows threads: one who owns a course makes all calls in turn, and has what
-takes long done elsewhere.
+Not thread-safe: the owner calls it from one thread at a time, and runs long
+computations elsewhere.
 """
 
 import logging
@@ -150,7 +150,7 @@ class VerificationWorkflow:
         self._publish(replace(self._status, is_here=False))
 
     def toggle_pause(self) -> None:
-        """Take no images until this is called again, or take them again."""
+        """Pause or resume the capture."""
         self._publish(replace(self._rested(), is_paused=not self._status.is_paused))
 
     def start_over(self) -> None:
@@ -482,7 +482,7 @@ class VerificationWorkflow:
     # Records
 
     def _keep(self) -> None:
-        """Keep what tasks have found, unless a later visit will add to their U."""
+        """Store the results of tasks, unless a later visit will add to their U."""
         self._keeping.settle(self._status)
         self._write()
 

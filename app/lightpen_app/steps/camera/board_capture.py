@@ -174,7 +174,7 @@ class BoardCapture(QObject):
             self._become(replace(self._state, outline=wanted.outline))
 
     def _on_leading_ended(self, job: Job, n_kept: int) -> None:
-        """Find it again if views were added meanwhile."""
+        """Repeat the computation if views were added meanwhile."""
         if job is self._leading:
             self._leading = None
             if self._state.sought is not None and self._state.n_kept > n_kept:

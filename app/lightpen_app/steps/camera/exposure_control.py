@@ -27,7 +27,7 @@ class ExposureControl(QObject):
         self._on_adjustment_requested(False)
 
     def adjust(self, seen: LiveImage, inspection: Inspection) -> None:
-        """Go on with the adjustment by one more image, if one is under way."""
+        """Continue an adjustment in progress by one more image."""
         before, caps = self._adjustment, self._live.caps
         if before is None or caps is None:
             return

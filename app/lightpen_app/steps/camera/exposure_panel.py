@@ -268,7 +268,7 @@ class FocusPanel(Translated, QFrame):
         self._refresh()
 
     def set_recorded(self, is_recorded: bool) -> None:
-        """Say whether the images are as they were taken, whatever is turned now."""
+        """Show whether the images are recorded, so that settings have no effect."""
         self._is_recorded = is_recorded
         self._refresh()
 

@@ -54,7 +54,7 @@ class IntrinsicsControl(QObject):
             self._reading.cancel()
 
     def _forget_file(self) -> None:
-        """Say nothing any more of a file that was chosen at another station."""
+        """Clear the message on a file that was chosen at another station."""
         self._drop_reading()
         self._panel.forget_refused()
 

@@ -130,13 +130,13 @@ class LivePanel(Translated, QWidget):
         self._refresh()
 
     def set_recorded(self, origin: Origin | None) -> None:
-        """Say what recorded images are of, which are shown again; None for others."""
+        """Show the origin of replayed images; None for live ones."""
         if origin is not self._recorded:
             self._recorded = origin
             self._refresh()
 
     def _forget(self) -> None:
-        """Show no image until the next comes."""
+        """Clear the image until the next arrives."""
         self._view.set_image(None)
         self._seen = None
         self._arrivals.clear()

@@ -76,7 +76,7 @@ class RigPanel(Translated, QGroupBox):
         return self._problem.value()
 
     def step(self) -> StatusMessage:
-        """Return whether the cameras keep step."""
+        """Return whether the cameras are synchronous."""
         return self._step.value()
 
     def set_value(self, is_wanted: bool, file: RigFile | None) -> None:

@@ -55,7 +55,7 @@ class SecondCameraChoice(QWidget):
         return self._source
 
     def show_step(self, seen: LiveImage) -> None:
-        """Return whether two cameras take their images at the same moment.
+        """Show whether two cameras take their images simultaneously.
 
         Parameters
         ----------
@@ -77,11 +77,11 @@ class SecondCameraChoice(QWidget):
         self._rig.set_step(not_synchronised(lag_ms, px_per_mm), n_unpaired)
 
     def forget_step(self) -> None:
-        """Know nothing of their moments: no images come."""
+        """Clear the lag: no images arrive."""
         self._rig.set_step(None, None)
 
     def shut_down(self) -> None:
-        """Read no more."""
+        """Cancel reading."""
         if self._reading is not None:
             self._reading.cancel()
 

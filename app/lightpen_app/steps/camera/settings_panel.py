@@ -149,7 +149,7 @@ class SettingsPanel(Translated, QGroupBox):
     ) -> None:
         before = tuple(field.itemData(index) for index in range(field.count()))
         with QSignalBlocker(field):
-            if offered != before:  # else somebody may be choosing
+            if offered != before:  # else the user may be choosing
                 field.clear()
                 for each in offered:
                     field.addItem(each, each)

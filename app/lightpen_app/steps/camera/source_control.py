@@ -81,7 +81,7 @@ class BesideControl(QObject):
         return is_other
 
     def shut_down(self) -> None:
-        """Look no more."""
+        """Stop."""
         if self._looking is not None:
             self._looking.cancel()
 

@@ -137,7 +137,7 @@ class SourcePanel(Translated, QGroupBox):
         self._refresh()
 
     def set_absent(self, absent: Mapping[str, Message]) -> None:
-        """Say what must be installed for sources, by their keys."""
+        """Show what must be installed for sources, by their keys."""
         self._absent = absent
         self._retranslate()
 
@@ -147,7 +147,7 @@ class SourcePanel(Translated, QGroupBox):
         return self._is_searching
 
     def set_searching(self, is_searching: bool) -> None:
-        """Say whether cameras are being looked for."""
+        """Show whether a search for cameras is in progress."""
         self._is_searching = is_searching
         self._refresh()
 

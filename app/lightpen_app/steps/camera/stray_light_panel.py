@@ -91,7 +91,7 @@ class StrayLightPanel(Translated, QGroupBox):
             self._refresh()
 
     def set_live(self, is_live: bool) -> None:
-        """Say whether images come; a search without them is given up."""
+        """Show whether images arrive; without them a search is cancelled."""
         if is_live == self._is_live:
             return
         self._is_live = is_live

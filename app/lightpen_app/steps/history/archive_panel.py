@@ -96,7 +96,7 @@ class ArchivePanel(Translated, QWidget):
         self._retranslate()
 
     def set_working(self, working: bool) -> None:
-        """Show that something is under way, and let nothing else begin."""
+        """Show that an operation is in progress, and disable the others."""
         self._progress.setValue(0)
         self._working.setVisible(working)
         self._refresh_buttons()

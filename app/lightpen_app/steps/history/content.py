@@ -47,7 +47,7 @@ LEAST_TABS = 28 * GRID  # px
 
 
 class HistoryContent(Translated, QWidget):
-    """Shows the entries that are looked for, and what they come to.
+    """Shows the entries found, and statistics of their tips.
 
     Signals
     -------
@@ -220,7 +220,7 @@ class HistoryContent(Translated, QWidget):
         self._chosen.set_due_rule(rule)
         self._reader.read_due(rule, self._tips.library)
 
-    # What several swings come to
+    # Joint results of several swings
 
     def _adjust_together(self) -> None:
         results = (each.entry.event.result for each in self._selection.selected())

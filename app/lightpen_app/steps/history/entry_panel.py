@@ -112,7 +112,7 @@ class EntryPanel(Translated, QWidget):
         self._is_guarded = is_guarded
 
     def set_messages(self, remarks: Sequence[StoredEntry]) -> None:
-        """Show what concerns the entry."""
+        """Show the messages on the entry."""
         self._messages = tuple(remarks)
         self._retranslate()
 

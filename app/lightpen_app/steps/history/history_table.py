@@ -227,7 +227,7 @@ class HistoryTable(Translated, RowTable):
         return self._model.line(at.row()) if at.isValid() else None
 
     def selected(self) -> tuple[Line, ...]:
-        """Return the lines that are selected, as far as they are read and not many."""
+        """Return the selected lines that are loaded, unless they are many."""
         ranges = self.selectionModel().selection()
         parts = map(ranges.at, range(ranges.count()))
         rows = chain.from_iterable(range(r.top(), r.bottom() + 1) for r in parts)

@@ -25,7 +25,7 @@ MOST_WAITING = 3  # blocks; of those that were scrolled past, none is read
 
 @dataclass(frozen=True)
 class FirstEntries:
-    """What is read at once for entries that are looked for.
+    """The first data read for a filter.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class HistoryReader(QObject):
         )
 
     def read_messages(self, entry: StoredEntry) -> None:
-        """Read what concerns an entry."""
+        """Read the messages on an entry."""
         logbook = self._logbook
         self._start(
             "remarks",

@@ -42,9 +42,9 @@ class SelectionPanel(Translated, QWidget):
     Signals
     -------
     adjust_requested()
-        LED file and camera file by all selected swings are asked for.
+        Improved LED and camera files from the selected swings are requested.
     report_requested()
-        The report of the repeatability is asked for.
+        The report of the repeatability is requested.
     """
 
     adjust_requested = Signal()
@@ -117,7 +117,7 @@ class SelectionPanel(Translated, QWidget):
         return self._selected
 
     def set_adjusted(self, message: StatusMessage) -> None:
-        """Show what the adjustment of the selected swings came to."""
+        """Show the result of the adjustment of the selected swings."""
         self._adjusted.set_value(message)
 
     def comparison(self) -> Comparison | None:

@@ -72,7 +72,7 @@ class LedFileControl(QObject):
         self._panel.set_savable(why_not, "json" if with_more else "csv")
 
     def discard(self) -> None:
-        """Give up the changes of the table, or a file that cannot be used."""
+        """Discard the changes of the table, or a file that cannot be used."""
         self._unless_lost(self._discard)
 
     def drop_job(self) -> None:
@@ -117,7 +117,7 @@ class LedFileControl(QObject):
             self._leds.open_in_use()
 
     def _unless_lost(self, act: Callable[[], None]) -> None:
-        """Do what gives up the changes of the table, but ask before."""
+        """Run a function that discards the changes of the table, once confirmed."""
         if self._leds.state.is_edited:
             self._panel.ask(self._discarding, act)
         else:

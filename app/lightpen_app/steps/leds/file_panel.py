@@ -144,7 +144,7 @@ class LedFilePanel(Translated, QWidget):
         self._question.ask()
 
     def withdraw(self) -> None:
-        """Ask nothing any more: the LEDs are others."""
+        """Hide the question: the LEDs have changed."""
         if self._question.words():
             self._question.hide()
             self._on_declined()

@@ -160,7 +160,7 @@ class MatchControl(QObject):
         return self._panel.doubt_of(match)
 
     def retranslate(self) -> None:
-        """Say what is missing for the detection of the pen."""
+        """Show what is missing for the detection of the pen."""
         preparation = self._selection.preparation
         if not self._live.is_open:
             why = self.tr("No camera is open. See the step Camera.")

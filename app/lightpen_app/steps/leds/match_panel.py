@@ -159,14 +159,14 @@ class MatchPanel(Translated, QGroupBox):
         self._refresh_state()
 
     def clear(self) -> None:
-        """Show no image."""
+        """Clear the image."""
         self._detection = None
         self._forget()
         self._view.set_image(None)
         self._refresh_state()
 
     def set_why_unknown(self, sentence: str) -> None:
-        """Say what is missing for the detection of the pen."""
+        """Show what is missing for the detection of the pen."""
         if sentence != self._why_none:
             self._why_none = sentence
             self._refresh()
@@ -194,7 +194,7 @@ class MatchPanel(Translated, QGroupBox):
         return self._match
 
     def set_value(self, value: PenMatch | None) -> None:
-        """Show how the pen fits other views; None while that is not known."""
+        """Show how the pen fits the views; None while unknown."""
         self._match = value
         self._refresh()
 

@@ -186,7 +186,7 @@ class LedsPage(ResponsiveLayout, Page):
         self.changed.emit()
 
     def _refresh(self) -> None:
-        """Show what follows from the draft and the nominal tip in force."""
+        """Show the state of the draft and the nominal tip in use."""
         pen, tip = self._leds.state.check.pen, self._selection.preparation.nominal_tip
         overriding = ""  # where it is not that of the table
         if tip is not None and pen is not None:

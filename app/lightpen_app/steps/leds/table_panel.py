@@ -127,7 +127,7 @@ class LedTablePanel(Translated, QGroupBox):
         return self._flaw.value().text
 
     def set_overriding_tip(self, point: str) -> None:
-        """Say that another nominal tip is in force, or nothing."""
+        """Show that another nominal tip is in use; hide it with an empty text."""
         self._override = point
         self._refresh()
 

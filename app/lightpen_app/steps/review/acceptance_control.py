@@ -27,7 +27,7 @@ class AcceptanceControl(QObject):
         run.refused.connect(self._on_refused)
 
     def ask_to_repeat(self) -> None:
-        """Ask whether to set the swing aside and swing anew."""
+        """Ask whether to set the swing aside and repeat it."""
         self._view.question.ask_about(repeat_question, self._runner.set_aside)
 
     def _ask_reason(self) -> None:

@@ -30,7 +30,7 @@ class DetailTabs(QTabWidget):
     images_made(ImagesPanel)
         The tab of the images is seen for the first time.
     saved(str), failed(str)
-        A sentence on a plot that was saved, or could not be.
+        Message on a saved plot, or on a failure to save it.
     """
 
     images_made = Signal(object)

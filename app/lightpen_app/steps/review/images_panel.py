@@ -49,16 +49,16 @@ class _Decoded:
 
 
 class ImagesPanel(Translated, QWidget):
-    """Shows the images of a solution; asks for some to be taken out or put back.
+    """Shows the images of a solution; requests to exclude or include some.
 
-    Delete takes the selected images out, Insert puts them back.
+    Delete excludes the selected images, Insert includes them.
 
     Signals
     -------
     take_out_requested(list of int), put_back_requested(list of int)
         Numbers of images.
     saved(str), failed(str)
-        A sentence on a plot that was saved, or could not be.
+        Message on a saved plot, or on a failure to save it.
     """
 
     take_out_requested = Signal(list)
@@ -158,7 +158,7 @@ class ImagesPanel(Translated, QWidget):
         self._refresh_buttons()
 
     def forget_refused(self) -> None:
-        """Let the last step not be undone if it was refused."""
+        """Remove the last step from the undo stack if it was refused."""
         if self._is_awaited:
             self._is_awaited = False
             self._steps.command(self._steps.index() - 1).setObsolete(True)

@@ -46,7 +46,7 @@ class MonteCarloRow(Translated, QWidget):
         self._progress = QProgressBar()
         self._progress.setRange(0, PROGRESS_STEPS)
         self._progress.setTextVisible(False)
-        self._label = SignLabel()
+        self._outcome = SignLabel()
         self._table = NumberTable()
 
         # Layout
@@ -58,7 +58,7 @@ class MonteCarloRow(Translated, QWidget):
             self._label,
             self._trials,
             (self._progress, 1),
-            (self._label, 1),
+            (self._outcome, 1),
         )
         layout.addWidget(self._table)
 
@@ -149,8 +149,8 @@ class MonteCarloRow(Translated, QWidget):
             field.setVisible(not is_busy)
         self._cancel.setVisible(is_busy)
         self._progress.setVisible(is_busy)
-        self._label.set_value(self._message())
-        self._label.setVisible(not is_busy)
+        self._outcome.set_value(self._message())
+        self._outcome.setVisible(not is_busy)
         self._table.setVisible(self._found is not None)
         if self._found is not None:
             self._table.set_value(self._figures(self._found))
@@ -171,7 +171,7 @@ class MonteCarloRow(Translated, QWidget):
         return StatusMessage(f"{outcome} {worded(self._found.explanation)}", Sign.RING)
 
     def _figures(self, found: MonteCarlo) -> Figures:
-        """Return U by both, and their difference by what so many trials know."""
+        """Return U by both, and their difference over its standard error."""
         by_trials = COVERAGE_FACTOR * found.deviation * MICROMETRES
         within = COVERAGE_FACTOR * found.precision * MICROMETRES
         by_budget = COVERAGE_FACTOR * found.linear * MICROMETRES

@@ -149,7 +149,7 @@ class NextTipsControl(QObject):
         job.start()
 
     def shut_down(self) -> None:
-        """Look no more."""
+        """Stop."""
         if self._search is not None:
             self._search.cancel()
 

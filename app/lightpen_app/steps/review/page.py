@@ -196,7 +196,7 @@ class ReviewPage(Page):
             self.step_requested.emit("swing")
 
     def _refresh(self) -> None:
-        """Show what there is now."""
+        """Show the current state."""
         self._view.tabs.fill()
         self._refresh_words()
 

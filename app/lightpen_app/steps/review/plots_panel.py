@@ -36,7 +36,7 @@ class PlotsPanel(Translated, QWidget):
     Signals
     -------
     saved(str), failed(str)
-        A sentence on a plot that was saved, or could not be.
+        Message on a saved plot, or on a failure to save it.
     """
 
     saved = Signal(str)

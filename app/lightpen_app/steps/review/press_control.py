@@ -10,7 +10,7 @@ from lightpen_app.work.swing_run import SwingRun
 
 
 class PressTestControl(QObject):
-    """Begins a swing with firm pressure, and shows how it differs from the first."""
+    """Starts a swing with firm pressure, and shows its difference from the first."""
 
     def __init__(
         self, run: SwingRun, view: ReviewView, notifications: Notifications

@@ -336,7 +336,7 @@ class Histogram(Plot):
         self._restyle()
 
     def set_data(self, values: FloatArray, n_bins: int = 41) -> None:
-        """Show how values (N,) are distributed."""
+        """Show the distribution of values (N,)."""
         assert self._bars is not None
         if not len(values):
             return

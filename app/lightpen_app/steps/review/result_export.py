@@ -64,7 +64,7 @@ class ResultExport(QObject):
         self._paper.failed.connect(self.failed)
 
     def follow(self, tools: ResultTools) -> None:
-        """Do what these ask for."""
+        """Connect the requests of the buttons."""
         tools.folder_requested.connect(self._open_folder)
         tools.copy_requested.connect(self._copy_tip)
         tools.save_requested.connect(self._ask_laboratory)

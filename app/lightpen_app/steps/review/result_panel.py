@@ -220,7 +220,7 @@ class ResultPanel(Translated, QFrame):
 
 
 def _tip_value(outcome: ReviewedResult) -> TipValue:
-    """Return the tip beside the previous and the nominal one, as far as there are."""
+    """Return the tip beside the previous and the nominal one, if known."""
     x, y, z = outcome.tip_pen.tolist()
     u_x, u_y, u_z = outcome.uncertainty.tolist()
     u, assessment = outcome.uncertainty, outcome.assessment

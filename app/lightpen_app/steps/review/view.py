@@ -123,7 +123,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self._progress.setValue(round(100 * fraction))
 
     def end_questions(self) -> None:
-        """Ask nothing any more."""
+        """Hide the question."""
         self.question.hide()
         self.reason.hide()
         self.withdrawal.hide()

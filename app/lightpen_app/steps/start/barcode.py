@@ -14,11 +14,11 @@ SHIFTS = (Qt.Key.Key_Shift, Qt.Key.Key_CapsLock)
 
 
 class BarcodeListener(QObject):
-    """Takes a barcode and its Enter out of the keys of a window, wherever the focus is.
+    """Intercepts a barcode and its Enter in a window, wherever the focus is.
 
-    Keys are held back for a moment, which nobody notices, and handed on as they came
-    unless they are a barcode. When they were pressed, the windowing system says: keys
-    that had to wait for a busy program are not taken for a scanner's.
+    Keys are held back for an imperceptible moment and forwarded unless they are a
+    barcode. Their time is that of the windowing system, so keys that waited for a busy
+    program are not mistaken for a scanner's.
 
     Signals
     -------

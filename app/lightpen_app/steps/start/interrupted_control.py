@@ -181,7 +181,7 @@ class InterruptedControl(QObject):
         )
 
     def _on_wanted_read(self, swing: Resumable) -> None:
-        """Go on with an interrupted swing; show the tip of one that has a verdict."""
+        """Resume an interrupted swing; show the tip of one that has a verdict."""
         if swing.record.verdict is None:
             self._on_swing_read(swing)
             return

@@ -18,7 +18,7 @@ from lightpen_app.work.swing_run import SwingRun
 
 
 class LastResultPresenter(QObject):
-    """Shows the last result in one panel, how it came about in another.
+    """Shows the last result in one panel, its swing in another.
 
     Signals
     -------
@@ -59,13 +59,13 @@ class LastResultPresenter(QObject):
         self._look_up(self._fill_in)
 
     def show_trend(self) -> None:
-        """Show how the tip developed, where there is the room."""
+        """Show the trend of the tip if there is room."""
         pen, tip, is_simulated = _key(self._selection.preparation)
         if not self._large.isHidden():
             self._large.set_value(pen, tip, is_simulated=is_simulated)
 
     def shut_down(self) -> None:
-        """Look no more."""
+        """Stop."""
         self._large.shut_down()
         if self._lookup is not None:
             self._lookup.cancel()

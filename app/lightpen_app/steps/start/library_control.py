@@ -188,7 +188,7 @@ class LibraryControl(QObject):
         self._watch.change(asked, lambda: _changed(folder, asked, by, now()))
 
     def _on_change_failed(self, asked: RequestedChange, why: str) -> None:
-        """Say it in the dialog, or on the page if that was left meanwhile."""
+        """Show the fault in the dialog, or on the page if the dialog is closed."""
         if self._dialog is None or not self._dialog.show_refused(asked, why):
             self._notices.show_status(why)
 

@@ -173,7 +173,7 @@ class StartPage(ResponsiveLayout, Page):
         self._refresh()
 
     def show_setup(self) -> None:
-        """Show what is set up once."""
+        """Show the settings page."""
         self._views.setCurrentIndex(1)
         if self.isVisible():
             self._setup.names.focus_missing_input(MissingInput.STATION)
@@ -202,7 +202,7 @@ class StartPage(ResponsiveLayout, Page):
 
     @override
     def event(self, event: QEvent) -> bool:
-        """Let no key of a barcode be taken for a shortcut."""
+        """Keep the keys of a barcode from triggering shortcuts."""
         if event.type() == QEvent.Type.ShortcutOverride:
             return self._library.barcodes.takes(event) or super().event(event)
         return super().event(event)

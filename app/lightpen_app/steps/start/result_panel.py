@@ -143,7 +143,7 @@ class LastResultPanel(Translated, QGroupBox):
         self._retranslate()
 
     def set_room(self, room: SizeClass) -> None:
-        """Show its figures the larger, the more room there is."""
+        """Scale its figures to the size of the window."""
         age, words, figures = SIZES[room.is_large + room.is_vast]
         set_size(self._age, age)
         for label in (self._when, *self._heads):

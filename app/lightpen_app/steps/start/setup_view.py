@@ -85,7 +85,7 @@ class SetupView(Translated, QWidget):
             column.insertWidget(0, self.newcomer)
 
     def set_why_not_done(self, why_not: str) -> None:
-        """Say what is missing for the day page."""
+        """Show what is missing for the day page."""
         self._done.set_why_not(why_not)
 
     def _retranslate(self) -> None:

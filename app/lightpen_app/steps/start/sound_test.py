@@ -92,7 +92,7 @@ class SoundTest(Translated, QWidget):
         self._timer.start()
 
     def _silence(self) -> str:
-        """Return why nothing can be heard, a sentence; empty if it can."""
+        """Return why audio is unavailable; empty if it is available."""
         reason = self._sounds.why_silent()
         if reason:
             return self.tr(

@@ -51,7 +51,7 @@ class TaskPicture:
 
 
 def posture_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> DialValue:
-    """Return how the pen was held at the points of a task, and how it is held now."""
+    """Return the postures of the pen at the points of a task, and the present one."""
     progress, found = state.progress(setup, task), state.found.get(task.kind)
     points = [*chain.from_iterable(progress.runs), *progress.points]
     if found is not None and not points:

@@ -1,4 +1,4 @@
-"""The measuring plan: opened or taught; the kind of the feature at hand; exports."""
+"""The measuring plan: opened or taught; the kind of the current feature; exports."""
 
 from collections.abc import Callable
 from functools import partial
@@ -38,7 +38,7 @@ SUFFIXES = "*.yaml *.yml"
 
 
 class PlanPanel(ResponsiveLayout, Translated, QWidget):
-    """Chooses a plan, changes the kind of the feature at hand, and saves results."""
+    """Chooses a plan, changes the kind of the current feature, and saves results."""
 
     narrow_below = 119 * GRID  # px; then all is in two rows
 
@@ -208,7 +208,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._change(lambda each: structs.replace(each, scan=scan))
 
     def _change(self, changed: Callable[[PlannedFeature], PlannedFeature]) -> None:
-        """Change the feature at hand in the plan."""
+        """Change the current feature in the plan."""
         plan, planned = self._plan(), self._planned()
         if plan is None or planned is None:
             return

@@ -131,7 +131,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._runner.ask(lambda workflow: workflow.toggle_pause())
 
     def hide_question(self) -> None:
-        """Ask nothing any more."""
+        """Hide the question."""
         self._question.hide()
 
     @override

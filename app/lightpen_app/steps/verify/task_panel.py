@@ -84,17 +84,13 @@ class TaskPanel(Translated, QWidget):
             progress = state.progress(setup, task)
             has_points = bool(progress.points or progress.runs)
         self._anew.setEnabled(found is not None or has_points)
-        assessment = None if found is None else found.assessment
-        if (
-            status.is_done and assessment is status.assessment
-        ):  # it stands above all tasks
-            assessment = None
+        judged = None if found is None else found.assessment
+        if status.is_done and judged is status.assessment:  # shown above all tasks
+            judged = None
         self._verdict.set_value(
             StatusMessage()
-            if assessment is None
-            else StatusMessage(
-                worded(assessment.reason), *GRADE_MARKS[assessment.grade]
-            )
+            if judged is None
+            else StatusMessage(worded(judged.reason), *GRADE_MARKS[judged.grade])
         )
         self._images.set_progress(reading)
 

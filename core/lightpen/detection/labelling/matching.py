@@ -35,7 +35,7 @@ AREA_RANGE = (0.5, 2.0)  # measured over predicted, all discs together
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Poses supposed for images, with the spots they explain.
+    """Pose hypotheses for images, with the spots they explain.
 
     Attributes
     ----------

@@ -32,8 +32,8 @@ from lightpen.model.rigid import rotation_from_vector
 MIN_IMAGES = 10
 LEAST = 1e-6  # px, of noise and ways; keeps exact lamps from dividing by zero
 RATIOS = np.geomspace(1e-8, 1e4, 200)  # of the variance of a step to that of a lamp
-HALF = 0.5  # of the way of the lamps, which the pen goes at least if the camera does
-WITH_LAMPS = 1.5  # times the way of the lamps, which a pen beside them may go
+HALF = 0.5  # of the lamp shift, by which the pen shifts at least if the camera moved
+WITH_LAMPS = 1.5  # times the lamp shift, largest shift of a pen beside them
 FAR = 3.0  # times the usual distance; what lies farther has slipped
 
 
@@ -150,7 +150,7 @@ def without_field(camera: Camera, observations: Observations) -> Observations:
 def _turns(camera: Camera, path: CameraPath) -> FloatArray:
     """Return the turn of the camera in each image, (N, 3, 3).
 
-    Up, down and sideways; lamps hardly show how it turns about its own axis.
+    Along x and y; lamps hardly show its rotation about the line of sight.
     """
     plane = camera.unproject_with_jacobian(path.lamps.mean(axis=0))
     x, y = plane.points

@@ -223,7 +223,7 @@ def change_since(
 
 
 def change_doubt(change: Change, date: str, limit: float | None) -> Message | None:
-    """Return what there is to look into about a change, if anything.
+    """Return why a change needs checking; None if it does not.
 
     Parameters
     ----------

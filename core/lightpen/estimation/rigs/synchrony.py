@@ -60,7 +60,7 @@ class PenRotations:
         return cls(rotations, variances, known)
 
     def shifted(self, n_moments: int) -> "PenRotations":
-        """Return them so many moments later."""
+        """Return them shifted by a number of images."""
         known = np.roll(self.known, n_moments)
         known[: max(n_moments, 0)] = False
         known[len(known) + min(n_moments, 0) :] = False

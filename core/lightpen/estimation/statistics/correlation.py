@@ -54,8 +54,8 @@ def correlated_covariance(
     residuals : (N, 3) array
         Of the solution.
     least : float
-        Variance that the residuals have at least in each direction: 1 where the
-        equations were divided by the standard deviations that are stated for them.
+        Lower bound of the variance of the residuals in each direction: 1 for equations
+        divided by their stated standard deviations.
     """
     from scipy.fft import dct  # takes 0.1 s
 

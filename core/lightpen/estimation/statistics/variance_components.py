@@ -159,9 +159,9 @@ def find_jitter(
     image, the sum of ``V_i^-1 (excess_i - V_i) V_i^-1`` is brought to 0. What would be
     negative is taken as none.
 
-    What is found is itself uncertain, the more the fewer images there are. One variance
-    counts as of as many degrees of freedom n as its own variance shows [1]_, and is
-    raised by ``n / (n - 2)`` to the mean of what it may be, as JCGM 101, 6.4.9 has it.
+    The estimates are uncertain themselves, in particular with few images. The degrees
+    of freedom n of a variance follow from its own variance [1]_; it is multiplied by
+    ``n / (n - 2)``, the mean of its distribution, as in JCGM 101, 6.4.9.
 
     References
     ----------

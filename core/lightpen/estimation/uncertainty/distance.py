@@ -1,11 +1,12 @@
-"""How well the distance of the cone repeats from swing to swing.
+"""Repeatability of the distance of the cone from swing to swing.
 
-A pen that grew makes all distances come out smaller: ``w / f``, the depth of the cone
-over the focal length, tells the growth between two swings at one place. The errors of
-the files move all swings alike and cancel. What remains is of each swing: noise, errors
-of centres that repeat with the posture, seat and drift. With the unknowns' covariance P
-and the derivative c of ``log(w / f)`` it is ``c P I P c^T``, I the information that
-these bring, equations (15), (17) and (18) of method.md.
+If the pen has expanded, all distances appear smaller: ``w / f``, the depth of the cone
+over the focal length, shows the expansion between two swings at one place. Errors of
+the files are common to all swings and cancel. What remains varies from swing to swing:
+noise, errors of centres that repeat with the posture, seat and drift. Its variance is
+``c P I P c^T``, with the covariance P of the unknowns, the derivative c of
+``log(w / f)`` and the information I of these errors, equations (15), (17) and (18) of
+method.md.
 """
 
 import numpy as np

@@ -50,7 +50,7 @@ def save_new(folder: Path, name: str, data: bytes) -> Path:
 
 
 def exported_solution(solution: Solution, names: Names) -> CalibrationFile:
-    """Return a solved swing that is not accepted yet, to be exported.
+    """Return a solved, not yet accepted swing for export.
 
     Raises
     ------

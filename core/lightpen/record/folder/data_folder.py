@@ -106,7 +106,7 @@ def _is_held(file: Path) -> bool:
     return not is_free
 
 
-OLDEST = 1.0  # s; after it nobody is between making a folder and locking its journal
+OLDEST = 1.0  # s; longest time between creating a folder and locking its journal
 
 
 def sweep_leftovers(data: Path) -> None:

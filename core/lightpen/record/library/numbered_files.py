@@ -1,8 +1,8 @@
 """A folder of JSON files that are written once, each named by its number in order.
 
-A file's number is one higher than that of any before, an order that no clock that was
-set back can turn round. Of two programs that take the same number one gets it, and the
-other the next. A file that was lost leaves its number to an empty ``000007.missing``.
+Numbers increase by one, so the order does not depend on clocks. Of two programs that
+try the same number, one gets it and the other the next. An empty ``000007.missing``
+reserves the number of a lost file.
 """
 
 from collections.abc import Callable
@@ -96,7 +96,7 @@ def numbered_files(folder: Path) -> list[Path]:
 
 
 def reserve_number(lost: Path) -> None:
-    """Let no new file get the number of one that was lost.
+    """Reserve the number of a lost file.
 
     Raises
     ------

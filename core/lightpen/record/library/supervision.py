@@ -273,7 +273,7 @@ def _is_introduced(guard: Supervision, change: LimitsChange) -> bool:
     """Return whether a station key may be used from a change on."""
     if not guard.station_keys and chain_of(change.station_key) == change.chain:
         return True
-    if guard.password is None:  # nobody could approve it
+    if guard.password is None:  # it could not be approved
         return True
     content = key_change(guard.chain, change.station_key)
     return is_signed(

@@ -1,4 +1,4 @@
-"""The library of pens, tips and cones: what there is, by which limits, due when.
+"""The library of pens, tips and cones: items, limits and due dates.
 
 Each change is a separate file in the data folder, numbered in their order and never
 changed, as limits are: it holds the whole of one item as it is from then on, and who

@@ -13,7 +13,7 @@ from lightpen.errors import FileError
 from lightpen.formats.file_locks import NO_LOCKS, locked, unlock
 from lightpen.formats.files import printable
 
-PATIENCE = 0.5  # s for one who only looks, or is about to close, to let go
+PATIENCE = 0.5  # s, wait for a reader or a closing process to release the lock
 
 
 def lock_journal(journal: IO[bytes], folder: Path) -> None:

@@ -80,12 +80,12 @@ class RecordWriter:
 
     @classmethod
     def create(cls, folder: Path, header: Header, *, is_swing: bool = True) -> Self:
-        """Make a record in a folder that does not exist or is empty.
+        """Create a record in a folder that does not exist or is empty.
 
         Parameters
         ----------
         is_swing : bool
-            Whether the system is to open it with the program; touches are no swing.
+            Whether the file manager opens it with the program: a swing, not touches.
 
         Raises
         ------

@@ -1,10 +1,10 @@
-"""A better LED file, and camera file, from several swings of one pen.
+"""Improved LED and camera files from several swings of one pen.
 
 Each swing measures camera, disc diameter, scale and LEDs by the information of its
 images, ``N_k x = b_k``, with its own tip, cone, seat and drift eliminated. The sum over
-the swings, with what the files state counted once, gives them together [1]_. A swing
-that took no part has to confirm it: its images must fit the new LEDs, held as they are,
-better than the old ones.
+the swings and the priors of the files gives the joint estimate [1]_. A swing that was
+not used must confirm it: its images must fit the new LEDs, held fixed, better than the
+old ones.
 
 References
 ----------

@@ -35,7 +35,7 @@ LIMIT = "max_uncertainty_mm"  # among the settings of an entry
 class Trend:
     """The calibrations of a tip that were accepted and not revoked.
 
-    One whose tip was reinstated stands for itself once.
+    A calibration whose tip was reinstated counts once.
 
     Attributes
     ----------

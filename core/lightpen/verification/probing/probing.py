@@ -106,11 +106,11 @@ class ProbingState:
     Attributes
     ----------
     held : tuple of TipObservation
-        Through which the pen is still; at rest the first and the last one.
+        Observations while the pen is still; at rest the first and the last one.
     deviating : TipObservation or None
-        The last one, if it disagrees.
+        The last observation, if it disagrees with those held.
     rejected : tuple of RejectedFrame
-        Between those that are held.
+        Rejected between those held.
     n_lost : int
         Images in a row without the pen.
     path : tuple of array
@@ -118,7 +118,7 @@ class ProbingState:
     taken : tuple of StillFrames
         Points probed so far.
     places : tuple of TipObservation
-        One image of each.
+        One observation of each point.
     is_sliding : bool
         Whether the pen was seen without a break since a point was taken.
     """
@@ -194,7 +194,7 @@ def advance_touch(
 
 
 def at_rest(state: ProbingState) -> ProbingState:
-    """Return the touches so far; the pen must leave where it is before the next."""
+    """Return the touches so far; the pen must leave its place before the next."""
     state = replace(_let_go(state).state, phase=ProbingPhase.AT_REST, path=())
     return replace(state, is_sliding=False)
 
@@ -212,7 +212,7 @@ def take_all(
 
 
 def read_rules(is_still: bool, n_frames: int) -> ProbingRules:
-    """Return how touches are taken from recorded images.
+    """Return the probing rules for recorded images.
 
     Parameters
     ----------

@@ -303,7 +303,7 @@ def _measured_by(choices: VerificationChoices, state: SessionState) -> SessionSt
 
 
 def rules_of(setup: SessionSetup, state: SessionState, task: AnyTask) -> ProbingRules:
-    """Return how the next point of a task is taken, and which one counts as new."""
+    """Return the probing rules of the next point of a task."""
     options = setup.choices.options_of(task)
     turn, distance = task.newness(options)
     rules = ProbingRules(setup.choices.n_frames, min_turn=turn, min_distance=distance)

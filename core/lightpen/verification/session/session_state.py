@@ -171,7 +171,7 @@ class SessionState:
 
     @property
     def assessment(self) -> VerificationAssessment | None:
-        """The worst that was found so far; a drift first, as it explains the rest."""
+        """The worst finding so far; a drift first, as it explains the others."""
         drift = self.found_by(DRIFT)
         found = [self.found[task.kind] for task in ALL_TASKS if task.kind in self.found]
         if drift is not None and not drift.assessment.is_accepted:
@@ -191,7 +191,7 @@ def n_visits(choices: VerificationChoices) -> int:
 
 
 def without_touches(state: SessionState) -> SessionState:
-    """Return it with the next run to begin; a pen at rest has to move on first."""
+    """Return the state at the start of the next run; a pen at rest must move first."""
     touching = replace(state.touching, taken=(), places=())
     return replace(state, touching=touching, touches=(), runs=(), fault=None)
 

@@ -98,7 +98,7 @@ class VerificationStatus:
 
     @property
     def assessment(self) -> VerificationAssessment | None:
-        """The worst that was found so far."""
+        """The worst finding so far."""
         found = None if self.state is None else self.state.assessment
         return None if found is None else judged_with(found, self.lamp_drift)
 

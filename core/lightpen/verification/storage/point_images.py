@@ -285,12 +285,12 @@ class LivePoints:
         detection: PenDetection,
         region: RegionOfInterest,
     ) -> SessionTransition:
-        """Take an image, and return what becomes of a verification by it.
+        """Process an image and return the transition of the verification.
 
         Raises
         ------
         FileError
-            It counts and cannot be kept.
+            A required image cannot be stored.
         """
         if state.touching.phase is ProbingPhase.HOLDING:
             self._lamps = self._lamps.with_frame(frame, detection, region)

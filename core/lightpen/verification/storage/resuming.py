@@ -147,7 +147,7 @@ def abandon_interrupted(
 ) -> None:
     """Conclude an interrupted verification as abandoned; its files are kept.
 
-    A damaged file is put aside.
+    A damaged file is set aside.
 
     Raises
     ------

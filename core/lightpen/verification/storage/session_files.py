@@ -258,7 +258,7 @@ class SessionKeeping:
         self._read = tuple(each for each in self._read if each.task in kinds)
 
     def conclude(self, status: VerificationStatus, outcome: TrialOutcome) -> None:
-        """Have the outcome of the verification written, with all its records."""
+        """Write the outcome of the verification with all its records."""
         tip, began = status.tip, status.began
         if tip is not None and began is not None:
             conclusion = Conclusion(outcome, began, self._now(), status.assessment)

@@ -113,7 +113,7 @@ class Articulation(Found):
 
 
 class ArticulationOptions(TaskOptions, frozen=True, tag="articulation"):
-    """There is nothing to choose."""
+    """No options."""
 
 
 def measure_articulation(

@@ -74,8 +74,8 @@ def graded(
 ) -> Grade:
     """Return the grade of an error with its U (k = 2), mm, the worst of several.
 
-    Rejected by the rule is to be repeated. Open by the rule is to be checked, and so is
-    an error that is more than chance and relevant for the limit.
+    REPEAT if the decision rule rejects. CHECK if it does not decide, or if the error is
+    significant and relevant for the limit.
     """
     decision = limits.decision(value, uncertainty, limit)
     if decision is Decision.REJECTED:

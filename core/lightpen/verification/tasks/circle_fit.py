@@ -134,13 +134,13 @@ def _across(normal: FloatArray) -> FloatArray:
 
 
 class RingResiduals(NamedTuple):
-    """Derivatives of how far points lie off a ring: outwards, then off its plane.
+    """Derivatives of the residuals of points from a ring: radial, then out of plane.
 
     Attributes
     ----------
     by_points : (2 N, 3 N) array
     by_ring : (2 N, 5) array
-        By its centre in its plane, by its height, and by two tilts.
+        By its centre in its plane, its height and two tilts.
     """
 
     by_points: FloatArray

@@ -85,7 +85,7 @@ class Drift(Found):
 
 
 class DriftOptions(TaskOptions, frozen=True, tag="drift"):
-    """There is nothing to choose."""
+    """No options."""
 
 
 def measure_drift(

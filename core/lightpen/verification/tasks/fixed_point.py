@@ -225,7 +225,7 @@ def _too_few(n_touches: int) -> CalibrationError:
 def _assessment(
     found: FixedPoint, limits: VerificationLimits
 ) -> VerificationAssessment:
-    """Judge the tip first, which explains a scatter; noise is nobody's fault."""
+    """Judge the tip first, as it explains a scatter; tolerate the expected noise."""
     against = judged_tip(found.tip, limits)
     if against is not None:
         return against

@@ -83,7 +83,7 @@ def base_name(name: str) -> str:
 def with_move(
     options: PartOptions, runs: Sequence[Points], conditions: Conditions
 ) -> PartOptions:
-    """Return the options with a new position of the part after the runs so far.
+    """Return the options with a new position of the part after the present runs.
 
     Its datum points are the three features with a centre that span the largest
     triangle.
@@ -137,14 +137,14 @@ def touches_of_part(
 
 
 def planned_at(options: PartOptions, run: int) -> PlannedFeature | None:
-    """Return the feature of a run from 0; None after the last, or without a plan."""
+    """Return the feature of run i (from 0); None after the last or without a plan."""
     runs = course(options)
     return runs[run] if run < len(runs) else None
 
 
 @dataclass(frozen=True, eq=False)
 class FeatureSoFar:
-    """The feature at hand.
+    """The current feature.
 
     Attributes
     ----------

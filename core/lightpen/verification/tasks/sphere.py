@@ -85,7 +85,7 @@ UNUSUAL = 0.001  # chance that an ideal sphere shows more form
 N_TRIALS = 4000
 LATEST = 6  # points whose residuals are shown
 
-# The points of the standard: so many at so many degrees from the pole.
+# Points of the standard: their number at each angle from the pole, degrees.
 RINGS = (1, 0.0), (4, 22.5), (8, 45.0), (4, 67.5), (8, 90.0)
 # The sphere of the simulated operator, from the bottom of its cone, mm
 SIMULATED_RADIUS = 15.0

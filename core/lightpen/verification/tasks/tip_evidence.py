@@ -1,4 +1,4 @@
-"""What the points of a task tell of the tip, and how large an error they would show.
+"""Error of the tip by the points of a task, and the error that they would detect.
 
 A point that is computed with a tip that is off by ``-d`` in the pen lies off by
 ``-R d``. Let ``r`` be the residuals of the points from an artefact, linear in the
