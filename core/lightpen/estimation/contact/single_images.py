@@ -18,7 +18,6 @@ from lightpen.model.pen import Pen
 MIN_IMAGES = 6  # the paper starts from six
 MAX_SIGMA = 1.0  # px, of one image coordinate; LED errors of 0.3 mm make this
 USUAL_SIGMA = 0.1  # px
-DOUBTFUL_SIGMA = 3 * USUAL_SIGMA  # beyond, a tip that seems to move is due to the files
 # An LED that runs along an arc during the exposure appears inside it, which moves the
 # pose of a blurred image by some hundredths of a millimetre; more is a slip.
 MAX_SMEAR = 0.15  # mm
