@@ -32,6 +32,7 @@ from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.formats.observation_files import Centers
 from lightpen.model.assumptions import USUAL
+from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 from lightpen.simulator.image_plans import plan_scene
 from lightpen.simulator.scenes import CLEAN, HARD, LEDS, Scene
@@ -60,8 +61,9 @@ class Outcome:
     by_u, tip : (3,) array
         Error of the tip by U, and by its share of what the trial draws: noise and
         the diameter of the discs, not lens and mechanics.
-    later : (3,) array
-        Of a later calibration with both files, by the same share.
+    later, same : (3,) array
+        Of a calibration with both files by another swing, and by the images that they
+        were found from, by the same share.
     intrinsics : (4,) array
         Of fx, fy, cx, cy.
     """
@@ -69,6 +71,7 @@ class Outcome:
     by_u: FloatArray
     tip: FloatArray
     later: FloatArray
+    same: FloatArray
     leds: FloatArray
     intrinsics: FloatArray
     tip_error: float  # µm
@@ -124,6 +127,11 @@ def rows_of(every: Sequence[Outcome | None]) -> list[Row]:
                     f"images, length off by {CALIPER:.0e}, by the same share,",
                     "later",
                 ),
+                (
+                    "tip x y z of a calibration of the images that both files were "
+                    "found from, by the same share,",
+                    "same",
+                ),
             )
         ),
         Row(
@@ -156,6 +164,7 @@ def outcome(seed: int) -> Outcome | None:
         by_u=COVERAGE_FACTOR * errors.tip / found.expanded_uncertainty,
         tip=errors.tip / np.sqrt(drawn),
         later=_later(found, station, seed),
+        same=_calibrated_with(found, found.pen, station, station.pixels),
         leds=(errors.leds / of_leds).ravel(),
         intrinsics=(errors.intrinsics / found.intrinsics_sigma)[:4],
         tip_error=float(np.linalg.norm(errors.tip)) * UM,
@@ -171,9 +180,16 @@ def _later(found: Discovery, station: Station, seed: int) -> FloatArray:
     factor = 1 + CALIPER * float(rng.standard_normal())
     pen = replace(found.pen, leds=factor * found.pen.leds, scale_sigma=CALIPER)
     again = seen_again(station, N_LATER, SIGMA, rng)
+    return _calibrated_with(found, pen, station, again.pixels)
+
+
+def _calibrated_with(
+    found: Discovery, pen: Pen, station: Station, pixels: FloatArray
+) -> FloatArray:
+    """Return the error of a calibration with found files, in deviations, (3,)."""
     order = np.argsort(errors_of(found, station).order)
-    pixels = again.pixels[:, order]
-    centers = Centers(np.arange(N_LATER), pixels, Path("simulated"))
+    numbers = np.arange(len(pixels))
+    centers = Centers(numbers, pixels[:, order], Path("simulated"))
     seen = observe_centers(centers, found.camera, pen)
     calibration = calibrate(found.camera, pen, seen)
     R, t = fit_rigid(station.pen.leds[order], pen.leds)

@@ -24,12 +24,13 @@ from lightpen.discovery.requirements import (
     require_enough,
     require_length,
     require_no_second_pen,
-    require_one_focal_length,
+    require_one_camera,
+    require_sketched,
 )
 from lightpen.discovery.scale import with_lengths_known
 from lightpen.discovery.scaled_start import (
     LEAST_LENGTH_SIGMA,
-    focal_lengths_of_halves,
+    adjust_halves,
     numbered,
     scaled_start,
 )
@@ -100,8 +101,11 @@ def _adjusted(
     sightings = swing.sightings
     pixels = pixels_of(swing.found.spots, swing.centers)
     scaled = start, lengths, choice = scaled_start(request, swing.found, pixels)
-    halves = focal_lengths_of_halves(scaled, pixels[swing.found.images], request.camera)
-    require_one_focal_length(*halves)
+    if request.sketch is not None and request.lengths:
+        require_sketched(lengths, request.sketch)
+    require_one_camera(
+        adjust_halves(scaled, pixels[swing.found.images], request.camera)
+    )
     report(0.6)
     second = None
     if request.second is not None:
@@ -119,7 +123,7 @@ def _adjusted(
         *(calibration, lengths, request.rough_leds, second),
         is_relative=request.is_relative,
     )
-    require_certain(discovery)
+    require_certain(discovery, sightings)
     return replace(
         discovery,
         hypotheses=swing.hypotheses,

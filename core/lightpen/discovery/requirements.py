@@ -1,6 +1,7 @@
 """What is refused: too little to see, a second pen, wrong lengths, weak swings."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,14 +9,15 @@ from lightpen.arrays import FloatArray
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.labelling import Labelled
 from lightpen.discovery.request import Request
-from lightpen.discovery.scale import nearest_pair
+from lightpen.discovery.scale import CONTRADICTING, nearest_pair
 from lightpen.discovery.sightings import Sightings
-from lightpen.discovery.starts import KnownLength
+from lightpen.discovery.starts import KnownLength, gradient_of
 from lightpen.errors import CalibrationError
-from lightpen.estimation.bundle.consistency_findings import DIAMETER
+from lightpen.estimation.bundle.consistency_findings import DIAMETER, SCALE
 from lightpen.estimation.calibrate import Calibration
 from lightpen.intrinsics.distortion import folds
 from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
 from lightpen.model.posture import tilts_of
 
 MIN_IMAGES = 40
@@ -24,8 +26,27 @@ SECOND_PEN = 3  # lights that move with one another, beside those of the pen
 OTHER_SIZE = 0.1  # relative: discs that are another size than stated
 ZOOMED = 1e-3  # of the focal length, between both halves of a swing, and
 HALVES_APART = 6.0  # standard deviations of the difference
-MOST_USED = 0.5  # of the images
+HALVES_MISFIT = 3.0  # times the noise of either half alone
+MOST_USED = 0.7  # of the images that show LEDs enough
+ROUGHLY = 2.5  # mm, standard deviation of a sketch accurate to 5 mm
+OTHERWISE_WARM = 2e-4  # relative, of a length: 10 K of aluminium
 WORST_TIP, WORST_FOCAL = 0.02, 0.03  # U over the pen's size, and relative
+
+
+class Halves(NamedTuple):
+    """The two halves of a swing, each adjusted alone.
+
+    Attributes
+    ----------
+    focal_lengths, sigmas : (2,) array
+        With standard uncertainties, px.
+    misfit : float
+        Noise of both about the common start, by that of the noisier half alone.
+    """
+
+    focal_lengths: FloatArray
+    sigmas: FloatArray
+    misfit: float
 
 
 def require_enough(sightings: Sightings) -> None:
@@ -50,10 +71,20 @@ def require_no_second_pen(found: Labelled) -> None:
 def require_length(
     calibration: Calibration, request: Request, lengths: Sequence[KnownLength]
 ) -> None:
-    """Refuse a length that contradicts the stated diameter of the discs."""
+    """Refuse a length that contradicts the diameter of the discs, or two cones."""
     if not request.lengths:
         return
     for each in calibration.contradictions:
+        if each.what == SCALE and request.second is not None:
+            distance = request.second.separation.distance
+            raise CalibrationError(
+                "discover.cones-contradict",
+                distance=distance,
+                implied=distance / each.estimated,
+                length=lengths[0].length,
+                first=lengths[0].first + 1,
+                second=lengths[0].second + 1,
+            )
         if each.what != DIAMETER or each.estimated <= 0:
             continue
         ratio = each.stated / each.estimated
@@ -86,15 +117,42 @@ def require_lens(camera: Camera) -> None:
         raise CalibrationError("discover.lens-folds")
 
 
-def require_one_focal_length(halves: FloatArray, sigmas: FloatArray) -> None:
-    """Refuse a swing whose halves have focal lengths, (2,), px, of their own."""
-    first, second = halves.tolist()
-    by_chance = HALVES_APART * float(np.linalg.norm(sigmas))
+def require_one_camera(halves: Halves) -> None:
+    """Refuse a swing whose halves fit alone, but not together."""
+    first, second = halves.focal_lengths.tolist()
+    by_chance = HALVES_APART * float(np.linalg.norm(halves.sigmas))
     if abs(first - second) > max(ZOOMED * first, by_chance):
         raise CalibrationError("discover.camera-changed", first=first, second=second)
+    if halves.misfit > HALVES_MISFIT:
+        raise CalibrationError("discover.halves-apart", times=halves.misfit)
 
 
-def require_certain(discovery: Discovery) -> None:
+def require_sketched(lengths: Sequence[KnownLength], sketch: Pen) -> None:
+    """Refuse lengths that the sketch of the pen contradicts."""
+    for each in lengths:
+        row = gradient_of(sketch.leds, each)
+        sketched = float(
+            np.linalg.norm(sketch.leds[each.second] - sketch.leds[each.first])
+        )
+        if sketch.led_covariance is not None:
+            variance = float(row @ sketch.led_covariance @ row)
+        elif sketch.led_sigma is not None:
+            variance = 2 * sketch.led_sigma**2
+        else:
+            variance = 2 * ROUGHLY**2
+        sigma = np.sqrt(variance + each.sigma**2 + (OTHERWISE_WARM * sketched) ** 2)
+        sigma = np.hypot(sigma, (sketch.scale_sigma or 0.0) * sketched)
+        if abs(each.length - sketched) > CONTRADICTING * sigma:
+            raise CalibrationError(
+                "discover.length-not-sketched",
+                length=each.length,
+                first=each.first + 1,
+                second=each.second + 1,
+                sketched=sketched,
+            )
+
+
+def require_certain(discovery: Discovery, sightings: Sightings) -> None:
     """Refuse a swing that hardly determines tip or camera, or much of which is left.
 
     Raises
@@ -103,7 +161,8 @@ def require_certain(discovery: Discovery) -> None:
         Says what is missing.
     """
     calibration = discovery.calibration
-    n_used, n_images = int(calibration.used.sum()), len(calibration.used)
+    n_used = int(calibration.used.sum())
+    n_images = sum(len(each) >= MIN_LEDS for each in sightings.centers)
     if n_used < MOST_USED * n_images:
         raise CalibrationError(
             "discover.many-left-out", n_used=n_used, n_images=n_images

@@ -6,13 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
+from lightpen.detection.pose import NOISE_FLOOR
 from lightpen.discovery.hypotheses import camera_prior
 from lightpen.discovery.labelling import Labelled
 from lightpen.discovery.lens_choice import choose_lens
 from lightpen.discovery.normals import towards_camera
 from lightpen.discovery.numbering import framed, number_by_place, number_by_sketch
 from lightpen.discovery.request import Request
-from lightpen.discovery.requirements import MIN_LEDS
+from lightpen.discovery.requirements import MIN_LEDS, Halves
 from lightpen.discovery.scale import MeasuredLength, known_lengths, scale_by
 from lightpen.discovery.starts import (
     KnownLength,
@@ -116,10 +117,10 @@ def scaled_start(request: Request, found: Labelled, pixels: FloatArray) -> Scale
     return ScaledStart(every, lengths, choice)
 
 
-def focal_lengths_of_halves(
+def adjust_halves(
     start: ScaledStart, pixels: FloatArray, known: Camera | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return focal length and its sigma by each half of the images, (2,) each, px.
+) -> Halves:
+    """Adjust each half of the images alone.
 
     Parameters
     ----------
@@ -128,16 +129,20 @@ def focal_lengths_of_halves(
     """
     state, n = start.state, len(pixels)
     prior = camera_prior(state.rig.cameras[0], known)
-    found, sigmas = np.empty(2), np.empty(2)
-    for k, half in enumerate(np.array_split(np.arange(n), 2)):
-        some = half[
-            np.unique(np.linspace(0, len(half) - 1, N_ADJUSTED // 2).astype(int))
-        ]
+    found, sigmas, noise = np.empty(2), np.empty(2), np.empty(2)
+    halves = [
+        half[np.unique(np.linspace(0, len(half) - 1, N_ADJUSTED // 2).astype(int))]
+        for half in np.array_split(np.arange(n), 2)
+    ]
+    for k, some in enumerate(halves):
         part = replace(state, rotations=state.rotations[some])
         alone = adjust_start(part, pixels[some], prior, N_HALF_STEPS, start.lengths)
-        found[k] = alone.state.rig.cameras[0].fx
+        found[k], noise[k] = alone.state.rig.cameras[0].fx, alone.sigma
         sigmas[k] = focal_sigma(alone, pixels[some], prior, start.lengths)
-    return found, sigmas
+    both = np.concatenate(halves)
+    together = replace(state, rotations=state.rotations[both])
+    common = adjust_start(together, pixels[both], prior, 0, start.lengths).sigma
+    return Halves(found, sigmas, common / max(noise.max(), NOISE_FLOOR))
 
 
 def _with_discs(pen: Pen, request: Request) -> Pen:

@@ -13,8 +13,10 @@ from tests.simulated_stations import (
 
 from lightpen.discovery.discover import discover
 from lightpen.discovery.found import Discovery
+from lightpen.discovery.requirements import require_sketched
 from lightpen.discovery.scale import MeasuredLength
 from lightpen.discovery.sightings import Sightings
+from lightpen.discovery.starts import KnownLength
 from lightpen.errors import CalibrationError
 from lightpen.simulator.swings import swing_from_postures
 
@@ -244,3 +246,43 @@ def test_a_length_to_an_led_that_is_none_is_refused() -> None:
     lengths = (MeasuredLength((1, 40), 100.0, 0.01),)
     with pytest.raises(CalibrationError, match="no LED 40"):
         discover(STATION.sightings, replace(STATION.request, lengths=lengths))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("zoom", [1.003, 1.1])
+def test_a_zoom_midway_is_refused(zoom: float) -> None:
+    station = random_station(902, n_images=N)
+    middle = np.array([station.camera.width, station.camera.height]) / 2
+
+    def zoomed(centers: list[np.ndarray]) -> list[np.ndarray]:
+        later = [middle + zoom * (each - middle) for each in centers[N // 2 :]]
+        return [*centers[: N // 2], *later]
+
+    assert refused(with_centers(station, zoomed), station) in {
+        "discover.camera-changed",
+        "discover.many-left-out",
+    }
+
+
+@pytest.mark.slow
+def test_halves_that_do_not_fit_together_are_refused() -> None:
+    station = random_station(901, n_images=N)
+    middle = np.array([station.camera.width, station.camera.height]) / 2
+
+    def zoomed(centers: list[np.ndarray]) -> list[np.ndarray]:
+        later = [middle + 1.003 * (each - middle) for each in centers[N // 2 :]]
+        return [*centers[: N // 2], *later]
+
+    assert refused(with_centers(station, zoomed), station) == "discover.halves-apart"
+
+
+def test_a_length_that_the_sketch_contradicts_is_refused() -> None:
+    leds = SHORT.pen.leds
+    rough = replace(SHORT.pen, leds=leds + 0.5)
+    exact = replace(rough, led_covariance=1e-4 * np.eye(leds.size), scale_sigma=1e-5)
+    apart = float(np.linalg.norm(leds[1] - leds[0]))
+
+    for sketch, wrong, right in ((rough, 20.0, 5.0), (exact, 0.2, 0.02)):
+        require_sketched([KnownLength(0, 1, apart + right, 0.01)], sketch)
+        with pytest.raises(CalibrationError, match="file of the pen their distance"):
+            require_sketched([KnownLength(0, 1, apart + wrong, 0.01)], sketch)

@@ -87,5 +87,14 @@ def test_a_second_cone_at_a_known_distance_gives_the_scale() -> None:
     assert errors.led_rms < 0.02
 
 
+@pytest.mark.slow
+def test_two_cones_that_contradict_the_length_are_refused() -> None:
+    separation = ConeSeparation(1.001 * float(np.linalg.norm(APART)), 1e-3)
+    second = SecondSightings(again(2, APART).sightings, separation)
+
+    with pytest.raises(CalibrationError, match="cones contradicts the length"):
+        discover(FIRST.sightings, replace(FIRST.request, second=second))
+
+
 def test_the_picture_shows_the_pen_upright(together: Together) -> None:
     assert picture_of_pen(together.found).startswith(b"\x89PNG")
