@@ -123,6 +123,21 @@ def test_conditions_out_of_range_are_refused(verify: Verify) -> None:
         assert option in outcome.stderr
 
 
+def test_images_of_the_calibration_verify_no_tip(
+    verify: Verify, lightpen: Run, shared_data: Path, tmp_path: Path
+) -> None:
+    verify()  # writes the LED centres
+    own, files = tmp_path / "own.json", shared_data / "fixed-point"
+    centers = ("--centers", tmp_path / "touches.csv", "--json", own)
+    pen = ("--camera", files / "camera.yaml", "--pen", files / "leds.csv")
+    assert lightpen("calibrate", *centers, *pen).returncode == 0
+
+    outcome = verify("--exit-by-verdict", tip=own)
+
+    assert outcome.returncode == 4
+    assert "CHECK: 1 of these files are those by which" in outcome.stdout
+
+
 def test_a_verification_that_fails_is_entered_as_refused(
     verify: Verify, tmp_path: Path
 ) -> None:

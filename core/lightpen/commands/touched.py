@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from lightpen.commands.console import lacking, progress, require_other_file
 from lightpen.detection.observations import Observations, Report, observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.formats.hashes import all_hashed, hashed
+from lightpen.formats.hashes import InputFile, all_hashed, hashed
 from lightpen.formats.json_records import file_entry
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
@@ -123,6 +124,17 @@ class MeasuredRuns:
         """Images that belong to no touch."""
         return [each for run in self.runs for each in run.rejected]
 
+    @cached_property
+    def hashed_files(self) -> tuple[InputFile, ...]:
+        """The images, or files of LED centres, with their hashes."""
+        return all_hashed(self.files)
+
+    @property
+    def n_of_calibration(self) -> int:
+        """Images, or files of LED centres, by which the tip itself was calibrated."""
+        own = {each.sha256 for each in self.calibration.calibration.inputs.observations}
+        return sum(each.sha256 in own for each in self.hashed_files)
+
     def input_entries(self, options: argparse.Namespace) -> dict[str, Any]:
         """Return the files that were read, for a record."""
         drift: Path | None = getattr(options, "drift", None)
@@ -130,7 +142,7 @@ class MeasuredRuns:
             "tip": file_entry(hashed(options.tip)),
             **viewer_entries(self.viewers),
             "pen": file_entry(hashed(self.pen_file)),
-            "images": [file_entry(file) for file in all_hashed(self.files)],
+            "images": [file_entry(file) for file in self.hashed_files],
             **({} if drift is None else {"drift": file_entry(hashed(drift))}),
         }
 

@@ -25,6 +25,7 @@ from lightpen.commands.press_test import add_verify_press
 from lightpen.commands.touched import MeasuredRuns, add_touch_inputs, measure_runs
 from lightpen.errors import UsageError
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.messages import message
 from lightpen.model.limits import rule_in_words
 from lightpen.verification.probing.drift_reference import (
     judged_with,
@@ -36,7 +37,11 @@ from lightpen.verification.storage.verification_files import (
     camera_serials,
     conditions_entries,
 )
-from lightpen.verification.tasks.assessment import VerificationAssessment
+from lightpen.verification.tasks.assessment import (
+    VERIFY_AGAIN,
+    VerificationAssessment,
+    check,
+)
 from lightpen.verification.tasks.probed_point import (
     ProbedPoint,
     on_surface,
@@ -181,6 +186,9 @@ def _verify_task(given: argparse.Namespace) -> int:
     conditions = measured.conditions
     found = task.measure(measured.touches, conditions, _task_options(task, given))
     judged = judged_with(found.assessment, measured.lamp_drift)
+    if judged.is_accepted and measured.n_of_calibration:
+        n_own = measured.n_of_calibration
+        judged = check(message("verification.own-images", n=n_own), VERIFY_AGAIN)
     rule = rule_in_words(conditions.limits)
     tables = task.tables(found, conditions)
     print(shown(found_text(tables, judged, measured.rejected, rule)))
