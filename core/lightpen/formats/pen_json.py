@@ -77,6 +77,9 @@ def from_json(tree: Tree, units: str | None, name: str) -> PenContent:
     nominal_tip = None
     if entries.has("nominal_tip") and entries.value("nominal_tip") is not None:
         nominal_tip = entries.counted(3, "nominal_tip") * unit
+    covariance = None
+    if entries.has("led_covariance"):
+        covariance = _covariance(entries, len(leds), unit, name)
     return PenContent(
         leds=np.array(coordinates) * unit,
         normals=_listed_normals(leds, name),
@@ -92,7 +95,7 @@ def from_json(tree: Tree, units: str | None, name: str) -> PenContent:
             for what in RANGES
             if entries.has(what)
         },
-        covariance=_covariance(entries, len(leds), unit, name),
+        covariance=covariance,
         found=_found(entries, len(leds), unit, name),
     )
 
@@ -103,18 +106,12 @@ def _found(entries: Entries, n_leds: int, unit: float, name: str) -> FoundPen | 
     part = entries.part("found_from")
     part.refuse_others(*_FOUND_KEYS)
     covariance = _covariance(part, n_leds, unit, name)
-    if covariance is None:
-        raise FileError("entry.missing", name=name, entry="led_covariance")
     diameter = float(part.counted(1, "diameter")[0]) * unit
     check_diameter(diameter, name)
     return FoundPen(part.points("images"), diameter, covariance)
 
 
-def _covariance(
-    entries: Entries, n_leds: int, unit: float, name: str
-) -> FloatArray | None:
-    if not entries.has("led_covariance"):
-        return None
+def _covariance(entries: Entries, n_leds: int, unit: float, name: str) -> FloatArray:
     n = 3 * n_leds
     matrix = entries.counted(n * n, "led_covariance").reshape(n, n) * unit**2
     off = float(np.abs(matrix - matrix.T).max())

@@ -76,7 +76,7 @@ class PairLag:
         """The same in ms, where the time between two views is known."""
         return None if self.interval_ms is None else self.views * self.interval_ms
 
-    def message(self, name: str) -> Message:
+    def remark(self, name: str) -> Message:
         """Return it as text, of a camera of that name."""
         if self.lag_ms is None:
             return message(
@@ -221,7 +221,7 @@ def calibrate_pair(
     if duplicates:
         remarks.append(message_on_duplicates(views.n_views, duplicates))
     if lag is not None and lag.is_significant:
-        remarks.append(lag.message(names[1]))
+        remarks.append(lag.remark(names[1]))
     elif moved is not None:
         remarks.append(moved)
     return PairCalibration(

@@ -182,7 +182,7 @@ class SelectionPanel(Translated, QWidget):
             text = self.tr("The entries belong to different pens or tips.")
             self._change.set_value(StatusMessage(text, Sign.WARNING, Tone.WARN))
         elif found.change.is_unexplained:
-            text = worded(found.change.message(dates[0].partition(" ")[0]))
+            text = worded(found.change.remark(dates[0].partition(" ")[0]))
             self._change.set_value(StatusMessage(text, Sign.WARNING, Tone.WARN))
         else:
             text = self.tr("The change is within the combined uncertainty.")

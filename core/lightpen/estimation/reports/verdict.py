@@ -195,7 +195,7 @@ class Change:
         beyond = np.abs(self.difference) > CHANGE_GATE * self.expanded_uncertainty
         return bool(beyond.any())
 
-    def message(self, date: str) -> Message:
+    def remark(self, date: str) -> Message:
         """Return the verdict as text, with the date of the earlier tip."""
         lengths = np.abs(self.difference)
         axis = int(np.argmax(lengths / np.maximum(self.expanded_uncertainty, TINY)))
@@ -232,7 +232,7 @@ def change_doubt(change: Change, date: str, limit: float | None) -> Message | No
     """
     if limit is not None and change.distance > limit:
         return change_beyond_limit(change.distance, date, limit)
-    return change.message(date) if change.is_unexplained else None
+    return change.remark(date) if change.is_unexplained else None
 
 
 def judge_change(
