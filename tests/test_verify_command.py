@@ -1,6 +1,7 @@
 """Tests of `lightpen verify`, `repeatability` and `improve-pen`."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -437,7 +438,8 @@ def test_calibrations_are_solved_again_and_their_uncertainty_checked(
 
     assert outcome.returncode == 0, outcome.stderr
     assert "U (k = 2), Monte Carlo" in outcome.stdout
-    assert "Monte Carlo gives less: U is" in outcome.stdout
+    # U is not too small; whether it is too large, 20 trials can hardly tell.
+    assert re.search("Monte Carlo (gives less: U is|confirms U)", outcome.stdout)
     (again,) = read(tmp_path / "again.json")["calibrations"]
     assert max(map(abs, again["change_mm"])) < 1e-6
     assert again["monte_carlo"]["trials"] + again["monte_carlo"]["failed"] == 20
