@@ -825,6 +825,10 @@
         <translation>保存两个文件并标定测头</translation>
     </message>
     <message>
+        <source>Not specified</source>
+        <translation>未指定</translation>
+    </message>
+    <message>
         <source>Length</source>
         <translation>长度</translation>
     </message>
@@ -5595,6 +5599,10 @@ mm</translation>
         <translation>读取中</translation>
     </message>
     <message>
+        <source>NOT READY</source>
+        <translation>未就绪</translation>
+    </message>
+    <message>
         <source>NOT POSSIBLE</source>
         <translation>无法进行</translation>
     </message>
@@ -5742,8 +5750,16 @@ mm</translation>
         <translation>平均值 - 标定的锥孔</translation>
     </message>
     <message>
+        <source>Both halves of the swing fit alone, but not together: the residuals are {times:.0f} times larger. Lock zoom, focus and image stabilisation, clamp camera and cone, and repeat the swing.</source>
+        <translation>摆动的前后两半各自符合模型，合在一起却不符合：残差为原来的 {times:.0f} 倍。请锁定变焦、对焦和防抖，夹紧相机和锥孔，然后重新摆动。</translation>
+    </message>
+    <message>
         <source>CSV, a row for each characteristic</source>
         <translation>CSV，每个特性一行</translation>
+    </message>
+    <message>
+        <source>Camera or LEDs were found from these images. They count once: only what was known before them is taken from the files.</source>
+        <translation>相机或 LED 是由这些图像求得的。这些图像只计一次：仅采用文件中在此之前已知的内容。</translation>
     </message>
     <message>
         <source>Camera {camera}: {fault}</source>
@@ -5894,6 +5910,10 @@ mm</translation>
         <translation>误差</translation>
     </message>
     <message>
+        <source>Error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm): U is too large for the decision rule to prove that the limit is kept.</source>
+        <translation>误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：U 过大，按判定规则无法证明符合限值。</translation>
+    </message>
+    <message>
         <source>Expected std. deviation</source>
         <translation>预期标准差</translation>
     </message>
@@ -5984,6 +6004,10 @@ mm</translation>
     <message>
         <source>LED centres</source>
         <translation>LED 中心</translation>
+    </message>
+    <message>
+        <source>LED positions and images disagree: {sigma:.2f} px; usual is {usual} px or less. The tip seems to move, too. First check that the LED file belongs to this pen with its LEDs in order, and the camera file to this camera, lens and focus; then that the tip was pressed into the cone.</source>
+        <translation>LED 位置与图像不符：{sigma:.2f} px；通常不超过 {usual} px。测头也似乎在移动。请先检查 LED 文件是否属于此光笔且 LED 顺序正确，相机文件是否属于此相机、镜头和对焦；再检查测头是否压紧在锥孔中。</translation>
     </message>
     <message>
         <source>LED {led} is listed already on line {line}.</source>
@@ -6212,6 +6236,10 @@ mm</translation>
     <message>
         <source>One swing does not show changes of a pen; give at least two.</source>
         <translation>一次摆动无法显示光笔的变化；请至少给出两次。</translation>
+    </message>
+    <message>
+        <source>Only {n_used} of {n_images} images agree on one tip. Press the tip into the cone, clamp cone and camera, lock zoom and focus, and repeat the swing.</source>
+        <translation>{n_images} 幅图像中只有 {n_used} 幅对应同一测头位置。请将测头压入锥孔，夹紧锥孔和相机，锁定变焦和对焦，然后重新摆动。</translation>
     </message>
     <message>
         <source>Operation not permitted</source>
@@ -6534,6 +6562,10 @@ mm</translation>
         <translation>两台相机不同步：{camera} 滞后 {lag:.2f} ± {u:.2f} 个视图间隔 (k = 2)。光笔速度为 100 mm/s 时，每毫秒误差为 {px:.2f} px。请用同一信号触发两台相机。</translation>
     </message>
     <message>
+        <source>The distance of the cones contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.</source>
+        <translation>锥孔间距与长度矛盾：给定间距为 {distance:.3f} mm；按 LED {first} 与 {second} 之间的 {length:g} mm 计算为 {implied:.3f} mm。请检查两者，并核对测量的是哪两个 LED。</translation>
+    </message>
+    <message>
         <source>The distortion coefficients of {name} fold the image of {width} x {height} px: some pixels have no direction of view, or two. Check them, or calibrate the camera again with views that reach into the corners.</source>
         <translation>{name} 的畸变系数使 {width} × {height} px 的图像折叠：有些像素没有视线方向，或有两个。请检查这些系数，或用覆盖到图像边角的视图重新标定相机。</translation>
     </message>
@@ -6554,8 +6586,16 @@ mm</translation>
         <translation>测头库文件 {file} 由更新版本的程序写成。请使用该版本。</translation>
     </message>
     <message>
+        <source>The files of camera and pen were found from the images of {swing}, which would count twice. Remove it.</source>
+        <translation>相机文件和光笔文件是由 {swing} 的图像求得的，这些图像会被计两次。请将其去掉。</translation>
+    </message>
+    <message>
         <source>The first camera of {name}, {camera}, is the reference of the rig: its cam_from_rig must be the identity. List the reference camera first, and give the others from its frame.</source>
         <translation>{name} 中的第一台相机 {camera} 是相机组的基准：其 cam_from_rig 必须是单位变换。请把基准相机列在第一位，其余相机均相对于它的坐标系给出。</translation>
+    </message>
+    <message>
+        <source>The length of {length:g} mm does not fit LEDs {first} and {second}: in the file of the pen their distance is {sketched:.2f} mm. Check which LEDs were measured, and the file.</source>
+        <translation>长度 {length:g} mm 与 LED {first} 和 {second} 不符：光笔文件中两者的距离为 {sketched:.2f} mm。请核对测量的是哪两个 LED，并检查文件。</translation>
     </message>
     <message>
         <source>The normal of LED {led} points away from the viewer (nz = {nz:.3f}); nz must be positive in the pen frame. Change its sign.</source>
@@ -6608,6 +6648,10 @@ mm</translation>
     <message>
         <source>The swing {folder} of entry {number} is missing.</source>
         <translation>第 {number} 个条目的摆动 {folder} 缺失。</translation>
+    </message>
+    <message>
+        <source>The system keyring has no password of user {user} for the service {service}. Store it with: keyring set {service} {user} (Windows: cmdkey /generic:{service} /user:{user} /pass).</source>
+        <translation>系统密钥环中没有用户 {user} 用于服务 {service} 的密码。请用以下命令保存：keyring set {service} {user}（Windows：cmdkey /generic:{service} /user:{user} /pass）。</translation>
     </message>
     <message>
         <source>The tip cannot be accepted. {why}</source>
@@ -6876,10 +6920,6 @@ mm</translation>
     <message>
         <source>{n_off} of {n_points} points do not lie on the plane of the others, and these scatter by {off:.2f} mm. Probe one plate, and hold the pen on it.</source>
         <translation>{n_points} 个测点中有 {n_off} 个不在其余各点的平面上，其余各点的离散为 {off:.2f} mm。请只触测一块平板，并使光笔与其保持接触。</translation>
-    </message>
-    <message>
-        <source>{n_others} lights move together, but not with the pen: there is a second pen, or a mirror. Remove or cover it, and repeat the swing.</source>
-        <translation>{n_others} 个光点一起运动，但不随光笔运动：存在第二支光笔或反光镜。请移开或遮住，然后重新摆动。</translation>
     </message>
     <message>
         <source>{n_points} of {needed} points</source>
@@ -7548,6 +7588,10 @@ mm</translation>
     <message>
         <source>{n_images} {reason}</source>
         <translation>{reason} {n_images} 幅</translation>
+    </message>
+    <message>
+        <source>{n_others} lights move together, but not with the pen: there is a second pen, or a mirror, or the zoom changed. Remove or cover it, lock the zoom, and repeat the swing.</source>
+        <translation>有 {n_others} 个光点一起移动，但不随光笔移动：可能有第二支光笔或反射镜，或者变焦已改变。请将其移走或遮住，锁定变焦，然后重新摆动。</translation>
     </message>
     <message>
         <source>{n_poses} poses are usable; the tip needs at least {needed}. Capture more images.</source>
@@ -8240,10 +8284,6 @@ mm</translation>
     <message>
         <source>On the server: {finding}</source>
         <translation>服务器上：{finding}</translation>
-    </message>
-    <message>
-        <source>Only {n_used} of {n_images} images agree on one tip. Press the tip into the cone, clamp cone and camera, and repeat the swing.</source>
-        <translation>{n_images} 幅图像中只有 {n_used} 幅与同一测头一致。请将测头压入锥孔，夹紧锥座和相机，然后重新摆动。</translation>
     </message>
     <message>
         <source>Point std. deviation: u {u:.4f}, v {v:.4f}, w {w:.4f} mm over all postures.</source>
@@ -9020,10 +9060,6 @@ mm</translation>
     <message>
         <source>The system keyring cannot be read: {reason}. Unlock it, or keep the password in a file.</source>
         <translation>无法读取系统密钥环：{reason}。请将其解锁，或将密码保存在文件中。</translation>
-    </message>
-    <message>
-        <source>The system keyring has no password of user {user} for the service {service}. Store it with: keyring set {service} {user}.</source>
-        <translation>系统密钥环中没有用户 {user} 在服务 {service} 上的密码。保存命令：keyring set {service} {user}。</translation>
     </message>
     <message>
         <source>The temperature of the pen was not measured; this station requires it. Measure it and enter it at Start, then repeat the swing.</source>
@@ -9814,10 +9850,6 @@ mm</translation>
         <translation>{other} 与 {first} 所用的内参文件不同。请给出使用同一内参文件的两次摆动。</translation>
     </message>
     <message>
-        <source>{path} has two cones; the record holds the LED centres of the first one alone. Calibrate from the images.</source>
-        <translation>{path} 有两个锥座；记录只含第一个锥座的 LED 中心。请从图像校准。</translation>
-    </message>
-    <message>
         <source>{path} is the name of a device on Windows, not of a file. Choose another name.</source>
         <translation>{path} 是 Windows 上的设备名，而不是文件名。请选择其他名称。</translation>
     </message>
@@ -10078,6 +10110,10 @@ mm</translation>
         <translation>{name} 与记录时不同（校验和错误）。请用备份恢复。</translation>
     </message>
     <message>
+        <source>{n} of these files are those by which the tip was calibrated: they cannot verify it. Probe the artefact anew.</source>
+        <translation>这些文件中有 {n} 个是标定该测头时所用的，不能用来验证它。请重新测量标准器。</translation>
+    </message>
+    <message>
         <source>{path} cannot be changed: {reason}. Check the write permission.</source>
         <translation>无法更改 {path}：{reason}。请确认您有写入权限。</translation>
     </message>
@@ -10092,6 +10128,10 @@ mm</translation>
     <message>
         <source>{path} has several cameras; only calibrations of a single camera can be recomputed. Remove it.</source>
         <translation>{path} 来自多台相机；只能重新求解单台相机的标定。请将其去掉。</translation>
+    </message>
+    <message>
+        <source>{path} has two cones, and an earlier version wrote it without the LED centres in the second one. Calibrate from the images.</source>
+        <translation>{path} 含两个锥孔，由早期版本写入，缺少第二个锥孔中的 LED 中心。请由图像重新标定。</translation>
     </message>
     <message>
         <source>{path} is neither a recorded swing nor a result. Open a swing folder, a file in it, or a file in the folder results.</source>
