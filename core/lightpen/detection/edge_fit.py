@@ -43,7 +43,7 @@ MIN_RAYS, MAX_RAYS = 32, 128
 SHARPNESS = 4
 ROUNDS = 3 * [[0, 1, 2, 3, 4]] + 2 * [[0, 1, 2, 3, 4, 5]] + 2 * [[0, 1, 2, 3, 5]]
 # From the image before, whose shape and blur a disc still has nearly.
-KNOWN_ROUNDS = ROUNDS[2:]
+KNOWN_ROUNDS = ROUNDS[3:]
 RIDGE = 1e-12  # of the normal matrix, which no disc of many may spoil
 LONGEST_STEP = 1.5  # px, of the rim in one round
 CONVERGED = 0.05  # px

@@ -123,17 +123,21 @@ def search_compliance(
         Standard deviation that is assumed, mm.
     """
     move = cone_moves(bundle.state.rotations).compliance
-    spread = bundle.unknowns.sensitivity(each.cone_rows)
-    spread = spread.reshape(-1, spread.shape[-1])
-    left = each.cone_right.ravel() - spread @ bundle.values
+    unknowns, own = bundle.unknowns, each.cone_rows[..., :N_CONE]
+    step, shifts = unknowns.step(bundle.values)
+    left = each.cone_right - each.cone_rows @ step
+    left -= np.einsum("nij,nj->ni", own, shifts)
+    moved = own @ move
+    common = np.tensordot(each.cone_rows, move[..., 0], ([0, 1], [0, 1]))
+    by_form = (unknowns.forms.T @ moved[..., 0]).ravel()
+    with_others = np.concatenate([unknowns.mixing.T @ common, by_form])[:, None]
     rows = move.reshape(-1, 1)
-    with_others = spread.T @ rows
-    S = rows.T @ (each.cone_rows[..., :N_CONE] @ move).reshape(-1, 1)
+    S = rows.T @ moved.reshape(-1, 1)
     S -= with_others.T @ bundle.covariance @ with_others
     effect = Effect(
         EffectName.COMPLIANCE, 0, np.zeros((1, 1)), (np.eye(1),), compliance
     )
-    size = size_of(effect, S, rows.T @ left)
+    size = size_of(effect, S, rows.T @ left.ravel())
     by_unknowns = -bundle.covariance[:6] @ with_others
     return SearchedEffect(effect, size, by_unknowns, is_candidate=False)
 

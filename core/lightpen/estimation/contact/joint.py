@@ -43,6 +43,7 @@ OUTLIER = 5.0  # standard deviations; a normal vector in 2-D exceeds it in 4e-6
 MIN_TURN_LEDS = 3  # in an image; fewer leave its rotation free
 SETTLED = 1e-4  # mm, change of tip and cone after which the loss is dropped
 CONVERGED = 1e-7  # mm
+NEARLY = 1e-3  # mm, of a running fit; the step leaves less than a thousandth of it
 MAX_STEPS = 50
 MAX_SELECTIONS = 5
 TURN_RIDGE = 1e-6  # px^2/rad^2 beside some 1e6; an image may lose all its LEDs
@@ -160,7 +161,8 @@ def fit_contact(
         state, _ = _descend(model, state, None, SETTLED)
     for _ in range(MAX_SELECTIONS):
         used = inliers(state.residuals)
-        state, reduced = _descend(model, state, used, CONVERGED)
+        tolerance = NEARLY if is_near else CONVERGED
+        state, reduced = _descend(model, state, used, tolerance)
         if np.array_equal(inliers(state.residuals), used):
             break
     if is_near:  # the last step was too small for what it leaves to matter
