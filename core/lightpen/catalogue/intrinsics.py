@@ -23,6 +23,7 @@ MESSAGES = {
     "intrinsics.skewed": "The columns of pixels are not perpendicular to the rows, by {degrees:.2f}°: the images were sheared by software, an interlaced source, or a rolling shutter before a moving board. Use unprocessed images of a board at rest.",
     "intrinsics.drift": "The camera drifts during the set: by {px:.2f} px over the image from the first view to the last (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px). Let the camera warm up, fix lens and mount, and take the views again.",
     "intrinsics.step": "The views from {name} on differ from those before by {px:.2f} px over the image (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px), more than by chance. Check whether zoom, focus or mount changed there.",
+    "intrinsics.halves": "Every second view differs from the others by {px:.2f} px over the image (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px), more than by chance. Check that all images are from one camera with one setting.",
     "intrinsics.bend-implausible": "The views fit only if the board {board} is bent by {bend:.0f} mm, which is implausible. Check the number and size of its squares, and that all images are from one camera with one setting.",
     "intrinsics.size-implausible": "A square size of {pitch:g} mm makes a board of {side:.3g} m. Check that it is in mm. The intrinsics do not depend on it; all distances do.",
     "intrinsics.folds": "The estimated distortion folds the image in its corners, where no view shows the board. Add views with the board in each corner of the image.",

@@ -25,7 +25,9 @@ from lightpen.intrinsics.board_findings import (
 from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.camera_change import (
     detectable_zoom,
+    find_alternation,
     find_change,
+    message_on_alternation,
     message_on_change,
 )
 from lightpen.intrinsics.distortion import (
@@ -169,7 +171,8 @@ def calibrate_camera(
             explain(views, tolerances, first, None, lessened=HALVED) or error
         ) from error
     change = find_change(found.effects, found.views.names)
-    if change is not None or found.is_suspicious:
+    alternation = find_alternation(found.effects)
+    if change is not None or alternation is not None or found.is_suspicious:
         released = released_tolerances(tolerances) if found.denied.any() else None
         better = explain(views, tolerances, found.adjustment, change, released)
         if better is not None:
@@ -183,6 +186,8 @@ def calibrate_camera(
         remarks.append(message_on_duplicates(views.n_views, duplicates))
     if change is not None:
         remarks.append(message_on_change(change))
+    elif alternation is not None:
+        remarks.append(message_on_alternation(alternation))
     open_lens = _message_on_projection(found.adjustment)
     remarks += [each for each in (found.choice.remark, open_lens) if each is not None]
     at = found.adjustment.of_intrinsics(0)

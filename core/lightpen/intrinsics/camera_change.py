@@ -49,24 +49,47 @@ def find_change(mixed: MixedFit, names: tuple[str, ...]) -> CameraChange | None:
     if not splits:
         return None
     order = np.arange(n_views)
-    trials = [(first, (order >= first).astype(float)) for first in splits]
-    trials.append((0, np.linspace(-0.5, 0.5, n_views)))
+    shares = [(order >= first).astype(float) for first in splits]
+    found = _most_significant(mixed, [*shares, np.linspace(-0.5, 0.5, n_views)])
+    if found is None:
+        return None
+    number, *change = found
+    name = names[splits[number]] if number < len(splits) else ""
+    return CameraChange(name, *change)
+
+
+def find_alternation(mixed: MixedFit) -> CameraChange | None:
+    """Return the change of every second view from the others, if it is significant."""
+    order = np.arange(len(mixed.scores.scores))
+    found = _most_significant(mixed, [(order % 2).astype(float)])
+    return None if found is None else CameraChange("", *found[1:])
+
+
+def _most_significant(
+    mixed: MixedFit, shares: list[FloatArray]
+) -> tuple[int, FloatArray, float] | None:
+    """Return number, difference and px in the image of the most significant change.
+
+    Parameters
+    ----------
+    shares : list of (V,) array
+        That the views have in each change.
+    """
     camera = mixed.adjustment.state.cameras[0]
     at = mixed.adjustment.of_intrinsics(0)
     n = at.stop - at.start
     ways = (_zoom(camera), np.eye(n)[:, :4], np.eye(n))
+    chance = CHANCE / (len(shares) * N_WAYS)
     clustering = max(mixed.scores.clustering, 1.0)
     best, most = None, 1.0
-    for first, share in trials:
+    for number, share in enumerate(shares):
         score, information = mixed.scores.change(share)
         for way in ways:
             difference, squares = _fitted_change(score[at], information[at, at], way)
-            chance = CHANCE / (len(trials) * N_WAYS)
             least = clustering * chi_square_quantile(way.shape[1], chance)
             if squares > most * least:
                 most = squares / least
-                in_image = moved_in_image(camera, difference)
-                best = CameraChange(names[first] if first else "", difference, in_image)
+                best = number, difference, moved_in_image(camera, difference)
     return best
 
 
@@ -121,3 +144,9 @@ def message_on_change(change: CameraChange) -> Message:
     return message(
         "intrinsics.step", name=change.name, px=change.in_image, fx=fx, cx=cx, cy=cy
     )
+
+
+def message_on_alternation(change: CameraChange) -> Message:
+    """Return the message on every second view that differs from the others."""
+    fx, _, cx, cy, *_ = change.difference.tolist()
+    return message("intrinsics.halves", px=change.in_image, fx=fx, cx=cx, cy=cy)

@@ -125,6 +125,17 @@ def test_a_small_change_is_a_finding(make_views: MakeViews, camera: Camera) -> N
 
 
 @pytest.mark.slow
+def test_halves_that_differ_are_a_finding(
+    make_views: MakeViews, camera: Camera
+) -> None:
+    odd = np.arange(24) % 2 == 1
+    other = make_views(n_views=24, of=zoomed(camera, 1.003))
+    found = calibrated(merged(make_views(n_views=24), other, odd))
+
+    assert [each.code for each in found.remarks] == ["intrinsics.halves"]
+
+
+@pytest.mark.slow
 def test_an_unchanged_camera_is_not_said_to_have_changed(make_views: MakeViews) -> None:
     for seed in range(3):
         assert not calibrated(make_views(seed=seed)).remarks
