@@ -78,9 +78,6 @@ class Aravis:
         self.camera_get_device_serial_number = risky(
             "camera_get_device_serial_number", text, pointer
         )
-        self.camera_gv_auto_packet_size = risky(
-            "camera_gv_auto_packet_size", c_uint, pointer
-        )
         self.camera_get_payload = risky("camera_get_payload", c_uint, pointer)
         self.camera_start_acquisition = risky("camera_start_acquisition", None, pointer)
         self.camera_stop_acquisition = risky("camera_stop_acquisition", None, pointer)

@@ -30,7 +30,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 
 LABELLED_AT_ONCE = 64  # images; labelling is vectorised over them
-SAME_CENTERS = 0.001  # px, rms, of one image twice; of two, noise leaves thrice that
+SAME = 0.002  # px, rms: the noise of any two images is more, that of a new coding less
 SEARCH_MEMORY_A_PIXEL = 5  # bytes: 16 bits, twice, and what is saturated
 
 Report = Callable[[float], None]
@@ -156,7 +156,7 @@ def observe_images(
         _require_right_hand(spots, camera, pen)
     seen = replace(seen, details=tuple(image.detail for image in images))
     return replace(
-        _with_copies(seen),
+        without_copies(seen),
         advice=None if mostly_labelled else _advice(seen.reasons, spots, camera, pen),
     )
 
@@ -178,7 +178,9 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
     names = tuple(f"frame {frame}" for frame in centers.frames)
     images = zip(pixels, rotations, translations, strict=True)
     detections = [detection_of_centers(*image) for image in images]
-    return _with_copies(_observations(names, detections, np.zeros((len(names), 0, 2))))
+    return without_copies(
+        _observations(names, detections, np.zeros((len(names), 0, 2)))
+    )
 
 
 def leave_out(
@@ -195,39 +197,35 @@ def leave_out(
     return replace(observations, reasons=tuple(kept))
 
 
-def _with_copies(seen: Observations) -> Observations:
-    """Return observations with images left out that are copies of earlier ones.
+def without_copies(seen: Observations) -> Observations:
+    """Return observations whose copies of earlier images have the reason ``COPY``.
 
-    Noise moves the centres of two images of a pen at rest; what it does not move is one
-    image given twice, perhaps packed again, and shows nothing new.
+    Copies have the same LEDs with the same centres, but for rounding and another
+    coding; two images of a pen at rest differ by their noise.
     """
-    used = [i for i, reason in enumerate(seen.reasons) if reason is Reason.NONE]
-    pixels = seen.pixels[used]
-    places = np.nanmean(pixels, axis=1)[:, 0] if used else np.zeros(0)
-    order = np.argsort(places, kind="stable")
-    copies: dict[int, int] = {}
-    for k, one in enumerate(order):
-        for other in order[k + 1 :]:
-            if places[other] - places[one] > SAME_CENTERS:
-                break
-            first, later = sorted((used[one], used[other]))
-            if later not in copies and _are_same(seen.pixels[[first, later]]):
-                copies[later] = first
+    used = np.flatnonzero([reason is Reason.NONE for reason in seen.reasons])
+    pixels = seen.pixels[used].reshape(len(used), 2 * seen.pixels.shape[1])
+    known = np.isfinite(pixels)
+    pixels = np.where(known, pixels, 0.0)
+    counts = np.maximum(known.sum(axis=1), 1)
+    means = pixels.sum(axis=1) / counts  # those of copies differ by less than SAME
+    order, firsts = np.argsort(means, kind="stable"), np.arange(len(used))
+    for step in range(1, len(used)):
+        near = means[order[step:]] - means[order[:-step]] < SAME
+        if not near.any():
+            break
+        one, other = order[:-step][near], order[step:][near]
+        same = np.all(known[one] == known[other], axis=1)
+        squares = np.sum((pixels[one] - pixels[other]) ** 2, axis=1)
+        same &= squares < SAME**2 * counts[one]
+        earlier, later = np.sort([one[same], other[same]], axis=0)
+        np.minimum.at(firsts, later, earlier)
     reasons, details = list(seen.reasons), list(seen.details)
-    for later, first in copies.items():
-        reasons[later] = Reason.COPY
-        details[later] = message("image.copy-of", name=seen.names[first])
+    for i, first in enumerate(firsts):
+        if first < i:
+            reasons[used[i]] = Reason.COPY
+            details[used[i]] = message("image.copy-of", name=seen.names[used[first]])
     return replace(seen, reasons=tuple(reasons), details=tuple(details))
-
-
-def _are_same(pixels: FloatArray) -> bool:
-    """Return whether centres of two images, (2, L, 2), are the same but for a trace."""
-    one, other = pixels
-    gaps = one - other
-    both = np.isfinite(gaps[:, 0])
-    if not np.array_equal(np.isfinite(one), np.isfinite(other)):
-        return False
-    return bool(np.sqrt(np.mean(gaps[both] ** 2)) < SAME_CENTERS)
 
 
 def _search(

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen.detection.observations import Observations
+from lightpen.detection.observations import Observations, without_copies
 from lightpen.detection.pose import Poses, fit_paper_poses, fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
@@ -37,7 +37,6 @@ from lightpen.estimation.contact.camera_motion import (
     pose_steadily,
     without_field,
 )
-from lightpen.estimation.contact.copies import without_copies
 from lightpen.estimation.contact.joint import (
     ContactModel,
     JointFit,

@@ -20,7 +20,6 @@ from lightpen.swing_messages import (
 
 DAMAGED = message("results.damaged", file="a, b {c}.json")
 ADVICE = message("share.temperature")
-SHOUTED = str.upper
 
 
 def stored(original: Message) -> StoredMessage:

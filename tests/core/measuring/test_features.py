@@ -5,8 +5,6 @@ distances are perpendicular to all columns of the Jacobian, the feature stays th
 least squares, so its solution is known exactly (ISO 10360-6).
 """
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
@@ -18,7 +16,6 @@ from lightpen.model.rigid import rotation_from_vector
 EXACT = 1e-9  # mm
 FAR = np.array([6000.0, -5000.0, 6500.0])  # some 10 m from the origin
 RNG = np.random.default_rng(20261124)
-Make = Callable[[int], FloatArray]
 
 
 def _around(n: int, arc: float) -> FloatArray:

@@ -10,13 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.detection.observations import Observations
+from lightpen.detection.observations import Observations, without_copies
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.bundle.adjustment import Adjustment
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.contact.camera_motion import pose_steadily, without_field
-from lightpen.estimation.contact.copies import without_copies
 from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_contact
 from lightpen.estimation.contact.single_images import require_fit
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR, Budget

@@ -47,7 +47,6 @@ _MEMORY_KIB, _TIME_COST, _LANES = 65_536, 3, 4
 _CHAIN_LENGTH = 32  # hexadecimal digits
 
 PublicKey: TypeAlias = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
-Signed: TypeAlias = Annotated[str, Meta(pattern="^[0-9a-f]{128}$")]
 
 
 class SigningKey:

@@ -388,19 +388,15 @@ def covered(points: Sequence[ProbedPoint]) -> float:
     return 0.0 if fit is None else fit.covered
 
 
-def away_from_cones(progress: TaskProgress) -> Screening:
+def away_from_cones(
+    options: object, conditions: Conditions, progress: TaskProgress
+) -> Screening:
     """Return that the last point counts unless it is in a cone that is done."""
     last, count = progress.points[-1].point_cam, len(progress.points)
     distances = (float(np.linalg.norm(last - cone)) for cone in progress.cones)
     if any(distance <= IN_CONE for distance in distances):
         return without_last(count, message("session.still-in-cone"))
     return keep_all(count)
-
-
-def _screen(
-    options: CircleOptions, conditions: Conditions, progress: TaskProgress
-) -> Screening:
-    return away_from_cones(progress)
 
 
 def _missing(options: CircleOptions, ball_diameter: float | None) -> Message | None:
@@ -550,7 +546,7 @@ CIRCLE = VerificationTask(
     fraction=_fraction,
     count=_count,
     instruction=_instruction,
-    screen=_screen,
+    screen=away_from_cones,
     newness=lambda options: (ANY, NEW_PLACE),
     missing=_missing,
 )

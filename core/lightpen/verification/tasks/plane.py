@@ -51,7 +51,6 @@ from lightpen.verification.tasks.task import (
     ResultRow,
     ResultTable,
     Runs,
-    Screening,
     TaskOptions,
     TaskProgress,
     VerificationTask,
@@ -327,12 +326,6 @@ def _assessment(
     )
 
 
-def _screen(
-    options: PlaneOptions, conditions: Conditions, progress: TaskProgress
-) -> Screening:
-    return away_from_cones(progress)
-
-
 def _entries(found: Flatness, instrument: Instrument) -> dict[str, Any]:
     return {
         "flatness_mm": found.fit.flatness,
@@ -437,6 +430,6 @@ PLANE = VerificationTask(
     hand=_hand,
     n_points=lambda options: options.n_points,
     instruction=_instruction,
-    screen=_screen,
+    screen=away_from_cones,
     newness=lambda options: (ANY, NEW_PLACE),
 )

@@ -54,7 +54,6 @@ from lightpen.verification.tasks.task import (
     ResultRow,
     ResultTable,
     Runs,
-    Screening,
     Surface,
     SurfaceOption,
     TaskOptions,
@@ -314,12 +313,6 @@ def _assessment(
     return with_power(good, tip, limits)
 
 
-def _screen(
-    options: SphereOptions, conditions: Conditions, progress: TaskProgress
-) -> Screening:
-    return away_from_cones(progress)
-
-
 def _missing(options: SphereOptions, ball_diameter: float | None) -> Message | None:
     if not options.diameter:
         return message("sphere.no-diameter")
@@ -457,7 +450,7 @@ SPHERE = VerificationTask(
     hand=_hand,
     n_points=lambda options: options.n_points,
     instruction=_instruction,
-    screen=_screen,
+    screen=away_from_cones,
     newness=lambda options: (ANY, NEW_PLACE),
     missing=_missing,
 )

@@ -5,10 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.observations import observe_centers
+from lightpen.detection.observations import observe_centers, without_copies
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.contact.copies import without_copies
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.formats.observation_files import Centers
 from lightpen.simulator.swings import (
