@@ -54,7 +54,7 @@ class Launchers:
         return remove_entry()
 
     def data_folder(self) -> Path:
-        """Return where records, results and the archive are, as chosen."""
+        """Return the chosen folder of records, results and archive."""
         from lightpen_app.work.settings import Settings, data_folder, settings_file
 
         return data_folder(Settings(settings_file()).preferences())

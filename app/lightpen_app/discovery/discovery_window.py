@@ -212,7 +212,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._refresh()
 
     def _instructed(self, state: DiscoveryState) -> StatusMessage:
-        """Return what to do now."""
+        """Return the next step as text."""
         if state.progress is not None:
             words = self.tr("Computing: {0:.0%}").format(state.progress)
             return StatusMessage(words, Sign.WAIT, Tone.QUIET)

@@ -272,7 +272,7 @@ def n_images_text(n_images: int) -> str:
 
 
 def missing_input_text(lack: MissingInput) -> str:
-    """Return what to do about something that is missing, a sentence."""
+    """Return the advice on a missing input."""
     return _translated(_LACKS[lack])
 
 
@@ -307,7 +307,7 @@ def origin_text(origin: Origin | None) -> str:
 
 
 def accepted_phrase(origin: Origin | None) -> Instruction:
-    """Return what has become of a tip that was accepted."""
+    """Return the text on an accepted tip."""
     if origin is not Origin.SIMULATED:
         return Instruction(_translated(QT_TRANSLATE_NOOP("phrases", "IN USE")))
     return Instruction(

@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen, QPolygonF
 
 
 class Sign(Enum):
-    """What is drawn."""
+    """Symbol to draw."""
 
     NONE = auto()
     CHECK = auto()

@@ -131,7 +131,7 @@ class MutedSounds:
 
 
 def find_sounds(folder: Path) -> Sounds:
-    """Return what can play sounds here; their files go to a folder."""
+    """Return the player of this system; sound files are written to a folder."""
     if sys.platform == "win32":
         return FileSounds(folder, _play_on_windows)
     for program, *options in PLAYERS:

@@ -39,7 +39,7 @@ class TextSize(IntEnum):
 
 
 class Appearance(StrEnum):
-    """Which palette the user chose."""
+    """Choice of the palette."""
 
     SYSTEM = "system"
     LIGHT = "light"
@@ -205,7 +205,7 @@ def set_text_scale(scale: float) -> None:
 
 
 def scaled(size: TextSize) -> int:
-    """Return how large text of the type scale is here, px."""
+    """Return the size of a text of the type scale on this screen, px."""
     application = QApplication.instance()
     scale = None if application is None else application.property(SCALE)
     return round(size * (scale or 1.0))

@@ -215,7 +215,7 @@ def text_height(text: str, size: float, width: float, *, bold: bool = False) -> 
 
 
 def text_width(text: str, size: float, *, bold: bool = False) -> float:
-    """Return how wide words in one line are, dots."""
+    """Return the width of a text in one line, dots."""
     shown = printed_text(text)
     return QFontMetricsF(print_font(size, bold=bold)).horizontalAdvance(shown)
 

@@ -40,7 +40,7 @@ LETTERS = PrintSize.SMALL
 
 @dataclass(frozen=True)
 class PlotRange:
-    """What part of the numbers a plot shows."""
+    """Range of a plot."""
 
     x_low: float
     x_high: float
@@ -50,7 +50,7 @@ class PlotRange:
 
 @dataclass(frozen=True)
 class Plane:
-    """Where numbers lie on paper."""
+    """Scale of numbers on paper."""
 
     area: QRectF
     shown: PlotRange
@@ -72,12 +72,12 @@ class Plane:
         return [QPointF(*place) for place in places]
 
     def point(self, x: float, y: float) -> QPointF:
-        """Return where one point lies, dots."""
+        """Return the position of one point, dots."""
         return self.points(np.array([x]), np.array([y]))[0]
 
 
 class Mark(Enum):
-    """What the series of a plot are drawn as."""
+    """Style of the series of a plot."""
 
     LINE = auto()
     DOT = auto()

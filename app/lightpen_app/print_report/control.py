@@ -41,7 +41,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class ReportContent:
-    """What is put on paper of a calibration.
+    """Content of the report of a calibration.
 
     Attributes
     ----------

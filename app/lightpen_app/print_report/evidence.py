@@ -126,7 +126,7 @@ def image_blocks(
 
 
 def led_blocks(calibration: CalibrationRecord) -> Iterable[Block]:
-    """Return how each LED fits, and the camera as fitted."""
+    """Return the fit of each LED, and the fitted camera."""
     yield heading(translate("paper", "LEDs and camera"))
     yield row_of_charts([led_chart(calibration)], CHART)
     rows = []

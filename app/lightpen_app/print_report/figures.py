@@ -86,7 +86,7 @@ def budget_chart(calibration: CalibrationRecord) -> Chart:
 
 
 def tips_chart(calibration: CalibrationRecord) -> Chart:
-    """Return where each image puts the tip, from the cone, in the camera frame."""
+    """Return the tip by each image minus the cone, camera frame."""
     tips = np.array([f.tip_cam_mm for f in calibration.frames], dtype=np.float64)
     used = np.array([f.used for f in calibration.frames], dtype=bool)
     away = MICROMETRES * (tips[used] - np.array(calibration.cone_cam_mm))
@@ -103,7 +103,7 @@ def tips_chart(calibration: CalibrationRecord) -> Chart:
 
 
 def running_chart(reestimated: ReestimatedPoses, tip: FloatArray) -> Chart:
-    """Return how the tip (3,), mm, settled from image to image."""
+    """Return the convergence of the tip (3,), mm, with the images."""
     steady = _steady(reestimated)
     numbers = reestimated.numbers[steady].astype(np.float64)
     away = MICROMETRES * (reestimated.tips[steady] - tip)
@@ -276,7 +276,7 @@ def _paint_dial(painter: QPainter, area: QRectF, reach: float) -> Plane:
 
 
 def _steady(reestimated: ReestimatedPoses) -> FloatArray:
-    """Return which of the running tips are certain enough to be drawn, (M,)."""
+    """Return the mask of the running tips that are certain enough to draw, (M,)."""
     last = reestimated.uncertainties[-1].max()
     worst = reestimated.uncertainties.max(axis=1)
     return np.asarray(worst <= STEADY * last)

@@ -161,7 +161,7 @@ def rule_blocks(calibration_file: CalibrationFile) -> Iterable[Block]:
 
 
 def budget_blocks(calibration: CalibrationRecord) -> Iterable[Block]:
-    """Return what U is made of."""
+    """Return the uncertainty budget."""
     parts = calibration.uncertainty
     u = MICROMETRES * _uncertainty(calibration)
     largest = MICROMETRES * calibration.weakest_direction.expanded_uncertainty_mm

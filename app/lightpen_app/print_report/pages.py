@@ -38,7 +38,7 @@ class PlacedBlock:
 
 @dataclass(frozen=True)
 class Margins:
-    """What every page has above and below.
+    """Header and footer of every page.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class PrintReport:
 
     @property
     def n_pages(self) -> int:
-        """How many pages there are."""
+        """Number of pages."""
         return len(self.pages)
 
 

@@ -313,7 +313,7 @@ def signature_blocks(by: str) -> Iterable[Block]:
 
 
 def _status(calibration_file: CalibrationFile) -> str:
-    """Return what the library says of pen and tip."""
+    """Return the library entries of pen and tip."""
     if calibration_file.due is None:
         return stated("")
     return ", ".join(status_words(calibration_file)) or translate("paper", "valid")

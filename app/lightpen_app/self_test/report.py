@@ -18,7 +18,7 @@ class SelfTestError(Exception):
 
 @dataclass(frozen=True)
 class Check:
-    """What one check found.
+    """Result of one check.
 
     Attributes
     ----------

@@ -20,7 +20,7 @@ FILE_LIST = "files.sha256"
 
 
 def file_list() -> Path:
-    """Return where the list is if the program was installed by its installer."""
+    """Return the path of the file list of the installer, if it was used."""
     return Path(sys.prefix).parent / FILE_LIST
 
 

@@ -132,7 +132,7 @@ class Sidebar(Translated, QFrame):
         return self._subject.text()
 
     def standing(self) -> StatusMessage:
-        """Return what of it must not be measured with."""
+        """Return the item that must not be used for measuring."""
         return self._standing.value()
 
     def set_subject(self, subject: Subject) -> None:
@@ -197,7 +197,7 @@ class Sidebar(Translated, QFrame):
         self._retranslate()
 
     def options_corner(self) -> QPoint:
-        """Return where on the screen the top left of the options' button is."""
+        """Return the screen position of the top left of the options button."""
         return self._options.mapToGlobal(QPoint(0, 0))
 
     def _retranslate(self) -> None:

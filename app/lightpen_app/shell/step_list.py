@@ -16,7 +16,7 @@ from lightpen_app.widgets.translated import Translated
 
 
 class StepState(Enum):
-    """How far a step is."""
+    """State of a step."""
 
     DONE = auto()
     DOUBTFUL = auto()
@@ -210,7 +210,7 @@ class StepButton(Translated, QAbstractButton):
 
 
 class StepList(Translated, QWidget):
-    """All steps; a click, Space or Enter asks for one.
+    """List of the steps; a click, Space or Enter requests one.
 
     Signals
     -------

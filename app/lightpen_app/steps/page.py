@@ -139,7 +139,7 @@ class Page(Translated, QWidget):
         """Pause or resume on Space."""
 
     def first_control(self) -> QWidget | None:
-        """Return what has the focus at first; None for the first one there is."""
+        """Return the initial focus; None for the first widget."""
         return None
 
     def entered(self) -> None:

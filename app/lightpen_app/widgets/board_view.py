@@ -22,7 +22,7 @@ _BEST, _WORST = np.array([16, 60, 96, 230]), np.array([214, 104, 24, 230])
 
 @dataclass(frozen=True, eq=False)
 class BoardOverlay:
-    """What is drawn on the image.
+    """Overlay of the image.
 
     Attributes
     ----------

@@ -132,12 +132,12 @@ class ImageView(Translated, QWidget):
         return self._size
 
     def pixel_at(self, place: QPointF) -> QPointF:
-        """Return which image point is drawn at a place of the widget."""
+        """Return the image point at a position of the widget."""
         target, scale = self._target()
         return (place - target.topLeft()) / scale - QPointF(0.5, 0.5)
 
     def place_of(self, x: float, y: float) -> QPointF:
-        """Return where on the widget an image point is drawn."""
+        """Return the position of an image point on the widget."""
         target, scale = self._target()
         return target.topLeft() + QPointF(x + 0.5, y + 0.5) * scale
 
@@ -356,7 +356,7 @@ class ImageView(Translated, QWidget):
 
 
 def _label_box(ring: QRectF, angle: float, size: QSizeF, away: float) -> QRectF:
-    """Return where a label stands beside a ring, px."""
+    """Return the position of a label beside a ring, px."""
     reach, width, height = ring.width() / 2 + away, size.width(), size.height()
     x = ring.center().x() + math.cos(angle) * (reach + width / 2)
     y = ring.center().y() + math.sin(angle) * (reach + height / 2)

@@ -21,7 +21,7 @@ ROW_HEIGHT, LARGE_ROW_HEIGHT = 3 * GRID, 4 * GRID  # px; that of the head likewi
 
 @dataclass(frozen=True)
 class Figures:
-    """What a table shows.
+    """Content of a table.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class NumberTable(QTableWidget):
         return QSize(max(width, 20 * GRID), self.sizeHint().height())
 
     def _needed(self) -> list[int]:
-        """Return how wide each column must be, px."""
+        """Return the width of each column, px."""
         heads = self.horizontalHeader()
         return [
             max(self.sizeHintForColumn(i), heads.sectionSizeHint(i))

@@ -28,7 +28,7 @@ CREDIBLE_DPI = (60.0, 250.0)  # outside, a screen does not show its size
 
 @dataclass(frozen=True, eq=False)
 class OperatorValue:
-    """What the operator must know now.
+    """Present content of the operator view.
 
     Attributes
     ----------

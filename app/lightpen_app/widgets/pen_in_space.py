@@ -110,7 +110,7 @@ class PenInSpace(Translated, QWidget):
 
 
 def seen_from_behind(stand: DisplayedPosture, posture: Posture) -> FloatArray:
-    """Return where the LEDs are seen from the tip, right and up, (L, 2), mm."""
+    """Return the LEDs as seen from the tip, right and up, (L, 2), mm."""
     numbers = posture.tilt, posture.direction, posture.turn
     rotation = rotations_of(stand.pen, *(np.array([each]) for each in numbers))[0]
     right, down, away = ((stand.pen.leds - stand.tip_pen) @ rotation.T).T

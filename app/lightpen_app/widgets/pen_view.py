@@ -40,7 +40,7 @@ ROUND = np.linspace(0, 2 * np.pi, N_CORNERS, endpoint=False)
 
 @dataclass(frozen=True, eq=False)
 class PenPicture:
-    """What is shown of a pen.
+    """Displayed content of a pen.
 
     Attributes
     ----------
@@ -67,12 +67,12 @@ class _Projection:
     shows_origin: bool
 
     def nearness(self, points: FloatArray) -> FloatArray:
-        """Return how near points (..., 3) are, -1 at the back to 1 in front."""
+        """Return the depth of points (..., 3), -1 at the back to 1 in front."""
         near = (points - self.center) @ self.turn[2] / self.radius
         return np.asarray(np.clip(near, -1, 1))
 
     def places(self, points: FloatArray) -> list[QPointF]:
-        """Return where points (N, 3) are drawn."""
+        """Return the positions of points (N, 3)."""
         seen = (np.reshape(points, (-1, 3)) - self.center) @ self.turn.T
         shrunk = self.scale / (1 - seen[:, 2] / (EYE * self.radius))
         return [
@@ -136,7 +136,7 @@ class PenView(Translated, QWidget):
         return self._yaw, self._pitch
 
     def place_of(self, led: int) -> QPointF:
-        """Return where the LED of a number is drawn."""
+        """Return the position of the LED of a number."""
         pen = self._value.pen
         if pen is None:
             raise ValueError("`place_of` needs a pen.")

@@ -1,4 +1,4 @@
-"""What plots are drawn on: the area and its axes."""
+"""Canvas of the plots: area and axes."""
 
 from collections.abc import Sequence
 from typing import TypeAlias

@@ -196,7 +196,7 @@ class Plot(QWidget):
         return ()
 
     def _fitted_title_px(self) -> int:
-        """Return how large the title is, which must be read whole, px."""
+        """Return the font size that shows the whole title, px."""
         largest = scaled(TextSize.SMALL)
         words = "   ".join((self._axes.title, *self._named_curves()))
         needed = QFontMetricsF(font(largest, bold=True)).horizontalAdvance(words)
@@ -455,7 +455,7 @@ class TracePlot(Plot):
         return float(covered + area.width() * outside)
 
     def _height(self, values: FloatArray) -> FloatArray:
-        """Return how high values (N,) are drawn."""
+        """Return the drawn values (N,)."""
         if not self._y_log:
             return values
         positive = np.where(values > 0, values, np.nan)

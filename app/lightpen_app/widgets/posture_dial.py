@@ -37,7 +37,7 @@ def _zeros() -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class DialValue:
-    """What a dial shows.
+    """Content of a dial.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ def field_of(posture: Posture) -> tuple[int, int]:
 
 
 def place_of(posture: Posture, heading: float) -> tuple[float, float]:
-    """Return where a posture is drawn: right and up of the middle, rim = 1."""
+    """Return the position of a posture: right and up of the centre, rim = 1."""
     radius = float(np.interp(posture.tilt, TILTS, (0.0, *RING_EDGES)))
     angle = posture.direction + heading
     return radius * math.cos(angle), radius * math.sin(angle)
@@ -379,7 +379,7 @@ def _bar_height(side: float) -> float:
 
 
 def _turn_x(box: QRectF, turn: float) -> float:
-    """Return where on the bar a turn (rad) lies, px."""
+    """Return the position of a turn (rad) on the bar, px."""
     share = float(np.clip(turn / MAX_TURN, -1, 1))
     return box.center().x() + share * box.width() / 2
 

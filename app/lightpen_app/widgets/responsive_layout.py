@@ -33,7 +33,7 @@ class SizeClass:
 
     @property
     def margin(self) -> int:
-        """What is left free at the left and right of a page, px."""
+        """Margin at the left and right of a page, px."""
         return 2 * GRID if self.is_narrow else 4 * GRID
 
 

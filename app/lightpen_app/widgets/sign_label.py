@@ -24,7 +24,7 @@ SIDE = 2 * GRID
 
 @dataclass(frozen=True)
 class StatusMessage:
-    """What is found, or is the matter.
+    """Message with its sign and tone.
 
     Attributes
     ----------

@@ -23,7 +23,7 @@ from lightpen_app.widgets.fitted_text import WRAPPED, fitted_size
 
 @dataclass(frozen=True)
 class State:
-    """What the program is doing.
+    """State of the program.
 
     Attributes
     ----------

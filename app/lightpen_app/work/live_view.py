@@ -263,7 +263,7 @@ class LiveView(QObject):
 
     @property
     def connection(self) -> Connection:
-        """How the camera is."""
+        """State of the connection."""
         return self._states[self._chosen].connection
 
     @property
@@ -274,7 +274,7 @@ class LiveView(QObject):
 
     @property
     def settings(self) -> CameraSettings:
-        """What the camera has in force."""
+        """Applied settings of the camera."""
         return self._states[self._chosen].settings or CameraSettings()
 
     @property
@@ -293,7 +293,7 @@ class LiveView(QObject):
 
     @property
     def caps(self) -> CameraCapabilities | None:
-        """What the camera can do; None until it was open."""
+        """Capabilities of the camera; None before it is opened."""
         return self.capabilities_of(self._chosen)
 
     def capabilities_of(self, camera: int) -> CameraCapabilities | None:
@@ -442,7 +442,7 @@ class LiveView(QObject):
 
 @dataclass
 class _CameraState:
-    """How a camera is."""
+    """State of a camera."""
 
     connection: Connection = Connection.CLOSED
     settings: CameraSettings | None = None

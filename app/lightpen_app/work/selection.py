@@ -63,17 +63,17 @@ class Selection(QObject):
 
     @property
     def preparation(self) -> Preparation:
-        """What is chosen for a calibration."""
+        """Choices for a calibration."""
         return self._preparation
 
     @property
     def choices(self) -> VerificationChoices:
-        """What the tip is verified by."""
+        """Choices for a verification."""
         return self._choices
 
     @property
     def supervision(self) -> Supervision:
-        """What supervisors have set for the data folder."""
+        """Limits and guard of the data folder."""
         return self._supervision
 
     @property

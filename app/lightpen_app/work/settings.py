@@ -42,7 +42,7 @@ AGAIN_MS = 5000  # after which what could not be written is tried again
 
 @dataclass(frozen=True)
 class Preferences:
-    """What the user chose for all stations.
+    """Preferences for all stations.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ class Settings(QObject):
         self._save("stations", {name: _entries(station)})
 
     def cameras(self) -> dict[str, CameraSettings]:
-        """Return how cameras were set up last, by their serial numbers."""
+        """Return the last camera settings, by serial number."""
         kept = self._content.get("cameras", {})
         return {
             serial: _read(entries, CameraSettings()) for serial, entries in kept.items()
@@ -154,7 +154,7 @@ class Settings(QObject):
         self._save("cameras", {serial: _entries(settings)})
 
     def camera_files(self, serials: str) -> CameraFiles:
-        """Return what is stored for the camera of a serial number, or for a pair."""
+        """Return the stored settings of a camera by serial number, or of a pair."""
         kept = self._content.get("camera_files", {}).get(serials)
         return _read(kept, CameraFiles())
 
@@ -288,7 +288,7 @@ class Settings(QObject):
 
 
 def settings_file() -> Path:
-    """Return where the settings of this user belong on this system."""
+    """Return the path of the settings of this user on this system."""
     return platformdirs.user_config_path("lightpen", appauthor=False) / "lightpen.json"
 
 

@@ -36,7 +36,7 @@ Changes: TypeAlias = dict[tuple[str, str], Any]  # by section and name
 
 @dataclass(frozen=True)
 class LoadedSettings:
-    """What a file holds, and why it is not all, if anything was wrong."""
+    """Content of a settings file, and its faults."""
 
     content: Content
     fault: Message | None = None

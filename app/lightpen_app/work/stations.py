@@ -32,7 +32,7 @@ class StoredCamera:
 
 @dataclass(frozen=True)
 class CameraFiles:
-    """What belongs to a camera, whatever the station.
+    """Settings of a camera, independent of the station.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class FilePaths:
 
 @dataclass(frozen=True)
 class Station:
-    """What was chosen last at a station.
+    """Last choices at a station.
 
     Attributes
     ----------

@@ -144,7 +144,7 @@ class Streaming(QObject):
 
 
 def _what_counts(preparation: Preparation) -> tuple[object, ...]:
-    """Return what the current tip depends on."""
+    """Return the inputs of the current tip."""
     return (
         *(preparation.names, preparation.origin, preparation.second is None),
         *(preparation.camera_file, preparation.pen_file),

@@ -75,7 +75,7 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
 
     @property
     def records_folder(self) -> Path:
-        """Where swings are recorded."""
+        """Folder of the recorded swings."""
         return self._folder / RECORDS
 
     def on_swing(self, status: SwingStatus, events: tuple[SwingEvent, ...]) -> None:

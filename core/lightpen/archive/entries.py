@@ -186,7 +186,7 @@ class StoredEntry:
 
 @dataclass(frozen=True)
 class ChainHead:
-    """How far a chain has come.
+    """Last entry of a chain.
 
     Attributes
     ----------

@@ -32,7 +32,7 @@ _UNSAFE = {"..", "."}
 
 @dataclass(frozen=True)
 class FetchResult:
-    """What was fetched.
+    """Result of fetching.
 
     Attributes
     ----------

@@ -111,7 +111,7 @@ def _images(data: Path, journal: FileHash) -> Iterator[FileHash]:
 
 
 def file_finding(data: Path, number: int, file: FileHash) -> Message | None:
-    """Return what differs between a file and its entry."""
+    """Return the differences between a file and its entry."""
     path = data / file.place
     if not path.exists():
         return message(

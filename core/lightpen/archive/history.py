@@ -51,7 +51,7 @@ class Line:
 
 @dataclass(frozen=True)
 class KnownNames:
-    """By which names entries can be looked for.
+    """Names to filter entries by.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ def lines(
 
 
 def messages_on(database: Database, entry: StoredEntry) -> tuple[StoredEntry, ...]:
-    """Return what concerns an entry: notes, that it was revoked, or restored."""
+    """Return the entries on an entry: comments, revocation, reinstatement."""
     found = select(*READ).where(ENTRIES.c.concerns == entry.sha256).order_by(*IN_ORDER)
     with database.reading() as connection:
         rows = connection.execute(found).all()

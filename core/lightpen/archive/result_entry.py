@@ -14,7 +14,7 @@ from lightpen.record.results.result_folder import FolderArchive
 
 @dataclass(frozen=True)
 class ArchivePlace:
-    """Where in an archive a calibration is entered.
+    """Entry of a calibration in an archive.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ def with_entry(file: CalibrationFile) -> CalibrationFile:
 
 
 def entry_of_file(result: Path, sha256: str) -> ArchivePlace | None:
-    """Return where a result or a verification is entered.
+    """Return the entry of a result or a verification.
 
     Parameters
     ----------

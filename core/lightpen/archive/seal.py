@@ -33,7 +33,7 @@ class SealedHead(Struct, frozen=True):
 
 
 class Seal(Struct, frozen=True):
-    """What a file was when it was closed."""
+    """State of a file when it was closed."""
 
     heads: tuple[SealedHead, ...]
     sha256: Digest

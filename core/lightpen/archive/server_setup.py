@@ -88,7 +88,7 @@ COMMIT;
 
 
 def server_sql() -> str:
-    """Return what an administrator runs once in the database of a server."""
+    """Return the SQL that an administrator runs once in the database of a server."""
     dialect = postgresql.dialect()  # type: ignore[no-untyped-call]
     made: list[CreateTable | CreateIndex] = []
     for table in (CHAIN_WRITERS, ENTRIES, RECORDS):

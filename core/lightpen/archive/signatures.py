@@ -83,7 +83,7 @@ class ChainKeys:
             self.finding(each)
 
     def finding(self, entry: StoredEntry) -> Message | None:
-        """Return what is wrong with the signature of the next entry; None if nothing.
+        """Return the fault of the signature of the next entry; None if it is valid.
 
         Changes of keys are followed.
         """

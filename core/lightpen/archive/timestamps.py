@@ -160,7 +160,7 @@ def with_timestamps(
 
 
 class _Client:
-    """What is done by the package rfc3161-client.
+    """Functions of the package rfc3161-client.
 
     Raises
     ------
@@ -202,7 +202,7 @@ class _Client:
         )
 
     def finding(self, place: str, content: bytes, entry: StoredEntry) -> Message | None:
-        """Return what is wrong with a timestamp of an entry; None if nothing."""
+        """Return the fault of a timestamp of an entry; None if it is valid."""
         place, number = printable(place), entry.entry.number
         digest = bytes.fromhex(entry.sha256)
         try:
@@ -276,7 +276,7 @@ def _no_root(file: Path) -> FileError:
 
 
 def _answer(address: str, query: bytes) -> bytes:
-    """Return what an authority answers to a query, by HTTP.
+    """Return the HTTP response of an authority to a query.
 
     Raises
     ------
@@ -298,7 +298,7 @@ def _answer(address: str, query: bytes) -> bytes:
 def _stored_finding(
     database: Database, client: _Client, file: Path
 ) -> tuple[Message | None, str, int]:
-    """Return what is wrong with a stored timestamp, its chain and its number."""
+    """Return the fault of a stored timestamp, with its chain and number."""
     place, named = f"{TIMESTAMPS}/{file.name}", _NAME.fullmatch(file.name)
     if named is None:
         return message("archive.timestamp-wrong", file=printable(place)), "", 0

@@ -48,5 +48,5 @@ class UseCount:
 
 
 def closed() -> ArchiveError:
-    """Return that an archive is closed."""
+    """Return the error that an archive is closed."""
     return ArchiveError("archive.closed")

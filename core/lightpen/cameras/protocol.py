@@ -231,7 +231,7 @@ class RegionLimits:
 
 
 def _place(wanted: int, most: float, step: int) -> int:
-    """Return where a region begins instead of there."""
+    """Return the nearest possible offset of a region below the wanted one."""
     return step and int(min(max(wanted, 0), most)) // step * step
 
 

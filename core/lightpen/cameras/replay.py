@@ -77,7 +77,7 @@ class ReplayCamera:
 
     @property
     def serial(self) -> str:
-        """Where the images are."""
+        """Location of the images."""
         return self._where
 
     @property

@@ -10,7 +10,7 @@ from lightpen.messages import Message
 
 
 class SourceNeeds(Enum):
-    """What a source needs to be opened."""
+    """Parameters that a source needs."""
 
     NOTHING = auto()
     FILES = auto()  # a folder, a pattern, a video or a record
@@ -20,7 +20,7 @@ class SourceNeeds(Enum):
 
 @dataclass(frozen=True)
 class SourcePlace:
-    """Where the images of a source come from.
+    """Location of the images of a source.
 
     Attributes
     ----------

@@ -18,6 +18,6 @@ def source_named(key: str) -> Source | None:
 
 
 def absent_sources() -> dict[str, Message]:
-    """Return what must be installed first, by the keys of the sources; slow."""
+    """Return the missing installations by the keys of the sources; slow."""
     reasons = ((source.key, source.why_absent()) for source in SOURCES)
     return {key: why_absent for key, why_absent in reasons if why_absent is not None}

@@ -62,7 +62,7 @@ def not_negative(text: str) -> float:
 def number_from(
     lowest: float, highest: float, what: str, unit: str
 ) -> Callable[[str], float]:
-    """Return what reads a number within limits, both of them included."""
+    """Return a parser of numbers within limits, both included."""
 
     def number_of(text: str) -> float:
         number = finite(text)

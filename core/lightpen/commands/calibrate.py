@@ -194,7 +194,7 @@ def _note(note: Message) -> None:
 
 
 def _lacking(option: str, images: Sequence[str]) -> UsageError:
-    """Return that an option is missing, and why the images are not a record."""
+    """Return the error that an option is missing, and why the images are no record."""
     missing = missing_parts(Path(images[0])) if len(images) == 1 else ()
     if not missing:
         return lacking(option)
@@ -354,7 +354,7 @@ def _observe(
     *,
     is_centers: bool,
 ) -> tuple[Observations, tuple[Path, ...]]:
-    """Return what images or a file of centres show, and the files of it."""
+    """Return the observations of images or of a file of centres, and their files."""
     if is_centers:
         path = Path(given[0])
         require_other_file(record, path)

@@ -88,7 +88,7 @@ def write_record(path: Path, record: Mapping[str, Any] | Struct) -> None:
 
 
 def lacking(option: str) -> UsageError:
-    """Return that an option is missing which only a record can do without."""
+    """Return the error that an option is missing that only a record makes optional."""
     return UsageError("cli.option-missing", option=option)
 
 

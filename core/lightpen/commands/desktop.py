@@ -29,7 +29,7 @@ class Desktop(Protocol):
         """Remove it from the menu."""
 
     def data_folder(self) -> Path:
-        """Return where records, results and the archive are, as chosen."""
+        """Return the chosen folder of records, results and archive."""
 
     def languages(self) -> tuple[str, ...]:
         """Return the languages of the program, English first."""

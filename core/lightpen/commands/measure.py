@@ -136,7 +136,7 @@ def _is_csv(place: str) -> bool:
 
 
 def _places(plan: Plan, given: Sequence[str]) -> dict[str, str]:
-    """Return where the touches of each feature are, in the order of the plan."""
+    """Return the locations of the touches of each feature, in order of the plan."""
     names = [feature.name for feature in plan.features]
     found: dict[str, str] = {}
     for text in given:

@@ -225,7 +225,7 @@ def _point(option: str, words: list[Any]) -> Any:
 
 
 def _author(options: argparse.Namespace) -> Author:
-    """Return who changes the library, once its guard is confirmed by the archive."""
+    """Return the author of a change, once the archive has confirmed the guard."""
     data = _data(options)
     with suppress(NoArchiveError), closing(look_into(data / ARCHIVE)) as database:
         confirm_limits(database, chain_at_home(database), read_supervision(data))

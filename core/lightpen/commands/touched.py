@@ -111,7 +111,7 @@ class MeasuredRuns:
 
     @property
     def instrument(self) -> Instrument:
-        """What they were measured with."""
+        """Instrument they were measured with."""
         return self.conditions.instrument
 
     @property
@@ -212,7 +212,7 @@ def touches_at(places: Sequence[str], instrument: Instrument) -> list[ProbedPoin
 
 @dataclass(frozen=True, eq=False)
 class _SeenRun:
-    """What the images of a run, or its centres, show in each camera."""
+    """Observations of a run in each camera, by images or centres."""
 
     name: str
     views: tuple[Observations, ...]

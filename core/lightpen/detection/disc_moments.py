@@ -83,7 +83,7 @@ class PixelBox(NamedTuple):
 
     @property
     def area(self) -> int:
-        """How many pixels it holds."""
+        """Number of pixels."""
         return (self.right - self.left) * (self.bottom - self.top)
 
     def grown(self, margin: int, shape: tuple[int, ...]) -> "PixelBox":
@@ -338,7 +338,7 @@ def with_rims(
 
 
 def _known(disc: Disc, before: Sequence[EdgeStart]) -> EdgeStart:
-    """Return where the fit of a rim begins: with the nearest shape before, if any."""
+    """Return the start of an edge fit: the nearest previous shape, if any."""
     assert disc.rim is not None
     if not before:
         return disc.rim
@@ -418,7 +418,7 @@ def _without_hole(soft: MatLike) -> MatLike:
 
 
 def _rim_start(soft: MatLike, frame: PixelBox) -> EdgeStart | None:
-    """Return where to look for the rim of a region, if it is like an ellipse."""
+    """Return the start of the edge fit of a region, if it is like an ellipse."""
     contours, _ = cv2.findContours(soft, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     m = cv2.moments(contours[0])
     if m["m00"] < MIN_AREA:

@@ -90,7 +90,7 @@ class EdgeFit(NamedTuple):
 
 
 class EdgeStart(NamedTuple):
-    """Where the fit of a rim begins.
+    """Start values of an edge fit.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class _Ellipses(NamedTuple):
 
 
 class _Rays(NamedTuple):
-    """Where rays cross ellipses, and how their parameters move the crossings.
+    """Intersections of rays with ellipses, and their derivatives by the parameters.
 
     Attributes
     ----------

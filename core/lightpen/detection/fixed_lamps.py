@@ -30,7 +30,7 @@ MARGIN = 8  # px about a masked circle
 def masked_lights(
     image: Image, mask: FloatArray | None, full_scale: int | None = None
 ) -> FloatArray:
-    """Return where the light is that a mask leaves out, (M, 2), px.
+    """Return the centroids of light in masked circles, (M, 2), px.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def masked_lights(
 
 
 def fixed_lamps(masked: FloatArray, detections: Sequence[PenDetection]) -> FloatArray:
-    """Return where images show lamps that do not move, (N, K, 2), px.
+    """Return the fixed lamps in images, (N, K, 2), px.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def fixed_lamps(masked: FloatArray, detections: Sequence[PenDetection]) -> Float
 
 
 def lamps_among(masked: FloatArray, lights: Sequence[FloatArray]) -> FloatArray:
-    """Return where images show lamps that stay, by lights that are no LEDs.
+    """Return the fixed lamps in images among lights that are no LEDs.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ SAME_SPOT = 2.0  # px between the centres of a spot in two images, at least
 
 @dataclass(frozen=True)
 class Exposure:
-    """How bright the LEDs of an image are.
+    """Brightness of the LEDs of an image.
 
     Attributes
     ----------

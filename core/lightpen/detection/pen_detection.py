@@ -301,7 +301,7 @@ def _followed(
 
 
 def _window(camera: Camera, pen: Pen, before: PenDetection) -> PixelBox:
-    """Return where in the image the LEDs are that hardly moved, with room round."""
+    """Return the region of the image with the LEDs that hardly moved, with a margin."""
     leds = pen.leds @ before.rotation.T + before.translation
     radius = camera.fx * pen.diameter / 2 / float(leds[:, 2].min())
     room = ceil(MAX_SHIFT + ROOM * radius)

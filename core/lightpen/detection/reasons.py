@@ -12,7 +12,7 @@ MISHAPS = (ArithmeticError, ValueError, cv2.error)
 
 
 class Reason(StrEnum):
-    """Why an image does not take part in the calibration."""
+    """Reason for not using an image in the calibration."""
 
     NONE = ""
     UNREADABLE = "unreadable"
@@ -38,7 +38,7 @@ class Reason(StrEnum):
 
     @property
     def words(self) -> Message:
-        """It in a few words; `NONE` has none."""
+        """Short text; empty for `NONE`."""
         return _WORDS[self]
 
 

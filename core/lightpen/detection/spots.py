@@ -144,7 +144,7 @@ class Spots:
         return len(self.centers)
 
     def rims(self, corner: FloatArray) -> list[EdgeStart]:
-        """Return where to search for the rims of these spots in the next image.
+        """Return the search regions of these spots in the next image.
 
         Merged spots, and those that the border cuts, are left out.
 

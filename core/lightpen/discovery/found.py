@@ -105,7 +105,7 @@ def discovery_of(
     *,
     is_relative: bool,
 ) -> Discovery:
-    """Return what a calibration with wide priors has found.
+    """Return the result of a calibration with wide priors.
 
     Parameters
     ----------

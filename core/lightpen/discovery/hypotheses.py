@@ -258,7 +258,7 @@ def _require_one_camera(
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """What all hypotheses are tried on."""
+    """Data common to all hypotheses."""
 
     pixels: FloatArray
     size: tuple[int, int]
@@ -309,7 +309,7 @@ class _Trial:
 
 
 def camera_prior(camera: Camera, known: Camera | None) -> CameraPrior:
-    """Return what is known of a camera: its file, or what all cameras are like."""
+    """Return the prior of a camera: its file, or that of any camera."""
     if known is None:
         return any_camera(camera)
     return CameraPrior.of(known, prior_of_camera(known, USUAL).covariance)

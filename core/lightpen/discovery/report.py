@@ -128,7 +128,7 @@ def discovery_text(discovery: Discovery) -> str:
 
 
 def swings_record(together: Together) -> dict[str, Any]:
-    """Return what several swings add to the record."""
+    """Return the entries of several swings for the record."""
     held_out = together.held_out
     record: dict[str, Any] = plain(
         {
@@ -169,7 +169,7 @@ def swings_text(together: Together) -> str:
 
 
 def remarks_of(discovery: Discovery) -> tuple[Message, ...]:
-    """Return what limits the uncertainty, and what is to be known of the result."""
+    """Return the limits of the uncertainty, and notes on the result."""
     if discovery.is_relative:
         return (message("discover.relative"),)
     if not discovery.lengths:

@@ -15,7 +15,7 @@ from lightpen.verification.tasks.probed_point import ProbedPoint
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """What is known, and how results are to be given.
+    """Prior knowledge, and the form of the results.
 
     Attributes
     ----------

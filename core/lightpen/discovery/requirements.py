@@ -1,4 +1,4 @@
-"""What is refused: too little to see, a second pen, wrong lengths, weak swings."""
+"""Checks: too few LEDs, a second pen, wrong lengths, weak swings."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

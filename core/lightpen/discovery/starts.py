@@ -41,7 +41,7 @@ WORST = 1e12  # misfit of a state that is none
 
 
 class CameraPrior(NamedTuple):
-    """What is known of the intrinsics of a camera.
+    """Prior knowledge of the intrinsics of a camera.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ def any_covariance(camera: Camera) -> FloatArray:
 
 
 def any_camera(camera: Camera) -> CameraPrior:
-    """Return what is known of any camera with images of this size."""
+    """Return the prior of any camera with images of this size."""
     ideal = ideal_camera(camera.width, camera.height, camera.fx)
     ideal = replace(
         ideal, distortion=np.zeros_like(camera.distortion), lens=camera.lens

@@ -59,7 +59,7 @@ class HeldOut:
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """What several swings found.
+    """Joint result of several swings.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ def _report_part(report: Report, k: int, n: int, fraction: float) -> None:
 
 
 def joined(swings: Sequence[Discovery]) -> Discovery:
-    """Return what swings found together, in the frame of the first.
+    """Return the joint result of swings, in the frame of the first.
 
     What is known of camera and discs without images counts once: each swing brings the
     information of its images, which is its own less that of these priors.
@@ -212,7 +212,7 @@ def _values(each: Discovery, frame: Discovery) -> FloatArray:
 
 
 def _prior_information(each: Discovery) -> FloatArray:
-    """Return what is known of camera and discs without images, (q, q)."""
+    """Return the prior information of camera and discs, (q, q)."""
     at, priors = each.parameters, each.calibration.priors
     information = np.zeros((at.number, at.number))
     camera = at.cameras[0]

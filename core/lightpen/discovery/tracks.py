@@ -180,7 +180,7 @@ class _Tracks:
     def advanced(
         self, there: FloatArray, match: IntArray, spots: FloatArray, image: int
     ) -> "_Tracks":
-        """Return the tracks after an image; a lost one goes as it is predicted."""
+        """Return the tracks after an image; a lost one follows its prediction."""
         found = match >= 0
         at = match[found]
         step = np.zeros_like(spots)

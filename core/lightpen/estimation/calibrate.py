@@ -107,7 +107,7 @@ class CameraImages:
 
     @property
     def used(self) -> BoolArray:
-        """Which images take part, (N,)."""
+        """Mask of the used images, (N,)."""
         return np.array([reason is Reason.NONE for reason in self.reasons])
 
 
@@ -187,7 +187,7 @@ class Calibration:
 
     @property
     def leds_used(self) -> BoolArray:
-        """Which LEDs of the first camera take part, (N, L)."""
+        """Mask of the used LEDs of the first camera, (N, L)."""
         return self.cameras[0].leds_used
 
     @property
@@ -210,7 +210,7 @@ class Calibration:
 
     @cached_property
     def self_check(self) -> SelfCheck | None:
-        """How well parts of the LEDs predict the others."""
+        """Cross-validation: prediction of LEDs by the others."""
         bundle = self.bundle
         return check_prediction(
             *(bundle.state, bundle.residuals, bundle.used, bundle.unknowns.noise),
@@ -292,7 +292,7 @@ class _Inputs(NamedTuple):
 
 
 class _Before(NamedTuple):
-    """What is known of rig and pen without the images of a calibration."""
+    """Prior knowledge of rig and pen."""
 
     rig: Rig
     pen: Pen

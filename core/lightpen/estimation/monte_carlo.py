@@ -142,7 +142,7 @@ class MonteCarlo:
 
     @property
     def explanation(self) -> Message:
-        """What the largest difference from the linear budget means."""
+        """Explanation of the largest difference from the linear budget."""
         relative = self.linear / self.deviation - 1
         axis = int(np.argmax(np.abs(relative)))
         percent, name = 100 * abs(float(relative[axis])), "xyz"[axis]
@@ -265,7 +265,7 @@ def _edge_widths(calibration: Calibration, n_images: int) -> FloatArray:
 
 
 def _drawn_moves(trials: Trials, rng: np.random.Generator) -> FloatArray:
-    """Return where the tip sits in the cone in each image, (N, 3), mm."""
+    """Return the offset of the tip in the cone in each image, (N, 3), mm."""
     by_form = _drawn(trials.move_covariance, rng).reshape(-1, N_CONE)
     values, vectors = np.linalg.eigh(trials.jitter)
     root = vectors * np.sqrt(np.maximum(values, 0.0))

@@ -34,7 +34,7 @@ RIDGE = 1e-9  # of the trace of the normal matrix of a pose
 
 
 class SelfCheck(NamedTuple):
-    """How well parts of the LEDs predict the others.
+    """Cross-validation: prediction of LEDs by the others.
 
     Attributes
     ----------

@@ -23,7 +23,7 @@ WHAT = message("file.machine-settings")
 
 @dataclass(frozen=True)
 class MachineSettings:
-    """What holds for those who have chosen nothing else.
+    """Default settings of the machine.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ def machine_file() -> Path:
 
 
 def machine_settings() -> MachineSettings:
-    """Return what the file sets; nothing if there is none.
+    """Return the settings of the file; defaults without one.
 
     Raises
     ------

@@ -15,7 +15,7 @@ N_POSE, N_SHAPE = 6, 5
 
 @dataclass(frozen=True, eq=False)
 class BoardState:
-    """All parameters that the points of the views depend on.
+    """Parameters of the projected points of the views.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ def board_points(board: Board, shape: FloatArray) -> FloatArray:
 
 @cache
 def deformations_of(board: Board) -> FloatArray:
-    """Return how each error of a board moves its points, (N, 3, 5)."""
+    """Return the derivatives of the board points by its errors, (N, 3, 5)."""
     points = board.points
     x, y = points[:, 0], points[:, 1]
     u, v = x / np.abs(x).max(), y / np.abs(y).max()

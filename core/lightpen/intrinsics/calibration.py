@@ -364,7 +364,7 @@ def _require_determined(fitted: BoardFit) -> None:
 
 
 def _halves(effects: MixedFit) -> ViewHalves | None:
-    """Return what every second view makes of the camera against the others."""
+    """Return the split-half difference of the camera: every second view vs. others."""
     n_views = len(effects.scores.scores)
     if n_views < 2 * MIN_VIEWS:
         return None

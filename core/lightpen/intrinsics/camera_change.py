@@ -110,7 +110,7 @@ def detectable_zoom(mixed: MixedFit) -> float:
 
 
 def _zoom(camera: Camera) -> FloatArray:
-    """Return how a zoom changes the intrinsics, (4 + n, 1)."""
+    """Return the derivative of the intrinsics by a zoom, (4 + n, 1)."""
     zoom = np.zeros((len(camera.intrinsics), 1))
     zoom[:2, 0] = camera.fx, camera.fy
     return zoom

@@ -34,7 +34,7 @@ SIGMAS = 2.0  # of the mean gain of a view
 
 @dataclass(frozen=True)
 class Choice:
-    """Why this lens model.
+    """Choice of the lens model.
 
     Attributes
     ----------

@@ -77,7 +77,7 @@ class PairLag:
         return None if self.interval_ms is None else self.views * self.interval_ms
 
     def remark(self, name: str) -> Message:
-        """Return it as text, of a camera of that name."""
+        """Return the message on the camera of that name."""
         if self.lag_ms is None:
             return message(
                 "pair.late",

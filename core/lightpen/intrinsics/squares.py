@@ -28,7 +28,7 @@ REFINING = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 30, 0.01)
 
 
 class _Beyond(Enum):
-    """What lies beyond the outermost corners."""
+    """Squares beyond the outermost corners."""
 
     SQUARES = auto()
     RIM = auto()
@@ -37,7 +37,7 @@ class _Beyond(Enum):
 
 @dataclass(frozen=True)
 class CornerCount:
-    """How many inner corners of a chessboard are seen.
+    """Number of visible inner corners of a chessboard.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ def _sides(grid: FloatArray) -> list[FloatArray]:
 
 
 def _next_row(grid: FloatArray) -> FloatArray:
-    """Return where the row after the last one lies, (C, 2)."""
+    """Return the predicted next row, (C, 2)."""
     if len(grid) < 3:
         return np.asarray(2 * grid[-1] - grid[-2])
     return np.asarray(3 * grid[-1] - 3 * grid[-2] + grid[-3])
@@ -151,7 +151,7 @@ def _placed(grey: npt.NDArray[np.uint8], grid: FloatArray) -> FloatArray:
 
 
 def _beyond(grey: npt.NDArray[np.uint8], grid: FloatArray) -> _Beyond:
-    """Return what lies beyond the last row of a grid."""
+    """Return the squares beyond the last row of a grid."""
     one = _next_row(grid)
     other = _next_row(np.concatenate([grid, one[None]]))
     if np.linalg.norm(one - grid[-1], axis=1).min() < MIN_STEP:

@@ -63,7 +63,7 @@ def _start_fisheye(views: Views) -> Camera:
 
 
 def _bend(camera: Camera, views: Views) -> float:
-    """Return how far points lie from homographies of the board, px rms."""
+    """Return the rms residual of the points from homographies of the board, px."""
     squares, count = 0.0, 0
     some = slice(None, None, max(views.n_views // SOME, 1))
     for pixels, seen in zip(views.pixels[some, 0], views.seen[some, 0], strict=True):

@@ -61,7 +61,7 @@ def map_uncertainty(camera: Camera, covariance: FloatArray) -> UncertaintyMap:
 
 
 def error_fields(camera: Camera) -> FloatArray:
-    """Return how errors of the intrinsics move the image, (63, 2, 4 + n), px.
+    """Return the derivatives of image points by the intrinsics, (63, 2, 4 + n), px.
 
     The turn that explains most of each is left out; 0 where a fisheye sees nothing.
     """
@@ -81,7 +81,7 @@ def error_fields(camera: Camera) -> FloatArray:
 
 
 def moved_in_image(camera: Camera, difference: FloatArray) -> float:
-    """Return how far a difference of the intrinsics moves the image, px rms."""
+    """Return the rms image shift by a difference of the intrinsics, px."""
     moves = error_fields(camera) @ difference
     return float(np.sqrt(np.mean(np.square(moves).sum(axis=-1))))
 

@@ -138,7 +138,7 @@ def fit_effects(views: Views, fitted: BoardFit) -> MixedFit:
 
 
 def _mm_a_px(fitted: BoardFit) -> float:
-    """Return what a pixel is on the board, mm."""
+    """Return the size of a pixel on the board, mm."""
     camera, poses = fitted.state.cameras[0], fitted.state.poses
     return float(np.nanmedian(poses.translations[:, 2])) / camera.fx
 

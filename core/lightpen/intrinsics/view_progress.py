@@ -35,7 +35,7 @@ class ViewProgress:
 
 
 def view_progress(views: Views, camera: int = 0) -> ViewProgress:
-    """Return how far the views of a camera vary."""
+    """Return the variation of the views of a camera."""
     size = views.image_sizes[camera]
     found = [
         _measures(_outline(views, seen), size)

@@ -61,7 +61,7 @@ class Views:
 
     @property
     def seen(self) -> BoolArray:
-        """Which points were seen, (V, C, N)."""
+        """Mask of the visible points, (V, C, N)."""
         return np.asarray(np.isfinite(self.pixels).all(axis=-1))
 
     @property

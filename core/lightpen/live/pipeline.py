@@ -85,14 +85,14 @@ class LiveListener(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class _Capture:
-    """What takes every image: a swing, a verification, or neither."""
+    """Consumer of the images: a swing, a verification, or none."""
 
     swing: SwingSetup | None = None
     verification: RegionOfInterest | None = None
 
     @property
     def wanted(self) -> SwingSetup | RegionOfInterest | None:
-        """What is detected for it."""
+        """Target of its detection."""
         return self.swing or self.verification
 
 
@@ -257,7 +257,7 @@ class Live:
         return next((each for each in self._verifiers if each.status.is_here), None)
 
     def _verified(self) -> RegionOfInterest | None:
-        """Return what a verification detects; None without one."""
+        """Return the detection target of a verification; None without one."""
         verifier = self._verifier
         status = None if verifier is None else verifier.status
         return status.region if status is not None and status.is_touching else None

@@ -283,7 +283,7 @@ def _orientation(
 
 
 def _extent(one: Measured) -> float:
-    """Return how far the touches of a feature reach along its axis, mm."""
+    """Return the extent of the touches of a feature along its axis, mm."""
     assert one.points is not None
     along = one.points.values.reshape(-1, 3) @ one.surface.quantity.values[AXIS]
     return float(np.ptp(along))

@@ -37,7 +37,7 @@ ROUND = {
 
 
 class Evidence(StrEnum):
-    """What decided the side."""
+    """Origin of the choice of the side."""
 
     NONE = "no ball"
     PLAN = "plan"

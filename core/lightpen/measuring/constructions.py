@@ -61,7 +61,7 @@ def projection_on_line(feature: FloatArray, line: FloatArray) -> FloatArray:
 
 
 def intersection_of_line_and_plane(line: FloatArray, plane: FloatArray) -> FloatArray:
-    """Return where a line meets a plane, (3,)."""
+    """Return the intersection of a line and a plane, (3,)."""
     normal = plane[AXIS]
     share = ((plane[PLACE] - line[PLACE]) @ normal) / (line[AXIS] @ normal)
     return np.asarray(line[PLACE] + share * line[AXIS])

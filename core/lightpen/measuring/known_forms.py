@@ -35,7 +35,7 @@ BY_CHANCE = 0.005  # that touches on known form deviate from it by more
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """What touches on known form say of the instrument.
+    """Refinement of the instrument by touches on known form.
 
     Attributes
     ----------

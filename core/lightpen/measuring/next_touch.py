@@ -1,4 +1,4 @@
-"""Where on a feature the next touch tells most of it.
+"""Most informative place of the next touch on a feature.
 
 Of places spread over the feature the one is taken that most reduces the volume of the
 covariance of its unknowns (D-optimal design [1]_): with the derivatives ``J`` of the

@@ -63,7 +63,7 @@ class Construction(StrEnum):
 
 
 class CharacteristicKind(StrEnum):
-    """What is evaluated."""
+    """Evaluated characteristics."""
 
     X = "x"
     Y = "y"

@@ -34,7 +34,7 @@ class FeatureKind(Enum):
 
 
 class Distances(NamedTuple):
-    """How far N points are from a feature, by K distances each.
+    """Residuals of N points from a feature, K each.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Distances(NamedTuple):
 
 @dataclass(frozen=True)
 class FeatureModel:
-    """What a kind of feature is.
+    """Properties of a kind of feature.
 
     Attributes
     ----------

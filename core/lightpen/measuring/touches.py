@@ -16,7 +16,7 @@ def at_position(name: str, position: int) -> str:
 
 @dataclass(frozen=True, eq=False)
 class PartTouches:
-    """All touches of a part in their order.
+    """Touches of a part in order.
 
     Attributes
     ----------

@@ -32,7 +32,7 @@ ROUNDING, TINY = 1e-15, 1e-12
 
 
 class Criterion(Enum):
-    """What is least, or greatest."""
+    """Criterion: minimum or maximum."""
 
     MINIMUM_ZONE = "minimum zone"
     INSCRIBED = "maximum inscribed"

@@ -28,7 +28,7 @@ USUAL_RISK = 0.05
 
 
 class DecisionRule(StrEnum):
-    """How a measured value is compared with its limits."""
+    """Decision rule for a measured value and its limits."""
 
     SIMPLE = "simple acceptance"
     GUARD_BAND = "guard band"
@@ -36,7 +36,7 @@ class DecisionRule(StrEnum):
 
 
 class Decision(StrEnum):
-    """What a rule says of a value."""
+    """Outcome of a decision rule."""
 
     ACCEPTED = "accepted"
     OPEN = "open"  # neither conformity nor nonconformity is proven
@@ -70,7 +70,7 @@ def decide(
     upper: float = inf,
     max_risk: float = USUAL_RISK,
 ) -> Decision:
-    """Return what a rule says of a value with its U (k = 2).
+    """Return the decision on a value with its U (k = 2).
 
     Parameters
     ----------

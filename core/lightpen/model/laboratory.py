@@ -1,4 +1,4 @@
-"""Who calibrates, where, and by which procedure."""
+"""Laboratory, operator and procedure of a calibration."""
 
 import re
 from dataclasses import dataclass

@@ -91,7 +91,7 @@ _RULE: Any = _choice(message("limit.rule"), RULES, *map(rule_name, RULES))
 
 @dataclass(frozen=True)
 class SwingLimits:
-    """When a swing ends, and which tip passes.
+    """Limits on the end of a swing and on the tip.
 
     Attributes
     ----------

@@ -20,7 +20,7 @@ MARK_DIGITS = 3  # of a mark in a file, px
 
 @dataclass(frozen=True, eq=False)
 class FoundPen:
-    """What was known of a pen before the images that it was found from.
+    """Prior knowledge of a pen that was found from images.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class FoundPen:
 
 @dataclass(frozen=True, eq=False)
 class FoundCamera:
-    """What was known of a camera before the images that it was found from.
+    """Prior knowledge of a camera that was found from images.
 
     Attributes
     ----------

@@ -96,7 +96,7 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class PenMatch:
-    """How a pen fits some views of it.
+    """Agreement of a pen with views of it.
 
     Attributes
     ----------
@@ -220,7 +220,7 @@ class _Seen:
 
 @dataclass(frozen=True, eq=False)
 class _Located:
-    """Where the LEDs sit on the pen."""
+    """Positions of the LEDs on the pen."""
 
     pixels: FloatArray  # (N, L, 2)
     shifts: dict[int, Shift]  # by LED number

@@ -150,7 +150,7 @@ def _on_board(
     translation: FloatArray,
     bend: tuple[float, float, float],
 ) -> FloatArray:
-    """Return where the samples meet the board, (..., 2), mm."""
+    """Return the intersections of the samples with the board, (..., 2), mm."""
     rays = directions @ rotation
     eye = -rotation.T @ translation
     half = np.abs(board.points[:, :2]).max(axis=0)
@@ -226,7 +226,7 @@ def _soft(depth: FloatArray) -> FloatArray:
 
 
 def _squares(x: FloatArray, y: FloatArray, first: int) -> FloatArray:
-    """Return how white the squares of a chessboard are, 0 to 1, of side 1."""
+    """Return the brightness of a chessboard with squares of side 1, 0 to 1."""
     across, down = (2 * _soft(_wave(each)) - 1 for each in (x, y))
     sign = 1 if first == 1 else -1
     return np.asarray(0.5 + 0.5 * sign * across * down)
@@ -282,7 +282,7 @@ def _circles_light(board: Board, places: FloatArray) -> FloatArray:
 
 
 def _from_circles(away: FloatArray, step: float, columns: int, rows: int) -> FloatArray:
-    """Return how far places are from the nearest middle of a grid's circles."""
+    """Return the distances of places from the nearest circle centre of a grid."""
     most = np.array([columns, rows]) - 1
     nearest = np.clip(np.round(away / step), 0, most)
     return np.asarray(np.linalg.norm(away - step * nearest, axis=-1))

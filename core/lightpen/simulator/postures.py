@@ -102,7 +102,7 @@ def draw_postures(n: int, rng: np.random.Generator, kind: SwingKind) -> Postures
 
 
 def operator_postures(times: FloatArray, seed: int = 0) -> Postures:
-    """Return how an operator holds the pen at given times.
+    """Return the postures of the pen in an operator's hand at given times.
 
     The pen goes round the cone in some seven seconds while its tilt and roll vary at
     rates of their own; the hand trembles by `TREMOR`. A smooth function of time: the

@@ -297,7 +297,7 @@ def leds_in_camera(
 
 
 def faces_camera(leds_cam: FloatArray, normals_cam: FloatArray) -> BoolArray:
-    """Return which discs face the camera, shape (..., L)."""
+    """Return the mask of the discs that face the camera, (..., L)."""
     faces: BoolArray = np.einsum("...i,...i->...", leds_cam, normals_cam) < 0
     return faces
 

@@ -67,7 +67,7 @@ class ProbingOperator:
 
 
 def _ball_on(goal: HandGoal, point: FloatArray, ball_diameter: float) -> FloatArray:
-    """Return where the centre of the ball goes."""
+    """Return the target of the ball centre."""
     if goal.outwards is None:
         return point
     return np.asarray(point + ball_diameter / 2 * goal.outwards)

@@ -136,7 +136,7 @@ class Finger:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What the camera sees during one exposure.
+    """View of the camera during one exposure.
 
     Attributes
     ----------

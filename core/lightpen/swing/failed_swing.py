@@ -15,7 +15,7 @@ from lightpen.swing_messages import leds_misfit
 
 @dataclass(frozen=True, eq=False)
 class FailedSwing:
-    """Why there is no tip, and how the LEDs fit in each image alone.
+    """Reason of a failed solution, and the fit of the LEDs in each image alone.
 
     Attributes
     ----------

@@ -213,7 +213,7 @@ class Preparation:
 
     @property
     def sources(self) -> tuple[SourceChoice, ...]:
-        """Where the images of each camera come from."""
+        """Source of the images of each camera."""
         if self.second is None:
             return (self.source,)
         return (self.source, self.second.source)

@@ -25,7 +25,7 @@ def seat_of(state: SwingState) -> Seat | None:
 
 
 def steady_seat(pen: Pen, state: SwingState) -> Seat | None:
-    """Return where the tip rested for the last second; None if it did not.
+    """Return the resting place of the tip in the last second; None if it moved.
 
     With a nominal tip the pen may stand still. Without one it must swing a little, or
     any still pen would do.

@@ -77,7 +77,7 @@ def fit_seat(
 def tip_offsets(
     seat: Seat, rotations: FloatArray, translations: FloatArray
 ) -> FloatArray:
-    """Return where poses put the tip, minus the cone, camera frame, (N, 3), mm."""
+    """Return the tip by each pose minus the cone, camera frame, (N, 3), mm."""
     return contact_residuals(rotations, translations, seat.tip_pen, seat.cone_cam)
 
 

@@ -53,7 +53,7 @@ class Phase(StrEnum):
 
 
 class Pause(StrEnum):
-    """Why a swing is paused."""
+    """Reason of a pause."""
 
     NONE = ""
     LOST = "lost"

@@ -75,7 +75,7 @@ _logger = logging.getLogger(__name__)
 
 
 class SwingWorkflow:
-    """One swing after another, from the first image to acceptance.
+    """Successive swings, from the first image to acceptance.
 
     A command that is not possible in the present state is ignored.
 

@@ -83,7 +83,7 @@ class Cause(Enum):
 
 
 class VerificationWorkflow:
-    """One verification after another, of the current tip.
+    """Successive verifications of the current tip.
 
     Parameters
     ----------

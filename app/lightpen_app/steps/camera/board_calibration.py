@@ -70,7 +70,7 @@ class BoardCalibration(QObject):
 
     @property
     def found(self) -> CameraCalibration | None:
-        """What was computed last; None where that is given up."""
+        """The last result; None if it was discarded."""
         return None if self._computed is None else self._computed.found
 
     def remark(self) -> StatusMessage:
@@ -256,7 +256,7 @@ def save_camera(camera: Camera, path: Path, report: Report) -> InputFile:
 
 
 def facts_text(found: CameraCalibration) -> str:
-    """Return what came out, a line each."""
+    """Return the result, one text a line."""
     camera, translate = found.camera, QCoreApplication.translate
     assert camera.covariance is not None
     fx, fy, cx, cy = camera.intrinsics[:4].tolist()
@@ -280,6 +280,6 @@ def facts_text(found: CameraCalibration) -> str:
 
 
 def uncertainty_over_image(found: CameraCalibration) -> UncertaintyMap:
-    """Return how uncertain the intrinsics leave where a point is seen."""
+    """Return the text on the projection uncertainty of the intrinsics."""
     assert found.camera.covariance is not None
     return map_uncertainty(found.camera, found.camera.covariance)

@@ -26,7 +26,7 @@ NANOSECONDS = 1e9
 
 @dataclass(frozen=True, eq=False)
 class BoardLook:
-    """What one image shows, and the hash of its pixels where that is the board."""
+    """Detection in one image, and the hash of its pixels if it shows the board."""
 
     points: FloatArray | None
     sha256: str = ""
@@ -35,7 +35,7 @@ class BoardLook:
 
 @dataclass(frozen=True, eq=False)
 class SuggestedOutline:
-    """Where the board should be held next, as its outline in the image, (4, 2), px."""
+    """Next posture of the board, as its outline in the image, (4, 2), px."""
 
     outline: FloatArray
 
@@ -184,7 +184,7 @@ class BoardCapture(QObject):
 def look_for_board(
     image: Image, board: Board, asks_why: bool, report: Report
 ) -> BoardLook:
-    """Return what an image shows of a board, and why nothing if it is asked."""
+    """Return the detection of a board in an image, and the reason of a failure."""
     points = find_points(image, board, quick=True)
     if points is None:
         return BoardLook(
@@ -194,7 +194,7 @@ def look_for_board(
 
 
 def find_outline(capture: Capture, report: Report) -> SuggestedOutline:
-    """Return where the board should be held next."""
+    """Return the next posture of the board."""
     return SuggestedOutline(wanted_outline(capture))
 
 

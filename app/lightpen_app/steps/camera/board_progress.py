@@ -36,11 +36,11 @@ class BoardProgress(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> ViewProgress:
-        """Return what is shown."""
+        """Return the displayed value."""
         return self._value
 
     def verdict(self) -> StatusMessage:
-        """Return what the views lack, or that they suffice."""
+        """Return the shortfall of the views, or that they suffice."""
         return self._verdict.value()
 
     def set_value(self, value: ViewProgress) -> None:

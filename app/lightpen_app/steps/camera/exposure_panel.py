@@ -115,7 +115,7 @@ class ExposurePanel(Translated, QFrame):
         self._refresh()
 
     def advice(self) -> str:
-        """Return what to do, a sentence."""
+        """Return the advice."""
         return self._advice.text()
 
     def _on_exposure_edited(self, exposure_ms: float) -> None:
@@ -273,7 +273,7 @@ class FocusPanel(Translated, QFrame):
         self._refresh()
 
     def hint(self) -> str:
-        """Return what to do, a sentence."""
+        """Return the advice."""
         return self._hint.text()
 
     def _refresh(self) -> None:

@@ -89,7 +89,7 @@ class LivePanel(Translated, QWidget):
         self._switch.set_value(shown)
 
     def state(self) -> StatusMessage:
-        """Return how the camera is."""
+        """Return the state of the camera."""
         return self._state.value()
 
     def figures(self) -> str:

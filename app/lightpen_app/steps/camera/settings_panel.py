@@ -95,7 +95,7 @@ class SettingsPanel(Translated, QGroupBox):
         self.set_camera(None, CameraSettings())
 
     def hint(self) -> StatusMessage:
-        """Return what to know about the pixel format."""
+        """Return the remark on the pixel format."""
         return self._hint.value()
 
     def counts(self) -> str:

@@ -21,7 +21,7 @@ MOST_SHOWN = 100  # findings; the rest is counted
 
 
 class SaveFormat(Enum):
-    """What is saved."""
+    """Format to save."""
 
     TABLE = auto()
     JSON = auto()

@@ -39,7 +39,7 @@ class DraftEdit(QUndoCommand):
 
     @override
     def id(self) -> int:
-        """Return which field is typed into."""
+        """Return the edited field."""
         if self.before.rows != self.after.rows:
             return NO_MERGING
         return DIAMETER if self.before.tip == self.after.tip else TIP
@@ -127,7 +127,7 @@ class LedDraft(QObject):
 
     @property
     def state(self) -> LedState:
-        """What the table shows now."""
+        """Current content of the table."""
         return self._state
 
     def follow_selection(self) -> None:
@@ -198,7 +198,7 @@ def why_not_savable(state: LedState) -> str:
 
 
 def unsaved_leds_text(state: LedState) -> str:
-    """Return what would be lost, a sentence."""
+    """Return the message on the changes that would be lost."""
     if not state.is_edited:
         return ""
     return QCoreApplication.translate("LedsPage", "The LED table has unsaved changes.")

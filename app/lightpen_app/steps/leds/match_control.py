@@ -56,7 +56,7 @@ class PenWatch(QObject):
         self._compare()
 
     def last_match(self, camera: Camera | None, pen: Pen | None) -> PenMatch | None:
-        """Return how a pen fitted when it was compared last; None if never."""
+        """Return the last comparison of the pen; None without one."""
         is_same = camera is self._camera and pen is self._pen
         return self._last if is_same else None
 

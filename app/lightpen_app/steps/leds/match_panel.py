@@ -190,7 +190,7 @@ class MatchPanel(Translated, QGroupBox):
             self._refresh()
 
     def value(self) -> PenMatch | None:
-        """Return how the pen fits the views so far."""
+        """Return the agreement of the pen with the views so far."""
         return self._match
 
     def set_value(self, value: PenMatch | None) -> None:

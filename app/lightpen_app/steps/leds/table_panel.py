@@ -21,7 +21,7 @@ from lightpen_app.widgets.translated import Translated
 
 
 class Changes(Enum):
-    """How the table differs from the file in use."""
+    """Difference of the table from the file in use."""
 
     NONE = auto()
     FOREIGN = auto()  # it shows another file, which cannot be used

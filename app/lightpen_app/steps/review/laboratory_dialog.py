@@ -18,7 +18,7 @@ N_NEEDED, N_FIELDS = 4, 7  # the others may be empty
 
 
 class LaboratoryDialog(FittedWindow, Translated, QDialog):
-    """Who calibrates where; name, e-mail address, city and country are needed.
+    """Dialog for the laboratory; name, e-mail address, city and country are required.
 
     Signals
     -------

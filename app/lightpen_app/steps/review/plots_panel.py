@@ -210,7 +210,7 @@ class ResidualsPanel(PlotsPanel):
 
 
 class UncertaintyPanel(PlotsPanel):
-    """What the uncertainty of the tip is made of, and the postures behind it."""
+    """Uncertainty budget of the tip, and the postures."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         # Widgets

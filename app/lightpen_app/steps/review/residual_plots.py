@@ -116,7 +116,7 @@ class MisfitPlot(Plot):
         self._on_limit_moved()
 
     def limit_pixel(self) -> QPoint:
-        """Return where the line can be gripped, in px of `canvas`."""
+        """Return the handle of the line, in px of `canvas`."""
         left, right = self.ranges()[0]
         return self._pixel(left + LIMIT_GRIP * (right - left), self._limit.value())
 
@@ -125,7 +125,7 @@ class MisfitPlot(Plot):
         return self._places[number]
 
     def pixel_of(self, number: int) -> QPoint:
-        """Return where an image is drawn, in px of `canvas`."""
+        """Return the position of an image, in px of `canvas`."""
         return self._pixel(*self._places[number])
 
     def canvas(self) -> QWidget:

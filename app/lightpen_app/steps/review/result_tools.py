@@ -14,7 +14,7 @@ from lightpen_app.widgets.translated import Translated
 
 @dataclass(frozen=True)
 class Export:
-    """What is saved."""
+    """Format to save."""
 
     formats: tuple[ExportFormat, ...]
     has_plots: bool = False

@@ -122,7 +122,7 @@ def returns_to_swing(before: SwingStatus, now: SwingStatus) -> bool:
 
 
 def next_step(status: SwingStatus) -> NextStep | None:
-    """Return what to do after the verdict; None as long as there is none."""
+    """Return the next step after the verdict; None without a verdict."""
     if status.verdict is not None:
         return status.verdict.next_step
     if status.failure is None:
@@ -297,7 +297,7 @@ def why_not_swung(status: SwingStatus) -> str:
 
 
 def unsaved_text(status: SwingStatus) -> str:
-    """Return what to think of before the window closes; nothing where all is done."""
+    """Return the question before the window closes; empty if all is done."""
     translate = QCoreApplication.translate
     if status.solution is None or status.result is not None:
         return ""

@@ -95,7 +95,7 @@ class DayControl(QObject):
             self.changed.emit()
 
     def main_action(self) -> MainAction:
-        """Return what the main button does: swing, or lead to what is not ready."""
+        """Return the action of the main button: swing, or show the missing input."""
         amber = self._first_amber()
         if amber is None:
             return MainAction(self.tr("Start swing"))

@@ -46,7 +46,7 @@ class TipRow:
 
 @dataclass(frozen=True)
 class ReadinessItem:
-    """One thing that a swing needs.
+    """One precondition of a swing.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class ReadinessItem:
 
 @dataclass(frozen=True)
 class CameraState:
-    """How the live images are.
+    """State of the live images.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ def readiness(
     file_doubt: str,
     verification: VerificationStatus,
 ) -> tuple[ReadinessItem, ...]:
-    """Return what a swing needs, in the order in which it is examined."""
+    """Return the preconditions of a swing, in order of examination."""
     return (
         ReadinessItem("camera", _camera_message(now, camera)),
         ReadinessItem("leds", _leds_message(now, statuses, camera, file_doubt)),
@@ -129,7 +129,7 @@ def readiness(
 
 
 def tip_details(now: Preparation, statuses: StationStatus) -> str:
-    """Return what is known of the tip that is chosen, in one line."""
+    """Return the text on the selected tip, in one line."""
     translate, names = QCoreApplication.translate, now.names
     tip, point = statuses.library.tips.get(names.tip), now.nominal_tip
     if point is None and now.pen is not None:

@@ -162,7 +162,7 @@ class DayView(Translated, QWidget):
         return self._search
 
     def readiness(self) -> tuple[ReadinessItem, ...]:
-        """Return what is said about the swing."""
+        """Return the text on the swing."""
         return self._ready.items()
 
     def set_question(self, temperature_c: float | None, *, is_asked: bool) -> None:

@@ -57,7 +57,7 @@ class ItemButton(Translated, PushButton):
         self._retranslate()
 
     def choices(self) -> tuple[ItemChoice, ...]:
-        """Return what can be chosen."""
+        """Return the choices."""
         return self._choices
 
     def set_choices(self, choices: Sequence[ItemChoice]) -> None:

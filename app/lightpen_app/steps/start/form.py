@@ -44,7 +44,7 @@ LARGEST_BALL = 100.0  # mm
 
 
 class NamesForm(Translated, QWidget):
-    """Who calibrates what, where.
+    """Station, operator and items under calibration.
 
     Signals
     -------
@@ -233,7 +233,7 @@ class NamesForm(Translated, QWidget):
 
 
 class LimitsForm(Translated, QGroupBox):
-    """What ends a swing.
+    """Limits that end a swing.
 
     Signals
     -------

@@ -100,7 +100,7 @@ class InterruptedItem(Translated, QFrame):
         return self._when.text(), unbroken(self._what.text())
 
     def height_for(self, width: int) -> int:
-        """Return how high the row must be to show its words whole, px."""
+        """Return the height of the row that shows its text completely, px."""
         least = SENTENCE_HEIGHT if self._kind is RowKind.DAMAGED else ROW_HEIGHT
         for each in self.findChildren(QWidget):
             each.ensurePolished()  # its font is known only then

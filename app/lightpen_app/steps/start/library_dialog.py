@@ -196,7 +196,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         super().done(result)
 
     def kind(self) -> ItemKind:
-        """Return which items are shown."""
+        """Return the kind of the shown items."""
         return KINDS[self._tabs.currentIndex()]
 
     def set_kind(self, kind: ItemKind) -> None:

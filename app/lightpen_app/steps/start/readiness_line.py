@@ -54,7 +54,7 @@ class ReadinessLine(QFrame):
             button.clicked.connect(partial(self._on_clicked, index))
 
     def items(self) -> tuple[ReadinessItem, ...]:
-        """Return what is shown."""
+        """Return the displayed value."""
         return self._items
 
     def set_narrow(self, narrow: bool) -> None:

@@ -43,7 +43,7 @@ SIZES = (  # of age, words and figures, where there is little room, plenty, and 
 
 @dataclass(frozen=True, eq=False)
 class LastResult:
-    """What is known of the current tip.
+    """Data of the current tip.
 
     Attributes
     ----------

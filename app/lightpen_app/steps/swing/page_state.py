@@ -53,7 +53,7 @@ class SideAction(Enum):
 
 @dataclass(frozen=True, eq=False)
 class SwingPageState:
-    """All that the page shows.
+    """Content of the page.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class SwingProgress:
 def advance_progress(
     before: SwingProgress | None, status: SwingStatus
 ) -> SwingProgress | None:
-    """Return what the swing lacks; None without a swing."""
+    """Return the shortfall of the swing; None without a swing."""
     state, setup = status.state, status.setup
     if state is None or setup is None:
         return None
@@ -269,7 +269,7 @@ def why_not_more(status: SwingStatus) -> str:
 
 
 def missing_text(status: SwingStatus) -> str:
-    """Return what the swing lacks, in sentences."""
+    """Return the shortfall of the swing as messages."""
     state, setup = status.state, status.setup
     if state is None or setup is None:
         return ""
@@ -277,7 +277,7 @@ def missing_text(status: SwingStatus) -> str:
 
 
 def unsaved_swing_text(status: SwingStatus) -> str:
-    """Return what to think of before the window closes; nothing where all is done."""
+    """Return the question before the window closes; empty if all is done."""
     state = status.state
     if state is None or state.phase is Phase.VERDICT or not state.n_kept:
         return ""

@@ -110,7 +110,7 @@ class SwingViewState:
 
     @cached_property
     def dial(self) -> DialValue:
-        """What the dial shows."""
+        """Content of the dial."""
         return _dial(self)
 
     @property
@@ -190,7 +190,7 @@ class SwingWords(QObject):
         )
 
     def note(self, moment: SwingViewState) -> str:
-        """Return what the count excludes: time, limit, and unused images."""
+        """Return the text beside the count: time, limit and unused images."""
         limit = moment.setup.limits.max_images
         text = self.tr("at most {0} images").format(limit)
         if moment.setup.is_recording:
@@ -227,7 +227,7 @@ class SwingWords(QObject):
         return StatusMessage(worded(why), Sign.WARNING, Tone.WARN)
 
     def stand(self, moment: SwingViewState) -> DisplayedPosture | None:
-        """Return how the pen is drawn in space; nothing where its tip is not known."""
+        """Return the view of the pen in space; None if its tip is unknown."""
         pen, seat = moment.setup.pen, moment.state.kept.seat or moment.state.seat
         tip = pen.nominal_tip if seat is None else seat.tip_pen
         if tip is None:

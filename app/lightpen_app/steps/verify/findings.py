@@ -66,7 +66,7 @@ def posture_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> Di
 
 
 def ring_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> RingValue:
-    """Return where a ring was touched, in the last run once it is done."""
+    """Return the touches of a ring, those of the last run once it is done."""
     found = state.found_by(CIRCLE)
     if found is None:
         fit = ring_fit(state.progress(setup, task).points)

@@ -1,4 +1,4 @@
-"""What the step Measure shows, computed from the status of the measurement."""
+"""Content of the step Measure, computed from the status of the measurement."""
 
 from dataclasses import replace
 

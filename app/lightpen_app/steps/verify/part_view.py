@@ -27,7 +27,7 @@ FROM_ABOVE = np.array([0.6, 0.0, 0.0])  # rotation vector of the first view
 
 @dataclass(frozen=True, eq=False)
 class PartValue:
-    """What of a part is drawn, frame of the camera, mm.
+    """Drawn content of a part, frame of the camera, mm.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ NOTHING = PartValue(EMPTY, EMPTY)
 
 
 def part_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> PartValue:
-    """Return what is probed of a part, and what is measured once it is done."""
+    """Return the probed points of a part, and its features once measured."""
     progress, found = state.progress(setup, task), state.found_by(PART)
     touching = state.touching
     is_seen = bool(touching.held) and not touching.n_lost

@@ -189,7 +189,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         job.start()
 
     def _folder(self) -> str:
-        """Return where files were saved last."""
+        """Return the folder of the last saved files."""
         return str(self._workbench.save_place.folder())
 
     def _on_free_clicked(self) -> None:

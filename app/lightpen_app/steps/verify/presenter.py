@@ -134,7 +134,7 @@ class VerifyPresenter(QObject):
         return PARTED.join(filter(None, parts))
 
     def _purpose(self) -> str:
-        """Return what the step is for."""
+        """Return the purpose of the step."""
         return self.tr("Verify the current tip on reference artefacts.")
 
     def _tip_is_doubted(self) -> bool:

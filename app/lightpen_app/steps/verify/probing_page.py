@@ -1,4 +1,4 @@
-"""What the steps Verify and Measure share: probing from the tip to a verdict."""
+"""Base of the steps Verify and Measure: probing from the tip to a verdict."""
 
 from functools import partial
 

@@ -21,7 +21,7 @@ TURN = 16 * 360  # of a circle, as Qt counts
 
 @dataclass(frozen=True)
 class RingValue:
-    """What of a ring is touched.
+    """Touches of a ring.
 
     Attributes
     ----------

@@ -33,7 +33,7 @@ class Headline:
 
 @dataclass(frozen=True, eq=False)
 class VerifyView:
-    """All that the page shows of a verification, except the results.
+    """Content of the page of a verification, except the results.
 
     Attributes
     ----------

@@ -43,7 +43,7 @@ SHIFT_TOLERANCE = 20.0  # px, once the shift common to all is taken off
 
 @dataclass(frozen=True)
 class SearchEffort:
-    """How hard to search an image.
+    """Effort of the search of an image.
 
     Attributes
     ----------

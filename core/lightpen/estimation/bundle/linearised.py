@@ -21,7 +21,7 @@ N_CONE = 3
 
 @dataclass(frozen=True, eq=False)
 class BundleState:
-    """All parameters that the images of a swing depend on.
+    """Parameters of the images of a swing.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class BundleState:
         return cones
 
     def leds_in(self, c: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return where LEDs are in the frame of a camera, mm, and their normals.
+        """Return the LEDs in the frame of a camera, mm, and their normals.
 
         Returns
         -------

@@ -213,7 +213,7 @@ class Linearised:
 
     @property
     def by_tip_and_cone(self) -> FloatArray:
-        """How far a step of (tip, cone) moves the tip in each image, (N, 3, 6)."""
+        """Derivative of the tip in each image by (tip, cone), (N, 3, 6)."""
         moves = np.empty((len(self.rotations), 3, 6))
         moves[..., :3] = -self.rotations
         moves[..., 3:] = np.eye(3)
@@ -338,7 +338,7 @@ def _descend(
 
 
 def inliers(residuals: FloatArray) -> BoolArray:
-    """Return which LEDs are inliers, (N, L), of residuals (N, L, 2), px.
+    """Return the mask of inlier LEDs, (N, L), by residuals (N, L, 2), px.
 
     None of an image that has too few of them.
     """

@@ -17,7 +17,7 @@ MIN_SEEN = 6  # images, to speak of a displacement
 
 @dataclass(frozen=True, eq=False)
 class LedQuality:
-    """How each LED fits.
+    """Quality of the fit of each LED.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ def measure_leds(rig: Rig, pen: Pen, pixels: FloatArray, joint: JointFit) -> Led
 def _displacements(
     rig: Rig, pen: Pen, pixels: FloatArray, joint: JointFit
 ) -> tuple[FloatArray, FloatArray]:
-    """Return where each LED sits by the poses of all, and its standard deviation, mm.
+    """Return the position of each LED by the poses of all, and its std. deviation, mm.
 
     An LED that was mostly left out is judged by all its images; its scatter then says
     whether it is displaced or only badly seen.

@@ -120,7 +120,7 @@ def require_fit(sigma: float) -> None:
 
 
 def _smeared(observations: Observations) -> BoolArray:
-    """Return which images have clearly wider LED rims than most."""
+    """Return the mask of images with clearly wider LED edges than most."""
     widths = observations.edge_widths
     known = widths[np.isfinite(widths)]
     usual = np.median(known) if len(known) else np.inf
@@ -128,7 +128,7 @@ def _smeared(observations: Observations) -> BoolArray:
 
 
 def _fitting(poses: Poses) -> BoolArray:
-    """Return which images have a pose that most of their LEDs agree with."""
+    """Return the mask of images whose pose agrees with most of their LEDs."""
     n_seen = (poses.weights > 0).sum(axis=1)
     n_trusted = (poses.weights > TRUSTED_WEIGHT).sum(axis=1)
     return np.asarray((n_trusted >= MIN_POSE_LEDS) & (2 * n_trusted > n_seen))

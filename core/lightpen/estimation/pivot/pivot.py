@@ -166,7 +166,7 @@ class _Equations:
         return np.asarray(solution)
 
     def inliers(self, solution: FloatArray, used: BoolArray) -> BoolArray:
-        """Return which poses are inliers.
+        """Return the mask of the inliers.
 
         The median distance of the used poses sets the unit, so that a model that fits
         worse than the covariances say (geometry errors, a worn cone) does not cost good
@@ -205,7 +205,7 @@ class _Equations:
         return H, g + H @ shift
 
     def residuals(self, solution: FloatArray) -> FloatArray:
-        """Return where each pose puts the tip minus the pivot, (N, 3), mm."""
+        """Return the tip by each pose minus the pivot, (N, 3), mm."""
         return contact_residuals(
             self.rotations, self.translations, solution[:3], solution[3:]
         )

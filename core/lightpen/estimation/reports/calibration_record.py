@@ -39,7 +39,7 @@ Lamp: TypeAlias = tuple[Length | None, Length | None]
 
 
 class ImageCounts(Struct, frozen=True):
-    """How many images there are, and why some are not used."""
+    """Number of images, and reasons for unused ones."""
 
     total: Count
     used: Count

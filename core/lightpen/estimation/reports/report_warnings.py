@@ -76,7 +76,7 @@ def _copy_warnings(calibration: Calibration) -> list[Message]:
 
 
 def _noise_warnings(calibration: Calibration) -> list[Message]:
-    """Return what is reported of LEDs that are far noisier than the others."""
+    """Return the warnings on LEDs that are far noisier than the others."""
     bundle = calibration.bundle
     noise = np.median(bundle.unknowns.noise, axis=0).max(axis=0)
     return [

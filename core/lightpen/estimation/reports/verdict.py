@@ -67,7 +67,7 @@ _ADVICE = {
 
 
 class Grade(StrEnum):
-    """What to do with a calibration."""
+    """Grade of a calibration."""
 
     PASS = "pass"
     CHECK = "check"
@@ -75,7 +75,7 @@ class Grade(StrEnum):
 
 
 class NextStep(StrEnum):
-    """What to do after a verdict."""
+    """Next step after a verdict."""
 
     ACCEPT = "accept"
     CAPTURE_MORE = "capture more"
@@ -171,7 +171,7 @@ _NEXT_STEPS = {
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """How far a tip lies from an earlier one.
+    """Change of a tip since an earlier calibration.
 
     Attributes
     ----------
@@ -186,7 +186,7 @@ class Change:
 
     @property
     def distance(self) -> float:
-        """How far apart the tips lie, mm."""
+        """Distance of the tips, mm."""
         return float(np.linalg.norm(self.difference))
 
     @property

@@ -53,7 +53,7 @@ class _RigMistake:
 
 
 class _Distance(NamedTuple):
-    """How far a camera lies from where the images put it."""
+    """Deviation of stated extrinsics from those by the images."""
 
     camera: int
     angle: float  # rad

@@ -82,7 +82,7 @@ class PenRotations:
 
 @dataclass(frozen=True, eq=False)
 class RelativeRotation:
-    """How one camera is turned against another, by P moments that both see.
+    """Relative rotation of two cameras at P common moments.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class TimeLag:
 
 
 def relative_turn(one: PenRotations, other: PenRotations) -> RelativeRotation:
-    """Return how the other camera is turned, robust against poses that are wrong."""
+    """Return the relative rotation of the other camera, robust against outliers."""
     pairs = np.flatnonzero(one.known & other.known)
     each = other.rotations[pairs] @ np.swapaxes(one.rotations[pairs], 1, 2)
     rotation = nearest_rotation(np.median(each, axis=0))
@@ -157,7 +157,7 @@ def relative_turn(one: PenRotations, other: PenRotations) -> RelativeRotation:
 def require_same_moments(
     one: PenRotations, other: PenRotations, name: str
 ) -> RelativeRotation:
-    """Return how the other camera is turned, if its images are of the same moments.
+    """Return the relative rotation of the other camera, if the images are simultaneous.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How U is made: the uncertainty budget of tip and cone.
+"""Uncertainty budget of tip and cone: how U is computed.
 
 All equations are those of method.md. The fit is linear about its solution: with the
 information N of the images, L of the priors and M of other measurements, the unknowns

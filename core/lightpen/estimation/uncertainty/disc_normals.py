@@ -27,7 +27,7 @@ TURN = 1e-3  # rad, of a difference
 
 
 class NormalEffect(NamedTuple):
-    """What a turn of all normals does to a bundle that holds them.
+    """Effect of a rotation of all normals on a bundle with fixed normals.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class NormalEffect(NamedTuple):
 
 
 def effect_of_normals(bundle: Bundle) -> NormalEffect:
-    """Return what a turn of all normals does, to first order.
+    """Return the first-order effect of a rotation of all normals.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ class Parameters(NamedTuple):
 
     @property
     def number(self) -> int:
-        """How many there are."""
+        """Their number."""
         return int(self.leds.stop)
 
 

@@ -55,7 +55,7 @@ class SecondImages:
     def joined(
         self, first: BundleState, pixels: FloatArray
     ) -> tuple[BundleState, FloatArray]:
-        """Return where the adjustment of both swings begins, and the images of both.
+        """Return the start values of the adjustment of both swings, and their images.
 
         Parameters
         ----------

@@ -163,7 +163,7 @@ class CalibrationFile:
 
 @dataclass(frozen=True, eq=False)
 class ShownImages:
-    """What the images of a calibration showed.
+    """Observations of a calibration.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What an exported tip is besides valid, when it was measured, and when it is due."""
+"""Status, date and due date of an exported tip."""
 
 from contextlib import suppress
 from dataclasses import replace

@@ -4,7 +4,7 @@ from enum import StrEnum
 
 
 class TrialOutcome(StrEnum):
-    """How a verification or the calibration of a camera ended."""
+    """Outcome of a verification or of the calibration of a camera."""
 
     ACCEPTED = "accepted"
     REFUSED = "refused"  # solved, but not used

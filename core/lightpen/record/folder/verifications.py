@@ -90,7 +90,7 @@ class StoredVerification(Struct, frozen=True):
 
     @property
     def why(self) -> StoredMessage | None:
-        """What its grade is for."""
+        """Reason of the grade."""
         verdict = self.verdict
         if verdict is None:
             return None

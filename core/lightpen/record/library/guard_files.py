@@ -47,7 +47,7 @@ _Signed: TypeAlias = Annotated[str, Meta(pattern="^([0-9a-f]{128})?$")]
 
 
 class PasswordVerifier(Struct, frozen=True):
-    """What a password is verified by: the supervisor's public key that follows from it.
+    """Verifier of a password: the supervisor's public key derived from it.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class PasswordVerifier(Struct, frozen=True):
 
 
 class LimitsChange(Struct, omit_defaults=True, kw_only=True):
-    """What was set at one time: a password, limits of a station, or a station key.
+    """One setting: a password, limits of a station, or a station key.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class LimitsChange(Struct, omit_defaults=True, kw_only=True):
 
 
 def read_limits_change(content: bytes, file: Path) -> LimitsChange:
-    """Return what a file of limits says; its signatures are not verified.
+    """Return the content of a file of limits, without verifying signatures.
 
     Raises
     ------

@@ -7,5 +7,5 @@ SUPERVISOR_SIGNATURE = "supervisor_signature"
 
 
 def key_change(chain: str, public: str) -> bytes:
-    """Return what approves another station key of a chain when signed."""
+    """Return the text whose signature approves another station key of a chain."""
     return f"lightpen station key\n{chain}\n{public}".encode()

@@ -57,7 +57,7 @@ PICTURE = message("file.picture")
 
 @dataclass(frozen=True)
 class Author:
-    """Who changes the library.
+    """Author of a change of the library.
 
     Attributes
     ----------
@@ -259,7 +259,7 @@ def given_axis(direction: tuple[float, float, float]) -> tuple[float, float, flo
 
 
 def no_such_item(kind: ItemKind, name: str) -> Message:
-    """Return that an item is not in the library."""
+    """Return the error that an item is not in the library."""
     return message("library.no-such-item", kind=KIND_WORDS[kind], id=printable(name))
 
 

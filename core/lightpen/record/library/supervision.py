@@ -39,7 +39,7 @@ from lightpen.record.signing.station import memory_file, remembered
 
 @dataclass(frozen=True)
 class Signature:
-    """Who signs as a supervisor, by name and password."""
+    """Name and password of a supervisor."""
 
     name: str
     password: str = field(repr=False)
@@ -47,7 +47,7 @@ class Signature:
 
 @dataclass(frozen=True)
 class Supervision:
-    """What the supervisors of a data folder have set.
+    """Limits and guard set by the supervisors of a data folder.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ def folded_name(station: str) -> str:
 
 
 def read_supervision(data: Path) -> Supervision:
-    """Return what is set in a data folder.
+    """Return limits and guard of a data folder.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def require_name(signature: Signature) -> None:
 def _followed(
     guard: Supervision, data: Path, file: Path, content: bytes
 ) -> Supervision:
-    """Return what is set after one more change."""
+    """Return limits and guard after one more change."""
     change = read_limits_change(content, file)
     found = signatures_of(content, place_in(data, file))
     password, station_keys = change.password or guard.password, guard.station_keys

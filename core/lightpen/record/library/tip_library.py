@@ -49,7 +49,7 @@ ItemT = TypeVar("ItemT", bound="Item")
 
 
 class ItemKind(StrEnum):
-    """What is in the library."""
+    """Kinds of items of the library."""
 
     PEN = "pen"
     TIP = "tip"
@@ -69,7 +69,7 @@ KIND_WORDS: Mapping[ItemKind, Message] = {
 
 
 class AxisOrigin(StrEnum):
-    """How the axis of a stylus was found."""
+    """Origin of the axis of a stylus."""
 
     GIVEN = "given"
     SPIN = "spin"
@@ -83,7 +83,7 @@ class Picture(Struct, frozen=True):
 
 
 class Item(Struct, frozen=True, kw_only=True):
-    """What every item has.
+    """Common entries of all items.
 
     Attributes
     ----------

@@ -42,7 +42,7 @@ from lightpen.swing_messages import last_unknown, too_little_tilt
 
 @dataclass(frozen=True, eq=False)
 class SwingAssessment:
-    """What a solved swing is worth.
+    """Assessment of a solved swing.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Which tips of a pen can be calibrated after one."""
+"""Tips of a pen that can be calibrated next."""
 
 from contextlib import suppress
 from dataclasses import dataclass

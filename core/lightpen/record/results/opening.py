@@ -1,4 +1,4 @@
-"""What is opened from outside the program: a swing, by any file that leads to it.
+"""Opening a swing from outside the program, by any file that belongs to it.
 
 A record is a folder, and no system opens a folder with a program of its own choice: in
 each lies a small file whose name does. A result leads to the swing that it comes from.

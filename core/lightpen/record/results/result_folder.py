@@ -294,7 +294,7 @@ class FolderArchive:
         return (self._data / SIMULATED if is_simulated else self._data) / RESULTS
 
     def _roots(self) -> tuple[Path, Path]:
-        """Return where results are."""
+        """Return the folder of the results."""
         return self._root(True), self.folder
 
     def _standing(

@@ -79,7 +79,7 @@ class ResultHeading(Struct):
 
 
 class Withdrawal(Struct, frozen=True):
-    """What takes a result back.
+    """Revocation of a result.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class Withdrawal(Struct, frozen=True):
 
 
 class TipChange(Struct, frozen=True):
-    """How far a tip lies from the one that was in force before, when it was accepted.
+    """Distance of a tip from its predecessor at acceptance.
 
     That one is the tip as found, the one that was accepted the tip as left.
 
@@ -145,7 +145,7 @@ class TipChange(Struct, frozen=True):
 
     @property
     def distance_mm(self) -> float:
-        """How far apart the tips lie."""
+        """Distance of the tips."""
         return math.hypot(*self.difference_mm)
 
     @property
@@ -295,7 +295,7 @@ def result_bytes(
 def withdrawal_bytes(
     withdrawal: Withdrawal, sign: Callable[[bytes], bytes] = bytes
 ) -> bytes:
-    """Return what takes a result back, as JSON; ``sign`` as of `result_bytes`."""
+    """Return a revocation as JSON; ``sign`` as of `result_bytes`."""
     entries = {"format": newest_format(WITHDRAWAL), **to_builtins(withdrawal)}
     return with_checksum(sign(json_bytes(entries)))
 

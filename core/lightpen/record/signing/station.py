@@ -38,7 +38,7 @@ WHAT = message("file.station-key")
 
 
 class RememberedFolder(Struct, frozen=True):
-    """What a user account remembers of a data folder with a supervisor password.
+    """Memory of a user account about a data folder with a supervisor password.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What is assumed of a station, among the settings of a record."""
+"""Assumptions of a station in the settings of a record."""
 
 from collections.abc import Mapping
 from dataclasses import asdict

@@ -92,7 +92,7 @@ class RigCopies(Struct, frozen=True):
 
 
 class Header(Struct, frozen=True, kw_only=True):
-    """What a swing was captured with.
+    """Conditions of the capture of a swing.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a review lists of a solved swing: its images, the worst first."""
+"""Images of a solved swing for the review, the worst first."""
 
 from collections import Counter
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Who calibrates what, and the name of the folder that a swing gets by it."""
+"""Names of station, operator and items, and the folder name of a swing."""
 
 import re
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ LONGEST_WORD = 24  # characters; of up to 4 bytes, of the 255 that a name may ha
 
 @dataclass(frozen=True)
 class Names:
-    """Who calibrates what, where.
+    """Station, operator and items under calibration.
 
     Attributes
     ----------

@@ -32,7 +32,7 @@ from lightpen.record.swings.reading import Record, image_name, recorded_origin
 
 @dataclass(frozen=True, eq=False)
 class RecordSource:
-    """What a calibration is computed from.
+    """Inputs of a calibration.
 
     Attributes
     ----------

@@ -48,7 +48,7 @@ OPENER_TEXT = b"Open this file to see the swing of this folder in Lightpen.\n"
 
 @dataclass(frozen=True, eq=False)
 class SecondaryView:
-    """What another camera of a rig saw at the moment of an image.
+    """Simultaneous image of another camera of a rig.
 
     Attributes
     ----------

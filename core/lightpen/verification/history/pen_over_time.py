@@ -67,7 +67,7 @@ class PenOverTime:
 
     @property
     def n_missing(self) -> int:
-        """How many swings are missing before a better LED file can be made."""
+        """Number of swings missing for an improved LED file."""
         return max(MIN_POOLED + 1 - len(self.poolable), 0)
 
 

@@ -44,7 +44,7 @@ MORE_IMAGES = message("press-test.more-images")
 
 @dataclass(frozen=True, eq=False)
 class PressTest:
-    """What firm pressure changed.
+    """Change of the tip by firm pressure.
 
     Attributes
     ----------

@@ -55,7 +55,7 @@ class CurrentTip:
 
     @property
     def region(self) -> RegionOfInterest:
-        """What to look for in the images."""
+        """Target of the detection."""
         pen, rig = self.instrument.pen, self.instrument.rig
         first, *others = (
             RegionOfInterest(camera, pen, mask)

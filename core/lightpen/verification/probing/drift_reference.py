@@ -37,7 +37,7 @@ MIN_BLOCKS, MAX_BLOCKS = 3, 10  # before, during and after; larger ones are less
 
 @dataclass(frozen=True, eq=False)
 class LampImages:
-    """What images of touches show of lamps, in the order of time.
+    """Lamps in images of touches, in order of time.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class LampImages:
 
 @dataclass(frozen=True, eq=False)
 class LampObservations:
-    """What the images of each camera show of lamps.
+    """Lamps in the images of each camera.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class LampObservations:
 
 
 def lamps_in(seen: Sequence[Observations]) -> LampObservations:
-    """Return what recorded images of each camera show of lamps."""
+    """Return the lamps in recorded images of each camera."""
     return LampObservations(tuple(map(_lamps_of, seen)))
 
 
@@ -127,7 +127,7 @@ def _lights(
 
 @dataclass(frozen=True, eq=False)
 class LampDrift:
-    """How far fixed lamps moved while a tip was verified.
+    """Drift of fixed lamps during a verification.
 
     Attributes
     ----------

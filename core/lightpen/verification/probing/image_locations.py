@@ -1,4 +1,4 @@
-"""Where images of touches are: folders, patterns and videos, and records of swings.
+"""Locations of images of touches: folders, patterns, videos and records of swings.
 
 Those of a rig are in a folder for each camera, named as the rig file names it, in the
 folder of a run; or in a record.
@@ -144,7 +144,7 @@ def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> ImageLocation
 
 
 def _recorded_touches(record: Record) -> tuple[RecordedTouch, ...] | None:
-    """Return which touches the images of a verification are of; None of a swing."""
+    """Return the touch of each image of a verification; None for a swing."""
     if not any(image.touch for image in record.images):
         return None
     out = record.taken_out

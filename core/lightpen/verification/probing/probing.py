@@ -55,7 +55,7 @@ class ProbingPhase(StrEnum):
 
 
 class ProbingEventKind(StrEnum):
-    """What can happen."""
+    """Kinds of probing events."""
 
     RECORDED = "recorded"
     BROKEN_OFF = "broken off"
@@ -63,7 +63,7 @@ class ProbingEventKind(StrEnum):
 
 @dataclass(frozen=True)
 class ProbingRules:
-    """When a touch is taken.
+    """Rules of recording a touch.
 
     Attributes
     ----------
@@ -236,7 +236,7 @@ def taken_again(
 
 
 def touch_frame(name: str, detection: PenDetection) -> ProbingFrame:
-    """Return what images with a pose show of the pen."""
+    """Return the observation of the pen in images with a pose."""
     return ProbingFrame(
         name, detection.rig_pixels, detection.rotation, detection.translation
     )

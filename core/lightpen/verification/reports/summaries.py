@@ -170,7 +170,7 @@ def pen_health_text(found: PenHealth) -> str:
 
 
 def press_test_text(found: PressTest) -> str:
-    """Return what firm pressure changed as text."""
+    """Return the change by firm pressure as text."""
     names = ("Tip x", "Tip y (along pen)", "Tip z", "Cone u", "Cone v", "Cone w")
     lines = [f"{'Firm less usual, mm':<{TITLE}}{'change':>{COLUMN}}{'U':>{COLUMN}}"]
     for name, *values in zip(names, found.change, found.uncertainty, strict=True):

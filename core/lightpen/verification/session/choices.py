@@ -1,4 +1,4 @@
-"""What a station verifies, with which artefacts, and by which limits."""
+"""Verification tasks of a station, with artefacts and limits."""
 
 from dataclasses import dataclass, field, replace
 
@@ -21,7 +21,7 @@ from lightpen.verification.tasks.task import FoundT, OptionsT, VerificationTask
 
 @dataclass(frozen=True)
 class VerificationChoices:
-    """What is verified, and how.
+    """Selected tasks and their options.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class VerificationChoices:
         return replace(self, kinds=tuple(t.kind for t in ALL_TASKS if t.kind in kinds))
 
     def missing(self, ball_diameter: float | None) -> Message | None:
-        """Return what must be entered before, with a ball of this diameter, mm."""
+        """Return the missing entry, with a ball of this diameter, mm."""
         if not self.kinds:
             return message("verification.no-task")
         each = (t.missing(self.options_of(t), ball_diameter) for t in self.tasks)

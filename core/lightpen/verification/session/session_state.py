@@ -30,7 +30,7 @@ from lightpen.verification.tasks.task import (
 
 @dataclass(frozen=True, eq=False)
 class SessionSetup:
-    """What is verified, and by what; see `Conditions`."""
+    """Instrument, tasks and artefacts; see `Conditions`."""
 
     instrument: Instrument
     choices: VerificationChoices = field(default_factory=VerificationChoices)

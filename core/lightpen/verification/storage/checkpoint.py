@@ -110,7 +110,7 @@ class VerificationCheckpoint(Struct, frozen=True):
 
     @property
     def n_done(self) -> int:
-        """How many of its tasks are done."""
+        """Number of completed tasks."""
         done = {run.task for run in self.runs if run.is_last}
         return len(done | {images.task for images in self.read})
 

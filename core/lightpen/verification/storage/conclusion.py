@@ -1,4 +1,4 @@
-"""How a verification ended: accepted, refused or abandoned, in a file that stays.
+"""End of a verification: accepted, refused or abandoned, in a permanent file.
 
 A verification is concluded when all that was chosen is done: accepted where the limits
 are kept, refused where they are not. Who accepts the tip all the same concludes it once

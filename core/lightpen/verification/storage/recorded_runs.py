@@ -30,7 +30,7 @@ class CompletedTask:
 
 @dataclass(frozen=True, eq=False)
 class ReadRuns:
-    """What recorded images have found.
+    """Results from recorded images.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ def read_runs(
     rules: ProbingRules,
     report: Report,
 ) -> ReadRuns:
-    """Return what recorded images have found.
+    """Return the results from recorded images.
 
     Parameters
     ----------

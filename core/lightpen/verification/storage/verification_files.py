@@ -34,7 +34,7 @@ from lightpen.verification.tasks.task import Found
 
 @dataclass(frozen=True)
 class TaskImages:
-    """Where the images of a task come from.
+    """Source of the images of a task.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ def camera_serials(instrument: Instrument) -> list[str]:
 def conditions_entries(
     temperature_c: float | None, humidity_percent: float | None
 ) -> dict[str, float]:
-    """Return what was measured of the environment, as entries of a record."""
+    """Return the measured environment as entries of a record."""
     conditions = {"temperature_c": temperature_c, "humidity_percent": humidity_percent}
     return {name: each for name, each in conditions.items() if each is not None}
 

@@ -1,4 +1,4 @@
-"""What a verification found: a grade, the reason that counts most, and what to do."""
+"""Assessment of a verification: grade, main reason and next step."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ WORST = (Grade.PASS, Grade.CHECK, Grade.REPEAT)  # last
 
 @dataclass(frozen=True)
 class VerificationAssessment:
-    """What a verification found.
+    """Assessment of a verification.
 
     A value is compared with its limit by the decision rule of the limits. A difference
     that is more than chance and relevant for the limit is never accepted in silence.
@@ -51,7 +51,7 @@ def worst(found: Iterable[VerificationAssessment]) -> VerificationAssessment:
 
 
 def accepted(reason: Message, next_step: Message = USE_TIP) -> VerificationAssessment:
-    """Return that all is well."""
+    """Return an assessment that passes."""
     return VerificationAssessment(Grade.PASS, reason, next_step)
 
 
@@ -92,7 +92,7 @@ def judged_error(
     blamed: VerificationAssessment,
     n_values: int = 1,
 ) -> VerificationAssessment | None:
-    """Return what an error with its U (k = 2), mm, is found to be; None if it passes.
+    """Return the assessment of an error with its U (k = 2), mm; None if it passes.
 
     Parameters
     ----------

@@ -391,7 +391,7 @@ def covered(points: Sequence[ProbedPoint]) -> float:
 def away_from_cones(
     options: object, conditions: Conditions, progress: TaskProgress
 ) -> Screening:
-    """Return that the last point counts unless it is in a cone that is done."""
+    """Accept the last point unless it is in a cone that was probed before."""
     last, count = progress.points[-1].point_cam, len(progress.points)
     distances = (float(np.linalg.norm(last - cone)) for cone in progress.cones)
     if any(distance <= IN_CONE for distance in distances):

@@ -67,7 +67,7 @@ class CircleFit:
 
     @property
     def covered(self) -> float:
-        """All of the ring but its largest gap between touches, degrees."""
+        """Covered angle: 360 minus the largest gap between touches, degrees."""
         return 360.0 - float(np.degrees(gaps_of(self.angles).max()))
 
 
@@ -163,7 +163,7 @@ def ring_residuals(fit: CircleFit, n: int) -> RingResiduals:
 
 
 def on_ring_of(points: FloatArray) -> BoolArray:
-    """Return which points (N, 3) lie on the circle that most of them lie on."""
+    """Return the mask of the points (N, 3) on the circle through most of them."""
     rng = np.random.default_rng(0)  # the same points give the same circle
     members = np.argsort(rng.random((N_SAMPLES, len(points))), axis=1)[:, :3]
     a, b, c = (points[members[:, k]] for k in range(3))

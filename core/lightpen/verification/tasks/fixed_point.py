@@ -135,7 +135,7 @@ class FixedPoint(Found):
 
 
 class FixedPointOptions(TaskOptions, frozen=True, tag="fixed point"):
-    """How often the cone is probed."""
+    """Number of touches of the cone."""
 
     n_touches: Annotated[int, Meta(ge=MIN_TOUCHES, le=MAX_TOUCHES)] = USUAL_TOUCHES
 
@@ -274,7 +274,7 @@ def _assessment(
 def without_others(
     points: Sequence[ProbedPoint], limit: float = ELSEWHERE
 ) -> Screening:
-    """Return that points count that lie within a limit, mm, of most of them."""
+    """Accept the points within a limit, mm, of most of them."""
     places = scatter_of(points).points
     distances = np.linalg.norm(places - np.median(places, axis=0), axis=1)
     kept = np.flatnonzero(distances <= limit).tolist()
@@ -284,7 +284,7 @@ def without_others(
 
 
 def elsewhere(distance: float) -> Message:
-    """Return that a point does not count that lies this far from the others, mm."""
+    """Reject a point at this distance from the others, mm."""
     return message("session.elsewhere", distance=distance)
 
 

@@ -296,7 +296,7 @@ def _refinement_entries(
 
 
 def _refined(refinement: Refinement, instrument: Instrument) -> Message:
-    """Return what features of known form say of the tip."""
+    """Return the evidence on the tip by features of known form."""
     names = ", ".join(refinement.names)
     if not refinement.is_used:
         return message(

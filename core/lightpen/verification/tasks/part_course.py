@@ -202,7 +202,7 @@ def fit_of(
 
 @cache
 def planned_places(planned: PlannedFeature) -> tuple[Place, ...]:
-    """Return where to probe a feature by its nominals, frame of the part.
+    """Return the points to probe on a feature by its nominals, frame of the part.
 
     The normals point out of the material. Empty if the nominals do not tell.
     """
@@ -224,7 +224,7 @@ def planned_places(planned: PlannedFeature) -> tuple[Place, ...]:
 
 
 def hand_goal(options: PartOptions, run: int, step: int) -> HandGoal:
-    """Return what a simulated operator does for a point of a run, both from 0."""
+    """Return the goal of a simulated operator for a point of a run, both from 0."""
     planned = planned_at(options, run)
     places = () if planned is None else planned_places(planned)
     if not places:

@@ -224,7 +224,7 @@ def fit_plane(points_cam: FloatArray) -> PlaneFit:
 
 
 def _on_plane(places: FloatArray) -> BoolArray:
-    """Return which points (N, 3) lie on the plane that most of them lie on."""
+    """Return the mask of the points (N, 3) on the plane through most of them."""
     rng = np.random.default_rng(0)  # the same points give the same plane
     members = np.argsort(rng.random((N_SAMPLES, len(places))), axis=1)[:, :3]
     a, b, c = (places[members[:, k]] for k in range(3))

@@ -275,7 +275,7 @@ def point_sensitivities(instrument: Instrument, poses: Poses) -> FloatArray:
 
 
 class _Derivatives(NamedTuple):
-    """How the centres in the images of a camera follow poses and parameters.
+    """Derivatives of the centres in the images of a camera by poses and parameters.
 
     Attributes
     ----------
@@ -328,7 +328,7 @@ def _pooled_sigma(instrument: Instrument, poses: Poses) -> float:
 
 
 def _agreeing(points: FloatArray, noises: FloatArray) -> list[int]:
-    """Return which points (n, 3) of a touch are where most of them are."""
+    """Return the mask of the inliers of the points (n, 3) of a touch."""
     distances = in_deviations(points - np.median(points, axis=0), noises)
     unit = max(float(np.median(distances)) / median_distance(), 1.0)
     return np.flatnonzero(distances <= outlier_distance() * unit).tolist()

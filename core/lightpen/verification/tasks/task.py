@@ -28,7 +28,7 @@ Runs: TypeAlias = Sequence[tuple[str, Sequence[ProbedPoint]]]
 
 
 class Surface(StrEnum):
-    """What the ball touches of a ring, or of the ends of a length."""
+    """Probed surface of a ring, or of the ends of a length."""
 
     GROOVE = "groove"  # in which the centre of the ball runs, or cones
     BORE = "bore"  # or inner faces
@@ -87,7 +87,7 @@ class NumberOption:
 
 @dataclass(frozen=True)
 class SurfaceOption:
-    """Which surface of an artefact is touched.
+    """Option for the probed surface of an artefact.
 
     Attributes
     ----------
@@ -242,18 +242,18 @@ class Screening:
 
 
 def keep_all(count: int) -> Screening:
-    """Return that all points count."""
+    """Accept all points."""
     return Screening(range(count))
 
 
 def without_last(count: int, fault: Message) -> Screening:
-    """Return that the last point does not count."""
+    """Reject the last point."""
     return Screening(range(count - 1), fault)
 
 
 @dataclass(frozen=True)
 class HandGoal:
-    """What a simulated operator does for the next point.
+    """Goal of a simulated operator for the next point.
 
     Attributes
     ----------

@@ -163,7 +163,7 @@ def _detected_deviations() -> float:
 def judged_tip(
     found: TipEvidence, limits: VerificationLimits
 ) -> VerificationAssessment | None:
-    """Return what is found against the tip; None if nothing is."""
+    """Return the finding against the tip; None without one."""
     change, uncertainty = found.known_change, found.known_uncertainty
     distance = float(np.linalg.norm(change))
     if not found.is_significant or distance <= RELEVANT * limits.tip:
