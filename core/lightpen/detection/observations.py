@@ -18,7 +18,7 @@ from lightpen.detection.pen_detection import (
     unseen,
 )
 from lightpen.detection.pose import MIN_POSE_LEDS, start_poses
-from lightpen.detection.reasons import MISHAPS, Reason, mishap_detail
+from lightpen.detection.reasons import UNFORESEEN, Reason, exception_detail
 from lightpen.detection.small_spots import MIN_WIDTH
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import CalibrationError, FileError
@@ -98,7 +98,7 @@ class _Searched:
 
     @classmethod
     def failed(cls, error: Exception) -> Self:
-        return cls(reason=Reason.UNHANDLED, detail=mishap_detail(error))
+        return cls(reason=Reason.UNHANDLED, detail=exception_detail(error))
 
 
 def observe_images(
@@ -245,7 +245,7 @@ def _search(
             detect_spots(image, mask, full_scale=full_scale),
             masked_lights(image, mask, full_scale),
         )
-    except MISHAPS as error:
+    except UNFORESEEN as error:
         return _Searched.failed(error)
 
 
@@ -256,7 +256,7 @@ def _labelled(
     spots = [image.spots for image in searched]
     try:
         detections = detections_of(spots, label_images(spots, camera, pen), camera)
-    except MISHAPS as error:
+    except UNFORESEEN as error:
         if len(searched) > 1:  # which one it was is seen one by one
             return [
                 pair for image in searched for pair in _labelled([image], camera, pen)

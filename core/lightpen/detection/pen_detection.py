@@ -23,7 +23,7 @@ from lightpen.detection.labelling.labels import (
     track_spots,
 )
 from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_poses
-from lightpen.detection.reasons import MISHAPS, Reason
+from lightpen.detection.reasons import UNFORESEEN, Reason
 from lightpen.detection.spots import EXACT_SIGMA, SpotFlaw, Spots, detect_spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
@@ -197,7 +197,7 @@ def detect_pen(
         labels = _label(spots, camera, pen, before)
         detection = detections_of([spots], [labels], camera)[0]
         return _fitted(detection, camera, pen, is_near=True)
-    except MISHAPS:
+    except UNFORESEEN:
         return unseen(pen, Reason.UNHANDLED)
 
 

@@ -8,7 +8,7 @@ from lightpen.messages import Message, message
 
 # Exceptions of the arithmetic on unforeseen images. One such image is left
 # out, and says so; it does not end a swing or a calibration.
-MISHAPS = (ArithmeticError, ValueError, cv2.error)
+UNFORESEEN = (ArithmeticError, ValueError, cv2.error)
 
 
 class Reason(StrEnum):
@@ -77,6 +77,6 @@ def counted(n_images: int, reason: Reason) -> Message:
     )
 
 
-def mishap_detail(error: Exception) -> Message:
-    """Return the detail of an image that failed by one of `MISHAPS`."""
+def exception_detail(error: Exception) -> Message:
+    """Return the detail of an image that failed by one of `UNFORESEEN`."""
     return message("image.unhandled", kind=type(error).__name__, problem=str(error))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.reasons import MISHAPS
+from lightpen.detection.reasons import UNFORESEEN
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 from lightpen.errors import FileError
 from lightpen.formats.decoding import bits_of
@@ -90,7 +90,7 @@ def find_spots(
         size = (image.shape[1], image.shape[0])
         try:
             return detect_spots(image, full_scale=2 ** bits_of(image) - 1), size
-        except MISHAPS:
+        except UNFORESEEN:
             return Spots.none(), size
 
     n_images = len(source.names)

@@ -53,9 +53,9 @@ def find_change(mixed: MixedFit, names: tuple[str, ...]) -> CameraChange | None:
     found = _most_significant(mixed, [*shares, np.linspace(-0.5, 0.5, n_views)])
     if found is None:
         return None
-    number, *change = found
+    number, difference, in_image = found
     name = names[splits[number]] if number < len(splits) else ""
-    return CameraChange(name, *change)
+    return CameraChange(name, difference, in_image)
 
 
 def find_alternation(mixed: MixedFit) -> CameraChange | None:

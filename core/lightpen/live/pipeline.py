@@ -30,7 +30,7 @@ from lightpen.cameras.protocol import (
 from lightpen.cameras.worker import LONGEST_STOP, CameraWorker
 from lightpen.cameras.worker_events import Failed, FaultRaised, FrameReady, WorkerEvent
 from lightpen.detection.pen_detection import PenDetection, detect_pen
-from lightpen.detection.reasons import MISHAPS
+from lightpen.detection.reasons import UNFORESEEN
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.detection.spots import Spots, detect_spots, have_moved
 from lightpen.errors import LightpenError
@@ -445,7 +445,7 @@ class Live:
             try:
                 spots = detect_spots(frame.image, mask, full_scale=frame.full_scale)
                 return LiveImage(frame, spots, None, c)
-            except MISHAPS:
+            except UNFORESEEN:
                 return LiveImage(frame, Spots.none(), None, c)
         detection = detect_pen(
             frame.image,

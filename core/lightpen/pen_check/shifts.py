@@ -126,10 +126,10 @@ def _next_shifted(system: "_System", shifted: list[int]) -> _Found | None:
     order = np.argsort(-gains)
     best = others[order[0]]
     # How much the rest explains once the best is free.
-    freed = np.array([*shifted, best])
-    base = system.gain(freed)
-    rest = [system.gain(np.append(freed, j)) - base for j in others if j != best]
-    length = np.linalg.norm(system.shifts(freed)[-1])
+    released = np.array([*shifted, best])
+    base = system.gain(released)
+    rest = [system.gain(np.append(released, j)) - base for j in others if j != best]
+    length = np.linalg.norm(system.shifts(released)[-1])
     limit = max(SIGNIFICANT, STANDS_OUT * float(np.median(rest)))
     if gains[order[0]] < limit or length < MIN_SHIFT:
         return None

@@ -646,7 +646,7 @@ def test_whatever_happens_the_events_tell_what_is_kept(seed: int, drops: bool) -
     station = Station(seed=seed)
     operator, rng = station.operator, np.random.default_rng(seed)
     operator.seat()
-    mishaps = (
+    disturbances = (
         lambda: operator.slip(rng.uniform(0.05, 1.0), rng.uniform(0.1, 4.0)),
         operator.lift,
         operator.seat,
@@ -658,7 +658,7 @@ def test_whatever_happens_the_events_tell_what_is_kept(seed: int, drops: bool) -
     )
     station.run(8.0)
     for _ in range(20):
-        mishaps[rng.integers(len(mishaps))]()
+        disturbances[rng.integers(len(disturbances))]()
         station.run(rng.uniform(0.3, 4.0))
 
     recorded: set[int] = set()
