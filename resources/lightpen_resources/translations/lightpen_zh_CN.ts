@@ -7902,6 +7902,10 @@ mm</translation>
         <translation>链 {chain} 的第 {number} 个条目被更改。</translation>
     </message>
     <message>
+        <source>Every second view differs from the others by {px:.2f} px over the image (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px), more than by chance. Check that all images are from one camera with one setting.</source>
+        <translation>每隔一幅的图像与其余图像在像面上相差 {px:.2f} px（fx {fx:+.2f}、cx {cx:+.2f}、cy {cy:+.2f} px），超出偶然范围。请检查所有图像是否来自同一台相机且设置相同。</translation>
+    </message>
+    <message>
         <source>Expansion</source>
         <translation>热膨胀</translation>
     </message>
