@@ -130,7 +130,7 @@ def try_demo(trial: Trial) -> None:
 
 def try_double_click(trial: Trial) -> None:
     """Open a recorded swing by its file, as a double click does."""
-    _show_classes_to_wine(trial)
+    shown = _show_classes_to_wine(trial)
     record = trial.data / "records" / "swing 一"
     record_swing(record, trial.data / "files")
     with RecordWriter.resume(open_record(record)) as writer:
@@ -141,6 +141,8 @@ def try_double_click(trial: Trial) -> None:
     is_open = await_so(lambda: NAMES.pen in _settings(trial))
     trial.expect("a double click opens a swing", is_open, _settings(trial))
     trial.end_programs()
+    for key in shown:
+        trial.machine.run(["reg", "delete", key, "/f"])
 
 
 def try_refusals(trial: Trial) -> None:
@@ -212,6 +214,7 @@ def try_removal(trial: Trial, files: frozenset[str], registry: frozenset[str]) -
     trial.expect("uninstalls in silence", outcome.status == 0, outcome)
     trial.expect("the user's data stay", record.exists())
     shutil.rmtree(trial.data)
+    shutil.rmtree(trial.keys, ignore_errors=True)  # which always stay
     expect_nothing_left(trial, files, registry)
 
     trial.install()
@@ -254,11 +257,17 @@ def _desktop(trial: Trial) -> Path:
     return trial.machine.home / "Desktop" / "Lightpen.lnk"
 
 
-def _show_classes_to_wine(trial: Trial) -> None:
-    """Copy the file type to where Wine 8 looks for it, unlike Windows."""
-    if IS_WINDOWS:
-        return
-    for name in (".lightpen", "Lightpen.Swing"):
-        there = rf"HKLM\Software\Classes\{name}"
-        copy = ["reg", "copy", rf"{CLASSES}\{name}", there, "/s", "/f"]
+def _show_classes_to_wine(trial: Trial) -> list[str]:
+    """Copy the file type to where Wine 8 looks for it, unlike Windows.
+
+    Returns
+    -------
+    list of str
+        The copies, to be deleted afterwards.
+    """
+    shown = []
+    for name in () if IS_WINDOWS else (".lightpen", "Lightpen.Swing"):
+        shown.append(rf"HKLM\Software\Classes\{name}")
+        copy = ["reg", "copy", rf"{CLASSES}\{name}", shown[-1], "/s", "/f"]
         trial.machine.run(copy)
+    return shown
