@@ -23,7 +23,7 @@ from lightpen_app.work.notifications import Notifications
 AGAIN_MS = 15 * 60 * 1000  # after which a tip may be overdue that was not
 LOOK_MS = 5000  # at what was taken over from other stations
 MOST_SHOWN = 5  # changes; the newest
-SHARED = "shared library"  # cause of what is to be read
+SHARED = "shared_library"  # cause of what is to be read
 
 Change = Callable[[], Library]
 

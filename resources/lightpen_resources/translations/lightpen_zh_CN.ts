@@ -4432,6 +4432,10 @@ needed</source>
         <translation>此相机的图像：已接收；不完整而舍弃；丢失；因计算机太慢而未处理。</translation>
     </message>
     <message>
+        <source>fps</source>
+        <translation>幅/秒</translation>
+    </message>
+    <message>
         <source>Larger packets reduce the computer load. Network card and switches must support them (jumbo frames).</source>
         <translation>较大的数据包可减轻计算机负担。网卡和交换机须支持（巨型帧）。</translation>
     </message>

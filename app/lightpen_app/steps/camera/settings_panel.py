@@ -44,7 +44,7 @@ class SettingsPanel(Translated, QGroupBox):
 
         # Widgets
         self._rate_name = QLabel()
-        self._rate = SettingField("Hz", (0.1, 1000.0), 1)
+        self._rate = SettingField("", (0.1, 1000.0), 1)
         self._format_name = QLabel()
         self._format = ChoiceField()
         self._trigger_name = QLabel()
@@ -252,6 +252,7 @@ class SettingsPanel(Translated, QGroupBox):
                 "not processed because the computer was too slow."
             )
         )
+        self._rate.setSuffix(" " + self.tr("fps"))
         self._retranslate_counts()
         self._packet.setToolTip(
             self.tr(

@@ -41,7 +41,7 @@ class _PoseMistake:
     """A usual mistake: how it is undone, and its message."""
 
     undo: Callable[[FloatArray, FloatArray], Poses]
-    message: Callable[[float, float], Message]
+    remark: Callable[[float, float], Message]
 
 
 def require_usual_reading(rotations: FloatArray, translations: FloatArray) -> None:
@@ -69,7 +69,7 @@ def require_usual_reading(rotations: FloatArray, translations: FloatArray) -> No
     likeliest = int(np.argmin(undone))
     closer = undone[likeliest] < MUCH_CLOSER * as_read
     if closer and as_read > ROUNDING * typical:
-        raise CalibrationError(_MISTAKES[likeliest].message(as_read, undone[likeliest]))
+        raise CalibrationError(_MISTAKES[likeliest].remark(as_read, undone[likeliest]))
     _require_tip(R, t, as_read)
 
 
