@@ -20,6 +20,7 @@ from lightpen.discovery.starts import (
     any_covariance,
 )
 from lightpen.estimation.bundle.linearised import BundleState
+from lightpen.formats.camera_checks import folds
 from lightpen.intrinsics.distortion import (
     FEW,
     FISHEYE,
@@ -30,7 +31,6 @@ from lightpen.intrinsics.distortion import (
     WIDE,
     WORTH,
     Choice,
-    folds,
     is_significantly_less,
 )
 from lightpen.intrinsics.lens_conversion import convert_lens

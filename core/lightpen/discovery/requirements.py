@@ -15,7 +15,7 @@ from lightpen.discovery.starts import KnownLength, gradient_of
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.consistency_findings import DIAMETER, SCALE
 from lightpen.estimation.calibrate import Calibration
-from lightpen.intrinsics.distortion import folds
+from lightpen.formats.camera_checks import folds
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.posture import tilts_of

@@ -125,17 +125,24 @@ def check_fold(camera: Camera, entries: Entries) -> None:
     FileError
         It does.
     """
-    grid = np.meshgrid(
-        np.linspace(0, camera.width - 1, FOLD_SAMPLES),
-        np.linspace(0, camera.height - 1, FOLD_SAMPLES),
-    )
-    try:
-        pixels = np.stack(grid, axis=-1)
-        camera.unproject(pixels[camera.sees(pixels)])
-    except CalibrationError as error:
+    if folds(camera):
         raise FileError(
             "camera-file.fold",
             name=entries.name,
             width=camera.width,
             height=camera.height,
-        ) from error
+        )
+
+
+def folds(camera: Camera) -> bool:
+    """Return whether the distortion folds the image before its corners."""
+    grid = np.meshgrid(
+        np.linspace(0, camera.width - 1, FOLD_SAMPLES),
+        np.linspace(0, camera.height - 1, FOLD_SAMPLES),
+    )
+    pixels = np.stack(grid, axis=-1)
+    try:
+        camera.unproject(pixels[camera.sees(pixels)])
+    except CalibrationError:
+        return True
+    return False

@@ -19,16 +19,12 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import (
-    FINEST,
-    adjust_board,
-    fit_board_poses,
-    linearise,
-)
-from lightpen.intrinsics.board_fit import N_POSE, N_SHAPE, BoardFit
+from lightpen.intrinsics.adjustment import FINEST, adjust_board, fit_board_poses
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit
 from lightpen.intrinsics.camera_change import FEWEST, CameraChange
 from lightpen.intrinsics.distortion import fit_camera, rough_poses
 from lightpen.intrinsics.uncertainty_map import moved_in_image
+from lightpen.intrinsics.unevenness import fit_unevenness
 from lightpen.intrinsics.views import BoardTolerances, Views, listed_names
 from lightpen.model.camera import Camera
 
@@ -36,7 +32,6 @@ MAX_ROUNDS = 8
 CORRELATED = 4.0  # points of a view that tell as much as an independent one
 MAX_PASSES = 8  # of turning one view
 ENOUGH = 0.998  # of the rms before, or one turned view more is not worth it
-RIDGE, HELD = 1e-8, 1e4  # of the information of a point: of nothing, of what is known
 LESSENED = 0.97  # of the rms without it, or an alternative is no explanation
 HALVED = 0.5  # the same, of views that no single camera fits
 USELESS = 0.001  # of the image's longer side, by which a change moves the image
@@ -173,7 +168,7 @@ def _fitted_groups(
     """Return the fits of a camera to each group, with one uneven board for all."""
     try:
         fits = [fit_camera(views, tolerances, near) for views in groups]
-        offsets, _ = _unevenness(groups, fits)
+        offsets, _ = fit_unevenness(groups, fits)
         fits = [
             adjust_board(
                 views,
@@ -187,58 +182,10 @@ def _fitted_groups(
     return fits
 
 
-def _unevenness(
-    groups: tuple[Views, ...], fits: list[BoardFit]
-) -> tuple[FloatArray, float]:
-    """Return by how much points are off in their plane beyond an affine board.
-
-    A step of Gauss and Newton of all unknowns together.
-
-    Returns
-    -------
-    (N, 3) array, float
-        mm; the residuals that it leaves, px rms.
-    """
-    board = groups[0].board
-    n_points, n_own = board.n_points, len(fits[0].prior)
-    n = 2 * n_points + n_own * len(fits)
-    known, right, squares, n_seen = np.zeros((n, n)), np.zeros(n), 0.0, 0
-    at = np.arange(n_points)
-    for g, (views, fit) in enumerate(zip(groups, fits, strict=True)):
-        own = slice(2 * n_points + g * n_own, 2 * n_points + (g + 1) * n_own)
-        known[own, own] += fit.sigma**2 * fit.prior
-        for sight in linearise(views, fit.state, fit.residuals):
-            columns = np.zeros((views.n_views, n_points, 2, n))
-            columns[..., own] = sight.shared
-            for axis in range(2):
-                columns[:, at, :, 2 * at + axis] = np.moveaxis(
-                    sight.by_board[..., axis], 1, 0
-                )
-            by_view = columns.reshape(views.n_views, -1, n)
-            own_poses = sight.own.reshape(views.n_views, -1, N_POSE)
-            Q = np.linalg.qr(own_poses)[0]
-            M = (by_view - Q @ (np.swapaxes(Q, 1, 2) @ by_view)).reshape(-1, n)
-            left = sight.residuals.reshape(views.n_views, -1, 1)
-            r = (left - Q @ (np.swapaxes(Q, 1, 2) @ left)).ravel()
-            known += M.T @ M
-            right += M.T @ r
-            squares += float(r @ r)
-        n_seen += int(views.seen.sum())
-    of_points = slice(0, 2 * n_points)
-    most = known[of_points, of_points].diagonal().max()
-    affine = np.linalg.qr(np.c_[board.points[:, :2], np.ones(n_points)])[0]
-    known[of_points, of_points] += HELD * most * np.kron(affine @ affine.T, np.eye(2))
-    known[np.arange(n), np.arange(n)] += RIDGE * most
-    found = np.linalg.solve(known, right)
-    left_over = max(squares - float(right @ found), 0.0) / (2 * n_seen)
-    off = found[of_points].reshape(-1, 2)
-    return np.c_[off, np.zeros(n_points)], float(np.sqrt(left_over))
-
-
 def _rms_by(views: Views, tolerances: BoardTolerances, near: Camera) -> float:
     """Return the residuals of a camera and an uneven board, px rms."""
     try:
-        return _unevenness((views,), [fit_camera(views, tolerances, near)])[1]
+        return fit_unevenness((views,), [fit_camera(views, tolerances, near)])[1]
     except CalibrationError:
         return np.inf
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.formats.camera_checks import folds
 from lightpen.intrinsics.alternatives import HALVED, explain
 from lightpen.intrinsics.board_findings import (
     board_contradictions,
@@ -32,10 +33,11 @@ from lightpen.intrinsics.camera_change import (
 )
 from lightpen.intrinsics.distortion import (
     FEW,
+    FOLDING,
+    PULLS,
     Choice,
     choose_distortion,
     fit_camera,
-    folds,
     rms_together,
 )
 from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
@@ -259,7 +261,27 @@ def _calibrated(
     _require_determined(fitted)
     _require_no_fold(fitted.state.cameras[0])
     _message_on_projection(fitted)
-    return _Found(kept, left_out, denied, choice, held_out, fit_effects(kept, fitted))
+    choice, effects = _fit_unfolded(kept, tolerances, choice, fitted)
+    return _Found(kept, left_out, denied, choice, held_out, effects)
+
+
+def _fit_unfolded(
+    views: Views, tolerances: BoardTolerances, choice: Choice, fitted: BoardFit
+) -> tuple[Choice, MixedFit]:
+    """Return the fit with effects; they may fold the image where the fit does not."""
+    effects = fit_effects(views, fitted)
+    near = fitted.state.cameras[0]
+    for pull in PULLS:
+        if choice.n_coefficients not in FOLDING:
+            break
+        if not folds(effects.adjustment.state.cameras[0]):
+            break
+        if choice.pull is not None and pull >= choice.pull:
+            continue
+        choice = replace(choice, pull=pull)
+        effects = fit_effects(views, fit_camera(views, tolerances, near, pull))
+    _require_no_fold(effects.adjustment.state.cameras[0])
+    return choice, effects
 
 
 def _before(views: Views, camera: Camera) -> Views:

@@ -127,6 +127,8 @@ def _fitted_change(
         Its directions.
     """
     known = way.T @ information @ way
+    if np.diag(known).min() <= 0:  # less than rounding
+        return np.zeros(len(score)), 0.0
     scale = 1 / np.sqrt(np.maximum(np.diag(known), 1e-300))
     values, vectors = np.linalg.eigh(known * np.outer(scale, scale))
     if values[0] <= LEAST_KNOWN:  # one part alone does not show

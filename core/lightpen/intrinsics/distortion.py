@@ -13,11 +13,12 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.formats.camera_checks import folds
 from lightpen.intrinsics.adjustment import FINEST, adjust_board, fit_board_poses
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
-from lightpen.intrinsics.uncertainty_map import error_fields
+from lightpen.intrinsics.unevenness import fit_unevenness
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera, LensModel
@@ -121,7 +122,7 @@ def choose_distortion(
 ) -> tuple[Choice, BoardFit, FloatArray]:
     """Return the lens model, its fit, and the cross-validation errors.
 
-    A model that has more coefficients, or that the fit is not of, must be better.
+    A model other than that of 5 coefficients must be better.
     """
     first = _Drawn(fitted, None)
     others: list[Callable[[], _Drawn | None]]
@@ -148,7 +149,11 @@ def choose_distortion(
             rms = rms_together(trial_errors, views)
             held_out[trial.n_coefficients] = rms
             before = held_out[best.n_coefficients]
-            if is_significantly_less(rms, before, trial_errors, errors):
+            if trial.n_coefficients == FEW:  # the plain lens, if nothing denies it
+                is_better = not is_significantly_less(before, rms, errors, trial_errors)
+            else:
+                is_better = is_significantly_less(rms, before, trial_errors, errors)
+            if is_better:
                 best, errors = trial, trial_errors
     report(0.8)
     return Choice(best.n_coefficients, held_out, best.pull), best.fitted, errors
@@ -225,15 +230,6 @@ def fit_camera(
     return adjust_board(views, state, tolerances, (known,))
 
 
-def folds(camera: Camera) -> bool:
-    """Return whether the distortion folds the image before its corners."""
-    try:
-        error_fields(camera)
-    except CalibrationError:
-        return True
-    return False
-
-
 def rms_together(errors: FloatArray, views: Views) -> float:
     """Return the error of all points, px rms, from that of each view."""
     counts = views.seen.sum(axis=(1, 2))
@@ -285,14 +281,20 @@ def _richer(views: Views, tolerances: BoardTolerances, few: _Drawn) -> _Drawn | 
 
 
 def _held_out(views: Views, tolerances: BoardTolerances, found: _Drawn) -> FloatArray:
-    """Return the error of each view by a fit of the others, (V,), px rms."""
+    """Return the error of each view by a fit of the others, (V,), px rms.
+
+    Uneven squares err alike with every lens model, and would hide what it gains.
+    """
     errors = np.full(views.n_views, np.nan)
     fold_of = np.arange(views.n_views) % min(N_FOLDS, views.n_views)
     for fold in range(int(fold_of.max()) + 1):
         others, own = views.chosen(fold_of != fold), views.chosen(fold_of == fold)
-        fitted = fit_camera(others, tolerances, found.camera, found.pull).state
+        fitted = fit_camera(others, tolerances, found.camera, found.pull)
+        uneven, _ = fit_unevenness((others,), [fitted])
+        near, pull = fitted.state.cameras[0], found.pull
+        state = fit_camera(others, tolerances, near, pull, uneven).state
         poses = rough_poses(found.camera, own)
-        residuals = fit_board_poses(own, replace(fitted, poses=poses))
+        residuals = fit_board_poses(own, replace(state, poses=poses))
         squares = np.square(residuals).sum(axis=-1)
         errors[fold_of == fold] = np.sqrt(np.nanmean(squares, axis=(1, 2)))
     return errors

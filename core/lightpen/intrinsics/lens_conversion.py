@@ -46,6 +46,8 @@ def _fitted(camera: Camera, blank: Camera, share: float) -> Camera | None:
     pixels = (np.stack(np.meshgrid(steps, steps), axis=-1) * size).reshape(-1, 2)
     directions = camera.unproject(pixels[camera.sees(pixels)])
     directions = directions[np.linalg.norm(directions, axis=1) < WIDEST]
+    if len(directions) < len(blank.intrinsics):
+        return None
     wanted = camera.pixels(directions)
     found = blank
     with np.errstate(all="ignore"):

@@ -23,6 +23,7 @@ N_COEFFICIENTS = 4
 WIDEST = np.radians(88.0)  # from the axis
 NEAR_AXIS = 1e-5  # of r^2, below which the series is exact to rounding
 STEPS = 30
+STEPS_TO_FOLD = 181
 TOLERANCE = 1e-12  # rad
 
 
@@ -61,7 +62,7 @@ def angles(coefficients: FloatArray, distances: FloatArray) -> FloatArray:
 
     Farther than `WIDEST` they are that; NaN where the coefficients fold the image.
     """
-    grid = np.linspace(0.0, WIDEST, 181)
+    grid = np.linspace(0.0, WIDEST, STEPS_TO_FOLD)
     at = _distance(coefficients, grid)
     fold = np.flatnonzero(_distance_slope(coefficients, grid) <= 0)
     last = len(grid) - 1 if len(fold) == 0 else max(int(fold[0]) - 1, 0)
@@ -82,7 +83,14 @@ def angles(coefficients: FloatArray, distances: FloatArray) -> FloatArray:
 
 
 def is_within(coefficients: FloatArray, distances: FloatArray) -> BoolArray:
-    """Tell which distances are those of directions up to `WIDEST`."""
+    """Tell which distances are those of directions up to `WIDEST`.
+
+    All are, where the coefficients fold the image before; `angles` tells where.
+    """
+    if np.any(
+        _distance_slope(coefficients, np.linspace(0.0, WIDEST, STEPS_TO_FOLD)) <= 0
+    ):
+        return np.ones(np.shape(distances), dtype=np.bool_)
     return np.asarray(distances <= _distance(coefficients, np.array(WIDEST)))
 
 

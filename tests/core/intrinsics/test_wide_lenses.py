@@ -1,11 +1,15 @@
 """Tests of fisheyes and other wide lenses by views of a board."""
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
+from lightpen.intrinsics.distortion import FEW, FISHEYE, choose_distortion, fit_camera
 from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.intrinsics.start import start_camera
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
@@ -24,6 +28,8 @@ ROUND = Camera(  # whose corners lie beyond 90 degrees
     distortion=np.array([0.0034, 0.0007, -0.002, 0.0002]),
     lens=LensModel.KANNALA_BRANDT,
 )
+
+FOLDING_BEYOND = np.array([0.11, -0.08, 0.36, -0.64])
 
 
 def held_before(camera: Camera, n_views: int, seed: int) -> Views:
@@ -104,3 +110,22 @@ def test_another_lens_model_images_nearly_the_same() -> None:
     np.testing.assert_allclose(
         fisheye.pixels(directions), mild.pixels(directions), atol=1.0
     )
+
+
+def test_a_fisheye_that_folds_beyond_its_image_sees_all_of_it() -> None:
+    camera = replace(WIDE, fx=1100.0, fy=1100.0, distortion=FOLDING_BEYOND)
+    corners = np.array([[0.0, 0.0], [1279.0, 0.0], [640.0, 400.0]])
+
+    assert camera.sees(corners).all()
+    assert convert_lens(camera, FEW) is not None
+
+
+def test_a_plain_lens_is_kept_though_a_fisheye_was_begun_with(
+    make_views: Callable[..., Views], camera: Camera
+) -> None:
+    views, fisheye = make_views(), convert_lens(camera, FISHEYE)
+    assert fisheye is not None
+    begun = fit_camera(views, BoardTolerances(), fisheye)
+    choice, _, _ = choose_distortion(views, BoardTolerances(), begun, lambda _: None)
+
+    assert choice.n_coefficients == FEW
