@@ -180,8 +180,14 @@ class _Tracks:
     def advanced(
         self, there: FloatArray, match: IntArray, spots: FloatArray, image: int
     ) -> "_Tracks":
-        """Return the tracks after an image; a lost one follows its prediction."""
+        """Return the tracks after an image; a lost one follows its prediction.
+
+        Where most spots are new the pen has jumped, and all tracks begin anew: the few
+        that found a spot have the wrong one, and would mislead those after it.
+        """
         found = match >= 0
+        if 2 * found.sum() < len(spots):
+            match, found = np.full_like(match, -1), np.zeros_like(found)
         at = match[found]
         step = np.zeros_like(spots)
         step[at] = spots[at] - self.last[found]
@@ -189,7 +195,8 @@ class _Tracks:
         is_new[at] = False
         if len(at):  # a new spot is taken to go as those about it
             step[is_new] = np.median(step[at], axis=0)
-        waiting = ~found & (self.missed < COASTING)
+        has_jumped = not found.any() and len(spots) > 0
+        waiting = ~found & (self.missed < COASTING) & (not has_jumped)
         n = len(spots)
         return _Tracks(
             np.concatenate([spots, there[waiting]]),
