@@ -58,7 +58,10 @@ class GenicamDevice:
         """Open the camera."""
         if not _is_installed():
             raise DeviceNotFound(_ABSENT)
-        from genicam import gentl
+        try:
+            from genicam import gentl
+        except ImportError as error:  # without the shared library of Python
+            raise DeviceNotFound(_ABSENT) from error
 
         self._harvester = harvester = _harvester(self._place.producer)
         name = self._place.name
