@@ -11,6 +11,7 @@ import argparse
 import json
 import os
 import platform
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -200,6 +201,8 @@ def write_pdf(html: str, file: Path) -> None:
 
 
 def _commit() -> str:
+    if shutil.which("git") is None:
+        return "unknown"
     words = ["git", "describe", "--always", "--dirty", "--abbrev=40"]
     found = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
     return found.stdout.strip() or "unknown"

@@ -1,5 +1,6 @@
 """That no test passes in which the thread of the windows touches a file of the user."""
 
+import os
 from pathlib import Path
 from threading import Thread
 
@@ -8,8 +9,8 @@ from tests.app.disk import APP, disk_watch
 
 def test_a_file_that_the_windows_thread_touches_is_noticed(tmp_path: Path) -> None:
     (tmp_path / "listed").mkdir()
-    code = compile("list(path.iterdir())", f"{APP}steps/page.py", "exec")
-    exec(code, {"path": tmp_path / "listed"})
+    code = compile("os.listdir(path)", f"{APP}steps/page.py", "exec")
+    exec(code, {"os": os, "path": tmp_path / "listed"})
 
     (seen,) = disk_watch().take()
     assert seen == f"os.listdir {tmp_path / 'listed'} by steps/page.py:1"

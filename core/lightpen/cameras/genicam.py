@@ -58,12 +58,9 @@ class GenicamDevice:
         """Open the camera."""
         if not _is_installed():
             raise DeviceNotFound(_ABSENT)
-        try:
-            from genicam import gentl
-        except ImportError as error:  # without the shared library of Python
-            raise DeviceNotFound(_ABSENT) from error
-
         self._harvester = harvester = _harvester(self._place.producer)
+        from genicam import gentl
+
         name = self._place.name
         try:
             indices = [
@@ -175,7 +172,10 @@ def _harvester(producer: str) -> Any:
     DeviceNotFound
         There is no producer, or none of them loads.
     """
-    from harvesters.core import Harvester
+    try:
+        from harvesters.core import Harvester
+    except ImportError as error:  # without the shared library of Python
+        raise DeviceNotFound(_ABSENT) from error
 
     files = [Path(producer)] if producer else _producers()
     if not files:
