@@ -179,7 +179,7 @@ def test_a_property_that_is_set_by_keyword_is_noticed() -> None:
 
 
 @pytest.mark.skipif(not shutil.which("localedef"), reason="needs a Turkish locale")
-@pytest.mark.skipif(PySide6.__version_info__ >= (6, 12), reason="sets it there, too")
+@pytest.mark.skipif(PySide6.__version_info__ >= (6, 12), reason="PySide6 6.12 mends it")
 def test_the_turkish_locale_of_these_tests_has_what_made_the_window_fail(
     environment_of: EnvironmentOf,
 ) -> None:

@@ -242,7 +242,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._sidebar.set_subject(subject)
 
     def set_stream(self, state: StreamState) -> None:
-        """Show on every page on which page the live detection is, if any."""
+        """Show the state of the live stream on every page."""
         self._sidebar.set_stream(state.status)
         self._stream_dialog.set_state(state)
 
@@ -534,7 +534,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._emit_attention()
 
     def _emit_attention(self) -> None:
-        """Return whether live images can be seen now."""
+        """Emit whether live images can be seen now."""
         is_seen = self.is_seen()
         self.attention_changed.emit(self.page().shows_images and is_seen)
 

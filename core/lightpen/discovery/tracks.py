@@ -186,8 +186,8 @@ class _Tracks:
         that found a spot have the wrong one, and would mislead those after it.
         """
         found = match >= 0
-        if 2 * found.sum() < len(spots):
-            match, found = np.full_like(match, -1), np.zeros_like(found)
+        has_jumped = bool(2 * found.sum() < len(spots))
+        found &= not has_jumped
         at = match[found]
         step = np.zeros_like(spots)
         step[at] = spots[at] - self.last[found]
@@ -195,7 +195,6 @@ class _Tracks:
         is_new[at] = False
         if len(at):  # a new spot is taken to go as those about it
             step[is_new] = np.median(step[at], axis=0)
-        has_jumped = not found.any() and len(spots) > 0
         waiting = ~found & (self.missed < COASTING) & (not has_jumped)
         n = len(spots)
         return _Tracks(

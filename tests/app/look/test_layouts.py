@@ -83,7 +83,7 @@ def test_a_layout_that_is_attached_first_keeps_no_items(dressed: QApplication) -
     window.deleteLater()
 
 
-@pytest.mark.skipif(PySide6.__version_info__ >= (6, 12), reason="keeps none there")
+@pytest.mark.skipif(PySide6.__version_info__ >= (6, 12), reason="PySide6 6.12 mends it")
 def test_a_layout_that_is_filled_first_keeps_its_items(dressed: QApplication) -> None:
     before, window, row = kept(), QWidget(), QHBoxLayout()
     labels = [QLabel() for _ in range(50)]

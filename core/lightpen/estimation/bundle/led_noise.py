@@ -1,7 +1,7 @@
 """Noise of each centre by its detector, and of each LED as a variance component.
 
-What the detector states of a centre is compared with other centres alone, and taken to
-the power by which the residuals are likeliest: 0 where they do not follow it.
+The standard deviations that the detector states are taken relative to their median, to
+the power of maximum likelihood of the residuals: 0 where these do not follow them.
 
 The logarithms of the LEDs' variances are normal about a common mean. Their spread is
 that beyond what as few residuals scatter by, and each is shrunk to the mean by what is
@@ -36,8 +36,7 @@ def find_center_noise(
     known = used & np.isfinite(sigmas)
     if not known.any() or sigmas[known].min() == sigmas[known].max():
         return None
-    ratios = np.where(np.isfinite(sigmas), sigmas, np.nan) / np.median(sigmas[known])
-    ratios = np.where(np.isfinite(ratios), ratios, 1.0)
+    ratios = np.where(np.isfinite(sigmas), sigmas / np.median(sigmas[known]), 1.0)
     squares, logs = np.sum(residuals[known] ** 2, axis=-1), np.log(ratios[known])
     # Minus twice the logarithm of the likelihood, with the likeliest common factor.
     means = [np.mean(squares * np.exp(-2 * power * logs)) for power in POWERS]
