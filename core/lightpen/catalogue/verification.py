@@ -198,7 +198,7 @@ MESSAGES = {
     "verification.verify-again": "Next: clean tip and artefact, clamp artefact and camera, and verify again.",
     "verification.better-postures": "Next: verify the tip in a fixed point, or probe again with the pen tilted and turned another way at each point.",
     "verification.unproven": "Error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm): U is too large for the decision rule to prove that the limit is kept.",
-    "verification.own-images": "{n} of these files were used to calibrate the tip and cannot verify it. Probe the artefact anew.",
+    "verification.own-images": "Files that were used to calibrate the tip cannot verify it: {n} of these. Probe the artefact anew.",
     "verification.more-points": "Next: probe more points with more images each, tilt the pen farther to all sides, and turn it.",
     "verification.check-files": "Next: check that the camera file belongs to this camera and the LED file to this pen.",
     "circle.open": "The points of {run} cover {covered:.0f} degrees of the ring, at least {needed:.0f} are needed to determine its radius. Probe the ring also between {first} and {second}.",

@@ -131,7 +131,7 @@ class MeasuredRuns:
 
     @property
     def n_of_calibration(self) -> int:
-        """Images, or files of LED centres, that were used to calibrate the tip itself."""
+        """Number of files that were used to calibrate the tip itself."""
         own = {each.sha256 for each in self.calibration.calibration.inputs.observations}
         return sum(each.sha256 in own for each in self.hashed_files)
 

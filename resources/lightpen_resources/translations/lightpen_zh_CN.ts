@@ -10118,7 +10118,7 @@ mm</translation>
         <translation>{name} 与记录时不同（校验和错误）。请用备份恢复。</translation>
     </message>
     <message>
-        <source>{n} of these files were used to calibrate the tip and cannot verify it. Probe the artefact anew.</source>
+        <source>Files that were used to calibrate the tip cannot verify it: {n} of these. Probe the artefact anew.</source>
         <translation>这些文件中有 {n} 个是标定该测头时所用的，不能用来验证它。请重新测量标准器。</translation>
     </message>
     <message>
