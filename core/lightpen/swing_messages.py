@@ -183,10 +183,15 @@ def file_contradicted(why: Message) -> Message:
 
 
 def time_span(intervals: float, interval_ms: float | None) -> Message:
-    """Return a time without its sign, given in image intervals: in ms if known."""
+    """Return a time without its sign, given in image intervals: in µs to s if known."""
     if interval_ms is None:
         return message("time.intervals", value=abs(intervals))
-    return message("time.ms", value=abs(intervals) * interval_ms)
+    span_ms = abs(intervals) * interval_ms
+    if span_ms < 0.9995:  # rounds to less than 1 ms
+        return message("time.us", value=1000 * span_ms)
+    if span_ms < 999.5:
+        return message("time.ms", value=span_ms)
+    return message("time.s", value=span_ms / 1000)
 
 
 def lateness(intervals: float, interval_ms: float | None) -> Message:

@@ -26,6 +26,7 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_from_postures,
 )
+from lightpen.swing_messages import time_span
 
 CAMERA, PEN = paper_camera(), paper_pen()
 N_IMAGES, NOISE = 120, 0.03
@@ -131,3 +132,11 @@ def test_a_time_is_stated_in_ms_if_the_image_rate_is_known_with_its_sign() -> No
     assert "2.5 ms early" in str(replace(effect, interval_ms=50.0).message)
     strobe = replace(effect, name=EffectName.STROBE, interval_ms=50.0)
     assert "2.5 ms apart" in str(strobe.message)
+
+
+@pytest.mark.parametrize(
+    ("intervals", "text"),
+    [(0.00343, "3.43 µs"), (0.99951, "1 ms"), (999, "999 ms"), (1500, "1.5 s")],
+)
+def test_the_unit_of_a_time_suits_its_size(intervals: float, text: str) -> None:
+    assert str(time_span(intervals, 1.0)) == text
