@@ -56,7 +56,7 @@ class Plane:
     shown: PlotRange
 
     def points(self, x: FloatArray, y: FloatArray) -> list[QPointF]:
-        """Return where x (N,) and y (N,) lie, dots; outside of the range at its rim."""
+        """Return the places of x (N,) and y (N,), dots, limited to the range."""
         shown, area = self.shown, self.area
         right = (np.clip(x, shown.x_low, shown.x_high) - shown.x_low) / (
             shown.x_high - shown.x_low

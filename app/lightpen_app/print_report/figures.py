@@ -34,7 +34,7 @@ from lightpen_app.print_report.charts import (
 
 translate = QCoreApplication.translate
 
-HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the rim
+HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the edge
 STEADY = 8.0  # times the last U, beyond which a tip by few images is left out
 FARTHEST = 40.0  # degrees of tilt that are shown
 N_BINS = 31

@@ -8,9 +8,9 @@ from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QTransform
 
 from lightpen_app.look.theme import GRID, TextSize, font
 
-TURNS = (-10.0, 10.0, -20.0, 20.0)  # of the words against the rim, degrees
+TURNS = (-10.0, 10.0, -20.0, 20.0)  # of the words against the circle, degrees
 FLAGS = int(Qt.AlignmentFlag.AlignVCenter | Qt.TextFlag.TextDontClip)
-DISTANCE = 1.085  # from the middle of the dial to that of the mark; rim = 1
+DISTANCE = 1.085  # from the middle of the dial to that of the mark; radius = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,29 +21,29 @@ class CameraPosition:
     ----------
     middle : QPointF
         Of the dial, px.
-    rim : float
+    radius : float
         Radius of the dial, px.
     angle : float
         In which direction from the middle, counter-clockwise from the right, rad.
     """
 
     middle: QPointF
-    rim: float
+    radius: float
     angle: float
 
     @property
     def place(self) -> QPointF:
         """Middle of the mark, px."""
         towards = QPointF(math.cos(self.angle), -math.sin(self.angle))
-        return self.middle + towards * (self.rim * DISTANCE)
+        return self.middle + towards * (self.radius * DISTANCE)
 
 
 def draw_camera(
     painter: QPainter, room: QRectF, stand: CameraPosition, words: str, color: QColor
 ) -> None:
     """Draw a camera that faces a dial, with a label inside a rectangle."""
-    rim = stand.rim
-    body = 0.055 * rim
+    radius = stand.radius
+    body = 0.055 * radius
     painter.save()
     painter.translate(stand.place)
     painter.rotate(math.degrees(-stand.angle) + 90)
@@ -55,7 +55,7 @@ def draw_camera(
     painter.drawRect(QRectF(-0.6 * body, -1.1 * body, 1.2 * body, 0.7 * body))
     painter.restore()
 
-    size = max(0.075 * rim, TextSize.SMALL)
+    size = max(0.075 * radius, TextSize.SMALL)
     painter.save()
     painter.setPen(color)
     painter.setFont(font(size))
@@ -63,7 +63,7 @@ def draw_camera(
     away = 2 * body + GRID / 2
     right = QRectF(away, -size / 2, length, size)
     left = right.translated(-2 * away - length, 0)
-    along = 90 - math.degrees(stand.angle % math.pi)  # the rim; never upside down
+    along = 90 - math.degrees(stand.angle % math.pi)  # the circle; never upside down
     turns = (0.0, along, *(along + each for each in TURNS))
     turn, box = min(
         ((turn, box) for turn in turns for box in (right, left)),
@@ -87,5 +87,5 @@ def _shortage(turn: float, box: QRectF, room: QRectF, stand: CameraPosition) -> 
     middle = back.map(stand.middle)
     x = min(max(middle.x(), box.left()), box.right())
     y = min(max(middle.y(), box.top()), box.bottom())
-    covered = stand.rim - math.hypot(x - middle.x(), y - middle.y())
+    covered = stand.radius - math.hypot(x - middle.x(), y - middle.y())
     return outside + max(covered, 0.0)

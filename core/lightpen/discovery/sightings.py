@@ -35,7 +35,7 @@ class Sightings:
     areas : tuple of (S,) array or None
         px^2; NaN of saturated ones.
     edge_widths : (N,) array
-        Mean width of the rims of each image, px; NaN where only centres are given.
+        Mean edge width of the LEDs in each image, px; NaN where only centres are given.
     """
 
     names: tuple[str, ...]

@@ -81,7 +81,7 @@ class Trials:
     jitter : (3, 3) array
         Covariance of the seat from image to image, mm^2.
     edge_widths : (N,) array
-        Of the rims, px; NaN where no areas are known.
+        Of the LEDs, px; NaN where no areas are known.
     """
 
     camera: Camera
@@ -258,7 +258,7 @@ def run_trial(trials: Trials, number: int) -> FloatArray | None:
 
 
 def _edge_widths(calibration: Calibration, n_images: int) -> FloatArray:
-    """Return the widths of the rims of the images that the joint fit holds, px."""
+    """Return the edge widths of the images that the joint fit holds, px."""
     if calibration.priors.reading is None:
         return np.full(n_images, np.nan)
     return np.full(n_images, np.nanmedian(calibration.observations.edge_widths))

@@ -17,12 +17,12 @@ from lightpen.simulator.sensor import Sensor
 SAMPLES = (
     3  # for measurements, per pixel and axis; blurred before they are taken together
 )
-RIM = 1.0  # of a square, white round the board
+WHITE_MARGIN = 1.0  # of a square, round the board
 WHITE, BLACK, BEHIND = 0.72, 0.05, 0.01  # of full scale
 MAX_TILT = np.radians(35.0)
 FILLED = (0.5, 0.8)  # of the image's shorter side, by the longer side of the board
 ROLLS = np.radians([-90.0, -15.0, 0.0, 10.0, 90.0])
-OUTER_RIM = 2.0  # squares or distances beyond the points, which stay in the image, too
+OUTER_MARGIN = 2.0  # squares or distances beyond the points, also in the image
 MAX_TRIES = 100
 N_HELD, HELD_S = 40, 2.0  # poses in which a board is held live; s of each
 MARGIN = 10  # px round what is seen of it
@@ -74,12 +74,12 @@ def render_board(
 def _window(
     camera: Camera, board: Board, rotation: FloatArray, translation: FloatArray
 ) -> tuple[slice, slice]:
-    """Return rows and columns of the image that show the board and its rim."""
+    """Return rows and columns of the image that show the board and its margin."""
     whole = slice(0, camera.height), slice(0, camera.width)
-    sheet = board.outline + (OUTER_RIM + 0.2) * board.pitch * np.sign(board.outline)
+    sheet = board.outline + (OUTER_MARGIN + 0.2) * board.pitch * np.sign(board.outline)
     along = np.linspace(0, 1, 20)[:, None, None]
-    rim = sheet + along * (np.roll(sheet, -1, axis=0) - sheet)
-    points = rim.reshape(-1, 3) @ rotation.T + translation
+    margin = sheet + along * (np.roll(sheet, -1, axis=0) - sheet)
+    points = margin.reshape(-1, 3) @ rotation.T + translation
     if points[:, 2].min() <= 0:
         return whole
     pixels = camera.project(points)
@@ -185,8 +185,10 @@ def _light(board: Board, places: FloatArray) -> FloatArray:
     width = columns * step - (0 if is_squares else board.detail)
     height = rows * step - (0 if is_squares else board.detail)
     x, y = places[..., 0] + 0.5 * width, places[..., 1] + 0.5 * height
-    rim = RIM * board.pitch
-    on_sheet = (x > -rim) & (x < width + rim) & (y > -rim) & (y < height + rim)
+    margin = WHITE_MARGIN * board.pitch
+    on_sheet = (
+        (x > -margin) & (x < width + margin) & (y > -margin) & (y < height + margin)
+    )
     column, row = np.floor(x / step).astype(int), np.floor(y / step).astype(int)
     on_board = (x >= 0) & (x < width) & (y >= 0) & (y < height)
     first = int(board.kind is BoardKind.LEGACY_CHARUCO and rows % 2 == 0)
@@ -291,10 +293,10 @@ def _from_circles(away: FloatArray, step: float, columns: int, rows: int) -> Flo
 def simulate_board_poses(
     camera: Camera, board: Board, n_views: int, rng: np.random.Generator
 ) -> BoardPoses:
-    """Return poses in which the whole board is seen, its rim included."""
+    """Return poses in which the whole board is seen, its margin included."""
     size = np.array(camera.image_size)
     longer = 2 * float(np.abs(board.points[:, :2]).max())
-    sheet = board.outline + OUTER_RIM * board.pitch * np.sign(board.outline)
+    sheet = board.outline + OUTER_MARGIN * board.pitch * np.sign(board.outline)
     rotations: list[FloatArray] = []
     translations: list[FloatArray] = []
     for _ in range(MAX_TRIES * n_views):

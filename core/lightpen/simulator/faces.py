@@ -1,8 +1,8 @@
 """Luminance patterns of real LEDs, and their images.
 
 The face of an LED gives each point of its disc a brightness of 0 to 1. It is drawn
-point by point: sub-pixels are traced back to the disc, and those that the rim passes
-through count as the share of them that is inside.
+point by point: sub-pixels are traced back to the disc, and those that the contour
+passes through count as the share of them that is inside.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from numpy.linalg import inv
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.simulator.rims import REACH, LightArray, Patch, orthogonal
+from lightpen.simulator.contours import REACH, LightArray, Patch, orthogonal
 
 SAMPLES = 4  # per pixel and axis
 COARSE = 4  # px, over which distortion is linear to 1e-4 px
@@ -67,8 +67,8 @@ class HotSpot:
 class Dome:
     """A spherical cap on the disc with limb darkening.
 
-    It hides nothing and stays within its rim, as a cap does that is seen by less than
-    90 degrees minus the slope at its rim.
+    It hides nothing and stays within its contour, as a cap does that is seen by less
+    than 90 degrees minus the slope at its contour.
 
     Attributes
     ----------

@@ -12,14 +12,14 @@ import numpy.typing as npt
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.simulator.faces import face_patches
-from lightpen.simulator.rims import (
+from lightpen.simulator.contours import (
     LightArray,
     Patch,
     blurred_insides,
-    disc_rims,
-    ellipse_rim,
+    disc_contours,
+    ellipse_contour,
 )
+from lightpen.simulator.faces import face_patches
 from lightpen.simulator.swings import faces_camera, leds_in_camera
 from lightpen.simulator.view import (
     BOARD_OFFSET,
@@ -155,16 +155,16 @@ def _led_patches(camera: Camera, pen: Pen, view: View, optics: Optics) -> list[P
             margin,
         )
     else:
-        rims = disc_rims(
+        contours = disc_contours(
             camera, leds[:, lit], normals[:, lit], pen.diameter / 2, optics.psf_sigma
         )
-        patches = blurred_insides(rims, optics.psf_sigma, margin)
+        patches = blurred_insides(contours, optics.psf_sigma, margin)
     return _scattered(_shining(patches, levels[lit], optics), optics)
 
 
 def _lamp_patches(lamp: Lamp, optics: Optics) -> list[Patch]:
-    rim = ellipse_rim(lamp.center, lamp.semi_axes, lamp.angle, optics.psf_sigma)
-    patches = blurred_insides(rim, optics.psf_sigma, _margin(optics))
+    contour = ellipse_contour(lamp.center, lamp.semi_axes, lamp.angle, optics.psf_sigma)
+    patches = blurred_insides(contour, optics.psf_sigma, _margin(optics))
     return _shining(patches, np.array([lamp.level * optics.exposure]), optics)
 
 

@@ -21,6 +21,7 @@ from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import pen_frame_from_raw
 from lightpen.model.rig import Rig, from_first
 from lightpen.model.rigid import fit_rigid, vector_from_rotation
+from lightpen.simulator.contours import disc_contours, measure_insides
 from lightpen.simulator.image_plans import (
     ImagePlan,
     ScenePlan,
@@ -29,19 +30,18 @@ from lightpen.simulator.image_plans import (
     render_plan,
 )
 from lightpen.simulator.render import hidden_fraction, led_levels
-from lightpen.simulator.rims import disc_rims, measure_insides
 from lightpen.simulator.samples import beside
 from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import leds_in_camera, rim_gaps
+from lightpen.simulator.swings import edge_gaps, leds_in_camera
 
 Json: TypeAlias = dict[str, Any]
 
 N_THREADS = 2  # one renders while another compresses
 NOTES = (
     "u = R x + T. proj: projected LED centre; ellipse_center: centre of the exact "
-    "conic image of the disc rim in the undistorted normalised plane, then distorted "
-    "to px; centroid: area centroid of the exact distorted disc region; all of the "
-    "whole disc at mid-exposure. visible: lit and not wholly hidden. saturated: "
+    "conic image of the disc contour in the undistorted normalised plane, then "
+    "distorted to px; centroid: area centroid of the exact distorted disc region; all "
+    "of the whole disc at mid-exposure. visible: lit and not wholly hidden. saturated: "
     "brighter than full scale. occluded_fraction: share of the disc's area behind "
     "fingers or outside the image."
 )
@@ -333,7 +333,7 @@ def _image_truth(plan: ScenePlan, image_plan: ImagePlan, folder: str) -> Json:
             swing.postures.rolls[index],
         ]
     )
-    gaps = rim_gaps(
+    gaps = edge_gaps(
         scene.camera, scene.pen, image_plan.rotation[None], image_plan.translation[None]
     )
     return {
@@ -369,12 +369,12 @@ def _led_truths(scene: Scene, image_plan: ImagePlan) -> list[Json]:
     camera, pen, view = scene.camera, scene.pen, image_plan.view
     leds, normals = leds_in_camera(pen, image_plan.rotation, image_plan.translation)
     ellipses = disc_images(camera, leds, normals, pen.diameter / 2)
-    rims = disc_rims(
+    contours = disc_contours(
         camera, leds[None], normals[None], pen.diameter / 2, scene.optics.psf_sigma
     )
-    insides = measure_insides(rims)
+    insides = measure_insides(contours)
     levels = view.gains * led_levels(leds, normals, image_plan.optics)
-    hidden = [hidden_fraction(camera, rim, view.fingers) for rim in rims.nodes]
+    hidden = [hidden_fraction(camera, nodes, view.fingers) for nodes in contours.nodes]
     projected = camera.project(leds)
     cosines = -np.einsum("li,li->l", leds, normals) / np.linalg.norm(leds, axis=-1)
     return [

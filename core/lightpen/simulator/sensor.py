@@ -18,8 +18,8 @@ from typing import Literal
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image, IntArray
+from lightpen.simulator.contours import LightArray
 from lightpen.simulator.render import Light
-from lightpen.simulator.rims import LightArray
 
 MOSTLY = 0.9  # share of the most likely reading above which the rest is drawn alone
 TABLE_SIZE = 2**16  # equally likely values: one for each 16-bit random number

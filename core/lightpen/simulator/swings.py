@@ -19,7 +19,7 @@ from lightpen.simulator.postures import Postures, SwingKind, draw_postures
 PAPER_TIP = np.array([-1.3182, -90.4095, -23.8548])  # mm, the paper's result
 PAPER_CONE = np.array([-4.871, 214.287, 1087.45])  # mm
 
-MIN_GAP = 6.0  # px between the rims of two discs
+MIN_GAP = 6.0  # px between the contours of two discs
 MAX_DOUBLINGS = 12
 
 
@@ -302,7 +302,7 @@ def faces_camera(leds_cam: FloatArray, normals_cam: FloatArray) -> BoolArray:
     return faces
 
 
-def rim_gaps(
+def edge_gaps(
     camera: Camera, pen: Pen, rotations: FloatArray, translations: FloatArray
 ) -> FloatArray:
     """Return a lower bound of the narrowest gap between two discs of each frame.
@@ -335,7 +335,7 @@ def shows_all(camera: Camera, pen: Pen, swing: Swing) -> BoolArray:
     facing = faces_camera(leds_cam, normals_cam).all(axis=-1)
     radius = camera.fx * pen.diameter / 2 / leds_cam[..., 2].min()
     inside = _inside(camera, camera.project(leds_cam), margin=2 * radius).all(axis=-1)
-    clear = rim_gaps(camera, pen, swing.rotations, swing.translations) >= MIN_GAP
+    clear = edge_gaps(camera, pen, swing.rotations, swing.translations) >= MIN_GAP
     shows: BoolArray = facing & inside & clear
     return shows
 

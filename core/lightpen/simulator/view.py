@@ -7,8 +7,8 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.contours import MIN_SIGMA
 from lightpen.simulator.faces import Face
-from lightpen.simulator.rims import MIN_SIGMA
 
 PEAK = 205 / 255
 GHOST_OFFSET = (9, 4)  # px, right and down
@@ -147,7 +147,7 @@ class View:
     lamps, glares, fingers : tuple
         Whatever else is in the picture; fingers hide what is behind them.
     faces : tuple of Face
-        How each LED looks inside its rim; empty for evenly lit ones.
+        How each LED looks inside its contour; empty for evenly lit ones.
     """
 
     rotations: FloatArray

@@ -27,7 +27,7 @@ TILTS = (np.radians(14.0), np.radians(28.0))  # in the middle of the rings of th
 TURNS = (np.radians(-25.0), 0.0, np.radians(25.0))
 N_ON_THE_WAY = 3  # postures that represent all in between
 MAX_INCIDENCE = np.radians(70.0)  # an LED seen flatter is a line, and dim
-MIN_GAP = 4.0  # px between the rims of two LEDs; blur joins closer ones
+MIN_GAP = 4.0  # px between the edges of two LEDs; blur joins closer ones
 
 
 @dataclass(frozen=True, eq=False)

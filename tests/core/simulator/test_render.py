@@ -8,6 +8,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
+from lightpen.simulator.contours import disc_contours, measure_insides
 from lightpen.simulator.render import (
     Light,
     Window,
@@ -15,7 +16,6 @@ from lightpen.simulator.render import (
     led_levels,
     render_view,
 )
-from lightpen.simulator.rims import disc_rims, measure_insides
 from lightpen.simulator.sensor import Sensor
 from lightpen.simulator.swings import (
     PAPER_TIP,
@@ -80,8 +80,8 @@ def test_shared_image_is_this_render_plus_its_noise(
     # 16 000 pixels: standard deviation 0.008 of the mean, 0.006 of the spread.
     assert normalised.mean() == pytest.approx(0, abs=0.03)
     assert normalised.std() == pytest.approx(1, abs=0.025)
-    rim = levels[lit] < 0.7
-    assert normalised[rim].std() == pytest.approx(1, abs=0.06)
+    contour = levels[lit] < 0.7
+    assert normalised[contour].std() == pytest.approx(1, abs=0.06)
 
 
 def test_level_of_an_led_follows_gain_and_viewing_angle() -> None:
@@ -200,8 +200,8 @@ def test_moving_pen_keeps_its_tip_and_blurs_its_leds() -> None:
 
 
 def test_rendered_centroids_are_those_of_the_exact_discs() -> None:
-    rims = disc_rims(CAMERA, LEDS[None], NORMALS[None], PEN.diameter / 2, 0.8)
-    exact = measure_insides(rims)
+    contours = disc_contours(CAMERA, LEDS[None], NORMALS[None], PEN.diameter / 2, 0.8)
+    exact = measure_insides(contours)
     for led in range(10):
         light = render_view(CAMERA, PEN, replace(VIEW, gains=np.eye(10)[led]), Optics())
         np.testing.assert_allclose(

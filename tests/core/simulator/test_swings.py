@@ -13,12 +13,12 @@ from lightpen.simulator.swings import (
     MIN_GAP,
     PAPER_CONE,
     PAPER_TIP,
+    edge_gaps,
     faces_camera,
     leds_in_camera,
     paper_camera,
     paper_pen,
     perturbed_pen,
-    rim_gaps,
     simulate_centers,
     slip_tip,
     swing_from_postures,
@@ -48,7 +48,7 @@ def test_every_led_is_whole_and_clear_in_a_careful_swing(name: str, kind: str) -
     assert faces_camera(leds, normals).all()
     assert pixels.min() > 25
     assert (pixels < np.array([CAMERA.width, CAMERA.height]) - 25).all()
-    gaps = rim_gaps(CAMERA, pen, swing.rotations, swing.translations)
+    gaps = edge_gaps(CAMERA, pen, swing.rotations, swing.translations)
     assert gaps.min() >= MIN_GAP
 
 
@@ -83,7 +83,7 @@ def test_postures_of_the_shared_set_give_its_poses_and_centers(
     expected = [[led["ellipse_center"] for led in frame["leds"]] for frame in frames]
     np.testing.assert_allclose(centers, expected, atol=2e-5)
     np.testing.assert_allclose(
-        rim_gaps(CAMERA, pen, swing.rotations, swing.translations),
+        edge_gaps(CAMERA, pen, swing.rotations, swing.translations),
         [frame["min_gap_px"] for frame in frames],
         atol=1e-3,
     )

@@ -27,7 +27,7 @@ LEAST_TOP = 1.5 * SHARP_EDGE  # px, of the trace
 
 
 class FocusMeter(Translated, QWidget):
-    """The width of the rims, px: the smaller, the sharper."""
+    """Edge width, px: the smaller, the sharper."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -17,14 +17,14 @@ LIMIT_REST = 1.1  # times the largest misfit, where nothing is above the line
 LIMIT_GRIP = 0.98  # of the width, where it has a grip
 LIMIT_LABEL = {"position": 0.5, "anchors": [(0.5, 1.0), (0.5, 1.0)]}  # above the line
 LEAST_WORDED = 22 * GRID  # px of height, from which the words fit above the line
-HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the rim
+HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the edge
 
 
 class MisfitPlot(Plot):
     """The misfit of each image over its number; a click chooses an image.
 
     Images that do not take part are crosses. Where they are far off, they are drawn at
-    the upper rim, so that the others can still be distinguished. A line above those
+    the upper edge, so that the others can still be distinguished. A line above those
     that take part can be drawn down to the worse half of them, to take them out.
 
     Signals

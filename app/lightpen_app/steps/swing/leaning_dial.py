@@ -84,8 +84,8 @@ class LeaningDial(PostureDial):
         else:
             moved = event.position().x() - self._turns_at
             self._turns_at = event.position().x()
-            _, rim, _ = self._places()
-            self._turn_by(moved / rim * MAX_TURN)
+            _, radius, _ = self._places()
+            self._turn_by(moved / radius * MAX_TURN)
 
     @override
     def wheelEvent(self, event: QWheelEvent) -> None:
@@ -123,8 +123,8 @@ class LeaningDial(PostureDial):
             painter = QPainter(self)
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.setPen(QPen(QColor(colors_of(self.palette()).accent), 2))
-            middle, rim, _ = self._places()
-            painter.drawEllipse(middle, 1.02 * rim, 1.02 * rim)
+            middle, radius, _ = self._places()
+            painter.drawEllipse(middle, 1.02 * radius, 1.02 * radius)
 
     @override
     def _retranslate(self) -> None:
@@ -146,8 +146,8 @@ class LeaningDial(PostureDial):
         self.leaned.emit(posture)
 
     def _lean_to(self, place: QPointF) -> None:
-        middle, rim, _ = self._places()
-        at = (place.x() - middle.x()) / rim, (middle.y() - place.y()) / rim
+        middle, radius, _ = self._places()
+        at = (place.x() - middle.x()) / radius, (middle.y() - place.y()) / radius
         self._want(posture_at(at, self._held().turn, self.value().heading))
 
     def _move_by(self, right: float, up: float) -> None:

@@ -12,7 +12,7 @@ from lightpen_app.look.theme import GRID, TextSize, colors_of, font
 from lightpen_app.widgets.fitted_text import fitted_size
 from lightpen_app.widgets.translated import Translated
 
-RIM_SHARE = 0.42  # of the side, from the middle to the ring
+RING_SHARE = 0.42  # of the side, from the middle to the ring
 BAND = 0.09  # of the side: how wide the ring is drawn
 DOT = 0.028  # of the side
 INNER = 0.5  # of the side, for the words in the middle
@@ -83,8 +83,8 @@ class RingView(Translated, QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         side = min(self.width(), self.height())
         middle = QPointF(self.width() / 2, self.height() / 2)
-        rim = RIM_SHARE * side
-        ring = QRectF(middle.x() - rim, middle.y() - rim, 2 * rim, 2 * rim)
+        radius = RING_SHARE * side
+        ring = QRectF(middle.x() - radius, middle.y() - radius, 2 * radius, 2 * radius)
         band = QPen(QColor(colors.raised), BAND * side)
         band.setCapStyle(Qt.PenCapStyle.FlatCap)
         painter.setPen(band)
@@ -99,7 +99,7 @@ class RingView(Translated, QWidget):
         painter.setBrush(QColor(colors.text))
         for angle in self._value.angles:
             across, up = math.cos(angle), math.sin(angle)
-            place = middle + QPointF(rim * across, -rim * up)
+            place = middle + QPointF(radius * across, -radius * up)
             painter.drawEllipse(place, DOT * side, DOT * side)
         self._draw_words(painter, middle, INNER * side)
 

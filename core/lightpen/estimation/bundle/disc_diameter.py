@@ -23,12 +23,12 @@ from lightpen.model.quantiles import normal_quantile
 
 # Rendered even, domed and ringed LEDs, hot spots and halos are off by 0.02 at most, a
 # steep dome by 0.05, a blur of a fifth of the disc by 0.08.
-RIM_ERROR = 0.05  # of the width of a rim, by which all rims may be displaced alike
+EDGE_ERROR = 0.05  # of its width, by which all edges may be displaced alike
 # Rendered domes stood 0.17 D (w - 1.35) / d^2 behind their discs, within a tenth, with
-# discs of 5 and 10 mm (D), 21 and 43 px (d), and rims (w) of 2.4 px to a fifth of the
+# discs of 5 and 10 mm (D), 21 and 43 px (d), and edges (w) of 2.4 px to a fifth of the
 # disc; even faces, rings and hot spots a quarter of that at most.
 DOME_SHIFT = 0.17
-SHARP_RIM = 1.35  # px wide
+SHARP_EDGE = 1.35  # px wide
 MIN_READINGS = 20
 
 
@@ -71,7 +71,7 @@ def read_diameter(
     areas : (N, C, L) array
         Areas of the imaged discs, px^2; NaN where not known.
     edge_widths : (N, C) array
-        Mean width of the rims of each image, px; NaN where not known.
+        Mean edge width of the LEDs in each image, px; NaN where not known.
 
     Returns
     -------
@@ -86,12 +86,12 @@ def read_diameter(
     diameters = pen.diameter * np.sqrt(areas[known] / modelled[known])
     value = float(np.median(diameters))
     scatter = float(np.median(np.abs(diameters - value))) / normal_quantile(0.25)
-    rims = np.broadcast_to(edge_widths[..., None], areas.shape)[known]
+    widths = np.broadcast_to(edge_widths[..., None], areas.shape)[known]
     radii = np.sqrt(areas[known] / np.pi)
-    rim = float(np.median(rims / radii))
-    dome = float(np.median(np.maximum(rims - SHARP_RIM, 0.0) / (2 * radii) ** 2))
+    edge = float(np.median(widths / radii))
+    dome = float(np.median(np.maximum(widths - SHARP_EDGE, 0.0) / (2 * radii) ** 2))
     return DiameterReading(
         value,
-        hypot(RIM_ERROR * rim * value, scatter),
+        hypot(EDGE_ERROR * edge * value, scatter),
         DOME_SHIFT * dome * value / np.sqrt(3.0),  # of a rectangular distribution
     )

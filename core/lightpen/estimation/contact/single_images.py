@@ -21,7 +21,7 @@ USUAL_SIGMA = 0.1  # px
 # An LED that runs along an arc during the exposure appears inside it, which moves the
 # pose of a blurred image by some hundredths of a millimetre; more is a slip.
 MAX_SMEAR = 0.15  # mm
-SMEARED = 1.25  # times the usual width of the LEDs' rims
+SMEARED = 1.25  # times the usual edge width of the LEDs
 TRUSTED_WEIGHT = 0.2  # of the Cauchy loss, at eight standard deviations
 
 

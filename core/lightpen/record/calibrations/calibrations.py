@@ -177,7 +177,7 @@ class ShownImages:
         Standard deviation of a coordinate of each centre by detection, px; NaN where
         not seen.
     edge_widths : (N,) array
-        Of the rims of the LEDs, px; NaN where not known.
+        Of the edges of the LEDs, px; NaN where not known.
     lamps : (N, K, 2) array
         Fixed lamps, px; NaN where not seen.
     """

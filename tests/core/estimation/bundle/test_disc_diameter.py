@@ -10,7 +10,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations, observe_centers
 from lightpen.estimation.bundle.disc_diameter import (
     MIN_READINGS,
-    SHARP_RIM,
+    SHARP_EDGE,
     read_diameter,
 )
 from lightpen.estimation.bundle.linearised import BundleState
@@ -156,7 +156,7 @@ def test_leds_that_seem_to_stand_behind_their_discs_move_the_tip_as_counted(
     even = observed(areas, pen, BLURRED, seed=10)
     counted, sharp = (
         calibrate(CAMERA, pen, replace(even, edge_widths=widths))
-        for widths in (even.edge_widths, np.full(len(SWING), SHARP_RIM))
+        for widths in (even.edge_widths, np.full(len(SWING), SHARP_EDGE))
     )
     reading = counted.priors.reading
     assert reading is not None

@@ -1,18 +1,19 @@
-"""Exact images of blurred discs, from their rims alone.
+"""Exact images of blurred discs, from their contours alone.
 
 A disc D of even brightness, seen through an optics that blurs by a Gaussian g and
 integrated by square pixels b, gives the pixel at (x, y) the level
 
     I(x, y) = (1_D * k)(x, y),    k(x, y) = (g * b)(x) (g * b)(y).
 
-With Q the integral of g * b, Green's theorem turns the area into the rim (x', y'):
+With Q the integral of g * b, Green's theorem turns the area into the contour (x', y'):
 
     I(x, y) = -+ closed integral of Q(x - x') (g * b)(y - y') dy'.
 
-The rim is projected through perspective and distortion exactly. The integrand is smooth
-on the scale of the blur, so the trapezoidal rule on the closed curve converges faster
-than any power of the spacing [1]_. The sum over the nodes is a product of two thin
-matrices, which is what makes it fast. Movement during the exposure is a mean over rims.
+The contour is projected through perspective and distortion exactly. The integrand is
+smooth on the scale of the blur, so the trapezoidal rule on the closed curve converges
+faster than any power of the spacing [1]_. The sum over the nodes is a product of two
+thin matrices, which is what makes it fast. Movement during the exposure is a mean over
+contours.
 
 References
 ----------
@@ -32,7 +33,7 @@ from lightpen.model.camera import Camera
 
 LightArray: TypeAlias = npt.NDArray[np.float32]
 
-MIN_SIGMA = 0.3  # px, below which a rim would need too many nodes
+MIN_SIGMA = 0.3  # px, below which a contour would need too many nodes
 MIN_NODES = 128
 SPACING = 1.1  # standard deviations of the blur between nodes: error below 1e-6
 REACH = 5.0  # standard deviations after which the blur is nil
@@ -40,13 +41,13 @@ STEPS_PER_PIXEL = 4096  # of the tables of the blur
 
 
 @dataclass(frozen=True, eq=False)
-class Rims:
+class Contours:
     """Closed outlines as nodes of the trapezoidal rule.
 
     Attributes
     ----------
     nodes : (N, M, 2) array
-        Points on N outlines, px. The S rims of a moving disc follow each other.
+        Points on N outlines, px. The S contours of a moving disc follow each other.
     steps : (N, M, 2) array
         Tangent times parameter step, px, divided by S.
     """
@@ -71,14 +72,14 @@ class Patch(NamedTuple):
     left: int
 
 
-def disc_rims(
+def disc_contours(
     camera: Camera,
     centers_cam: FloatArray,
     normals_cam: FloatArray,
     radius: float,
     sigma: float,
-) -> Rims:
-    """Return the imaged rims of discs, moving or not.
+) -> Contours:
+    """Return the imaged contours of discs, moving or not.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def disc_rims(
 
     Returns
     -------
-    Rims
+    Contours
         Of N outlines.
     """
     n_times = len(centers_cam)
@@ -105,13 +106,13 @@ def disc_rims(
     there = camera.project_with_jacobian(centers_cam[..., None, :] + spokes)
     steps = np.einsum("...ij,...j->...i", there.jacobian, tangents)
     steps *= 2 * np.pi / len(angles) / n_times
-    return Rims(_in_a_row(there.points), _in_a_row(steps))
+    return Contours(_in_a_row(there.points), _in_a_row(steps))
 
 
-def ellipse_rim(
+def ellipse_contour(
     center: FloatArray, semi_axes: tuple[float, float], angle: float, sigma: float
-) -> Rims:
-    """Return the rim of one ellipse in the image.
+) -> Contours:
+    """Return the contour of one ellipse in the image.
 
     Parameters
     ----------
@@ -126,7 +127,7 @@ def ellipse_rim(
 
     Returns
     -------
-    Rims
+    Contours
         Of one outline.
     """
     angles = _node_angles(2 * np.pi * max(semi_axes), sigma)
@@ -134,15 +135,15 @@ def ellipse_rim(
     axes = np.array(semi_axes)[:, None] * np.array([[cosine, sine], [-sine, cosine]])
     spokes = np.stack([np.cos(angles), np.sin(angles)], axis=-1) @ axes
     tangents = np.stack([-np.sin(angles), np.cos(angles)], axis=-1) @ axes
-    return Rims((center + spokes)[None], (2 * np.pi / len(angles) * tangents)[None])
+    return Contours((center + spokes)[None], (2 * np.pi / len(angles) * tangents)[None])
 
 
-def blurred_insides(rims: Rims, sigma: float, margin: int = 0) -> list[Patch]:
+def blurred_insides(contours: Contours, sigma: float, margin: int = 0) -> list[Patch]:
     """Return the blurred, pixel-integrated inside of each outline.
 
     Parameters
     ----------
-    rims : Rims
+    contours : Contours
         N outlines.
     sigma : float
         Of the Gaussian blur, px.
@@ -155,14 +156,14 @@ def blurred_insides(rims: Rims, sigma: float, margin: int = 0) -> list[Patch]:
         N of them.
     """
     reach = REACH * sigma + 1 + margin
-    lows = np.floor(rims.nodes.min(axis=1, initial=np.inf) - reach)
-    highs = np.ceil(rims.nodes.max(axis=1, initial=-np.inf) + reach)
+    lows = np.floor(contours.nodes.min(axis=1, initial=np.inf) - reach)
+    highs = np.ceil(contours.nodes.max(axis=1, initial=-np.inf) + reach)
     sizes = (highs - lows).astype(int) + 1
-    areas = np.einsum("nm,nm->n", rims.nodes[..., 0], rims.steps[..., 1])
-    weights = (-np.sign(areas)[:, None] * rims.steps[..., 1]).astype(np.float32)
+    areas = np.einsum("nm,nm->n", contours.nodes[..., 0], contours.steps[..., 1])
+    weights = (-np.sign(areas)[:, None] * contours.steps[..., 1]).astype(np.float32)
     tables = _blur_tables(sigma)
     patches = []
-    for n, nodes in enumerate(rims.nodes - lows[:, None, :]):
+    for n, nodes in enumerate(contours.nodes - lows[:, None, :]):
         rows = _look_up(tables.pixel, nodes[:, 1], sizes[n, 1]) * weights[n]
         columns = _look_up(tables.step, nodes[:, 0], sizes[n, 0])
         left, top = lows[n].astype(int)
@@ -186,11 +187,11 @@ class Outlines:
     centroids: FloatArray
 
 
-def measure_insides(rims: Rims) -> Outlines:
+def measure_insides(contours: Contours) -> Outlines:
     """Return exact areas and centroids of outlines, by Green's theorem."""
-    middles = rims.nodes.mean(axis=1, keepdims=True)
-    x, y = np.moveaxis(rims.nodes - middles, -1, 0)
-    dy = rims.steps[..., 1]
+    middles = contours.nodes.mean(axis=1, keepdims=True)
+    x, y = np.moveaxis(contours.nodes - middles, -1, 0)
+    dy = contours.steps[..., 1]
     areas = (x * dy).sum(axis=-1)
     moments = np.stack([(x * x * dy / 2).sum(axis=-1), (x * y * dy).sum(axis=-1)], -1)
     return Outlines(np.abs(areas), middles[:, 0] + moments / areas[:, None])
@@ -240,6 +241,6 @@ def orthogonal(normals: FloatArray) -> FloatArray:
 
 
 def _in_a_row(nodes: FloatArray) -> FloatArray:
-    """Join the rims of each disc over time: (S, N, M, 2) to (N, S M, 2)."""
+    """Join the contours of each disc over time: (S, N, M, 2) to (N, S M, 2)."""
     n_times, n_discs, n_nodes, _ = nodes.shape
     return np.swapaxes(nodes, 0, 1).reshape(n_discs, n_times * n_nodes, 2)
