@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 # As the program does; NumPy reads it when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# No windows on the desk of whoever runs the tests; set it to see them.
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
 # How long an example takes depends on what else the machine does. The examples are the
 # same in every run, as all that is random here.
 settings.register_profile("patient", deadline=None, derandomize=True)

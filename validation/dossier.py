@@ -25,6 +25,8 @@ from xml.etree import ElementTree
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from PySide6.QtGui import QGuiApplication, QPageSize, QPdfWriter, QTextDocument
+
 from lightpen import __version__
 from validation.feature_fitting import FittingResult, run_fitting_test
 
@@ -83,6 +85,8 @@ def main() -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     file = options.out / f"Lightpen-{__version__}-validation.json"
     file.write_text(json.dumps(content(proven, fitting), indent=1) + "\n", "utf-8")
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    _application = QGuiApplication([])
     write_pdf(page(proven, fitting, file), file.with_suffix(".pdf"))
     for requirement in proven:
         print(f"{requirement.id:4} {requirement.result}")
@@ -187,11 +191,7 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def write_pdf(html: str, file: Path) -> None:
-    """Print a page of HTML on A4."""
-    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
-    from PySide6.QtGui import QGuiApplication, QPageSize, QPdfWriter, QTextDocument
-
-    _application = QGuiApplication.instance() or QGuiApplication([])
+    """Print a page of HTML on A4; there must be an application of Qt, for its fonts."""
     writer = QPdfWriter(str(file))
     writer.setPageSize(QPageSize(QPageSize.PageSizeId.A4))
     writer.setTitle(f"Validation of Lightpen {__version__}")

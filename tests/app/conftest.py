@@ -1,7 +1,6 @@
 """Fixtures of the application's tests: its own look, whatever the machine has."""
 
 import gc
-import os
 import shutil
 import sys
 import time
@@ -65,10 +64,6 @@ from lightpen_app.work.garbage import collect_if_due
 from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
-
-# No windows on the desk of whoever runs the tests; set it to see them.
-os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
-
 
 PATIENCE_MS = 120_000  # on a machine that does other things besides
 

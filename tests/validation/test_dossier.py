@@ -86,6 +86,7 @@ def test_every_package_of_the_core_and_every_command_is_required_of() -> None:
     )
 
 
+@pytest.mark.usefixtures("qapp")
 def test_the_dossier_states_results_in_json_and_pdf(tmp_path: Path) -> None:
     passed = Outcome("tests/core/test_a.py::test_one", "passed")
     proven = [ProvenRequirement("R1", "It works & lasts.", (passed,))]
