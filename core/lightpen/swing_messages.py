@@ -86,41 +86,6 @@ SIDES = (
 MOST_SIDES = message("side.most")
 
 
-def starts_in(seconds: int) -> Message:
-    """Message: time until the capture begins."""
-    return message(Code.STARTS_IN, seconds=seconds)
-
-
-def few_leds(seen: int, needed: int) -> Message:
-    """State that an image shows too few LEDs."""
-    return message(Code.FEW_LEDS, seen=seen, needed=needed)
-
-
-def bad_fit(noise: float, usual: float) -> Message:
-    """State that the LEDs of an image do not fit: its noise and that of others, px."""
-    return message(Code.BAD_FIT, noise=noise, usual=usual)
-
-
-def tip_slipped(n_dropped: int) -> Message:
-    """Message: the tip has slipped, with the number of images lost."""
-    return message(Code.TIP_SLIPPED, n_dropped=n_dropped)
-
-
-def tip_elsewhere(distance: float) -> Message:
-    """Message: the tip rests in another place, with the distance, mm."""
-    return message(Code.TIP_ELSEWHERE, distance=distance)
-
-
-def images_read(n_read: int, n_images: int) -> Message:
-    """Message: number of images read from a recording."""
-    return message(Code.IMAGES_READ, n_read=n_read, n_images=n_images)
-
-
-def too_few_images(n_kept: int, needed: int) -> Message:
-    """Message: fewer images than the limit."""
-    return message(Code.TOO_FEW_IMAGES, n_kept=n_kept, needed=needed)
-
-
 def too_little_tilt(n_images: int, directions: Iterable[int]) -> Message:
     """Message: missing images by direction of the dial (0 to 7)."""
     sides = tuple(SIDES[direction] for direction in sorted(set(directions)))
@@ -131,34 +96,13 @@ def too_little_tilt(n_images: int, directions: Iterable[int]) -> Message:
     )
 
 
-def not_upright(n_images: int) -> Message:
-    """Message: missing images of the upright pen."""
-    return message(Code.NOT_UPRIGHT, n_images=n_images)
-
-
-def uncertain(uncertainty: float, limit: float) -> Message:
-    """State that U (k = 2) of the tip is above its limit, mm."""
-    return message(Code.UNCERTAIN, uncertainty=uncertainty, limit=limit)
-
-
-def cannot_get_below(floor: float, limit: float) -> Message:
-    """State that U (k = 2) stays above its limit whatever is captured, mm."""
-    return message(Code.OUT_OF_REACH, floor=1000 * floor, limit=1000 * limit)
-
-
 def file_uncertain(
     uncertainty: float, limit: float, share: float, advice: Message, assumed: bool
 ) -> Message:
     """Message: a file's uncertainty raises U (k = 2) above its limit, mm.
 
-    Parameters
-    ----------
-    share : float
-        U (k = 2) by that alone, mm.
-    advice : Message
-        Cause and remedy, completing "from ...".
-    assumed : bool
-        Whether the file leaves its uncertainty out.
+    ``share`` is U by that alone; ``advice`` names it and the remedy, completing
+    "from ..."; ``assumed`` is whether the file leaves its uncertainty out.
     """
     if assumed:
         return message(
@@ -175,11 +119,6 @@ def file_uncertain(
         share=share,
         advice=advice,
     )
-
-
-def file_contradicted(why: Message) -> Message:
-    """Message: the images contradict a file."""
-    return message(Code.FILE_CONTRADICTED, why=why)
 
 
 def time_span(intervals: float, interval_ms: float | None) -> Message:
@@ -200,99 +139,3 @@ def lateness(intervals: float, interval_ms: float | None) -> Message:
     if intervals < 0:
         return message("time.early", time=time)
     return message("time.late", time=time)
-
-
-def not_simultaneous(camera: str, lag: Message) -> Message:
-    """State how late a camera is, see `lateness`."""
-    return message(Code.NOT_SIMULTANEOUS, camera=camera, lag=lag)
-
-
-def camera_moved(distance: float) -> Message:
-    """Message: motion between cone and camera during the swing, mm."""
-    return message(Code.CAMERA_MOVED, distance=distance)
-
-
-def tip_changed(
-    distance: float, date: str, axis: str, difference: float, uncertainty: float
-) -> Message:
-    """Message: the tip has changed by more than the combined U.
-
-    Parameters
-    ----------
-    distance : float
-        How far it is from there, mm.
-    date : str
-        Date of the earlier result.
-    axis : str
-        Of the pen's frame, along which it is least explained.
-    difference, uncertainty : float
-        Along it, with U (k = 2) by both results, mm.
-    """
-    return message(
-        Code.TIP_CHANGED,
-        distance=distance,
-        date=date,
-        axis=axis,
-        difference=difference,
-        uncertainty=uncertainty,
-    )
-
-
-def change_beyond_limit(distance: float, date: str, limit: float) -> Message:
-    """Message: the tip has changed by more than its limit.
-
-    Parameters
-    ----------
-    distance : float
-        How far it is from there, mm.
-    date : str
-        Date of the earlier result.
-    limit : float
-        Of the tip, mm.
-    """
-    return message(Code.CHANGE_BEYOND_LIMIT, distance=distance, date=date, limit=limit)
-
-
-def last_unknown(why: Message) -> Message:
-    """State that a tip cannot be compared with the one in force."""
-    return message(Code.LAST_UNKNOWN, why=why)
-
-
-def halves_differ(difference: float, usual: float) -> Message:
-    """Message: difference between odd and even images, and its U (k = 2), mm."""
-    return message(Code.HALVES_DIFFER, difference=difference, usual=usual)
-
-
-def many_excluded(n_excluded: int) -> Message:
-    """State how many images the user has excluded."""
-    return message(Code.MANY_EXCLUDED, n_excluded=n_excluded)
-
-
-def many_dropped(n_dropped: int, n_images: int) -> Message:
-    """Message: number of excluded images that show the pen."""
-    return message(Code.MANY_DROPPED, n_dropped=n_dropped, n_images=n_images)
-
-
-def leds_off(sigma: float, uncertainty: float) -> Message:
-    """State the error of the LED file, and U (k = 2) of the tip by it alone, mm."""
-    return message(Code.LEDS_OFF, sigma=sigma, uncertainty=uncertainty)
-
-
-def led_displaced(led: int, distance: float) -> Message:
-    """Message: an LED is not at its file position, with the distance, mm."""
-    return message(Code.LED_DISPLACED, led=led, distance=distance)
-
-
-def leds_misfit(sigma: float, usual: float) -> Message:
-    """State the residuals of a fit, and what they are at most as a rule, px."""
-    return message(Code.LEDS_MISFIT, sigma=sigma, usual=usual)
-
-
-def no_tip(why: Message) -> Message:
-    """State why there is no tip."""
-    return message(Code.NO_TIP, why=why)
-
-
-def tip_is_good(uncertainty: float) -> Message:
-    """State U (k = 2) of a tip with which all is well, mm."""
-    return message(Code.GOOD, uncertainty=uncertainty)

@@ -7,10 +7,10 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.rig_pose import fit_rig_poses
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
-from lightpen.messages import Message
+from lightpen.messages import Message, message
 from lightpen.swing.kept_images import AcceptedImages
 from lightpen.swing.state import SwingSetup
-from lightpen.swing_messages import leds_misfit
+from lightpen.swing_messages import Code
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,5 +45,9 @@ def failed_swing(setup: SwingSetup, kept: AcceptedImages, why: Message) -> Faile
         residuals = poses.residuals.reshape(kept.pixels.shape)
     sigma = float(np.median(kept.sigmas)) if len(kept) else 0.0
     fits = sigma <= USUAL_SIGMA
-    causes = (why,) if fits else (leds_misfit(sigma, USUAL_SIGMA), why)
+    causes = (
+        (why,)
+        if fits
+        else (message(Code.LEDS_MISFIT, sigma=sigma, usual=USUAL_SIGMA), why)
+    )
     return FailedSwing(causes, kept.pixels, residuals)

@@ -19,7 +19,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
-from lightpen.messages import Message
+from lightpen.messages import Message, message
 from lightpen.model.posture import angles_between, posture_of
 from lightpen.swing.kept_images import AcceptedImages, keep, none_kept, without_slipped
 from lightpen.swing.rest import BATCH, in_place, offset, rests_in_place, steady_seat
@@ -49,12 +49,7 @@ from lightpen.swing_messages import (
     SOLVING,
     SWING_TO_SEAT,
     TOO_FAST,
-    bad_fit,
-    few_leds,
-    images_read,
-    starts_in,
-    tip_elsewhere,
-    tip_slipped,
+    Code,
 )
 
 SETTLING = 0.5  # s between the tip being found at rest and the countdown
@@ -125,7 +120,11 @@ def resume(state: SwingState) -> SwingState:
         return state
     n_read, n_images = state.progress.n_read, state.progress.n_images
     if n_images:
-        return _enter(state, Phase.CAPTURING, images_read(n_read, n_images))
+        return _enter(
+            state,
+            Phase.CAPTURING,
+            message(Code.IMAGES_READ, n_read=n_read, n_images=n_images),
+        )
     return _await_seat(state)
 
 
@@ -258,7 +257,9 @@ def _settled(
         return Transition(state)
     if state.n_kept:
         return Transition(_enter(state, Phase.CAPTURING, _asking(state)))
-    return Transition(_enter(state, Phase.COUNTDOWN, starts_in(ceil(COUNTDOWN))))
+    return Transition(
+        _enter(state, Phase.COUNTDOWN, message(Code.STARTS_IN, seconds=ceil(COUNTDOWN)))
+    )
 
 
 def _countdown(
@@ -269,7 +270,9 @@ def _countdown(
         return unsettled
     left = COUNTDOWN - (state.time - state.since)
     if left > 0:
-        return Transition(replace(state, message=starts_in(ceil(left))))
+        return Transition(
+            replace(state, message=message(Code.STARTS_IN, seconds=ceil(left)))
+        )
     return Transition(_enter(state, Phase.CAPTURING, _asking(state)))
 
 
@@ -370,7 +373,9 @@ def _astray(
     if begins and not events:
         events = (SwingEvent(SwingEventKind.SLIPPED),)
     n_dropped = len(strays) + len(dropped)
-    return Transition(replace(state, message=tip_slipped(n_dropped)), events)
+    return Transition(
+        replace(state, message=message(Code.TIP_SLIPPED, n_dropped=n_dropped)), events
+    )
 
 
 def _paused(
@@ -435,7 +440,7 @@ def _seating(setup: SwingSetup) -> Message:
 
 
 def _elsewhere(state: SwingState) -> Message:
-    return tip_elsewhere(offset(state, BATCH))
+    return message(Code.TIP_ELSEWHERE, distance=offset(state, BATCH))
 
 
 def _asking(state: SwingState) -> Message:
@@ -468,9 +473,13 @@ def _flawed(
     flawed = _with_new(setup, state.flawed_rotations, detection)
     needed = certain_leds(setup.pen)
     messages = {
-        Reason.TOO_FEW_LEDS: few_leds(detection.n_leds, needed),
+        Reason.TOO_FEW_LEDS: message(
+            Code.FEW_LEDS, seen=detection.n_leds, needed=needed
+        ),
         Reason.BLURRED: TOO_FAST,
-        Reason.MISFIT: bad_fit(detection.sigma, state.kept.sigma),
+        Reason.MISFIT: message(
+            Code.BAD_FIT, noise=detection.sigma, usual=state.kept.sigma
+        ),
     }
     return replace(
         state,

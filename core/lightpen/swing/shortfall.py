@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.pen_detection import PenDetection
-from lightpen.messages import Message
+from lightpen.messages import Message, message
 from lightpen.model.coverage import N_DIRECTIONS
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
@@ -21,14 +21,7 @@ from lightpen.model.posture import (
 from lightpen.swing.guidance import GuidanceInput, next_posture, visible_fields
 from lightpen.swing.seat import Seat
 from lightpen.swing.state import SwingSetup, SwingState
-from lightpen.swing_messages import (
-    UNKNOWN,
-    cannot_get_below,
-    not_upright,
-    too_few_images,
-    too_little_tilt,
-    uncertain,
-)
+from lightpen.swing_messages import UNKNOWN, Code, too_little_tilt
 
 UPRIGHT_HELD = 0.5  # s
 LEARNING_TILT = np.radians(12.0)  # shows to which side the operator leans
@@ -127,7 +120,11 @@ def out_of_reach(
     is_early = short.fields.sum() > (1 - ENOUGH_FILLED) * short.wanted.sum()
     if is_early or reached.floor < limits.max_uncertainty:
         return None
-    return cannot_get_below(reached.floor, limits.max_uncertainty)
+    return message(
+        Code.OUT_OF_REACH,
+        floor=1000 * reached.floor,
+        limit=1000 * limits.max_uncertainty,
+    )
 
 
 def turn_range(pen: Pen, rotations: FloatArray) -> tuple[float, float] | None:
@@ -158,17 +155,25 @@ def missing(setup: SwingSetup, state: SwingState) -> tuple[Message, ...]:
         n_images = int(short.fields[1:].sum())
         found.append(too_little_tilt(n_images, map(int, directions)))
     if short.fields[0, 0]:
-        found.append(not_upright(int(short.fields[0, 0])))
+        found.append(message(Code.NOT_UPRIGHT, n_images=int(short.fields[0, 0])))
     if short.n_for_uncertainty:
         uncertainty = state.kept.uncertainty
         limit = setup.limits.max_uncertainty
         known = np.isfinite(uncertainty)
-        found.append(uncertain(uncertainty, limit) if known else UNKNOWN)
+        found.append(
+            message(Code.UNCERTAIN, uncertainty=uncertainty, limit=limit)
+            if known
+            else UNKNOWN
+        )
     never = out_of_reach(setup.limits, state, short)
     if never is not None:
         found.append(never)
     if state.n_kept < setup.limits.min_images:
-        found.append(too_few_images(state.n_kept, setup.limits.min_images))
+        found.append(
+            message(
+                Code.TOO_FEW_IMAGES, n_kept=state.n_kept, needed=setup.limits.min_images
+            )
+        )
     return tuple(found)
 
 

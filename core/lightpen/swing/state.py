@@ -19,7 +19,7 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
 from lightpen.detection.region_of_interest import RegionOfInterest
-from lightpen.messages import Message
+from lightpen.messages import Message, message
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import dial_counts
@@ -34,7 +34,7 @@ from lightpen.swing.kept_images import (
     none_kept,
 )
 from lightpen.swing.seat import Seat
-from lightpen.swing_messages import SHOW_PEN, images_read
+from lightpen.swing_messages import SHOW_PEN, Code
 
 N_TRACED = 12  # estimates of a swing that is gone on with
 
@@ -288,7 +288,9 @@ def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:
         phase=Phase.CAPTURING if is_recording else Phase.WAIT,
         since=time,
         time=time,
-        message=images_read(0, 0) if is_recording else SHOW_PEN,
+        message=message(Code.IMAGES_READ, n_read=0, n_images=0)
+        if is_recording
+        else SHOW_PEN,
         kept=none_kept(setup.rig.n_cameras, setup.pen.n_leds, setup.assumptions),
         next_number=1,
         n_dropped=Counter(),

@@ -14,6 +14,7 @@ from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
 from lightpen.formats.decoding import encode_png
+from lightpen.messages import message
 from lightpen.record.swings.reading import DISCARDED, Record
 from lightpen.record.swings.writing import RecordWriter, SecondaryView
 from lightpen.swing.kept_images import keep
@@ -26,7 +27,7 @@ from lightpen.swing.state import (
     SwingSetup,
     SwingState,
 )
-from lightpen.swing_messages import images_read
+from lightpen.swing_messages import Code
 
 Rule: TypeAlias = Callable[[SwingSetup, SwingState, PenDetection, float], Transition]
 
@@ -150,7 +151,7 @@ def _further(state: SwingState, n_images: int) -> SwingState:
         state,
         phase=Phase.CAPTURING,
         progress=Progress(n_read, n_images),
-        message=images_read(n_read, n_images),
+        message=message(Code.IMAGES_READ, n_read=n_read, n_images=n_images),
     )
 
 

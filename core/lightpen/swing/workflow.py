@@ -65,7 +65,7 @@ from lightpen.swing.state import (
 )
 from lightpen.swing.status import Activity, SwingListener, SwingStatus
 from lightpen.swing.swing_recorder import SwingRecorder
-from lightpen.swing_messages import no_tip
+from lightpen.swing_messages import Code
 
 T = TypeVar("T")
 PRESS_IMAGES = 60  # at least, with firm pressure
@@ -547,7 +547,9 @@ class SwingWorkflow:
             assert setup is not None
             failed = failed_swing(setup, state.kept, why)
             status = replace(self._status, activity=Activity.NONE, failed=failed)
-            self._conclude(status, no_tip(failed.causes[0]), passed=False)
+            self._conclude(
+                status, message(Code.NO_TIP, why=failed.causes[0]), passed=False
+            )
             return
         if set(self._tried) > set(solution.taken_out):
             why = message("swing.images-stay-in", why=why)

@@ -5,7 +5,7 @@ from string import Formatter
 
 import pytest
 
-from lightpen.messages import CATALOGUE, Message
+from lightpen.messages import CATALOGUE, Message, message
 from lightpen.model.posture import Posture
 from lightpen.swing.state import Pause, Phase
 from lightpen.swing_messages import (
@@ -21,12 +21,6 @@ from lightpen.swing_messages import (
     SWING_TO_SEAT,
     TOO_FAST,
     Code,
-    bad_fit,
-    few_leds,
-    starts_in,
-    tip_elsewhere,
-    tip_is_good,
-    tip_slipped,
     too_little_tilt,
 )
 from lightpen_app.look.phrases import lean_phrase, phase_text, phrase
@@ -35,9 +29,13 @@ FAR, LITTLE = math.radians(28), math.radians(14)
 RIGHT, AWAY, LEFT, TOWARDS = (quarter * math.pi / 2 for quarter in range(4))
 LONGEST = 20  # letters that are read from 3 m on a screen of 1920 px
 DURING_A_SWING = (
-    *(SHOW_PEN, SEAT_TIP, SWING_TO_SEAT, HOLD_STILL, starts_in(3)),
-    *(LEAN_TO_YOUR_RIGHT, FOLLOW_ARROW, few_leds(3, 6), TOO_FAST, bad_fit(3, 6)),
-    *(tip_slipped(3), PEN_LOST, PEN_LIFTED, tip_elsewhere(3), PAUSED, SOLVING),
+    *(SHOW_PEN, SEAT_TIP, SWING_TO_SEAT, HOLD_STILL, LEAN_TO_YOUR_RIGHT, FOLLOW_ARROW),
+    *(TOO_FAST, PEN_LOST, PEN_LIFTED, PAUSED, SOLVING),
+    message(Code.STARTS_IN, seconds=3),
+    message(Code.FEW_LEDS, seen=3, needed=6),
+    message(Code.BAD_FIT, noise=3, usual=6),
+    message(Code.TIP_SLIPPED, n_dropped=3),
+    message(Code.TIP_ELSEWHERE, distance=3),
 )
 
 
@@ -87,7 +85,7 @@ def test_some_missing_sides_are_named_and_many_are_not() -> None:
 
 
 def test_what_to_do_at_the_screen_is_reported_there_alone() -> None:
-    good = tip_is_good(0.00412)
+    good = message(Code.GOOD, uncertainty=0.00412)
 
     assert str(good) == "U (k = 2) of the tip is 0.0041 mm."
     assert phrase(good).hint == f"{good} Accept at the computer."

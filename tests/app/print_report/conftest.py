@@ -17,6 +17,7 @@ from lightpen.archive.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import write_whole
 from lightpen.formats.stored_messages import StoredMessage
+from lightpen.messages import message
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import read_calibration
@@ -24,7 +25,7 @@ from lightpen.record.calibrations.reestimated_poses import reestimate_poses
 from lightpen.record.library.traceability import TracedItem
 from lightpen.record.results.results import Result, result_bytes
 from lightpen.record.swings.names import Names
-from lightpen.swing_messages import tip_changed
+from lightpen.swing_messages import Code
 from lightpen_app.print_report.pages import (
     PAGE_HEIGHT,
     PAGE_WIDTH,
@@ -66,7 +67,14 @@ def result(stated: dict[str, Any]) -> Result:
 @pytest.fixture
 def doubted(result: Result) -> Result:
     """Return one of a recording that was accepted with a reason."""
-    reported = tip_changed(0.0312, "2026-01-01", "y", 0.0301, 0.0142)
+    reported = message(
+        Code.TIP_CHANGED,
+        distance=0.0312,
+        date="2026-01-01",
+        axis="y",
+        difference=0.0301,
+        uncertainty=0.0142,
+    )
     return replace(
         result,
         grade=Grade.CHECK,

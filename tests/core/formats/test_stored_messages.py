@@ -9,14 +9,7 @@ from msgspec import structs, to_builtins
 from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import Message, message
-from lightpen.swing_messages import (
-    file_uncertain,
-    halves_differ,
-    last_unknown,
-    led_displaced,
-    tip_changed,
-    too_little_tilt,
-)
+from lightpen.swing_messages import Code, file_uncertain, too_little_tilt
 
 DAMAGED = message("results.damaged", file="a, b {c}.json")
 ADVICE = message("share.temperature")
@@ -31,14 +24,21 @@ def stored(original: Message) -> StoredMessage:
 @pytest.mark.parametrize(
     "original",
     [
-        tip_changed(0.03, "2026-01-02", "y", 0.02, 0.01),
-        halves_differ(0.02, 0.01),
-        led_displaced(7, 0.05),
+        message(
+            Code.TIP_CHANGED,
+            distance=0.03,
+            date="2026-01-02",
+            axis="y",
+            difference=0.02,
+            uncertainty=0.01,
+        ),
+        message(Code.HALVES_DIFFER, difference=0.02, usual=0.01),
+        message(Code.LED_DISPLACED, led=7, distance=0.05),
         too_little_tilt(6, [0, 2, 5]),
         too_little_tilt(20, range(8)),
-        last_unknown(DAMAGED),
+        message(Code.LAST_UNKNOWN, why=DAMAGED),
         file_uncertain(0.02, 0.01, 0.015, ADVICE, assumed=True),
-        halves_differ(math.nan, 0.01),
+        message(Code.HALVES_DIFFER, difference=math.nan, usual=0.01),
     ],
     ids=lambda original: original.code,
 )
@@ -59,7 +59,7 @@ def mark(template: str) -> str:
 def test_its_text_stands_where_the_catalogue_does_not_fit_any_more(
     changes: dict[str, object],
 ) -> None:
-    original = StoredMessage.of(led_displaced(7, 0.05))
+    original = StoredMessage.of(message(Code.LED_DISPLACED, led=7, distance=0.05))
 
     assert structs.replace(original, **changes).worded(mark) == original.text
 

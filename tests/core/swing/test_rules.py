@@ -10,6 +10,7 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import SkippingClock
 from lightpen.detection.pen_detection import PenDetection, detect_from_centers, unseen
 from lightpen.detection.reasons import Reason
+from lightpen.messages import message
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.posture import angles_between
@@ -54,12 +55,7 @@ from lightpen.swing_messages import (
     SEAT_TIP,
     SWING_TO_SEAT,
     Code,
-    few_leds,
-    tip_is_good,
-    tip_slipped,
-    too_few_images,
     too_little_tilt,
-    uncertain,
 )
 
 PERIOD = 0.15  # s, thrice the usual one: what is decided takes longer than either
@@ -412,7 +408,7 @@ def test_a_slip_says_so_once_with_the_number_of_images() -> None:
     station.operator.slip(0.3, 2.0)
     station.run(1.5)
     n_slipped = station.state.n_dropped[Reason.SLIPPED]
-    assert station.state.message == tip_slipped(n_slipped)
+    assert station.state.message == message(Code.TIP_SLIPPED, n_dropped=n_slipped)
     station.run(2.5)
     assert station.event_kinds().count(SwingEventKind.SLIPPED) == 1
     assert station.state.message == FOLLOW_ARROW
@@ -508,7 +504,7 @@ def test_too_few_leds_are_said_and_not_kept() -> None:
     station.operator.cover(leds=[1, 2, 3, 4, 5])
     station.run(3.0)
     assert station.state.n_kept <= n_kept + 1
-    assert station.state.message == few_leds(5, 6)
+    assert station.state.message == message(Code.FEW_LEDS, seen=5, needed=6)
     # Some 60 images, but counted once a posture.
     assert 1 <= station.state.n_dropped[Reason.TOO_FEW_LEDS] < 20
 
@@ -570,8 +566,11 @@ def test_finishing_early_says_what_is_missing() -> None:
     n_images = int(np.maximum(2 - station.state.counts[1:], 0).sum())
     bare = np.flatnonzero((station.state.counts[1:] < 2).any(axis=0))
     said = missing(station.setup, station.state)
-    assert too_few_images(station.state.n_kept, 60) in said
-    assert uncertain(station.state.kept.uncertainty, 0.02) in said
+    assert message(Code.TOO_FEW_IMAGES, n_kept=station.state.n_kept, needed=60) in said
+    assert (
+        message(Code.UNCERTAIN, uncertainty=station.state.kept.uncertainty, limit=0.02)
+        in said
+    )
     assert too_little_tilt(n_images, bare.tolist()) in said
 
     transition = finish(station.state)
@@ -600,7 +599,7 @@ def test_fields_the_camera_cannot_see_are_not_asked_for() -> None:
 
 
 def test_the_verdict_is_reported(whole: Station) -> None:
-    good = tip_is_good(0.004)
+    good = message(Code.GOOD, uncertainty=0.004)
     transition = conclude(whole.state, good, passed=True)
     assert transition.state.phase is Phase.VERDICT
     assert transition.state.message == good

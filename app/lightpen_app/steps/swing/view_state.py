@@ -17,7 +17,7 @@ from lightpen.simulator.follower import FIRST_LEAN
 from lightpen.swing.rules import COUNTDOWN, has_just_slipped
 from lightpen.swing.shortfall import Shortfall, out_of_reach, turn_range
 from lightpen.swing.state import Pause, Phase, SwingSetup, SwingState
-from lightpen.swing_messages import SHOW_PEN, Code, leds_misfit
+from lightpen.swing_messages import SHOW_PEN, Code
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import (
     Instruction,
@@ -217,7 +217,7 @@ class SwingWords(QObject):
         kept = moment.state.kept
         why = out_of_reach(moment.setup.limits, moment.state, moment.short)
         if len(kept) >= FEW and kept.sigma > USUAL_SIGMA:
-            why = leds_misfit(kept.sigma, USUAL_SIGMA)
+            why = message(Code.LEDS_MISFIT, sigma=kept.sigma, usual=USUAL_SIGMA)
         elif moment.has_unfit_spots and moment.state.phase in (Phase.WAIT, Phase.SEEN):
             n_leds = moment.setup.pen.n_leds
             why = message("diagnosis.spots-do-not-fit", n_needed=n_leds, n_leds=n_leds)

@@ -12,7 +12,7 @@ from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.messages import Message, message
 from lightpen.model.rig import of_camera
-from lightpen.swing_messages import lateness, not_simultaneous
+from lightpen.swing_messages import Code, lateness
 
 NOISY = 2.5  # times the noise of the usual LED
 
@@ -149,7 +149,9 @@ def late_cameras(calibration: Calibration) -> list[Message]:
         each.camera for each in calibration.effects if each.name is EffectName.DELAY
     ]
     return [
-        not_simultaneous(name, lateness(lag.value, interval_ms))
+        message(
+            Code.NOT_SIMULTANEOUS, camera=name, lag=lateness(lag.value, interval_ms)
+        )
         for name, lag in zip(names, calibration.lags, strict=True)
         if lag is not None and lag.is_noticeable and name not in corrected
     ]

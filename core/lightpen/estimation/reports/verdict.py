@@ -1,5 +1,6 @@
 """The verdict on a calibration: PASS, CHECK or REPEAT, with its reason."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -23,22 +24,8 @@ from lightpen.model.limits import SwingLimits
 from lightpen.swing_messages import (
     NO_TEMPERATURE,
     Code,
-    camera_moved,
-    change_beyond_limit,
-    file_contradicted,
     file_uncertain,
-    halves_differ,
-    last_unknown,
-    led_displaced,
-    leds_misfit,
-    leds_off,
-    many_dropped,
-    many_excluded,
-    tip_changed,
-    tip_is_good,
-    too_few_images,
     too_little_tilt,
-    uncertain,
 )
 
 FAR_OFF = 3.0  # times the limit of U: no result to work with
@@ -199,9 +186,13 @@ class Change:
         """Return the verdict as text, with the date of the earlier tip."""
         lengths = np.abs(self.difference)
         axis = int(np.argmax(lengths / np.maximum(self.expanded_uncertainty, TINY)))
-        return tip_changed(
-            *(self.distance, date, AXES[axis], float(lengths[axis])),
-            float(self.expanded_uncertainty[axis]),
+        return message(
+            Code.TIP_CHANGED,
+            distance=self.distance,
+            date=date,
+            axis=AXES[axis],
+            difference=float(lengths[axis]),
+            uncertainty=float(self.expanded_uncertainty[axis]),
         )
 
 
@@ -231,7 +222,9 @@ def change_doubt(change: Change, date: str, limit: float | None) -> Message | No
         Of the tip for the distance from there, mm; None if it has none.
     """
     if limit is not None and change.distance > limit:
-        return change_beyond_limit(change.distance, date, limit)
+        return message(
+            Code.CHANGE_BEYOND_LIMIT, distance=change.distance, date=date, limit=limit
+        )
     return change.remark(date) if change.is_unexplained else None
 
 
@@ -259,7 +252,7 @@ def judge_unknown(verdict: Verdict, why: Message) -> Verdict:
     """Judge a tip that would pass where the one before cannot be read."""
     if verdict.grade is not Grade.PASS:
         return verdict
-    return Verdict(Grade.CHECK, last_unknown(why))
+    return Verdict(Grade.CHECK, message(Code.LAST_UNKNOWN, why=why))
 
 
 def distance_from_nominal(
@@ -285,62 +278,70 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     long a camera ran before and after, and a swing that is captured does not keep it.
     """
     uncertainty = calibration.budget.weakest_uncertainty
-    limit = limits.max_uncertainty
+    if uncertainty > FAR_OFF * limits.max_uncertainty:
+        return Verdict(Grade.REPEAT, _why_uncertain(calibration, limits))
+    for finding in _findings(calibration, limits):
+        return Verdict(Grade.CHECK, finding)
+    return Verdict(Grade.PASS, message(Code.GOOD, uncertainty=uncertainty))
+
+
+def _why_uncertain(calibration: Calibration, limits: SwingLimits) -> Message:
+    """Return what makes U large: too few images, or a contribution that stays."""
     budget = calibration.budget
     largest = budget.largest_share
-    by_largest = budget.weakest_share(largest)
-    reasons = list(calibration.reasons)
-    n_images = sum(each.shows_pen and each is not Reason.COPY for each in reasons)
-    n_used = int(calibration.used.sum())
-    is_same_in_more = largest.name is ContributionName.CENTERS and n_used >= POSTURES
+    is_same_in_more = (
+        largest.name is ContributionName.CENTERS and calibration.used.sum() >= POSTURES
+    )
+    uncertainty, limit = budget.weakest_uncertainty, limits.max_uncertainty
     if largest.name in IMAGES_SHRINK and not is_same_in_more:
-        reason = uncertain(uncertainty, limit)
-    elif largest.name is ContributionName.LEDS and calibration.led_sigma > DISPLACED:
-        reason = leds_off(calibration.led_sigma, by_largest)
-    else:  # more images hardly change it
-        advice = _ADVICE[largest.name]
-        reason = file_uncertain(uncertainty, limit, by_largest, advice, largest.assumed)
-    if uncertainty > FAR_OFF * limit:
-        return Verdict(Grade.REPEAT, reason)
-    differences = np.abs(calibration.halves.difference)
-    by_chance = HALVES_GATE * calibration.halves.expanded_uncertainty
+        return message(Code.UNCERTAIN, uncertainty=uncertainty, limit=limit)
+    share, sigma = budget.weakest_share(largest), calibration.led_sigma
+    if largest.name is ContributionName.LEDS and sigma > DISPLACED:
+        return message(Code.LEDS_OFF, sigma=sigma, uncertainty=share)
+    advice = _ADVICE[largest.name]
+    return file_uncertain(uncertainty, limit, share, advice, largest.assumed)
+
+
+def _findings(calibration: Calibration, limits: SwingLimits) -> Iterator[Message]:
+    """Yield what needs checking, the most important first."""
+    limit, halves = limits.max_uncertainty, calibration.halves
+    differences = np.abs(halves.difference)
+    by_chance = HALVES_GATE * halves.expanded_uncertainty
     # A difference that is certain but smaller than what is allowed does not matter.
     apart = (differences > by_chance) & (differences > limit)
     if apart.any():
         worst = int(np.argmax(np.where(apart, differences, 0)))
-        usual = calibration.halves.expanded_uncertainty[worst]
-        differ = halves_differ(float(differences[worst]), float(usual))
-        return Verdict(Grade.CHECK, differ)
-    late = late_cameras(calibration)
-    if late:
-        return Verdict(Grade.CHECK, late[0])
+        usual = float(halves.expanded_uncertainty[worst])
+        difference = float(differences[worst])
+        yield message(Code.HALVES_DIFFER, difference=difference, usual=usual)
+    yield from late_cameras(calibration)
     if calibration.contradictions:
         worst_one = max(calibration.contradictions, key=lambda each: each.deviations)
-        return Verdict(Grade.CHECK, file_contradicted(worst_one.message))
+        yield message(Code.FILE_CONTRADICTED, why=worst_one.message)
     if calibration.moved > FAR_MOVED * limit:
-        return Verdict(Grade.CHECK, camera_moved(calibration.moved))
-    if calibration.joint.sigma > USUAL_SIGMA:
-        misfit = leds_misfit(calibration.joint.sigma, USUAL_SIGMA)
-        return Verdict(Grade.CHECK, misfit)
+        yield message(Code.CAMERA_MOVED, distance=calibration.moved)
+    sigma = calibration.joint.sigma
+    if sigma > USUAL_SIGMA:
+        yield message(Code.LEDS_MISFIT, sigma=sigma, usual=USUAL_SIGMA)
     if calibration.leds.displaced:
         lengths = np.linalg.norm(calibration.leds.displacement, axis=1)
         led = max(calibration.leds.displaced, key=lambda each: lengths[each - 1])
-        return Verdict(Grade.CHECK, led_displaced(led, float(lengths[led - 1])))
-    n_dropped, n_excluded = n_images - n_used, reasons.count(Reason.TAKEN_OUT)
+        distance = float(lengths[led - 1])
+        yield message(Code.LED_DISPLACED, led=led, distance=distance)
+    reasons = list(calibration.reasons)
+    n_images = sum(each.shows_pen and each is not Reason.COPY for each in reasons)
+    n_dropped = n_images - int(calibration.used.sum())
+    n_excluded = reasons.count(Reason.TAKEN_OUT)
     if n_dropped > MANY_DROPPED * n_images:
-        is_by_user = 2 * n_excluded > n_dropped
-        dropped = many_dropped(n_dropped, n_images)
-        return Verdict(
-            Grade.CHECK, many_excluded(n_excluded) if is_by_user else dropped
-        )
-    if uncertainty > limit:
-        return Verdict(Grade.CHECK, reason)
+        if 2 * n_excluded > n_dropped:
+            yield message(Code.MANY_EXCLUDED, n_excluded=n_excluded)
+        yield message(Code.MANY_DROPPED, n_dropped=n_dropped, n_images=n_images)
+    if calibration.budget.weakest_uncertainty > limit:
+        yield _why_uncertain(calibration, limits)
     if limits.requires_temperature and calibration.assumptions.temperature_c is None:
-        return Verdict(Grade.CHECK, NO_TEMPERATURE)
+        yield NO_TEMPERATURE
     if n_images < limits.min_images:
-        return Verdict(Grade.CHECK, too_few_images(n_images, limits.min_images))
+        yield message(Code.TOO_FEW_IMAGES, n_kept=n_images, needed=limits.min_images)
     bare = np.flatnonzero(dial_counts(calibration.joint.rotations)[1:].sum(axis=0) == 0)
     if len(bare) and limits.min_per_field:
-        n_images = limits.min_per_field * len(bare)
-        return Verdict(Grade.CHECK, too_little_tilt(n_images, map(int, bare)))
-    return Verdict(Grade.PASS, tip_is_good(uncertainty))
+        yield too_little_tilt(limits.min_per_field * len(bare), map(int, bare))

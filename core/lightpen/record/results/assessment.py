@@ -37,7 +37,7 @@ from lightpen.record.swings.reading import (
     recorded_origin,
 )
 from lightpen.record.swings.solving import Solution
-from lightpen.swing_messages import last_unknown, too_little_tilt
+from lightpen.swing_messages import Code, too_little_tilt
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ def assess(
         doubt = change_doubt(change, date, limit)
         verdict = judge_change(verdict, change, date, limit)
     all_doubts = chain(
-        [] if unknown is None else [last_unknown(unknown)],
+        [] if unknown is None else [message(Code.LAST_UNKNOWN, why=unknown)],
         [] if doubt is None else [doubt],
         overdue_items(library, names, local_time(record.header.created).date()),
         _far_from_nominal(solution),

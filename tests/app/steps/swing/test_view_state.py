@@ -7,6 +7,7 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from lightpen.estimation.reports.verdict import Grade, Verdict
+from lightpen.messages import message
 from lightpen.model.limits import SwingLimits
 from lightpen.simulator.swings import paper_camera, paper_pen
 from lightpen.swing.shortfall import measure_shortfall
@@ -18,13 +19,13 @@ from lightpen.swing.state import (
     SwingState,
     start_swing,
 )
-from lightpen.swing_messages import PEN_LOST, tip_is_good
+from lightpen.swing_messages import PEN_LOST, Code
 from lightpen_app.steps.swing.remaining_images import RemainingImages, in_true_steps
 from lightpen_app.steps.swing.view_state import SwingViewState, SwingWords
 from lightpen_app.widgets.sign_label import StatusMessage
 
 SETUP = SwingSetup(paper_camera(binning=2), paper_pen())
-PASSED = Verdict(Grade.PASS, tip_is_good(0.001))
+PASSED = Verdict(Grade.PASS, message(Code.GOOD, uncertainty=0.001))
 
 
 @pytest.fixture

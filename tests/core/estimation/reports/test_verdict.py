@@ -45,20 +45,7 @@ from lightpen.simulator.swings import (
     swing_from_postures,
     swing_poses,
 )
-from lightpen.swing_messages import (
-    NO_TEMPERATURE,
-    Code,
-    camera_moved,
-    change_beyond_limit,
-    halves_differ,
-    led_displaced,
-    leds_off,
-    many_dropped,
-    many_excluded,
-    tip_is_good,
-    too_few_images,
-    too_little_tilt,
-)
+from lightpen.swing_messages import NO_TEMPERATURE, Code, too_little_tilt
 
 CAMERA, PEN = paper_camera(), paper_pen()
 
@@ -82,7 +69,9 @@ def good() -> Calibration:
 def test_a_good_calibration_passes_with_its_uncertainty(good: Calibration) -> None:
     verdict = judge(good, SwingLimits(max_uncertainty=0.02))
     assert verdict.grade is Grade.PASS
-    assert verdict.reason == tip_is_good(good.budget.weakest_uncertainty)
+    assert verdict.reason == message(
+        Code.GOOD, uncertainty=good.budget.weakest_uncertainty
+    )
 
 
 @pytest.mark.parametrize(("share", "grade"), [(0.9, Grade.CHECK), (0.3, Grade.REPEAT)])
@@ -117,14 +106,14 @@ def test_halves_that_differ_along_any_axis_by_more_than_is_allowed_are_checked(
     halves = SplitHalfCheck(np.array([0.004, 0.025, 0.0]), uncertainty)
     limits = SwingLimits(max_uncertainty=0.02)
     verdict = judge(replace(good, halves=halves), limits)
-    assert verdict.reason == halves_differ(0.025, 0.005)
+    assert verdict.reason == message(Code.HALVES_DIFFER, difference=0.025, usual=0.005)
 
     small = SplitHalfCheck(np.array([0.004, 0.006, 0.0]), uncertainty)
     assert judge(replace(good, halves=small), limits).grade is Grade.PASS
 
 
 def test_what_must_be_repeated_cannot_be_accepted() -> None:
-    good = tip_is_good(0.004)
+    good = message(Code.GOOD, uncertainty=0.004)
     assert [Verdict(grade, good).can_be_accepted for grade in Grade] == [
         *(True, True, False)
     ]
@@ -162,7 +151,7 @@ def test_an_uncertainty_by_leds_that_are_off_is_reported_as_such(
 
     verdict = judge(off, SwingLimits(max_uncertainty=0.015))
     assert verdict.grade is Grade.CHECK
-    assert verdict.reason == leds_off(0.1, by_leds)
+    assert verdict.reason == message(Code.LEDS_OFF, sigma=0.1, uncertainty=by_leds)
     assert judge(off, SwingLimits(max_uncertainty=0.005)).grade is Grade.REPEAT
     assert judge(off, SwingLimits(max_uncertainty=0.03)).reason.code == Code.GOOD
 
@@ -288,7 +277,7 @@ def test_many_dropped_images_are_checked(good: Calibration) -> None:
     used = good.used.copy()
     used[::4] = False
     verdict = judge(replace(good, used=used), SwingLimits(max_uncertainty=0.02))
-    assert verdict.reason == many_dropped(38, 150)
+    assert verdict.reason == message(Code.MANY_DROPPED, n_dropped=38, n_images=150)
 
 
 def test_images_without_the_pen_do_not_count_however_many(good: Calibration) -> None:
@@ -303,7 +292,7 @@ def test_images_without_the_pen_do_not_count_however_many(good: Calibration) -> 
     limits = SwingLimits(max_uncertainty=0.02, min_images=50)
     assert judge(few, limits).grade is Grade.PASS
     verdict = judge(few, replace(limits, min_images=51))
-    assert verdict.reason == too_few_images(50, 51)
+    assert verdict.reason == message(Code.TOO_FEW_IMAGES, n_kept=50, needed=51)
 
 
 @pytest.mark.parametrize("reason", [Reason.SLIPPED, Reason.MISFIT, Reason.TAKEN_OUT])
@@ -316,7 +305,11 @@ def test_images_of_the_pen_that_are_left_out_count(
     limits = SwingLimits(max_uncertainty=0.02, min_images=150)
     verdict = judge(replace(good, used=used, reasons=reasons), limits)
     is_by_user = reason is Reason.TAKEN_OUT
-    reported = many_excluded(31) if is_by_user else many_dropped(31, 150)
+    reported = (
+        message(Code.MANY_EXCLUDED, n_excluded=31)
+        if is_by_user
+        else message(Code.MANY_DROPPED, n_dropped=31, n_images=150)
+    )
     assert verdict.reason == reported
 
 
@@ -328,7 +321,7 @@ def test_fewer_images_than_asked_for_are_checked_also_if_they_suffice(
 
     verdict = judge(good, replace(limits, min_images=151))
     assert verdict.grade is Grade.CHECK
-    assert verdict.reason == too_few_images(150, 151)
+    assert verdict.reason == message(Code.TOO_FEW_IMAGES, n_kept=150, needed=151)
 
 
 def test_sides_that_the_pen_never_leant_to_are_named() -> None:
@@ -398,7 +391,7 @@ def test_a_change_is_uncertain_by_both_calibrations() -> None:
     assert found.distance == pytest.approx(0.05)
 
 
-PASSED = Verdict(Grade.PASS, tip_is_good(0.004))
+PASSED = Verdict(Grade.PASS, message(Code.GOOD, uncertainty=0.004))
 
 
 @pytest.mark.parametrize(
@@ -438,9 +431,9 @@ def test_a_large_change_that_uncertainty_explains_passes() -> None:
 
 
 def test_what_is_wrong_with_a_tip_by_itself_counts_more_than_its_change() -> None:
-    repeat = Verdict(Grade.REPEAT, tip_is_good(0.4))
+    repeat = Verdict(Grade.REPEAT, message(Code.GOOD, uncertainty=0.4))
     assert judge_change(repeat, change([0.3, 0.2, 0.1]), "") is repeat
-    assert judge_unknown(repeat, tip_is_good(0.4)) is repeat
+    assert judge_unknown(repeat, message(Code.GOOD, uncertainty=0.4)) is repeat
 
 
 def test_a_fair_share_of_unchanged_tips_passes() -> None:
@@ -460,7 +453,9 @@ def test_a_fifth_of_all_images_may_be_dropped(good: Calibration) -> None:
     assert judge(replace(good, used=used), limits).grade is Grade.PASS
 
     used[30] = False
-    assert judge(replace(good, used=used), limits).reason == many_dropped(31, 150)
+    assert judge(replace(good, used=used), limits).reason == message(
+        Code.MANY_DROPPED, n_dropped=31, n_images=150
+    )
 
 
 def test_a_camera_that_moved_by_three_times_the_limit_is_checked(
@@ -471,7 +466,9 @@ def test_a_camera_that_moved_by_three_times_the_limit_is_checked(
     assert judge(good, limits).grade is Grade.PASS
 
     monkeypatch.setattr(Calibration, "moved", 0.061)
-    assert judge(good, limits) == Verdict(Grade.CHECK, camera_moved(0.061))
+    assert judge(good, limits) == Verdict(
+        Grade.CHECK, message(Code.CAMERA_MOVED, distance=0.061)
+    )
 
 
 def test_a_change_beyond_the_limit_of_the_tip_is_checked_though_it_is_explained() -> (
@@ -482,19 +479,23 @@ def test_a_change_beyond_the_limit_of_the_tip_is_checked_though_it_is_explained(
 
     assert change_doubt(found, "2026-01-02", 0.11) is None
     doubt = change_doubt(found, "2026-01-02", 0.09)
-    assert doubt == change_beyond_limit(0.1, "2026-01-02", 0.09)
+    assert doubt == message(
+        Code.CHANGE_BEYOND_LIMIT, distance=0.1, date="2026-01-02", limit=0.09
+    )
     assert judge_change(PASSED, found, "2026-01-02", 0.09).reason == doubt
 
 
 def test_a_doubt_repeats_a_reason_of_the_same_code_and_led() -> None:
-    displaced = led_displaced(3, 0.05)
+    displaced = message(Code.LED_DISPLACED, led=3, distance=0.05)
     warning = {
         led: message("warning.led-displaced", led=led, distance=0.05, u=0.01)
         for led in (3, 4)
     }
 
-    assert repeats(tip_is_good(0.1), tip_is_good(0.2))
-    assert not repeats(tip_is_good(0.1), displaced)
+    assert repeats(
+        message(Code.GOOD, uncertainty=0.1), message(Code.GOOD, uncertainty=0.2)
+    )
+    assert not repeats(message(Code.GOOD, uncertainty=0.1), displaced)
     assert repeats(warning[3], displaced)
     assert not repeats(warning[4], displaced)
 
@@ -521,4 +522,6 @@ def test_copies_of_images_count_once(good: Calibration) -> None:
     )
     assert judge(doubled, SwingLimits(max_uncertainty=0.02)).grade is Grade.PASS
     limits = SwingLimits(max_uncertainty=0.02, min_images=200)
-    assert judge(doubled, limits).reason == too_few_images(150, 200)
+    assert judge(doubled, limits).reason == message(
+        Code.TOO_FEW_IMAGES, n_kept=150, needed=200
+    )
