@@ -65,8 +65,6 @@ def install_entry() -> int:
     ------
     UsageError
         The system is no Linux.
-    FileError
-        They cannot be written.
     """
     data = _data_folder()
     program = Path(sys.argv[0]).absolute()  # a link, such as that of pipx, stays one
@@ -89,8 +87,6 @@ def remove_entry() -> int:
     ------
     UsageError
         The system is no Linux.
-    FileError
-        A file cannot be removed.
     """
     data = _data_folder()
     for name in (ENTRY_FILE, TYPES_FILE, ICON_FILE):

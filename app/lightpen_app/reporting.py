@@ -39,8 +39,6 @@ def write_paper(result: Path, out: Path | None, language: str) -> Path:
 
     Raises
     ------
-    ArchiveError
-        The archive beside it cannot be read.
     FileError
         The calibration cannot be read, or the PDF not be written.
     UsageError

@@ -61,8 +61,6 @@ def read_calibration_file(file: Path) -> ReportContent:
 
     Raises
     ------
-    ArchiveError
-        The archive beside it cannot be read.
     FileError
         The calibration cannot be read, or is not the one that was entered.
     UsageError
@@ -89,8 +87,6 @@ def read_kept_verification(path: Path) -> KeptVerification:
 
     Raises
     ------
-    ArchiveError
-        The archive beside it cannot be read.
     FileError
         It cannot be read, or is not the one that was entered.
     """

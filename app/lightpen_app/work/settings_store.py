@@ -78,11 +78,6 @@ def save(file: Path, content: Content, changes: Changes) -> Message | None:
     ----------
     content : mapping
         All that is in force, for a file that has nothing to be kept.
-
-    Raises
-    ------
-    FileError
-        The file cannot be written.
     """
     try:
         file.parent.mkdir(parents=True, exist_ok=True)

@@ -107,11 +107,6 @@ def append(
     ----------
     record : str, optional
         Record as JSON; the event contains its hash.
-
-    Raises
-    ------
-    ArchiveError
-        It cannot be kept.
     """
     with database.writing() as connection:
         if _is_entered(connection, chain, event):
@@ -236,11 +231,6 @@ def entries_of(database: Database, chain: str, after: int = 0) -> Iterator[Store
     ----------
     after : int
         Number of the entry before the first.
-
-    Raises
-    ------
-    ArchiveError
-        One is damaged.
     """
     while True:
         batch = batch_of(database, chain, after)
@@ -306,13 +296,7 @@ class ArchivedFiles:
         self._kinds: dict[str, str] = {}  # of the last entry of a swing
 
     def read(self) -> None:
-        """Read the entries added since the last call.
-
-        Raises
-        ------
-        ArchiveError
-            It cannot be read.
-        """
+        """Read the entries added since the last call."""
         wanted = (
             select(
                 *(ENTRIES.c.number, ENTRIES.c.result, ENTRIES.c.swing, ENTRIES.c.kind)

@@ -68,11 +68,6 @@ def check_archive(
         Data folder, whose files are examined, too.
     report : callable
         Called with the fraction done, 0 to 1; what it raises ends the check.
-
-    Raises
-    ------
-    ArchiveError
-        It cannot be read at all.
     """
     ends, home = heads(database), chain_at_home(database)
     n_all = max(1, sum(head.number for head in ends))

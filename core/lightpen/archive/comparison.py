@@ -50,11 +50,6 @@ def check_server(database: Database, server: Database) -> ServerCheckResult:
     """Look at every entry and record on a server, and compare both sides.
 
     A server may show a station its own chain alone.
-
-    Raises
-    ------
-    ArchiveError
-        One of the two cannot be read.
     """
     checked = check_archive(server)
     here, there = _numbers(database), _numbers(server)

@@ -85,25 +85,13 @@ class Database:
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """Read within one transaction.
-
-        Raises
-        ------
-        ArchiveError
-            It cannot be read, or was closed.
-        """
+        """Read within one transaction."""
         with self._used(self.engine) as connection:
             yield connection
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
-        """Write all of something or nothing of it; others wait meanwhile.
-
-        Raises
-        ------
-        ArchiveError
-            It cannot be written, or was closed.
-        """
+        """Write all of something or nothing of it; others wait meanwhile."""
         options = self.engine.execution_options(is_writing=True)
         with self._used(options) as connection:
             yield connection

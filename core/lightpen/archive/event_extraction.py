@@ -57,13 +57,7 @@ class ExtractedEvent:
 
 
 def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
-    """Return the event of a result file or of a revocation.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, or is damaged.
-    """
+    """Return the event of a result file or of a revocation."""
     content = read_bytes(file, WHAT, LARGEST_RECORD)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())
     found = results.content(file)
@@ -85,13 +79,7 @@ def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
 
 
 def account_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
-    """Return the event of a change of the tip library.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, or is damaged.
-    """
+    """Return the event of a change of the tip library."""
     content, change = read_bytes(file, WHAT, LARGEST_RECORD), read_change(file)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())
     item, picture = change.item, None
@@ -153,11 +141,6 @@ def account_of_refused(
     """Return the event of a solved swing whose tip was not accepted.
 
     A tip that passed is abandoned by its operator, any other is refused.
-
-    Raises
-    ------
-    FileError
-        A file of the swing cannot be read.
     """
     record, calibration = open_record(solution.source.folder), solution.calibration
     has_passed = assessment.verdict.grade is Grade.PASS

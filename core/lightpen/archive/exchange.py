@@ -86,8 +86,6 @@ def export_entries(database: Database, path: Path) -> int:
     ------
     NameTakenError
         The file exists.
-    FileError
-        It cannot be written.
     """
     n_entries, checksum = 0, sha256()
     try:

@@ -64,8 +64,6 @@ def fetch(
     ------
     ArchiveError
         The server has no such chain, or other entries than those that are here.
-    FileError
-        A file cannot be written.
     """
     home = chain_at_home(database)
     if home is None or chain_head(database, home).number == 0:

@@ -22,13 +22,7 @@ SERVER = "LIGHTPEN_ARCHIVE"  # names the variable with the address of a server
 
 
 def server_address() -> str:
-    """Return the address of the server: of the variable, else that of the computer.
-
-    Raises
-    ------
-    FileError
-        The settings of the computer cannot be read.
-    """
+    """Return the address of the server: of the variable, else that of the computer."""
     return os.environ.get(SERVER, "") or machine_settings().archive_server
 
 
@@ -95,13 +89,7 @@ class LazyLogbook:
                 raise AcceptanceError(error.message) from error
 
     def opened(self) -> "Logbook":
-        """Return the logbook, opened by now.
-
-        Raises
-        ------
-        ArchiveError
-            It cannot be opened, or was closed.
-        """
+        """Return the logbook, opened by now."""
         logbook = self._open()
         if logbook is None:
             raise closed()

@@ -184,8 +184,6 @@ class Logbook:
         ------
         ArchiveError
             It cannot be entered; the entry remains pending.
-        FileError
-            A file of the swing cannot be read.
         """
         with self._lock:
             self._enter(account_of_refused(self._results, solution, assessment, at))
@@ -269,19 +267,11 @@ class Logbook:
         ------
         AcceptanceError
             They are not.
-        ArchiveError
-            The archive cannot be read.
         """
         confirm_limits(self.database, self.chain, supervision)
 
     def delivery(self) -> ReplicationState | None:
-        """Return the progress of the replication; None without a server.
-
-        Raises
-        ------
-        ArchiveError
-            The archive cannot be read.
-        """
+        """Return the progress of the replication; None without a server."""
         if self._replicator is None:
             return None
         n_delivered, fault = self._replicator.n_delivered, self._replicator.fault
@@ -295,11 +285,6 @@ class Logbook:
 
         Where a supervisor must sign, only tell how much waits. A library that cannot
         be read, or is not as it was entered, is reported by all who need it.
-
-        Raises
-        ------
-        ArchiveError
-            One of the archives cannot be read.
         """
         with suppress(FileError, AcceptanceError, UsageError):
             guard = self._results.supervision()
@@ -409,8 +394,6 @@ def confirm_limits(
     ------
     AcceptanceError
         They are not.
-    ArchiveError
-        The archive cannot be read.
     """
     if supervision.chain not in ("", chain):
         raise AcceptanceError("limits.other-archive")

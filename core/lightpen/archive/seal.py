@@ -86,13 +86,7 @@ def read_seal(archive: Path) -> Seal | None:
 
 
 def lost_heads(database: Database, seal: Seal) -> tuple[SealedHead, ...]:
-    """Return the last entries of then that an archive does not hold any more.
-
-    Raises
-    ------
-    ArchiveError
-        It cannot be read.
-    """
+    """Return the last entries of then that an archive does not hold any more."""
     with database.reading() as connection:
         return tuple(
             head
@@ -108,13 +102,7 @@ def lost_heads(database: Database, seal: Seal) -> tuple[SealedHead, ...]:
 
 
 def is_sealed_otherwise(archive: Path, ends: tuple[ChainHead, ...], seal: Seal) -> bool:
-    """Return whether a file is not as it was sealed, though nothing was entered.
-
-    Raises
-    ------
-    FileError
-        It cannot be read.
-    """
+    """Return whether a file is not as it was sealed, though nothing was entered."""
     if is_open(archive):
         return False
     return seal.heads == sealed_heads(ends) and seal.sha256 != sha256(archive)

@@ -39,13 +39,7 @@ FOLDERS = (
 
 
 def station_files(data: Path) -> Iterator[Path]:
-    """Yield the files of such events, for each kind the oldest first.
-
-    Raises
-    ------
-    FileError
-        A folder cannot be read.
-    """
+    """Yield the files of such events, for each kind the oldest first."""
     for folder in FOLDERS:
         yield from reversed(numbered_files(data / folder))
 
@@ -56,13 +50,7 @@ def is_station_file(file: Path) -> bool:
 
 
 def account_of_station(results: FolderArchive, file: Path) -> ExtractedEvent:
-    """Return the event of a limits, verification or camera file.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, or is damaged.
-    """
+    """Return the event of a limits, verification or camera file."""
     content = read_bytes(file, WHAT, LARGEST_RECORD)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())
     if file.parent.name == LIMITS_FOLDER:

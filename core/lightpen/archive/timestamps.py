@@ -73,13 +73,7 @@ class Timestamp:
 
 
 def authority(address: str = "", certificate: Path | None = None) -> Authority:
-    """Return the authority that is given, else that of the computer.
-
-    Raises
-    ------
-    FileError
-        The settings of the computer cannot be read.
-    """
+    """Return the authority that is given, else that of the computer."""
     settings = machine_settings()
     if certificate is None and settings.timestamp_certificate:
         certificate = Path(settings.timestamp_certificate)
@@ -166,8 +160,6 @@ class _Client:
     ------
     ArchiveError
         The package is not installed.
-    FileError
-        The certificate cannot be read.
     """
 
     def __init__(self, certificate: Path | None) -> None:

@@ -40,8 +40,6 @@ def write_camera(
     ------
     UsageError
         The name has another suffix.
-    FileError
-        The file cannot be written.
     """
     if path.suffix.lower() not in (".yaml", ".yml"):
         raise UsageError("camera-file.suffix", name=printable(path.name))

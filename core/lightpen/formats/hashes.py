@@ -74,13 +74,7 @@ def hashed(path: Path) -> InputFile:
 
 
 def with_content(path: Path) -> InputFile:
-    """Return a file with its hash and its content.
-
-    Raises
-    ------
-    FileError
-        It cannot be read.
-    """
+    """Return a file with its hash and its content."""
     content = read_bytes(path, A_FILE, LIMIT)
     return InputFile(path, sha256_of(content).hexdigest(), content)
 

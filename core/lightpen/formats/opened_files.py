@@ -34,13 +34,7 @@ class CameraFile:
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Read it.
-
-        Raises
-        ------
-        FileError
-            It cannot be read.
-        """
+        """Read it."""
         return cls(path, read_camera(path), is_simulated(path), sha256(path))
 
 
@@ -72,8 +66,6 @@ class PenFile:
         ------
         UsageError
             The file does not say its units, and none are given.
-        FileError
-            It cannot be read.
         """
         pen = read_pen(path, units)
         return cls(path, pen, units, is_simulated(path), sha256(path))

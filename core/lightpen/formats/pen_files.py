@@ -165,8 +165,6 @@ def write_pen(pen: Pen, path: Path, parent_sha256: str = "") -> None:
     UsageError
         The name ends otherwise, or the pen has a name, a nominal tip or a covariance,
         for which a table has no place.
-    FileError
-        The file cannot be written.
     """
     suffix = path.suffix.lower()
     if suffix == ".json":

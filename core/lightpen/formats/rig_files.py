@@ -128,11 +128,6 @@ def write_rig(rig: Rig, path: Path, camera_files: Sequence[str]) -> None:
     ----------
     camera_files : sequence of str
         Names of the camera files, from the folder of the rig file.
-
-    Raises
-    ------
-    FileError
-        The file cannot be written.
     """
     cameras: list[dict[str, Any]] = []
     for c, (name, file) in enumerate(zip(rig.names, camera_files, strict=True)):

@@ -13,13 +13,7 @@ TEXT = "The files in this folder were simulated by Lightpen; they are of no real
 
 
 def mark_simulated(folder: Path) -> None:
-    """Mark a folder.
-
-    Raises
-    ------
-    FileError
-        It cannot be written.
-    """
+    """Mark a folder."""
     write_whole(folder / MARK, TEXT.encode())
 
 

@@ -38,13 +38,7 @@ class SourceEnvironment:
 
 
 def sample_files(around: SourceEnvironment, folder: Path) -> OpenedFiles:
-    """Write the files that go with the simulated camera, and return them.
-
-    Raises
-    ------
-    FileError
-        They cannot be written.
-    """
+    """Write the files that go with the simulated camera, and return them."""
     files = write_sample_files(around.scene, folder)
     return OpenedFiles(
         CameraFile.read(files.camera), PenFile.read(files.pen), read_rig(files.rig)

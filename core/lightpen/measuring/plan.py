@@ -301,13 +301,7 @@ def parse_plan(text: str, name: str) -> Plan:
 
 
 def write_plan(plan: Plan, path: Path) -> None:
-    """Write a plan as YAML.
-
-    Raises
-    ------
-    FileError
-        It cannot be written.
-    """
+    """Write a plan as YAML."""
     import yaml
 
     entries = msgspec.to_builtins(plan)

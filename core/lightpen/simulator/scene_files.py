@@ -176,13 +176,7 @@ def _silent(fraction: float) -> None:
 
 
 def write_sample_files(scene: Scene, folder: Path) -> SampleFiles:
-    """Write the camera, rig and pen files of a scene.
-
-    Raises
-    ------
-    FileError
-        They cannot be written.
-    """
+    """Write the camera, rig and pen files of a scene."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -244,13 +244,7 @@ def calibrate_by_folder(folder: str, board: Board, report: Report) -> ComputedCa
 
 
 def save_camera(camera: Camera, path: Path, report: Report) -> InputFile:
-    """Write a camera file, and return it with its hash.
-
-    Raises
-    ------
-    FileError
-        It cannot be written.
-    """
+    """Write a camera file, and return it with its hash."""
     write_camera(camera, path)
     return hashed(path)
 

@@ -33,13 +33,7 @@ def export_stem(names: Names, moment: datetime, origin: Origin | None) -> str:
 
 
 def save_new(folder: Path, name: str, data: bytes) -> Path:
-    """Write a file under an unused name, and return its path.
-
-    Raises
-    ------
-    FileError
-        It cannot be written.
-    """
+    """Write a file under an unused name, and return its path."""
     path = folder / name
     for tail in chain([""], map("-{}".format, count(2))):
         free = path.with_name(f"{path.stem}{tail}{path.suffix}")
@@ -50,13 +44,7 @@ def save_new(folder: Path, name: str, data: bytes) -> Path:
 
 
 def exported_solution(solution: Solution, names: Names) -> CalibrationFile:
-    """Return a solved, not yet accepted swing for export.
-
-    Raises
-    ------
-    FileError
-        A file of the swing cannot be read.
-    """
+    """Return a solved, not yet accepted swing for export."""
     limits = recorded_limits(open_record(solution.source.folder))
     inputs = record_inputs(solution.source)
     record = calibration_record(solution.calibration, inputs, "joint", limits)

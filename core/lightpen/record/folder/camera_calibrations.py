@@ -79,13 +79,7 @@ class StoredTrial(Struct, frozen=True):
 def keep_camera_trial(
     data: Path, trial: CameraTrial, names: Names, now: datetime
 ) -> Path:
-    """Write the file of a camera calibration and return it.
-
-    Raises
-    ------
-    FileError
-        It cannot be written.
-    """
+    """Write the file of a camera calibration and return it."""
     found, file = trial.found, trial.camera_file
     intrinsics = None
     if found is not None:
@@ -106,13 +100,7 @@ def keep_camera_trial(
 
 
 def read_camera_trial(content: bytes, file: Path) -> StoredTrial:
-    """Read the file of an attempt.
-
-    Raises
-    ------
-    FileError
-        It is damaged.
-    """
+    """Read the file of an attempt."""
     try:
         return parse_checked(content, StoredTrial)
     except DamagedError as error:

@@ -131,8 +131,6 @@ def write_limits_change(
     ------
     NameTakenError
         Another program made a change meanwhile.
-    FileError
-        It cannot be written.
     """
     file = numbered_file(data / LIMITS_FOLDER, number)
     make_folder(file.parent)

@@ -33,11 +33,6 @@ def add_numbered(folder: Path, data: bytes | Callable[[Path], bytes]) -> Path:
     ----------
     data : bytes or callable
         Content; or a function that returns it for the file.
-
-    Raises
-    ------
-    FileError
-        It cannot be written.
     """
     make_folder(folder)
     for free in count(1 + newest_number(folder)):
@@ -54,13 +49,7 @@ def numbered_file(folder: Path, number: int) -> Path:
 
 
 def newest_number(folder: Path) -> int:
-    """Return the number of the newest file, lost ones counted; 0 without any.
-
-    Raises
-    ------
-    FileError
-        The folder cannot be read.
-    """
+    """Return the number of the newest file, lost ones counted; 0 without any."""
     return max(map(number_of, _paths_in(folder)), default=0)
 
 
@@ -84,25 +73,13 @@ def make_folder(folder: Path) -> None:
 
 
 def numbered_files(folder: Path) -> list[Path]:
-    """Return the files, the newest first; others are left alone.
-
-    Raises
-    ------
-    FileError
-        The folder cannot be read.
-    """
+    """Return the files, the newest first; others are left alone."""
     files = [p for p in _paths_in(folder) if p.suffix == ".json" and number_of(p)]
     return sorted(files, key=lambda file: (number_of(file), file.name), reverse=True)
 
 
 def reserve_number(lost: Path) -> None:
-    """Reserve the number of a lost file.
-
-    Raises
-    ------
-    FileError
-        The folder cannot be written.
-    """
+    """Reserve the number of a lost file."""
     make_folder(lost.parent)
     with suppress(NameTakenError):
         create_whole(lost.with_suffix(MISSING), b"")

@@ -69,8 +69,6 @@ def set_password(data: Path, signature: Signature, new: str, now: datetime) -> N
     AcceptanceError
         The present password is another one, the name is missing, or the new one is too
         short.
-    FileError
-        It cannot be kept.
     """
     guard = read_supervision(data)
     approving = None
@@ -111,8 +109,6 @@ def set_limits(
     ------
     AcceptanceError
         It is not signed by a supervisor, or the limits were changed meanwhile.
-    FileError
-        It cannot be kept.
     """
     guard = read_supervision(data)
     key = require_supervisor(guard, signature)
@@ -151,8 +147,6 @@ def save_limits(
     AcceptanceError
         It is not signed by a supervisor, the password is too short, or the limits were
         changed meanwhile.
-    FileError
-        It cannot be kept.
     """
     if not read_supervision(data).is_guarded:
         set_password(data, signature, signature.password, now)
@@ -181,8 +175,6 @@ def renew_station_key(
     ------
     AcceptanceError
         There is a password, the key before is not here, and no supervisor signs.
-    FileError
-        It cannot be kept.
     """
     guard = read_supervision(data)
     old = station_key(chain_of(guard.station_keys[-1]) if guard.station_keys else chain)

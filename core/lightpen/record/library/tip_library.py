@@ -348,13 +348,7 @@ def library_changes(data: Path) -> Iterator[tuple[Path, LibraryChange]]:
 
 
 def library_files(data: Path) -> tuple[Path, ...]:
-    """Return the files of all changes, the oldest first.
-
-    Raises
-    ------
-    FileError
-        The folder cannot be read.
-    """
+    """Return the files of all changes, the oldest first."""
     return tuple(reversed(numbered_files(data / LIBRARY)))
 
 

@@ -105,13 +105,7 @@ def accept(
 def conclude_accepted(
     archive: FolderArchive, found: InterruptedSwings
 ) -> InterruptedSwings:
-    """Conclude the interrupted swings with accepted tips; return the others.
-
-    Raises
-    ------
-    FileError
-        The archive cannot be read at all.
-    """
+    """Conclude the interrupted swings with accepted tips; return the others."""
     interrupted = []
     for record in found.interrupted:
         result = _stored_result(archive, record)

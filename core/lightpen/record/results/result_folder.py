@@ -179,11 +179,6 @@ class FolderArchive:
         """Return the tips of a pen that have a result in force, the newest first.
 
         Results that cannot be read are passed over.
-
-        Raises
-        ------
-        FileError
-            The archive cannot be read at all.
         """
         root = self._root(is_simulated)
         found = [
@@ -194,13 +189,7 @@ class FolderArchive:
         return tuple(filter(None, dict.fromkeys(found)))
 
     def files_of_pen(self, pen: str, *, is_simulated: bool = False) -> tuple[Path, ...]:
-        """Return the results of a pen that are not revoked, the newest first.
-
-        Raises
-        ------
-        FileError
-            The archive cannot be read at all.
-        """
+        """Return the results of a pen that are not revoked, the newest first."""
         root = self._root(is_simulated)
         return tuple(
             file
@@ -230,11 +219,6 @@ class FolderArchive:
         """Return the last accepted result of the swing in a folder, or None.
 
         Results that cannot be read or that were revoked are passed over.
-
-        Raises
-        ------
-        FileError
-            The archive cannot be read at all.
         """
         for root in self._roots():
             for file, heading in self._standing(root, passes_over_damage=True):
@@ -245,24 +229,12 @@ class FolderArchive:
         return None
 
     def all_files(self) -> tuple[Path, ...]:
-        """Return the files of all results and takings back, the oldest first.
-
-        Raises
-        ------
-        FileError
-            The archive cannot be read at all.
-        """
+        """Return the files of all results and takings back, the oldest first."""
         roots = reversed(self._roots())
         return tuple(file for root in roots for file in reversed(numbered_files(root)))
 
     def content(self, file: Path) -> Result | Withdrawal:
-        """Return what one of `all_files` holds.
-
-        Raises
-        ------
-        FileError
-            It cannot be read, or is damaged.
-        """
+        """Return what one of `all_files` holds."""
         if self._heading(file, read_supervision(self._data)).takes_back is None:
             return self.read(file)
         return parse_withdrawal(read_bytes(file, WHAT, LARGEST_RECORD), file)
@@ -332,13 +304,7 @@ class FolderArchive:
         return lambda file: partial(signers.signed, place=place_in(self._data, file))
 
     def read(self, file: Path) -> Result:
-        """Return the result in a file of the archive.
-
-        Raises
-        ------
-        FileError
-            It cannot be read.
-        """
+        """Return the result in a file of the archive."""
         located = self._data.joinpath  # where an absolute folder stays what it is
         return parse_result(read_bytes(file, WHAT, LARGEST_RECORD), file, located)
 

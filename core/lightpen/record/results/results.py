@@ -306,13 +306,7 @@ def has_head(start: bytes) -> bool:
 
 
 def parse_heading(start: bytes, file: Path) -> ResultHeading:
-    """Parse the heading of a result file from its beginning or its whole content.
-
-    Raises
-    ------
-    FileError
-        It is damaged.
-    """
+    """Parse the heading of a result file from its beginning or its whole content."""
     try:
         return parse_checked(head_of(start), ResultHeading)
     except DamagedError as error:
@@ -320,13 +314,7 @@ def parse_heading(start: bytes, file: Path) -> ResultHeading:
 
 
 def parse_withdrawal(data: bytes, file: Path) -> Withdrawal:
-    """Parse a revocation.
-
-    Raises
-    ------
-    FileError
-        It is damaged.
-    """
+    """Parse a revocation."""
     try:
         return parse_upgraded(data, Withdrawal, WITHDRAWAL)
     except LaterFormatError as error:

@@ -96,13 +96,7 @@ def chain_of(public: str) -> str:
 
 
 def make_station_key() -> SigningKey:
-    """Return a new station key, stored in `key_folder`.
-
-    Raises
-    ------
-    FileError
-        It cannot be stored.
-    """
+    """Return a new station key, stored in `key_folder`."""
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
     key = SigningKey(Ed25519PrivateKey.generate())

@@ -79,13 +79,7 @@ def station_name(data: Path) -> str:
 
 
 def remembered(data: Path) -> RememberedFolder | None:
-    """Return what this user account remembers of a data folder, if anything.
-
-    Raises
-    ------
-    FileError
-        It cannot be read.
-    """
+    """Return what this user account remembers of a data folder, if anything."""
     file = memory_file(data)
     if not file.exists():
         return None
@@ -96,13 +90,7 @@ def remembered(data: Path) -> RememberedFolder | None:
 
 
 def remember(data: Path, n_changes: int, digest: str) -> None:
-    """Remember the limits of a data folder.
-
-    Raises
-    ------
-    FileError
-        It cannot be stored.
-    """
+    """Remember the limits of a data folder."""
     entry = RememberedFolder(str(data.absolute()), n_changes, digest)
     key_folder().mkdir(parents=True, exist_ok=True, mode=0o700)
     write_whole(memory_file(data), json_bytes(entry))

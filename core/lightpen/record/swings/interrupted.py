@@ -96,13 +96,7 @@ def find_unfinished(root: Path) -> InterruptedSwings:
 
 
 def discard_swing(folder: Path) -> None:
-    """Conclude an interrupted swing without a verdict; the images are kept.
-
-    Raises
-    ------
-    FileError
-        The record cannot be read or written.
-    """
+    """Conclude an interrupted swing without a verdict; the images are kept."""
     with RecordWriter.resume(open_record(folder)) as writer:
         writer.conclude(DISCARDED)
 
@@ -112,11 +106,6 @@ def discard_damaged(folder: Path) -> None:
 
     Nothing but the verdict is added, so that whoever restores the damaged file has the
     swing as it was.
-
-    Raises
-    ------
-    FileError
-        The record cannot be written.
     """
     with RecordWriter.of_damaged(folder) as writer:
         writer.conclude(DISCARDED)

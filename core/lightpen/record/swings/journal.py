@@ -128,13 +128,7 @@ def read_lines(folder: Path) -> list[bytes]:
 
 
 def parse_lines(lines: list[bytes], folder: Path) -> list[Line]:
-    """Parse the lines of a journal.
-
-    Raises
-    ------
-    FileError
-        A line is damaged.
-    """
+    """Parse the lines of a journal."""
     parsed: list[Line] = []
     for number, line in enumerate(lines, start=1):
         try:

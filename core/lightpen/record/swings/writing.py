@@ -324,11 +324,6 @@ def note_taken_out(folder: Path, taken_out: Mapping[int, str]) -> None:
     ----------
     taken_out : mapping of int to str
         Numbers of all images that do not, and why.
-
-    Raises
-    ------
-    FileError
-        The record cannot be written.
     """
     record = open_record(folder)
     with RecordWriter.resume(record) as writer:

@@ -140,8 +140,6 @@ def improve_led_file(
     ------
     CalibrationError
         There are too few swings, or the one held out does not confirm it.
-    FileError
-        It cannot be written.
     """
     if pen.camera is None:
         raise ValueError("The camera of the swings must be chosen.")

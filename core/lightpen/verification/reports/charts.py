@@ -22,8 +22,6 @@ def write_chart(found: Repeatability, path: Path) -> None:
     ------
     UsageError
         The name ends neither in .csv nor in .svg.
-    FileError
-        It cannot be written.
     """
     suffix = path.suffix.lower()
     if suffix == ".csv":

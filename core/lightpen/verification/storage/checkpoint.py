@@ -169,13 +169,7 @@ class CheckpointFile:
         self._descriptor = descriptor
 
     def note(self, value: VerificationCheckpoint) -> None:
-        """Write it if it has changed.
-
-        Raises
-        ------
-        FileError
-            It cannot be written.
-        """
+        """Write it if it has changed."""
         if value == self._written:
             return
         self.hold()
@@ -221,13 +215,7 @@ def under_way_path(folder: Path, names: Names, began: datetime) -> Path:
 
 
 def find_interrupted(data: Path) -> tuple[InterruptedVerification, ...]:
-    """Return the verifications in a data folder that no window holds, the newest first.
-
-    Raises
-    ------
-    FileError
-        A folder cannot be read.
-    """
+    """Return the verifications that no window holds, the newest first."""
     found: list[InterruptedVerification] = []
     for root in (data, data / SIMULATED):
         folder = root / VERIFICATIONS / UNDER_WAY
@@ -257,13 +245,7 @@ class UnlistedRecords:
 
 
 def written_since(folder: Path, under_way: VerificationCheckpoint) -> UnlistedRecords:
-    """Return the files written after that of a verification.
-
-    Raises
-    ------
-    FileError
-        The folder cannot be read.
-    """
+    """Return the files written after that of a verification."""
     session = under_way.began.isoformat(timespec="seconds")
     since: list[tuple[str, str]] = []
     for file in numbered_files(folder):

@@ -112,13 +112,7 @@ class PointImages:
         task: AnyTask,
         approach: FloatArray | None = None,
     ) -> str:
-        """Put an image on the disk, and return its name in the record.
-
-        Raises
-        ------
-        FileError
-            It cannot be written.
-        """
+        """Put an image on the disk, and return its name in the record."""
         if self._writer is None:
             new = self._begin()
             self._writer = RecordWriter.create(new.folder, new.header, is_swing=False)
@@ -143,13 +137,7 @@ class PointImages:
         return name
 
     def follow(self, before: SessionState, transition: SessionTransition) -> None:
-        """Take out what does not count any more, and end a run that is done.
-
-        Raises
-        ------
-        FileError
-            It cannot be written.
-        """
+        """Take out what does not count any more, and end a run that is done."""
         state = transition.state
         has_ended = transition.finished is not None or n_done(state) > n_done(before)
         counting = before if has_ended else state

@@ -117,13 +117,7 @@ class SessionRecords:
             self._waiting.pop(0)
 
     def write_now(self, kept: PendingRecord) -> None:
-        """Write a record of the current session, or nothing.
-
-        Raises
-        ------
-        FileError
-            It cannot be written.
-        """
+        """Write a record of the current session, or nothing."""
         self._write(kept, self._files)
 
     def _write(self, kept: PendingRecord, files: list[Path]) -> None:
@@ -265,13 +259,7 @@ class SessionKeeping:
             self._records.add(concluding(tip, conclusion, self._file))
 
     def accept(self, tip: CurrentTip, conclusion: Conclusion) -> None:
-        """Write that a tip is accepted all the same.
-
-        Raises
-        ------
-        FileError
-            It cannot be written.
-        """
+        """Write that a tip is accepted all the same."""
         self._records.write_now(concluding(tip, conclusion, None))
 
     def give_up(self, status: VerificationStatus) -> None:
@@ -300,13 +288,7 @@ class SessionKeeping:
         self._records.write()
 
     def note(self, status: VerificationStatus) -> None:
-        """Write the checkpoint from which the verification can be resumed.
-
-        Raises
-        ------
-        FileError
-            It cannot be written.
-        """
+        """Write the checkpoint from which the verification can be resumed."""
         tip, setup, runs = status.tip, status.setup, self.images.runs
         has_some = bool(runs or self._read)
         if tip is None or setup is None or status.began is None:
