@@ -134,7 +134,7 @@ def time_span(intervals: float, interval_ms: float | None) -> Message:
 
 
 def lateness(intervals: float, interval_ms: float | None) -> Message:
-    """Return how late something is, or early, given in image intervals."""
+    """Return a delay or advance, given in image intervals, as text."""
     time = time_span(intervals, interval_ms)
     if intervals < 0:
         return message("time.early", time=time)

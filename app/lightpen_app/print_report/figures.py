@@ -176,7 +176,7 @@ def histogram_chart(reestimated: ReestimatedPoses) -> Chart:
 
 
 def posture_chart(reestimated: ReestimatedPoses) -> Chart:
-    """Return where the pen leant in each image, from above, the camera below."""
+    """Return the plot of the pen tilts from above, with the camera below."""
     tilts, directions = np.degrees(reestimated.tilts), reestimated.directions
     right, away = tilts * np.cos(directions), tilts * np.sin(directions)
     reach = float(np.max(tilts, initial=FARTHEST))

@@ -254,7 +254,7 @@ def _draw(
 
 
 def _free_area(place: QPointF, text: str, taken: list[QRectF]) -> QRectF:
-    """Return where a text covers least, as near to a place as possible."""
+    """Return the nearest position of a text to a place where it covers least."""
     width = text_width(text, PrintSize.SMALL) + DOT
     height = text_height(text, PrintSize.SMALL, width)
     areas = [

@@ -65,7 +65,7 @@ def message_icon(remark: StatusMessage, widget: QWidget) -> QIcon:
 def subject_message(
     names: Names, origin: Origin | None, statuses: StationStatus
 ) -> StatusMessage:
-    """Return which of pen, tip and cone must not be used for measuring, and why.
+    """Return which of pen, tip and cone are blocked for measuring, and why.
 
     Simulated ones are never used for measuring.
     """

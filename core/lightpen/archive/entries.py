@@ -242,7 +242,7 @@ def since_us(moment: datetime) -> int:
 
 
 def named_entry(chain: str, number: int, station: str = "") -> Message:
-    """Return what an entry is called: by its station where one is known."""
+    """Return the name of an entry: with its station, if known."""
     if station:
         return message(
             "archive.entry-of-station", number=number, station=printable(station)

@@ -96,7 +96,7 @@ class LazyLogbook:
         return logbook
 
     def shared(self) -> tuple[Message, ...]:
-        """Return what was taken over from other stations since the start."""
+        """Return the entries copied from other stations since the start."""
         logbook = self._opened
         return () if logbook is None else logbook.shared
 

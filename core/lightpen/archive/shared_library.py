@@ -80,7 +80,7 @@ class TakenOver:
 def newer_elsewhere(
     data: Path, database: Database, now: datetime, server: Database | None = None
 ) -> tuple[TakenOver, ...]:
-    """Return what other stations changed later than this one.
+    """Return the changes of other stations that are newer than those of this one.
 
     Parameters
     ----------

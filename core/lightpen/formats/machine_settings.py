@@ -91,7 +91,7 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 
 def machine_file() -> Path:
-    r"""Return where it is: ``/etc/xdg/lightpen``, or ``C:\ProgramData\lightpen``."""
+    r"""Return the folder: ``/etc/xdg/lightpen``, or ``C:\ProgramData\lightpen``."""
     return platformdirs.site_config_path("lightpen", appauthor=False) / "machine.json"
 
 

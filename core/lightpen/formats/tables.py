@@ -63,7 +63,7 @@ class Table:
         return len(self.rows[0])
 
     def columns(self, names: Sequence[Sequence[str]], what: Message) -> list[int]:
-        """Return where columns are.
+        """Return the indices of columns.
 
         A table without header has its columns in the order of `names`.
 

@@ -68,7 +68,7 @@ def _ring(center: FloatArray, frame: FloatArray, radius: float) -> FloatArray:
 
 
 def _reach(one: Measured) -> float:
-    """Return how far the touches reach from the middle, along an axis or all over."""
+    """Return the half extent of the points, along an axis or in all directions."""
     if one.points is None:
         return MARK
     points = one.points.values.reshape(-1, 3)

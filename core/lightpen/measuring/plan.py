@@ -243,7 +243,7 @@ class Plan(_Entry, frozen=True):
         return next(each for each in self.features if each.name == name)
 
     def limited_to(self, names: Collection[str]) -> "Plan":
-        """Return what can be measured of it by some of its features."""
+        """Return the part of the plan that some of its features determine."""
         features = tuple(each for each in self.features if each.name in names)
         known = {each.name for each in features}
         constructions = []

@@ -151,7 +151,7 @@ class Camera:
         return self.found is not None and are_shared(self.found.marks, pixels)
 
     def before_images(self) -> "Camera":
-        """Return what was known before the images that the camera was found from."""
+        """Return the prior camera: intrinsics and covariance before the images."""
         if self.found is None:
             return self
         camera = self.with_intrinsics(self.found.intrinsics)

@@ -78,7 +78,7 @@ def tilts_of(rotations: FloatArray) -> FloatArray:
 
 
 def directions_of(rotations: FloatArray) -> FloatArray:
-    """Return where pens of rotations (N, 3, 3) lean to, (N,), 0 to 2 pi, likewise."""
+    """Return the tilt directions of rotations (N, 3, 3): (N,), 0 to 2 pi, likewise."""
     right, _, away = rotations[:, :, 1].T
     return np.asarray(np.arctan2(away, right) % (2 * np.pi))
 

@@ -17,7 +17,7 @@ def normal_quantile(chance: float) -> float:
 
 @cache
 def chi_square_quantile(n_free: int, chance: float) -> float:
-    """Return what chi-square of ``n_free`` degrees of freedom exceeds likewise."""
+    """Return the upper quantile of chi-square with ``n_free`` degrees of freedom."""
     from scipy.special import chdtri
 
     return float(chdtri(n_free, chance))

@@ -319,7 +319,7 @@ def _beside(
 
 
 def _owners(leds: FloatArray, points: FloatArray) -> list[int]:
-    """Return which of the points each missing LED is, or -1.
+    """Return the index of the point of each missing LED, or -1.
 
     As few coordinates as possible of the file are wrong then; of equals, the nearest.
     """

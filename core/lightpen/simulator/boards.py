@@ -129,7 +129,7 @@ def expose_board(light: FloatArray, sensor: Sensor, rng: np.random.Generator) ->
 
 @lru_cache(maxsize=2)
 def _directions(camera: Camera, field: LensField | None, samples: int) -> FloatArray:
-    """Return where each sample looks, (S H, S W, 3); a camera is asked many times.
+    """Return the direction of each sample, (S H, S W, 3); computed once per camera.
 
     Linear between pixels, which is off by less than 1e-4 px for the lenses here.
     """
@@ -164,7 +164,7 @@ def _on_board(
 
 
 def _moved(board: Board, places: FloatArray, uneven: FloatArray) -> FloatArray:
-    """Return how the corners about places are off, linear between them, (..., 2)."""
+    """Return the errors of the corners at places, interpolated linearly, (..., 2)."""
     grid = uneven.reshape(board.rows, board.columns, 2).astype(np.float32)
     at = (places - board.points[0, :2]) / board.pitch
     x, y = np.moveaxis(at.astype(np.float32), -1, 0)

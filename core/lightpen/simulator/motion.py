@@ -46,7 +46,7 @@ class Tremor:
         self._phases = rng.uniform(0, 2 * np.pi, (3, 4))
 
     def at(self, times: FloatArray) -> FloatArray:
-        """Return them at times (F,), shape (F, 3)."""
+        """Return the values at times (F,), shape (F, 3)."""
         waves = np.sin(times[:, None, None] * self._rates + self._phases)
         return np.asarray(waves.sum(axis=-1) / np.sqrt(2))
 

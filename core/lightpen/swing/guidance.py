@@ -115,7 +115,7 @@ def image_information(outlook: GuidanceInput, rotations: FloatArray) -> FloatArr
 
 
 def usable_leds(outlook: GuidanceInput, rotations: FloatArray) -> BoolArray:
-    """Return which LEDs would show whole, apart and face on enough, (N, C L).
+    """Return the mask of LEDs that are whole, separate and face the camera, (N, C L).
 
     The LEDs in one camera after those in the other.
     """
@@ -125,7 +125,7 @@ def usable_leds(outlook: GuidanceInput, rotations: FloatArray) -> BoolArray:
 
 
 def _usable_leds(outlook: GuidanceInput, rotations: FloatArray, c: int) -> BoolArray:
-    """Return which LEDs the c-th camera would show so, (N, L)."""
+    """Return this mask for the c-th camera, (N, L)."""
     camera, pen = outlook.rig.cameras[c], outlook.pen
     R, t = outlook.rig.rotations[c], outlook.rig.translations[c]
     turned = np.swapaxes(R @ rotations, 1, 2)

@@ -52,17 +52,17 @@ class OperatorPresence:
         return not self.begun_with.swings_like(self.choices)
 
     def come(self) -> Self:
-        """Return it with the operator present and refusals cleared."""
+        """Return a copy with the operator present and refusals cleared."""
         return replace(
             self, is_here=True, is_away=False, paused_by_leaving=False, refusal=None
         )
 
     def left(self) -> Self:
-        """Return it with the operator absent."""
+        """Return a copy with the operator absent."""
         return replace(self, is_here=False, is_away=True)
 
     def begun(self) -> Self:
-        """Return it with a swing begun with the present choices."""
+        """Return a copy with a swing begun with the present choices."""
         return replace(
             self, begun_with=self.choices, paused_by_leaving=False, refusal=None
         )

@@ -192,12 +192,12 @@ class Preparation:
         return self.limits.requires_temperature and temperature is None
 
     def with_temperature(self, temperature_c: float | None) -> Self:
-        """Return it with the temperature of the pen today; None if not measured."""
+        """Return a copy with the pen temperature of today; None if not measured."""
         assumptions = replace(self.assumptions, temperature_c=temperature_c)
         return replace(self, assumptions=assumptions, temperature_day=_today())
 
     def with_assumptions(self, assumptions: Assumptions) -> Self:
-        """Return it with other assumptions; another temperature is that of today."""
+        """Return a copy with other assumptions; a new temperature is that of today."""
         before, temperature = self.assumptions_today, assumptions.temperature_c
         changed = replace(self, assumptions=assumptions)
         if temperature == before.temperature_c:
@@ -237,10 +237,10 @@ class Preparation:
         return _ORIGINS.get(self.source.kind, Origin.LIVE)
 
     def with_source(self, source: SourceChoice) -> Self:
-        """Return it with images of another source.
+        """Return a copy with another image source.
 
-        The files of a simulated pen are not those of another source, nor is the stray
-        light; and another camera sees the operator from elsewhere.
+        Files of a simulated pen are only kept with the simulated source. Stray light
+        and the operator's heading belong to one camera and are dropped.
         """
         if source == self.source:
             return self
@@ -265,16 +265,16 @@ class Preparation:
         return None if self.second is None else self.second.rig_file
 
     def with_rig(self, rig_file: RigFile | None) -> Self:
-        """Return it with another file of both cameras; it needs two."""
+        """Return a copy with another rig file; it needs two cameras."""
         if self.second is None:
             return self
         return replace(self, second=replace(self.second, rig_file=rig_file))
 
     def with_second(self, source: SourceChoice | None) -> Self:
-        """Return it with another second camera, or without.
+        """Return a copy with another second camera, or without one.
 
-        The rig file stays, unless it is a simulated one of a real camera or the other
-        way round; the stray light is of the camera before.
+        The rig file is kept if it is simulated exactly as the source is; the stray
+        light mask of the camera before is dropped.
         """
         if source is None:
             return replace(self, second=None)
@@ -287,7 +287,7 @@ class Preparation:
         return replace(self, second=SecondCamera(source, rig_file))
 
     def without_images(self) -> Self:
-        """Return it while no image of its cameras has been received."""
+        """Return a copy for cameras that have not sent an image yet."""
         second = self.second
         if second is not None:
             second = replace(second, image_size=None, in_use=None)
@@ -300,15 +300,16 @@ class Preparation:
         return self.second.mask
 
     def with_mask(self, camera: int, mask: FloatArray) -> Self:
-        """Return it with another stray light mask of a camera, counted from 0."""
+        """Return a copy with another stray light mask of a camera, counted from 0."""
         if camera == 0 or self.second is None:
             return replace(self, mask=mask)
         return replace(self, second=replace(self.second, mask=mask))
 
     def renamed(self, names: Names) -> Self:
-        """Return it with other names; another tip has another ball and nominal centre.
+        """Return a copy with other names.
 
-        They are forgotten, unless a diameter was given with the name.
+        Ball diameter and nominal centre of the tip before are dropped, unless a
+        diameter comes with the new name.
         """
         now = self.names
         if names.tip == now.tip:
@@ -318,7 +319,7 @@ class Preparation:
         return replace(self, names=names, nominal_tip=None)
 
     def with_last(self, last: Result) -> Self:
-        """Return it for the tip of a result, with its ball and nominal centre."""
+        """Return a copy for the tip of a result, with its ball and nominal centre."""
         tip, ball_diameter = last.names.tip, last.names.ball_diameter
         names = replace(self.names, tip=tip, ball_diameter=ball_diameter)
         nominal_tip = last.nominal_tip
@@ -328,7 +329,7 @@ class Preparation:
         return replace(self, names=names, nominal_tip=nominal_tip)
 
     def with_listed(self, tip: ListedTip) -> Self:
-        """Return it for a tip of the library, with its ball and nominal centre."""
+        """Return a copy for a tip of the library, with its ball and nominal centre."""
         names = replace(self.names, tip=tip.id, ball_diameter=tip.ball_diameter_mm)
         return replace(self, names=names, nominal_tip=tip.nominal_tip)
 

@@ -270,7 +270,7 @@ class SwingWorkflow:
         self._publish(replace(first, pressed=pressed), SwingEvent(SwingEventKind.DONE))
 
     def _heading_for(self, swing: Resumable) -> float | None:
-        """Return where the operator stands, as this swing or the station knows it."""
+        """Return the operator's heading from this swing or from the station."""
         status, choices = self._status, self._presence.choices
         if swing.setup.is_recording:
             return None

@@ -363,7 +363,7 @@ class Histogram(Plot):
 
 
 def _around(points: FloatArray) -> QRectF:
-    """Return what holds points (N, 2), with room for arrows."""
+    """Return the rectangle around points (N, 2), with room for arrows."""
     low, high = points.min(axis=0), points.max(axis=0)
     room = 0.06 * max(float(np.max(high - low)), 1.0)
     width, height = (high - low + 2 * room).tolist()

@@ -64,7 +64,7 @@ class EntryPresenter(QObject):
         return replace(self._selection.preparation, names=self._names.value())
 
     def why_not_on(self) -> str:
-        """Return what is missing, or that the tip is retired."""
+        """Return the missing input, or that the tip is retired."""
         typed = self.typed()
         missing = typed.start_missing_inputs()
         tip = self._library.tip(typed.names.tip)

@@ -70,7 +70,7 @@ class StationStatus:
         return TipStatus.OVERDUE if is_over or found.is_due else TipStatus.VALID
 
     def overdue(self, pen: str, tip: str) -> Message | None:
-        """Return that the calibration of a current tip expired; None if it did not."""
+        """Return the message that a calibration has expired; None if it has not."""
         due = self.due(pen, tip)
         is_over = self.of_tip(pen, tip) is TipStatus.OVERDUE
         if (

@@ -234,13 +234,13 @@ class FolderArchive:
         return tuple(file for root in roots for file in reversed(numbered_files(root)))
 
     def content(self, file: Path) -> Result | Withdrawal:
-        """Return what one of `all_files` holds."""
+        """Return the content of one of `all_files`."""
         if self._heading(file, read_supervision(self._data)).takes_back is None:
             return self.read(file)
         return parse_withdrawal(read_bytes(file, WHAT, LARGEST_RECORD), file)
 
     def place_of(self, path: Path) -> str:
-        """Return where a file or folder is, from the data folder if it is in there."""
+        """Return the path of a file or folder, relative to the data folder if inside."""
         absolute = path.absolute()
         inside = absolute.is_relative_to(self._data)
         return (absolute.relative_to(self._data) if inside else absolute).as_posix()

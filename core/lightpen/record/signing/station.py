@@ -79,7 +79,7 @@ def station_name(data: Path) -> str:
 
 
 def remembered(data: Path) -> RememberedFolder | None:
-    """Return what this user account remembers of a data folder, if anything."""
+    """Return the entry of this user account for a data folder, if any."""
     file = memory_file(data)
     if not file.exists():
         return None

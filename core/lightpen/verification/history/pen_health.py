@@ -198,7 +198,7 @@ def _has_size(swing: CalibrationFile) -> bool:
 
 
 def _cone_seen(calibration: CalibrationFile, camera: Camera) -> FloatArray | None:
-    """Return where the cone would be seen, px, and its depth over the focal length."""
+    """Return the image of the cone, px, and its depth over the focal length."""
     fitted = np.array(calibration.calibration.instrument.intrinsics)
     if len(fitted) != len(camera.intrinsics):
         return None

@@ -143,7 +143,7 @@ def tip_at(tip: CurrentTip, place: ImageLocation) -> CurrentTip:
 
 
 def cone_before(calibration: CalibrationFile, viewers: PenCameras) -> FloatArray | None:
-    """Return where the calibration had the cone, (3,), mm; None before others."""
+    """Return the cone of the calibration, (3,), mm; None for other cameras."""
     is_same = viewers.hashes == calibration.camera_hashes
     return calibration.cone_cam if is_same else None
 

@@ -70,7 +70,7 @@ class LampObservations:
     cameras: tuple[LampImages, ...] = ()
 
     def then(self, other: "LampObservations") -> "LampObservations":
-        """Return what these cameras saw, and after it what they saw in the other."""
+        """Return these images of the reference, followed by those of another one."""
         if not (self.cameras and other.cameras):
             return self if self.cameras else other
         both = zip(self.cameras, other.cameras, strict=True)
@@ -79,7 +79,7 @@ class LampObservations:
     def with_frame(
         self, frame: Frame, detection: PenDetection, region: RegionOfInterest
     ) -> "LampObservations":
-        """Return it with one more image of each camera that sees the pen."""
+        """Return a copy with one more image of each camera that sees the pen."""
         views = zip(
             *((frame, *frame.others), (detection, *detection.others)),
             region.regions,

@@ -49,21 +49,21 @@ class VerificationChoices:
         return next(own, task.options())
 
     def with_options(self, options: AnyOptions) -> "VerificationChoices":
-        """Return them with other options of a task."""
+        """Return a copy with other options of a task."""
         chosen = {type(each): each for each in (*self.options, options)}
         ordered = (chosen.get(task.options) for task in ALL_TASKS)
         unusual = (each for each in ordered if each and each != type(each)())
         return replace(self, options=tuple(unusual))
 
     def with_moves(self, moves: tuple[Move, ...]) -> "VerificationChoices":
-        """Return them with other moves of a part, which belong to one session."""
+        """Return a copy with other moves of a part, which belong to one session."""
         options = self.options_of(PART)
         if options.moves == moves:
             return self
         return self.with_options(structs.replace(options, moves=moves))
 
     def with_task(self, task: AnyTask, *, is_chosen: bool) -> "VerificationChoices":
-        """Return them with a task chosen or not."""
+        """Return a copy with a task selected or not."""
         kinds = {*self.kinds, task.kind} if is_chosen else {*self.kinds} - {task.kind}
         return replace(self, kinds=tuple(t.kind for t in ALL_TASKS if t.kind in kinds))
 

@@ -116,7 +116,7 @@ def end_task(setup: SessionSetup, state: SessionState) -> SessionTransition:
 def run_again(
     setup: SessionSetup, state: SessionState, touches: Points, *, is_last: bool
 ) -> SessionState:
-    """Return it with a run that was done before, as it was then.
+    """Return the state with an earlier run, with its options of that time.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def measure_with_drift(setup: SessionSetup, done: RunsOfTask) -> Found:
 def with_read(
     setup: SessionSetup, state: SessionState, read: RunsOfTask, found: Found
 ) -> SessionState:
-    """Return it with what recorded images have found.
+    """Return the state with the results of recorded images.
 
     A drift reference that they are of counts in what was found before it, and one that
     is yet to come will count in what they have found.

@@ -60,7 +60,7 @@ class SessionSetup:
 def with_drift(
     setup: SessionSetup, reference: LampDrift | Drift | None
 ) -> SessionSetup:
-    """Return it with the drift of the camera by lamps or a cone."""
+    """Return the conditions with the camera drift measured by lamps or a cone."""
     if reference is None:
         return setup
     return replace(setup, drift=np.maximum(setup.drift, reference.share))
@@ -185,7 +185,7 @@ def n_done(state: SessionState) -> int:
 
 
 def n_visits(choices: VerificationChoices) -> int:
-    """Return how often the cone is visited: before, between and after the tasks."""
+    """Return the number of visits to the cone: before, between and after the tasks."""
     n_others = len({*choices.kinds} - {DRIFT.kind})
     return max(n_others + 1, MIN_VISITS)
 
@@ -197,7 +197,7 @@ def without_touches(state: SessionState) -> SessionState:
 
 
 def with_pen_at_rest(state: SessionState) -> SessionState:
-    """Return it for a pen that may lie anywhere: before its next touch it must move."""
+    """Return the state for a pen at an unknown place, which must move to touch again."""
     return replace(state, touching=at_rest(state.touching))
 
 

@@ -130,7 +130,7 @@ _HAPPENED = {
 def event_kinds(
     before: SessionState | None, transition: SessionTransition
 ) -> list[SessionEventKind]:
-    """Return what has happened to the touches by one more image."""
+    """Return the events of the touches by one more image."""
     happened = [_HAPPENED[event.what] for event in transition.events]
     if before is not None and _is_known(transition.state) and not _is_known(before):
         happened.append(SessionEventKind.KNOWN)

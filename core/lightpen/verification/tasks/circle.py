@@ -14,7 +14,6 @@ from msgspec import Meta
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
@@ -42,6 +41,14 @@ from lightpen.verification.tasks.probed_point import (
     joint_covariance,
     point_entries,
 )
+from lightpen.verification.tasks.surface_points import (
+    LATEST,
+    MAX_LEFT_OUT,
+    away_from_cones,
+    form_by_noise,
+    missing_certificate,
+    split_points,
+)
 from lightpen.verification.tasks.task import (
     ANY,
     BALL_OPTION,
@@ -54,7 +61,6 @@ from lightpen.verification.tasks.task import (
     ResultRow,
     ResultTable,
     Runs,
-    Screening,
     Surface,
     SurfaceOption,
     TaskOptions,
@@ -63,8 +69,6 @@ from lightpen.verification.tasks.task import (
     ball_offset,
     certificate_option,
     count_option,
-    keep_all,
-    without_last,
 )
 from lightpen.verification.tasks.tip_evidence import (
     TipEvidence,
@@ -73,19 +77,15 @@ from lightpen.verification.tasks.tip_evidence import (
     tip_entries,
     tip_evidence,
     with_power,
+    worse_finding,
 )
 
 MIN_TOUCHES = 6
 MIN_ANGLE = 270.0  # degrees
-UNUSUAL = 0.001  # chance that an ideal ring shows more form
-N_TRIALS = 4000
 MAX_FORM = 0.05  # of the radius: what is further off is no circle
-MAX_LEFT_OUT = 0.25  # of the touches
 ANOTHER = 0.1  # of the certified radius: then it is another circle
 ENOUGH_POINTS = 10  # for a session
 NEW_PLACE = 3.0  # mm
-IN_CONE = 5.0  # mm from the bottom of a cone that was probed before
-LATEST = 6  # points whose residuals are shown beside the ring
 
 # The ring of the simulated operator, from the bottom of its cone, mm
 SIMULATED_RADIUS = 31.751
@@ -269,7 +269,7 @@ def _measure_run(
             n_touches=len(touches),
             off=off,
         )
-    kept = tuple(t for t, on in zip(touches, on_ring, strict=True) if on)
+    kept, left_out = split_points(touches, on_ring)
     _require_closed(name, kept, fit)
     row = np.einsum(
         "ni,niq->q", fit.weights, np.array([touch.sensitivity for touch in kept])
@@ -280,7 +280,7 @@ def _measure_run(
     run = CircleRun(
         name=name,
         touches=kept,
-        left_out=tuple(t for t, on in zip(touches, on_ring, strict=True) if not on),
+        left_out=left_out,
         fit=fit,
         radius=fit.radius + ball_offset,
         uncertainty=COVERAGE_FACTOR * float(np.hypot(np.sqrt(variance), drift.max())),
@@ -296,18 +296,13 @@ def _form_by_noise(
     drift: FloatArray,
 ) -> float:
     """Return the quantile of the form that errors of the points make, mm."""
-    rng = np.random.default_rng(0)  # the same points give the same form
     n = len(touches)
     ring = ring_residuals(fit, n)
     covariance = joint_covariance(touches, instrument) + np.diag(np.tile(drift**2, n))
     by_radius = np.repeat([[1.0], [0.0]], n, axis=0)
     unknowns, _ = np.linalg.qr(np.column_stack([ring.by_ring, by_radius]))
     keeps = ring.by_points - unknowns @ (unknowns.T @ ring.by_points)
-    values, vectors = np.linalg.eigh(keeps @ covariance @ keeps.T)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    off = rng.standard_normal((N_TRIALS, 2 * n)) @ root.T
-    ranges = np.ptp(off.reshape(N_TRIALS, 2, n), axis=2).max(axis=1)
-    return float(np.quantile(ranges, 1 - UNUSUAL))
+    return form_by_noise(keeps @ covariance @ keeps.T, n_rows=2)
 
 
 def _require_closed(name: str, touches: Sequence[ProbedPoint], fit: CircleFit) -> None:
@@ -344,12 +339,9 @@ def _assessment(
     blamed = refused(reason, CALIBRATE_AGAIN)
     off = judged_error(error, uncertainty, limits.radius, limits, blamed)
     against = judged_tip(tip, limits)
-    if against is not None and against.grade is Grade.REPEAT:
-        return against
-    if off is not None:
-        return off
-    if against is not None:
-        return against
+    finding = worse_finding(against, off)
+    if finding is not None:
+        return finding
     worst = max(runs, key=lambda run: run.form / max(limits.form, run.form_by_noise))
     form_limit = max(limits.form, worst.form_by_noise)
     if worst.form > form_limit:
@@ -388,25 +380,12 @@ def covered(points: Sequence[ProbedPoint]) -> float:
     return 0.0 if fit is None else fit.covered
 
 
-def away_from_cones(
-    options: object, conditions: Conditions, progress: TaskProgress
-) -> Screening:
-    """Accept the last point unless it is in a cone that was probed before."""
-    last, count = progress.points[-1].point_cam, len(progress.points)
-    distances = (float(np.linalg.norm(last - cone)) for cone in progress.cones)
-    if any(distance <= IN_CONE for distance in distances):
-        return without_last(count, message("session.still-in-cone"))
-    return keep_all(count)
-
-
 def _missing(options: CircleOptions, ball_diameter: float | None) -> Message | None:
     if not options.radius:
         return message("verification.no-radius")
-    if not options.radius_uncertainty:
-        return message("verification.no-certificate-u")
-    if options.surface is not Surface.GROOVE and not ball_diameter:
-        return message("verification.no-ball")
-    return None
+    return missing_certificate(
+        options.radius_uncertainty, options.surface, ball_diameter
+    )
 
 
 def _entries(found: Circle, instrument: Instrument) -> dict[str, Any]:

@@ -17,13 +17,12 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.measuring.features import fit_feature
 from lightpen.measuring.surfaces import FeatureKind
+from lightpen.verification.tasks.surface_points import lie_near
 
 LEAST_POINTS = 3  # that determine a circle
 EDGE_ON = 0.9  # of the normal along u
 SMALLEST = 0.5  # mm, of what can be a circle at all
 THIN = 0.02  # of the points' extent: less across is a line
-ASTRAY = 8.0  # times the median distance from the circle
-LIFTED = 0.1  # mm; nearer points count, farther ones may be of a lifted pen
 N_SAMPLES = 500  # of three points each
 
 
@@ -182,9 +181,8 @@ def on_ring_of(points: FloatArray) -> BoolArray:
         distances = np.hypot(in_plane - radii[:, None], axial)
     medians = np.nan_to_num(np.median(distances, axis=1), nan=np.inf)
     best = distances[int(np.argmin(medians))]
-    near = best <= max(ASTRAY * float(np.median(best)), LIFTED)
-    again = np.linalg.norm(residuals_of(fit_circle(points[near]), points), axis=1)
-    return np.asarray(again <= max(ASTRAY * float(np.median(again)), LIFTED))
+    fit = fit_circle(points[lie_near(best)])
+    return lie_near(np.linalg.norm(residuals_of(fit, points), axis=1))
 
 
 def gaps_of(angles: FloatArray) -> FloatArray:

@@ -21,7 +21,6 @@ from msgspec import Meta
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
@@ -40,6 +39,7 @@ from lightpen.verification.tasks.probed_point import (
     on_surface,
     point_entries,
 )
+from lightpen.verification.tasks.surface_points import missing_certificate
 from lightpen.verification.tasks.task import (
     ANY,
     BALL_OPTION,
@@ -70,6 +70,7 @@ from lightpen.verification.tasks.tip_evidence import (
     tip_entries,
     tip_evidence,
     with_power,
+    worse_finding,
 )
 
 Ends: TypeAlias = tuple[tuple[ProbedPoint, ...], tuple[ProbedPoint, ...]]
@@ -363,12 +364,9 @@ def _assessment(found: Length, limits: VerificationLimits) -> VerificationAssess
         limit=worst.limit,
     )
     off = judged_error(*figures, limits, refused(reason, CHECK_FILES), n_places)
-    if against is not None and against.grade is Grade.REPEAT:
-        return against
-    if off is not None:
-        return off
-    if against is not None:
-        return against
+    finding = worse_finding(against, off)
+    if finding is not None:
+        return finding
     least = max(found.runs, key=lambda run: run.uncertainty / run.limit)
     if least.uncertainty > least.limit:
         return check(
@@ -402,11 +400,9 @@ def _screen(
 def _missing(options: LengthOptions, ball_diameter: float | None) -> Message | None:
     if not options.length:
         return message("verification.no-length")
-    if not options.length_uncertainty:
-        return message("verification.no-certificate-u")
-    if options.surface is not Surface.GROOVE and not ball_diameter:
-        return message("verification.no-ball")
-    return None
+    return missing_certificate(
+        options.length_uncertainty, options.surface, ball_diameter
+    )
 
 
 def _entries(found: Length, instrument: Instrument) -> dict[str, Any]:

@@ -35,11 +35,20 @@ from lightpen.verification.tasks.assessment import (
     check,
     refused,
 )
-from lightpen.verification.tasks.circle import away_from_cones
 from lightpen.verification.tasks.probed_point import (
     ProbedPoint,
     joint_covariance,
     point_entries,
+)
+from lightpen.verification.tasks.surface_points import (
+    MAX_LEFT_OUT,
+    UNUSUAL,
+    away_from_cones,
+    lie_near,
+    residuals_so_far,
+    residuals_table,
+    simulated_ranges,
+    split_points,
 )
 from lightpen.verification.tasks.task import (
     ANY,
@@ -70,15 +79,9 @@ LEAST_POINTS = 4  # that can lie off a plane at all
 SMALLEST = 5.0  # mm, root mean square distance of the points from their middle
 THIN = 0.2  # of the extent along: less across is a line
 NEW_PLACE = 5.0  # mm
-ASTRAY = 8.0  # times the median distance from the plane
-LIFTED = 0.1  # mm; nearer points count, farther ones may be of a lifted pen
-MAX_LEFT_OUT = 0.25  # of the points
 MAX_FORM = 0.1  # of the extent: what is rougher is no plate
 N_SAMPLES = 500  # of three points each
-N_TRIALS = 4000
 COVERAGE = 0.9545  # that k = 2 has of a normal distribution
-UNUSUAL = 0.001  # chance that an ideal plate shows more
-LATEST = 6  # points whose residuals are shown
 
 # The plate of the simulated operator, from the bottom of its cone, mm
 SIMULATED_CENTER = np.array([0.0, -40.0, 0.0])
@@ -175,8 +178,7 @@ def measure_plane(
             n_points=len(points),
             off=fit.flatness,
         )
-    kept = tuple(p for p, is_near in zip(points, near, strict=True) if is_near)
-    left_out = tuple(p for p, is_near in zip(points, near, strict=True) if not is_near)
+    kept, left_out = split_points(points, near)
     uncertainty, largest = _flatness_by_noise(fit, kept, conditions)
     tip = _tip_evidence(fit, kept, conditions)
     return Flatness(
@@ -235,10 +237,8 @@ def _on_plane(places: FloatArray) -> BoolArray:
     normals = normals[wide] / lengths[wide, None]
     distances = np.abs(np.einsum("sni,si->sn", places - a[wide, None], normals))
     best = distances[int(np.argmin(np.median(distances, axis=1)))]
-    near = best <= max(ASTRAY * float(np.median(best)), LIFTED)
-    fit = fit_plane(places[near])
-    again = np.abs((places - fit.center_cam) @ fit.normal_cam)
-    return np.asarray(again <= max(ASTRAY * float(np.median(again)), LIFTED))
+    fit = fit_plane(places[lie_near(best)])
+    return lie_near((places - fit.center_cam) @ fit.normal_cam)
 
 
 def _tip_evidence(
@@ -262,15 +262,15 @@ def _flatness_by_noise(
     fit: PlaneFit, points: Sequence[ProbedPoint], conditions: Conditions
 ) -> tuple[float, float]:
     """Return U and the largest usual range that errors of the points make, mm."""
-    rng = np.random.default_rng(0)  # the same points give the same uncertainty
     n = len(points)
     blocks = joint_covariance(points, conditions.instrument).reshape(n, 3, n, 3)
     along = np.einsum("i,minj,j->mn", fit.normal_cam, blocks, fit.normal_cam)
     along += float(fit.normal_cam**2 @ conditions.drift**2) * np.eye(n)
     values, vectors = np.linalg.eigh(fit.weights @ along @ fit.weights)
     root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
-    ranges = np.ptp(rng.standard_normal((N_TRIALS, n)) @ root, axis=1)
-    usual, largest = np.quantile(ranges, [COVERAGE, 1 - UNUSUAL]).tolist()
+    usual, largest = np.quantile(
+        simulated_ranges(root), [COVERAGE, 1 - UNUSUAL]
+    ).tolist()
     return usual, largest
 
 
@@ -287,43 +287,32 @@ def _assessment(
     against = judged_tip(tip, limits)
     if against is not None:
         return against
-    if error > max(limit, largest):
-        reason = message(
-            "plane.off",
-            flatness=flatness,
-            uncertainty=uncertainty,
-            certified=certified,
-            limit=limit,
-        )
-        return refused(reason, CALIBRATE_AGAIN)
-    if left_out:
-        reason = message(
-            "plane.lifted", n_left_out=len(left_out), first=left_out[0].label
-        )
-        return check(reason, VERIFY_AGAIN)
-    if uncertainty > limit:
-        reason = message("plane.uncertain", uncertainty=uncertainty, limit=limit)
-        return check(reason, MORE_POINTS)
-    if limits.decision(error, uncertainty, limit) is not Decision.ACCEPTED:
-        reason = message(
-            "plane.off",
-            flatness=flatness,
-            uncertainty=uncertainty,
-            certified=certified,
-            limit=limit,
-        )
-        return check(reason, MORE_POINTS)
-    return with_power(
-        message(
-            "plane.good",
-            flatness=flatness,
-            uncertainty=uncertainty,
-            certified=certified,
-            limit=limit,
-        ),
-        tip,
-        limits,
+    off = message(
+        "plane.off",
+        flatness=flatness,
+        uncertainty=uncertainty,
+        certified=certified,
+        limit=limit,
     )
+    if error > max(limit, largest):
+        return refused(off, CALIBRATE_AGAIN)
+    if left_out:
+        first = left_out[0].label
+        lifted = message("plane.lifted", n_left_out=len(left_out), first=first)
+        return check(lifted, VERIFY_AGAIN)
+    if uncertainty > limit:
+        uncertain = message("plane.uncertain", uncertainty=uncertainty, limit=limit)
+        return check(uncertain, MORE_POINTS)
+    if limits.decision(error, uncertainty, limit) is not Decision.ACCEPTED:
+        return check(off, MORE_POINTS)
+    good = message(
+        "plane.good",
+        flatness=flatness,
+        uncertainty=uncertainty,
+        certified=certified,
+        limit=limit,
+    )
+    return with_power(good, tip, limits)
 
 
 def _entries(found: Flatness, instrument: Instrument) -> dict[str, Any]:
@@ -359,35 +348,25 @@ def _tables(found: Flatness, conditions: Conditions) -> tuple[ResultTable, ...]:
     summary = ResultTable(
         message("plane.table"), columns, (ResultRow(message("plane.title"), values),)
     )
-    return summary, _residuals(found.points, found.fit)
+    residuals = residuals_table(
+        message("plane.residuals"),
+        message("plane.residual"),
+        found.points,
+        found.fit.residuals,
+    )
+    return summary, residuals
 
 
 def _figures_so_far(
     options: PlaneOptions, progress: TaskProgress, conditions: Conditions
 ) -> tuple[ResultTable, ...]:
-    points = progress.points
-    if len(points) < LEAST_POINTS:
-        return (_residuals((), None),)
-    try:
-        fit = fit_plane(np.array([point.point_cam for point in points]))
-    except CalibrationError:
-        return (_residuals((), None),)
-    return (_residuals(points, fit, LATEST),)
-
-
-def _residuals(
-    points: Sequence[ProbedPoint], fit: PlaneFit | None, latest: int = MAX_POINTS
-) -> ResultTable:
-    title = message("plane.residuals")
-    if fit is None:
-        return ResultTable(title)
-    rows = tuple(
-        ResultRow(str(i), [*point.point_cam.tolist(), residual])
-        for i, (point, residual) in enumerate(
-            zip(points, fit.residuals.tolist(), strict=True), start=1
-        )
+    return residuals_so_far(
+        message("plane.residuals"),
+        message("plane.residual"),
+        progress.points,
+        lambda places: fit_plane(places).residuals,
+        LEAST_POINTS,
     )
-    return ResultTable(title, (*"uvw", message("plane.residual")), rows[-latest:])
 
 
 def _instruction(options: PlaneOptions, progress: TaskProgress) -> Message:

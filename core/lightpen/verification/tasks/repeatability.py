@@ -223,7 +223,7 @@ def _capability(
 
 
 def _points_to(tip: FloatArray, n_tips: int, touched: RepeatedPoint) -> Message | None:
-    """Return what two scatters point to that differ by more than chance.
+    """Return the likely cause of two scatters that differ by more than chance.
 
     A point that scatters no more than its touches are expected to has not moved.
     """

@@ -21,7 +21,6 @@ from msgspec import Meta
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.measuring.features import fit_feature
@@ -37,11 +36,20 @@ from lightpen.verification.tasks.assessment import (
     judged_error,
     refused,
 )
-from lightpen.verification.tasks.circle import away_from_cones
 from lightpen.verification.tasks.probed_point import (
     ProbedPoint,
     joint_covariance,
     point_entries,
+)
+from lightpen.verification.tasks.surface_points import (
+    MAX_LEFT_OUT,
+    away_from_cones,
+    form_by_noise,
+    lie_near,
+    missing_certificate,
+    residuals_so_far,
+    residuals_table,
+    split_points,
 )
 from lightpen.verification.tasks.task import (
     ANY,
@@ -70,19 +78,15 @@ from lightpen.verification.tasks.tip_evidence import (
     tip_entries,
     tip_evidence,
     with_power,
+    worse_finding,
 )
 
 MIN_POINTS, USUAL_POINTS, MAX_POINTS = 9, 25, 50
 LEAST_POINTS = 5  # that can lie off a sphere at all
 SPREAD = 0.15  # smallest extent of the points over their radius, or none is determined
-ASTRAY, LIFTED = 8.0, 0.1  # times the median distance; mm, as of a ring
-MAX_LEFT_OUT = 0.25  # of the points
 MAX_FORM = 0.05  # of the radius: what is further off is no sphere
 ANOTHER = 0.1  # of the certified radius: then it is another sphere
 NEW_PLACE = 3.0  # mm
-UNUSUAL = 0.001  # chance that an ideal sphere shows more form
-N_TRIALS = 4000
-LATEST = 6  # points whose residuals are shown
 
 # Points of the standard: their number at each angle from the pole, degrees.
 RINGS = (1, 0.0), (4, 22.5), (8, 45.0), (4, 67.5), (8, 90.0)
@@ -189,14 +193,12 @@ def measure_sphere(
     if len(points) < MIN_POINTS:
         raise CalibrationError("sphere.too-few", n=len(points), needed=MIN_POINTS)
     fit = fit_sphere(places)
-    off = np.abs(fit.residuals)
-    near = off <= max(ASTRAY * float(np.median(off)), LIFTED)
+    near = lie_near(fit.residuals)
     fit = fit_sphere(places[near])
     if np.mean(~near) > MAX_LEFT_OUT or fit.form > MAX_FORM * fit.radius:
         n_off = int(np.sum(~near))
         raise CalibrationError("sphere.none", n_off=n_off, n=len(points), off=fit.form)
-    kept = tuple(p for p, is_near in zip(points, near, strict=True) if is_near)
-    left_out = tuple(p for p, is_near in zip(points, near, strict=True) if not is_near)
+    kept, left_out = split_points(points, near)
     diameter = 2 * (fit.radius + ball_offset(options.surface, conditions.ball_diameter))
     known = options.diameter_uncertainty
     if options.surface is not Surface.GROOVE:
@@ -218,16 +220,18 @@ def measure_sphere(
         + by_points @ np.diag(np.tile(conditions.drift**2, n)) @ by_points.T,
     )
     size = Size(diameter, options.diameter, float(np.hypot(own, known)))
-    form_by_noise = _form_by_noise(fit, spread)
+    unknowns, _ = np.linalg.qr(fit.by_sphere)
+    keeps = np.eye(n) - unknowns @ unknowns.T
+    by_noise = form_by_noise(keeps @ spread @ keeps)
     return Sphere(
         points=kept,
         left_out=left_out,
         fit=fit,
         size=size,
-        form_by_noise=form_by_noise,
+        form_by_noise=by_noise,
         tip=tip,
         assessment=_assessment(
-            size, (fit.form, form_by_noise), left_out, tip, conditions.limits
+            size, (fit.form, by_noise), left_out, tip, conditions.limits
         ),
     )
 
@@ -257,17 +261,6 @@ def _certified_covariance(n: int, uncertainty: float) -> FloatArray:
     return np.full((n, n), (uncertainty / 2 / COVERAGE_FACTOR) ** 2)
 
 
-def _form_by_noise(fit: SphereFit, spread: FloatArray) -> float:
-    """Return the quantile of the form that errors of the points make, mm."""
-    rng = np.random.default_rng(0)  # the same points give the same form
-    unknowns, _ = np.linalg.qr(fit.by_sphere)
-    keeps = np.eye(len(spread)) - unknowns @ unknowns.T
-    values, vectors = np.linalg.eigh(keeps @ spread @ keeps)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    off = rng.standard_normal((N_TRIALS, len(spread))) @ root.T
-    return float(np.quantile(np.ptp(off, axis=1), 1 - UNUSUAL))
-
-
 def _assessment(
     size: Size,
     form: tuple[float, float],
@@ -288,12 +281,9 @@ def _assessment(
     blamed = refused(reason, CALIBRATE_AGAIN)
     off = judged_error(error, uncertainty, limit, limits, blamed)
     against = judged_tip(tip, limits)
-    if against is not None and against.grade is Grade.REPEAT:
-        return against
-    if off is not None:
-        return off
-    if against is not None:
-        return against
+    finding = worse_finding(against, off)
+    if finding is not None:
+        return finding
     found, by_noise = form
     form_limit = max(limits.form, by_noise)
     if found > form_limit:
@@ -316,11 +306,9 @@ def _assessment(
 def _missing(options: SphereOptions, ball_diameter: float | None) -> Message | None:
     if not options.diameter:
         return message("sphere.no-diameter")
-    if not options.diameter_uncertainty:
-        return message("verification.no-certificate-u")
-    if options.surface is not Surface.GROOVE and not ball_diameter:
-        return message("verification.no-ball")
-    return None
+    return missing_certificate(
+        options.diameter_uncertainty, options.surface, ball_diameter
+    )
 
 
 def _entries(found: Sphere, instrument: Instrument) -> dict[str, Any]:
@@ -350,35 +338,25 @@ def _tables(found: Sphere, conditions: Conditions) -> tuple[ResultTable, ...]:
     values = [size.measured, size.error, size.uncertainty, found.fit.form]
     row = ResultRow(message("sphere.title"), [*values, float(len(found.points))])
     title = message("sphere.table", certified=size.certified)
-    return ResultTable(title, columns, (row,)), _residuals(found.points, found.fit)
+    residuals = residuals_table(
+        message("sphere.residuals"),
+        message("circle.radial"),
+        found.points,
+        found.fit.residuals,
+    )
+    return ResultTable(title, columns, (row,)), residuals
 
 
 def _figures_so_far(
     options: SphereOptions, progress: TaskProgress, conditions: Conditions
 ) -> tuple[ResultTable, ...]:
-    points = progress.points
-    if len(points) < LEAST_POINTS:
-        return (_residuals((), None),)
-    try:
-        fit = fit_sphere(np.array([point.point_cam for point in points]))
-    except CalibrationError:
-        return (_residuals((), None),)
-    return (_residuals(points, fit, LATEST),)
-
-
-def _residuals(
-    points: Sequence[ProbedPoint], fit: SphereFit | None, latest: int = MAX_POINTS
-) -> ResultTable:
-    title = message("sphere.residuals")
-    if fit is None:
-        return ResultTable(title)
-    rows = tuple(
-        ResultRow(str(i), [*point.point_cam.tolist(), residual])
-        for i, (point, residual) in enumerate(
-            zip(points, fit.residuals.tolist(), strict=True), start=1
-        )
+    return residuals_so_far(
+        message("sphere.residuals"),
+        message("circle.radial"),
+        progress.points,
+        lambda places: fit_sphere(places).residuals,
+        LEAST_POINTS,
     )
-    return ResultTable(title, (*"uvw", message("circle.radial")), rows[-latest:])
 
 
 def _instruction(options: SphereOptions, progress: TaskProgress) -> Message:

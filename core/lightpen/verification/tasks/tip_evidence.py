@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
@@ -153,7 +154,7 @@ def _detectable(covariance: FloatArray) -> float:
 
 @cache
 def _detected_deviations() -> float:
-    """Return how many standard deviations off a tip must be to be found."""
+    """Return the smallest detectable tip error in standard deviations."""
     from scipy.special import chndtrinc
 
     gate = chi_square_quantile(3, BY_CHANCE)
@@ -192,6 +193,18 @@ def judged_tip(
     return check(differs, CALIBRATE_AGAIN)
 
 
+def worse_finding(
+    against: VerificationAssessment | None, off: VerificationAssessment | None
+) -> VerificationAssessment | None:
+    """Return the finding that counts: against the tip, or of an error of size.
+
+    That the tip is refused comes first, then the error, then that the tip is checked.
+    """
+    if against is not None and against.grade is Grade.REPEAT:
+        return against
+    return against if off is None else off
+
+
 def with_power(
     reason: Message, found: TipEvidence, limits: VerificationLimits
 ) -> VerificationAssessment:
@@ -206,7 +219,7 @@ def with_power(
 
 
 def not_the_tip(found: TipEvidence, limits: VerificationLimits) -> Message:
-    """Return that points show no tip error as small as the limit."""
+    """Return the message that points cannot detect a tip error within the limit."""
     if found.detectable < inf:
         return message("tip.weak-power", detectable=found.detectable, limit=limits.tip)
     return message("tip.no-power", limit=limits.tip)
