@@ -185,7 +185,7 @@ def test_images_of_another_size_name_the_camera(copied: Path, lightpen: Run) -> 
     outcome = calibrate(lightpen, copied)
 
     assert_refused(outcome, "Camera right: 12 of 12 images are 1224 x 1024 px", 2)
-    assert "They have the size of left" in outcome.stderr
+    assert "Their size is that of left" in outcome.stderr
 
 
 def test_missing_images_are_reported_and_the_others_used(

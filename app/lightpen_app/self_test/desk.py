@@ -251,7 +251,7 @@ class Desk:
         return "opened, finished, reviewed and accepted"
 
     def tested_result(self) -> str:
-        """Return the folder of the accepted result, which is current."""
+        """Return pen, folder and grade of the accepted result, which is current."""
         return f"{self._result().names.pen} in {RESULTS}, grade {self._result().grade}"
 
     def tip(self) -> Tip:

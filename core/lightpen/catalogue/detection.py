@@ -31,5 +31,5 @@ MESSAGES = {
     "image.copy-of": "The same as {name}.",
     "calibrate.images-of-a-reason": "{n_images} {reason}",
     "image.unhandled": "The program failed on this image ({kind}: {problem}). Keep the image, and report it.",
-    "rig.size-of-another": "{told} They have the size of {other}: check that the images are in the order of the cameras of the rig file.",
+    "rig.size-of-another": "{told} Their size is that of {other}. Give the images in the order of the cameras in the rig file.",
 }

@@ -55,7 +55,7 @@ MESSAGES = {
     "library.shared": "Taken over from another station: {kind} {id}, {by}.",
     "library.shared-replacing": "Taken over from another station: {kind} {id}, {by}. It replaces the earlier change by {before}.",
     "library.shared-retired": "Retired at another station: {kind} {id}, {by}.",
-    "library.share-waits": "{n} changes of other stations to the tip library wait for a supervisor to sign them.",
+    "library.share-waits": "Changes of other stations to the tip library that a supervisor has not signed yet: {n}.",
     "limits.later-version": "The limits in {file} were written by a later version of the program. Use that version.",
     "library.later-version": "The file {file} of the tip library was written by a later version of the program. Use that version.",
     "library.damaged": "The tip library {file} was modified or damaged after it was saved. Restore the file from a copy.",

@@ -43,7 +43,7 @@ MESSAGES = {
     "verdict.no-temperature": "The temperature of the pen was not measured; this station requires it. Measure it and enter it at Start, then repeat the swing.",
     "verdict.last-unknown": "The tip cannot be compared with the current one. {why}",
     "verdict.halves-differ": "The tips from odd and even images differ by {difference:.4f} mm; usual is {usual:.4f} mm. The tip may have moved. Repeat the swing with the tip pressed in.",
-    "verdict.many-excluded": "You excluded {n_excluded} images. Undo, or repeat the swing.",
+    "verdict.many-excluded": "Images excluded manually: {n_excluded}. Include them again, or repeat the swing.",
     "verdict.many-dropped": "{n_dropped} of {n_images} images are excluded. Repeat the swing if the tip slipped.",
     "verdict.leds-off": "The LED coordinates are in error by {sigma:.3f} mm (standard deviation); this alone gives U (k = 2) = {uncertainty:.4f} mm. Check that the LED file belongs to this pen. More images hardly help.",
     "verdict.led-displaced": "LED {led} is {distance:.2f} mm from its file position. Check that the LED file belongs to this pen.",

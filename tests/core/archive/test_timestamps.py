@@ -101,7 +101,7 @@ def test_entries_after_the_last_timestamp_are_noted(station: Station, tsa: Tsa) 
 
     checked = check(station, tsa.root)
     assert checked.findings == ()
-    assert "2 entries after entry 1 have no timestamp yet" in str(checked.notes[0])
+    assert "Entries after entry 1 without a timestamp: 2" in str(checked.notes[0])
 
 
 def test_without_the_certificate_signatures_are_said_not_to_be_verified(
@@ -112,7 +112,7 @@ def test_without_the_certificate_signatures_are_said_not_to_be_verified(
 
     checked = check(station, None)
     assert checked.findings == ()
-    assert "signatures of 1 timestamps were not verified" in str(checked.notes[0])
+    assert "signature that was not verified: 1" in str(checked.notes[0])
 
 
 def test_a_timestamp_copied_from_another_entry_is_found(

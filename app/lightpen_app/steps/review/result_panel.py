@@ -209,7 +209,7 @@ class ResultPanel(Translated, QFrame):
         return StatusMessage(text, Sign.WARNING, Tone.WARN)
 
     def _self_check_message(self, check: SelfCheck | None) -> StatusMessage:
-        """Return the cross-validation of LEDs: error of those predicted by the others."""
+        """Return the cross-validation of the LEDs: each predicted by the others."""
         if check is None:
             return StatusMessage()
         text = self.tr("Self-check of the LEDs: {0}, limit {1}")

@@ -246,9 +246,9 @@ def _lamp_lines(calibration: Calibration) -> list[str]:
         path = images.path
         if path is None:
             continue
-        motion = f"they stay in place to {path.noise:.3f} px"
+        motion = f"stable within {path.noise:.3f} px"
         if path.moved > 0:
-            motion = f"they move by {path.moved:.2f} px, "
-            motion += "which is taken out" if path.is_followed else "the pen does not"
+            motion = f"moved by {path.moved:.2f} px, "
+            motion += "which is corrected" if path.is_followed else "unlike the pen"
         lines.append(f"Fixed lamps  {len(path.lamps)} in view; {motion}")
     return lines

@@ -240,7 +240,7 @@ class FolderArchive:
         return parse_withdrawal(read_bytes(file, WHAT, LARGEST_RECORD), file)
 
     def place_of(self, path: Path) -> str:
-        """Return the path of a file or folder, relative to the data folder if inside."""
+        """Return the path of a file, relative to the data folder if inside."""
         absolute = path.absolute()
         inside = absolute.is_relative_to(self._data)
         return (absolute.relative_to(self._data) if inside else absolute).as_posix()

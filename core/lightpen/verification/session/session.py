@@ -190,8 +190,8 @@ def with_read(
 ) -> SessionState:
     """Return the state with the results of recorded images.
 
-    A drift reference that they are of counts in what was found before it, and one that
-    is yet to come will count in what they have found.
+    A measured drift corrects the results before it; one that is still to be measured
+    will correct these.
     """
     if isinstance(found, Drift):
         state = _counting(setup, state, found)

@@ -197,7 +197,7 @@ def without_touches(state: SessionState) -> SessionState:
 
 
 def with_pen_at_rest(state: SessionState) -> SessionState:
-    """Return the state for a pen at an unknown place, which must move to touch again."""
+    """Return the state for a pen at an unknown place, which must move first."""
     return replace(state, touching=at_rest(state.touching))
 
 

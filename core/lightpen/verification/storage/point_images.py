@@ -289,7 +289,7 @@ class LivePoints:
         return transition
 
     def _drifted(self, setup: SessionSetup, state: SessionState) -> SessionSetup:
-        """Return the point with the motion of the camera, if required."""
+        """Return the conditions with the motion of the camera, if required."""
         task = state.task(setup)
         if task is None:
             return setup

@@ -290,7 +290,7 @@ class _Derivatives(NamedTuple):
 
 
 def _view(instrument: Instrument, c: int, poses: Poses) -> _Derivatives:
-    """Return the derivative of the images of the c-th camera by poses rig_from_pen."""
+    """Return the derivatives of the images of the c-th camera."""
     rig, pen, at = instrument.rig, instrument.pen, instrument.parameters
     camera, turn = rig.cameras[c], rig.rotations[c]
     R = turn @ poses.rotations
