@@ -46,6 +46,7 @@ from lightpen.simulator.swings import (
     swing_poses,
 )
 from lightpen.swing.preparation import Preparation
+from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import read_resumable
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station
@@ -85,7 +86,7 @@ def make_data(folder: Path) -> Data:
     poses = swing_poses(N_IMAGES, rng, pen=pen, camera=camera)
     R, t = poses.rotations, poses.translations
     pixels = simulate_centers(camera, pen, R, t, 0.03, rng)
-    with RecordWriter.create(swing, preparation.header()) as writer:
+    with RecordWriter.create(swing, record_header(preparation)) as writer:
         for i in range(N_IMAGES):
             writer.append(IMAGE, pixels[i], R[i], t[i], i / 20)
         writer.set_taken_out({2: "excluded"})

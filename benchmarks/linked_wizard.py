@@ -30,7 +30,7 @@ from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.names import Names
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
-from lightpen.swing.preparation import SourceChoice
+from lightpen.swing.image_sources import SourceChoice
 from lightpen.swing.state import Phase
 from lightpen_app.application import Wizard, ended, make_application
 from lightpen_app.wizard_pages import make_pages

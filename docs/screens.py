@@ -62,6 +62,7 @@ from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers
 from lightpen.swing.preparation import Preparation
+from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.rules import advance_swing
 from lightpen.swing.state import SwingSetup, SwingState, start_swing
@@ -543,7 +544,7 @@ def _probed(
 def _record(folder: Path, preparation: Preparation) -> None:
     """Write the record of a swing."""
     scene = Scene(n_images=N_RECORDED, seed=3)
-    header = structs.replace(preparation.header(), created=NOW)
+    header = structs.replace(record_header(preparation), created=NOW)
     with RecordWriter.create(folder, header) as writer:
         for index, image_plan in enumerate(plan_scene(scene).image_plans):
             image = render_plan(scene, image_plan)

@@ -564,7 +564,9 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
     from lightpen.simulator.scene_files import write_sample_files
     from lightpen.simulator.scenes import Scene
     from lightpen.simulator.swings import paper_camera
-    from lightpen.swing.preparation import Preparation, SecondCamera
+    from lightpen.swing.image_sources import SecondCamera
+    from lightpen.swing.preparation import Preparation
+    from lightpen.swing.record_header import record_header
     from lightpen.swing.state import start_swing
     from lightpen.swing.swing_recorder import capture_image
 
@@ -594,7 +596,7 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
     before: Sequence[PenDetection | None] = [None] * len(live)
     setup = preparation.swing_setup()
     state = start_swing(setup)
-    with RecordWriter.create(folder, preparation.header()) as writer:
+    with RecordWriter.create(folder, record_header(preparation)) as writer:
         while state.n_kept < n_images:
             frames = [camera.read(1.0) for camera in live]
             before = detection, *others = [

@@ -29,7 +29,7 @@ from lightpen.simulator.samples import eight_led_pen
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_pen
-from lightpen.swing.preparation import SourceChoice
+from lightpen.swing.image_sources import SourceChoice
 from lightpen.swing.state import Phase
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station

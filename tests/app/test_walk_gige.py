@@ -22,7 +22,7 @@ from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
-from lightpen.swing.preparation import SourceChoice
+from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import FilePaths, Station, StoredCamera
 

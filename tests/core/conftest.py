@@ -28,7 +28,8 @@ from lightpen.simulator.hand import Operator
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
-from lightpen.swing.preparation import Preparation, SecondCamera
+from lightpen.swing.image_sources import SecondCamera
+from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.state import Phase, SwingEvent, SwingEventKind, SwingState

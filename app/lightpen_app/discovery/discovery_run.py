@@ -28,7 +28,7 @@ from lightpen.live.pipeline import LiveImage
 from lightpen.messages import Message
 from lightpen.model.posture import Posture, posture_of
 from lightpen.record.swings.writing import make_record_folder
-from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import Mailbox

@@ -26,6 +26,7 @@ from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen.swing.preparation import Preparation
+from lightpen.swing.record_header import record_header
 from lightpen_app.application import Wizard, has_display, make_application
 from lightpen_app.crash import versions
 from lightpen_app.look.theme import FAMILIES, LIGHT, apply_theme, load_fonts
@@ -146,7 +147,7 @@ def record_swing(folder: Path, files: Path) -> None:
         limits=replace(SwingLimits(), min_per_field=0),
     )
     setup = preparation.swing_setup()
-    with RecordWriter.create(folder, preparation.header()) as writer:
+    with RecordWriter.create(folder, record_header(preparation)) as writer:
         for image_plan in plan_scene(SCENE).image_plans:
             image = render_plan(SCENE, image_plan)
             seen = detect_pen(image, setup.camera, setup.pen)

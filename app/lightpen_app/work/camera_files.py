@@ -12,7 +12,8 @@ from PySide6.QtCore import QObject
 from lightpen.arrays import FloatArray
 from lightpen.formats.opened_files import CameraFile
 from lightpen.formats.rig_files import RigFile, read_rig
-from lightpen.swing.preparation import Preparation, SourceKind
+from lightpen.swing.image_sources import SourceKind
+from lightpen.swing.preparation import Preparation
 from lightpen_app.look.words import shortened
 from lightpen_app.work.job import Job
 from lightpen_app.work.notifications import Notifications

@@ -10,7 +10,8 @@ from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.source import FoundDevice, SourceNeeds
 from lightpen.cameras.sources import source_named
 from lightpen.live.sources import SourceEnvironment, cameras_of
-from lightpen.swing.preparation import CameraInUse, Preparation
+from lightpen.swing.image_sources import CameraInUse
+from lightpen.swing.preparation import Preparation
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import DisplayedImage, LiveView
 from lightpen_app.work.selection import Selection

@@ -9,7 +9,8 @@ from PySide6.QtCore import QObject
 from lightpen.formats.opened_files import OpenedFiles, open_files
 from lightpen.live.sources import SourceEnvironment, sample_files
 from lightpen.record.swings.recordings import FilesBeside
-from lightpen.swing.preparation import Preparation, SourceChoice, SourceKind
+from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.preparation import Preparation
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.notifications import Notifications

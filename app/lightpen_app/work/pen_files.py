@@ -12,7 +12,8 @@ from lightpen.formats.opened_files import PenFile
 from lightpen.model.assumptions import Assumptions
 from lightpen.record.library.library_changes import Author, add_item, change_item
 from lightpen.record.library.tip_library import ItemKind, LedFile, Library, ListedPen
-from lightpen.swing.preparation import Preparation, SourceKind
+from lightpen.swing.image_sources import SourceKind
+from lightpen.swing.preparation import Preparation
 from lightpen_app.work.job import Job
 from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.notifications import Notifications

@@ -8,7 +8,8 @@ from lightpen.model.assumptions import USUAL
 from lightpen.model.limits import DueRule, StationLimits, SwingLimits
 from lightpen.record.library.supervision import Supervision
 from lightpen.record.swings.names import Names
-from lightpen.swing.preparation import Preparation, SourceChoice
+from lightpen.swing.image_sources import SourceChoice
+from lightpen.swing.preparation import Preparation
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import FilePaths, preparation_of, station_of

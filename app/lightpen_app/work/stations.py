@@ -10,7 +10,8 @@ from lightpen.cameras.sources import source_named
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.names import Names
-from lightpen.swing.preparation import Preparation, SecondCamera, SourceChoice
+from lightpen.swing.image_sources import SecondCamera, SourceChoice
+from lightpen.swing.preparation import Preparation
 from lightpen.verification.session.choices import VerificationChoices
 
 Triple: TypeAlias = tuple[float, float, float]

@@ -15,7 +15,7 @@ from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.samples import beside
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
-from lightpen.swing.preparation import SourceChoice
+from lightpen.swing.image_sources import SourceChoice
 
 SECOND_SERIAL = "SIM-2"
 

@@ -6,106 +6,28 @@ from typing import Self
 
 import numpy as np
 
-from lightpen import __version__
 from lightpen.arrays import FloatArray
-from lightpen.cameras.protocol import CameraSettings
-from lightpen.cameras.replay import RECORDED
-from lightpen.cameras.source import Source, SourceNeeds
-from lightpen.cameras.sources import SIMULATED, source_named
+from lightpen.cameras.source import SourceNeeds
 from lightpen.detection.region_of_interest import RegionOfInterest
-from lightpen.formats.camera_files import CAMERA_FILE
-from lightpen.formats.json_records import plain
 from lightpen.formats.opened_files import CameraFile, PenFile
-from lightpen.formats.pen_files import PEN_FILE
-from lightpen.formats.rig_files import RIG_FILE, RigFile
+from lightpen.formats.rig_files import RigFile
 from lightpen.local_time import local_now
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig
 from lightpen.record.library.tip_library import ListedTip
 from lightpen.record.results.results import Result
-from lightpen.record.swings.assumed import Plain, assumption_entries
-from lightpen.record.swings.header import FileCopy, Header, RigCopies
 from lightpen.record.swings.names import Names
-from lightpen.record.swings.recordings import is_simulated_recording
+from lightpen.swing.image_sources import (
+    N_CAMERAS,
+    CameraInUse,
+    SecondCamera,
+    SourceChoice,
+    SourceKind,
+)
 from lightpen.swing.state import SwingSetup
-
-N_CAMERAS = 2  # that are live at once
-
-
-class SourceKind(StrEnum):
-    """The sources that are no cameras; all are in `lightpen.cameras.sources`."""
-
-    SIMULATED = SIMULATED.key
-    RECORDED = RECORDED.key
-
-
-@dataclass(frozen=True)
-class SourceChoice:
-    """The source of images.
-
-    Attributes
-    ----------
-    kind : str
-        Key of a source.
-    place : str
-        Folder, pattern or video of a recording; serial number or address of a camera.
-    producer : str
-        File of a GenTL producer; empty for those that the system names.
-    """
-
-    kind: str = SourceKind.SIMULATED
-    place: str = ""
-    producer: str = ""
-
-    @property
-    def source(self) -> Source:
-        """The source; the simulated pen for an unknown kind."""
-        return source_named(self.kind) or SIMULATED
-
-    @property
-    def lacks_place(self) -> bool:
-        """Whether the place of the images is missing."""
-        return self.source.needs is not SourceNeeds.NOTHING and not self.place
-
-
-@dataclass(frozen=True)
-class CameraInUse:
-    """The camera that images come from."""
-
-    serial: str
-    settings: CameraSettings
-
-
-@dataclass(frozen=True, eq=False)
-class SecondCamera:
-    """A second camera, which sees the pen from elsewhere at the same moments.
-
-    Attributes
-    ----------
-    rig_file : RigFile or None
-        Extrinsics and intrinsics of both cameras.
-    image_size : pair of int or None
-        Width and height of its images, px; None while there are none.
-    in_use : CameraInUse or None
-        None until it is open.
-    mask : (M, 3) array
-        Circles of stray light in its images: centre x, y and radius, px.
-    """
-
-    source: SourceChoice = field(default_factory=SourceChoice)
-    rig_file: RigFile | None = None
-    image_size: tuple[int, int] | None = None
-    in_use: CameraInUse | None = None
-    mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
-
-    @property
-    def rig(self) -> Rig | None:
-        """Both cameras."""
-        return None if self.rig_file is None else self.rig_file.rig
 
 
 class MissingInput(StrEnum):
@@ -444,98 +366,9 @@ class Preparation:
             return one is two
         return one.rig_file is two.rig_file and np.array_equal(one.mask, two.mask)
 
-    def header(self, settings: dict[str, Plain] | None = None) -> Header:
-        """Return the header of a record that begins now; files are read again."""
-        rig_file = None if self.second is None else self.second.rig_file
-        if rig_file is not None:
-            camera_path = rig_file.camera_files[0]
-        elif self.camera_file is not None:
-            camera_path = self.camera_file.path
-        else:
-            raise ValueError("`camera_file` or a rig must be chosen.")
-        if self.pen_file is None:
-            raise ValueError("`pen_file` must be chosen.")
-        limits, origin = self.limits, self.origin
-        if origin is Origin.RECORDED and is_simulated_recording(self.source.place):
-            origin = Origin.SIMULATED
-        return Header(
-            camera_file=FileCopy.of(camera_path, CAMERA_FILE),
-            pen_file=FileCopy.of(self.pen_file.path, PEN_FILE),
-            created=local_now(),
-            program=f"lightpen {__version__}",
-            station=self.names.station,
-            operator=self.names.operator,
-            tip=self.names.tip,
-            cone=self.names.cone,
-            units=self.pen_file.units,
-            nominal_tip_mm=plain(self.nominal_tip),
-            mask_px=plain(self.mask),
-            settings={
-                "pen": self.names.pen,
-                "ball_diameter_mm": self.names.ball_diameter,
-                "origin": str(origin),
-                "source": str(self.source.kind),
-                "source_place": self.source.place,
-                **_camera_entries(self.camera_in_use),
-                **_second_entries(self.second),
-                "max_uncertainty_mm": limits.max_uncertainty,
-                "min_images": limits.min_images,
-                "max_images": limits.max_images,
-                "min_per_field": limits.min_per_field,
-                "spacing_rad": limits.spacing,
-                "requires_temperature": limits.requires_temperature,
-                **assumption_entries(self.assumptions_today),
-                **(settings or {}),
-            },
-            rig=None if self.second is None else _rig_copies(self.second),
-        )
-
 
 def _today() -> str:
     return local_now().date().isoformat()
-
-
-def _camera_entries(used: CameraInUse | None) -> dict[str, Plain]:
-    """Return the entries of a record on the camera."""
-    if used is None:
-        return {}
-    settings, region = used.settings, used.settings.region
-    entries: dict[str, Plain] = {
-        "camera_serial": used.serial,
-        "exposure_us": settings.exposure_us,
-        "gain_db": settings.gain_db,
-        "frame_rate": settings.frame_rate,
-        "pixel_format": settings.pixel_format,
-        "trigger": None if settings.trigger is None else str(settings.trigger),
-        "packet_size": settings.packet_size,
-        "region_px": None
-        if region is None
-        else f"{region.width} x {region.height} at {region.x}, {region.y}",
-    }
-    return {name: entry for name, entry in entries.items() if entry is not None}
-
-
-def _second_entries(second: SecondCamera | None) -> dict[str, Plain]:
-    """Return the entries of a record on the second camera."""
-    if second is None:
-        return {}
-    entries: dict[str, Plain] = {
-        "source": str(second.source.kind),
-        "source_place": second.source.place,
-        **_camera_entries(second.in_use),
-    }
-    return {f"second_{name}": entry for name, entry in entries.items()}
-
-
-def _rig_copies(second: SecondCamera) -> RigCopies | None:
-    file = second.rig_file
-    if file is None:
-        return None
-    return RigCopies(
-        FileCopy.of(file.path, RIG_FILE),
-        tuple(FileCopy.of(path, CAMERA_FILE) for path in file.camera_files[1:]),
-        (plain(second.mask),),
-    )
 
 
 _ORIGINS: dict[str, Origin] = {

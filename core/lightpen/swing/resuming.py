@@ -20,8 +20,8 @@ from lightpen.record.swings.reading import (
 )
 from lightpen.record.swings.recorded_source import source
 from lightpen.record.swings.writing import RecordWriter
+from lightpen.swing.image_sources import SourceChoice
 from lightpen.swing.kept_images import kept_before
-from lightpen.swing.preparation import SourceChoice
 from lightpen.swing.rules import start_again
 from lightpen.swing.shortfall import limits_for_more
 from lightpen.swing.state import SwingSetup, SwingState

@@ -43,6 +43,7 @@ from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread, T
 from lightpen.swing.failed_swing import failed_swing
 from lightpen.swing.operator_presence import OperatorPresence
 from lightpen.swing.preparation import Preparation
+from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
 from lightpen.swing.rig_sighting import seen_by_rig
 from lightpen.swing.rules import (
@@ -204,7 +205,7 @@ class SwingWorkflow:
         """Begin a new swing, or report why it cannot begin."""
         try:
             folder = make_record_folder(self._records, preparation.names, self._now())
-            RecordWriter.create(folder, preparation.header(settings)).close()
+            RecordWriter.create(folder, record_header(preparation, settings)).close()
             self._enter(read_resumable(folder))  # so with the files as recorded
         except LightpenError as error:
             self._presence = replace(self._presence, refusal=error.message)

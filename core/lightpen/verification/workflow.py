@@ -26,6 +26,7 @@ from lightpen.record.results.result_folder import FolderArchive
 from lightpen.runners.faults import FaultReporter
 from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread
 from lightpen.swing.preparation import Preparation
+from lightpen.swing.record_header import record_header
 from lightpen.verification.probing.current_tip import CurrentTip, read_tip_in_force
 from lightpen.verification.probing.drift_reference import LampObservations
 from lightpen.verification.probing.probing import read_rules
@@ -352,12 +353,13 @@ class VerificationWorkflow:
         assert preparation is not None
         assert status.tip is not None
         tip = status.tip
-        header = preparation.header(
+        header = record_header(
+            preparation,
             {
                 "verification": "" if status.task is None else status.task.kind,
                 "tip_file": tip.tip_file.path.name,
                 "tip_sha256": tip.tip_file.sha256,
-            }
+            },
         )
         return new_record(self._keeping.root(tip), tip.names, header)
 

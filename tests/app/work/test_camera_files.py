@@ -13,7 +13,7 @@ from lightpen.formats.opened_files import CameraFile
 from lightpen.formats.rig_files import read_rig, write_rig
 from lightpen.model.rig import Rig
 from lightpen.simulator.swings import paper_camera
-from lightpen.swing.preparation import CameraInUse, SourceChoice
+from lightpen.swing.image_sources import CameraInUse, SourceChoice
 from lightpen_app.work.workbench import Workbench
 
 SPOT = np.array([[100.0, 200.0, 20.0]])

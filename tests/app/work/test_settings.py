@@ -18,7 +18,7 @@ from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
 from lightpen.formats.machine_settings import machine_file
 from lightpen.model.laboratory import Laboratory
 from lightpen.record.swings.names import Names
-from lightpen.swing.preparation import SourceChoice
+from lightpen.swing.image_sources import SourceChoice
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.fixed_point import FixedPointOptions
 from lightpen_app.look.languages import system_language

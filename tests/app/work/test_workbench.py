@@ -26,12 +26,8 @@ from lightpen.model.limits import SwingLimits
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
 from lightpen.streaming.server import StreamPlace
-from lightpen.swing.preparation import (
-    MissingInput,
-    Preparation,
-    SourceChoice,
-    SourceKind,
-)
+from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.work.settings import Settings

@@ -32,7 +32,8 @@ from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
 from lightpen.simulator.swings import PAPER_CONE, simulate_centers, swing_poses
-from lightpen.swing.preparation import Preparation, SecondCamera
+from lightpen.swing.image_sources import SecondCamera
+from lightpen.swing.preparation import Preparation
 
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
 

@@ -15,7 +15,7 @@ from lightpen.record.swings.reading import open_record
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.samples import beside
 from lightpen.simulator.scenes import Scene
-from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.swing.image_sources import SourceChoice, SourceKind
 
 
 @pytest.fixture

@@ -16,12 +16,9 @@ from lightpen.record.swings.reading import Record, open_record, recorded_names
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
-from lightpen.swing.preparation import (
-    MissingInput,
-    Preparation,
-    SourceChoice,
-    SourceKind,
-)
+from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.preparation import MissingInput, Preparation
+from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import recorded_setup
 
 NAMES = Names("Hall 2", "Zoë", "LP-04", "T-10", "C-1", 3.0005)
@@ -42,7 +39,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Preparation:
 
 
 def recorded(preparation: Preparation, folder: Path) -> Record:
-    RecordWriter.create(folder, preparation.header()).close()
+    RecordWriter.create(folder, record_header(preparation)).close()
     return open_record(folder)
 
 
@@ -128,7 +125,7 @@ def test_no_swing_begins_without_both_files(whole: Preparation) -> None:
         with pytest.raises(ValueError, match="must be chosen"):
             part.swing_setup()
         with pytest.raises(ValueError, match="must be chosen"):
-            part.header()
+            record_header(part)
 
 
 def test_a_nominal_tip_takes_the_place_of_that_of_the_file(whole: Preparation) -> None:
@@ -207,7 +204,7 @@ def test_a_record_brings_its_setup_back_to_the_last_digit(
 def test_a_record_of_an_older_program_gets_the_usual_limits(
     whole: Preparation, tmp_path: Path
 ) -> None:
-    header = structs.replace(whole.header(), settings={"min_images": "many"})
+    header = structs.replace(record_header(whole), settings={"min_images": "many"})
     RecordWriter.create(tmp_path / "swing", header).close()
     record = open_record(tmp_path / "swing")
 
@@ -222,11 +219,11 @@ def test_a_file_that_vanished_since_is_reported_when_a_record_begins(
     gone = replace(whole.pen_file, path=tmp_path / "gone.csv")
 
     with pytest.raises(FileError, match=r"LED file .*gone\.csv does not exist"):
-        replace(whole, pen_file=gone).header()
+        record_header(replace(whole, pen_file=gone))
 
 
 def test_what_a_program_adds_is_kept_beside_the_choices(whole: Preparation) -> None:
-    header = whole.header({"exposure_us": 3000.0})
+    header = record_header(whole, {"exposure_us": 3000.0})
 
     assert header.settings["exposure_us"] == 3000.0
     assert header.settings["pen"] == "LP-04"

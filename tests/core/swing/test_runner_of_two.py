@@ -20,7 +20,8 @@ from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.recorded_source import source
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scene_files import write_sample_files
-from lightpen.swing.preparation import MissingInput, SourceChoice, SourceKind
+from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.preparation import MissingInput
 from lightpen.swing.resuming import read_resumable
 
 if TYPE_CHECKING:

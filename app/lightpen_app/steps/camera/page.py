@@ -5,7 +5,8 @@ from typing_extensions import override
 
 from lightpen.cameras.worker_events import Connection
 from lightpen.detection.inspection import Exposure, inspect
-from lightpen.swing.preparation import MissingInput, SourceChoice, SourceKind
+from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.preparation import MissingInput
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import first_missing, missing_input_text
 from lightpen_app.look.signs import Sign

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QWidget
 from lightpen.cameras.pairing import not_synchronised
 from lightpen.formats.rig_files import RigFile, read_rig
 from lightpen.live.pipeline import LiveImage
-from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.camera.rig_panel import RigPanel

@@ -7,7 +7,7 @@ from PySide6.QtCore import QObject
 from lightpen.cameras.source import FoundDevice
 from lightpen.cameras.sources import absent_sources
 from lightpen.record.swings.recordings import FilesBeside, files_beside
-from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.work.camera_setup import CameraSetup
 from lightpen_app.work.chosen_files import ChosenFiles

@@ -12,7 +12,7 @@ from lightpen.cameras.sources import SOURCES
 from lightpen.formats.images import SUFFIXES, VIDEO_SUFFIXES
 from lightpen.messages import Message
 from lightpen.record.swings.recordings import FilesBeside
-from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign

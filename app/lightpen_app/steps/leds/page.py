@@ -6,7 +6,7 @@ from typing_extensions import override
 
 from lightpen.pen_check.draft import PenDraft, exchanged, mended
 from lightpen.pen_check.match import Finding, PenMatch
-from lightpen.swing.preparation import SourceKind
+from lightpen.swing.image_sources import SourceKind
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import first_missing
 from lightpen_app.look.sentences import worded

@@ -48,7 +48,7 @@ from lightpen.simulator.hand import HandActivity
 from lightpen.simulator.scene_files import write_scene
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.view import Lamp
-from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.sounds import SilentSounds
 from lightpen_app.look.theme import Tone

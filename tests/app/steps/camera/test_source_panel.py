@@ -9,7 +9,7 @@ from pytestqt.qtbot import QtBot
 from lightpen.cameras.source import FoundDevice
 from lightpen.cameras.sources import SOURCES
 from lightpen.messages import message
-from lightpen.swing.preparation import SourceChoice
+from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone
 from lightpen_app.steps.camera.device_field import DeviceField

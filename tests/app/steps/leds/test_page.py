@@ -37,7 +37,8 @@ from lightpen.simulator.hand import HandActivity
 from lightpen.simulator.samples import fanned_pen, six_led_pen
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_pen
-from lightpen.swing.preparation import MissingInput, SourceChoice, SourceKind
+from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.preparation import MissingInput
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow

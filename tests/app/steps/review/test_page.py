@@ -60,6 +60,7 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import swing_from_postures
 from lightpen.simulator.view import still_view
 from lightpen.swing.preparation import Preparation
+from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import (
     Resumable,
     read_for_more,
@@ -128,7 +129,7 @@ def recorded(small_scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Pa
     directions = np.radians(np.tile(np.arange(0, 360, 45), 3))[4:]
     turns = np.radians(np.resize([-25.0, 0.0, 25.0], N_IMAGES))
     swing = swing_from_postures(Postures(tilts, directions, turns))
-    with RecordWriter.create(folder / "swing", preparation.header()) as writer:
+    with RecordWriter.create(folder / "swing", record_header(preparation)) as writer:
         for i in range(N_IMAGES):
             R, t = swing.rotations[i], swing.translations[i]
             image_plan = ImagePlan(i, still_view(pen, R, t), small_scene.optics, R, t)

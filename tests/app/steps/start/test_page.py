@@ -41,7 +41,8 @@ from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.swings import simulate_centers, swing_poses
-from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.record_header import record_header
 from lightpen_app.look.sounds import MutedSounds, SilentSounds, Sound, Sounds
 from lightpen_app.look.theme import TextSize, Tone
 from lightpen_app.look.words import breakable
@@ -250,7 +251,7 @@ def interrupted(
         setup.camera, setup.pen, swing.rotations, swing.translations, 0.05, rng
     )
     folder = workbench.run.records_folder / name
-    header = structs.replace(given.header(), created=created)
+    header = structs.replace(record_header(given), created=created)
     with RecordWriter.create(folder, header) as writer:
         for index in range(n_images):
             pose = swing.rotations[index], swing.translations[index]

@@ -32,7 +32,7 @@ from lightpen.record.library.tip_library import (
     library_files,
     read_library,
 )
-from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_app.look.sounds import SilentSounds
 from lightpen_app.shell.sidebar import Sidebar, Subject, subject_of
 from lightpen_app.steps.start.barcode import PACE_MS

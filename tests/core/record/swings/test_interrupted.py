@@ -28,6 +28,7 @@ from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers, swing_poses
 from lightpen.swing.preparation import Preparation
+from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import read_for_more, read_resumable
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
@@ -54,7 +55,7 @@ def recorded(
     preparation: Preparation, folder: Path, n_images: int, hours: int = 0
 ) -> RecordWriter:
     created = NOON + timedelta(hours=hours)
-    header = structs.replace(preparation.header(), created=created)
+    header = structs.replace(record_header(preparation), created=created)
     writer = RecordWriter.create(folder, header)
     append(writer, n_images)
     return writer
@@ -185,7 +186,7 @@ def test_an_interrupted_swing_goes_on_with_all_its_images(
     pixels: FloatArray = simulate_centers(
         setup.camera, setup.pen, swing.rotations, swing.translations, 0.05, rng
     )
-    with RecordWriter.create(tmp_path / "a", preparation.header()) as writer:
+    with RecordWriter.create(tmp_path / "a", record_header(preparation)) as writer:
         for index in range(30):
             writer.append(
                 *(BLACK, pixels[index], swing.rotations[index]),

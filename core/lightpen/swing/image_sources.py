@@ -1,0 +1,88 @@
+"""The sources of images that are chosen for a calibration."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.replay import RECORDED
+from lightpen.cameras.source import Source, SourceNeeds
+from lightpen.cameras.sources import SIMULATED, source_named
+from lightpen.formats.rig_files import RigFile
+from lightpen.model.rig import Rig
+
+N_CAMERAS = 2  # that are live at once
+
+
+class SourceKind(StrEnum):
+    """The sources that are no cameras; all are in `lightpen.cameras.sources`."""
+
+    SIMULATED = SIMULATED.key
+    RECORDED = RECORDED.key
+
+
+@dataclass(frozen=True)
+class SourceChoice:
+    """The source of images.
+
+    Attributes
+    ----------
+    kind : str
+        Key of a source.
+    place : str
+        Folder, pattern or video of a recording; serial number or address of a camera.
+    producer : str
+        File of a GenTL producer; empty for those that the system names.
+    """
+
+    kind: str = SourceKind.SIMULATED
+    place: str = ""
+    producer: str = ""
+
+    @property
+    def source(self) -> Source:
+        """The source; the simulated pen for an unknown kind."""
+        return source_named(self.kind) or SIMULATED
+
+    @property
+    def lacks_place(self) -> bool:
+        """Whether the place of the images is missing."""
+        return self.source.needs is not SourceNeeds.NOTHING and not self.place
+
+
+@dataclass(frozen=True)
+class CameraInUse:
+    """The camera that images come from."""
+
+    serial: str
+    settings: CameraSettings
+
+
+@dataclass(frozen=True, eq=False)
+class SecondCamera:
+    """A second camera, which sees the pen from elsewhere at the same moments.
+
+    Attributes
+    ----------
+    rig_file : RigFile or None
+        Extrinsics and intrinsics of both cameras.
+    image_size : pair of int or None
+        Width and height of its images, px; None while there are none.
+    in_use : CameraInUse or None
+        None until it is open.
+    mask : (M, 3) array
+        Circles of stray light in its images: centre x, y and radius, px.
+    """
+
+    source: SourceChoice = field(default_factory=SourceChoice)
+    rig_file: RigFile | None = None
+    image_size: tuple[int, int] | None = None
+    in_use: CameraInUse | None = None
+    mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+
+    @property
+    def rig(self) -> Rig | None:
+        """Both cameras."""
+        return None if self.rig_file is None else self.rig_file.rig
