@@ -313,15 +313,19 @@ class Stage:
         _await_jobs()
 
     def _fill_swing(self) -> None:
-        swing = _swing(self._workbench.selection.preparation.swing_setup(), self._scene)
-        run = self._workbench.run
-        run.runner.begin(self._workbench.selection.preparation)
+        selection, run = self._workbench.selection, self._workbench.run
+        swing = _swing(selection.preparation.swing_setup(), self._scene)
+        heading = swing.heading  # kept for the next swings, as by a real one
+        selection.set_preparation(replace(selection.preparation, heading=heading))
+        run.runner.begin(selection.preparation)
         self._wait_until(lambda: run.status.state is not None)
         run.on_swing(replace(run.status, state=swing), ())
         for index in range(N_SHOWN):
             self._show_image(index)
         refreshed = QDeadlineTimer(2 * REFRESH_MS)
         self._wait_until(refreshed.hasExpired)
+        if run.status.state is not swing:
+            raise RuntimeError("The page does not show the swing.")
 
     def _fill_review(self) -> None:
         _await_jobs()
