@@ -42,7 +42,7 @@ from typing_extensions import override
 from lightpen.archive.chains import append
 from lightpen.archive.entries import Event, Kind
 from lightpen.cameras.clock import SkippingClock
-from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, sealed
+from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, Stats, sealed
 from lightpen.detection.pen_detection import detect_from_centers, detect_pen
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.live.pipeline import LiveImage
@@ -99,6 +99,7 @@ PERIOD = 0.05  # s
 N_KEPT = 60  # when the swing is drawn
 N_RECORDED = 60  # images that are reviewed
 N_SHOWN = 40  # live images that a page is shown
+N_RECEIVED = 1240  # images, by the camera
 CHOICES = VerificationChoices(
     (FIXED_POINT.kind, CIRCLE.kind, LENGTH.kind),
     (
@@ -197,6 +198,10 @@ class StillCamera(SimulatedCamera):
     def read(self, timeout_s: float) -> NoReturn:
         threading.Event().wait(timeout_s / 20)
         raise FrameTimeout(message("file.image"))
+
+    @override
+    def stats(self) -> Stats:
+        return Stats(delivered=N_RECEIVED)
 
 
 class Stage:

@@ -88,7 +88,6 @@ _SHORTS: dict[Code, str] = {
 _AT_THE_SCREEN: dict[Code, str] = {
     Code.PAUSED: QT_TRANSLATE_NOOP("phrases", "Press Space to continue."),
     Code.MANY_DROPPED: QT_TRANSLATE_NOOP("phrases", "{0} See the list in Review."),
-    Code.GOOD: QT_TRANSLATE_NOOP("phrases", "{0} Accept at the computer."),
 }
 _SHARES: dict[ContributionName, str] = {
     ContributionName.NOISE: QT_TRANSLATE_NOOP("phrases", "noise"),

@@ -264,15 +264,15 @@ def text_label(size: TextSize = TextSize.BODY, tone: Tone = Tone.PLAIN) -> QLabe
 
 def set_tone(widget: QWidget, tone: Tone) -> None:
     """Set the tone of a widget's text."""
-    _set_styled(widget, "tone", tone.value)
+    set_styled(widget, "tone", tone.value)
 
 
 def set_size(widget: QWidget, size: TextSize) -> None:
     """Let a label or a table have another place of the type scale."""
-    _set_styled(widget, "scale", size.name.lower())
+    set_styled(widget, "scale", size.name.lower())
 
 
-def _set_styled(widget: QWidget, name: str, value: str) -> None:
+def set_styled(widget: QWidget, name: str, value: str) -> None:
     """Set a property used by the style sheet."""
     if widget.property(name) == value:
         return

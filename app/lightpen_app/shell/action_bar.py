@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QFrame, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, Tone, set_styled, text_label
 from lightpen_app.steps.page import MainAction
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.responsive_layout import SizeClass
@@ -69,6 +69,7 @@ class ActionBar(Translated, QFrame):
         self._main.setText(action.text)
         if action.why_not and self._main.hasFocus():
             self.setFocus()  # kept for the button, until it can be pressed again
+        set_styled(self._main, "early", "true" if action.is_early else "")
         self._main.setEnabled(not action.why_not)
         if not action.why_not and self.hasFocus():
             self._main.setFocus()

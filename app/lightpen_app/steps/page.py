@@ -23,11 +23,14 @@ class MainAction:
     at_screen : bool
         Whether it takes someone at the screen: a presenter's remote and the operator
         view do not press it.
+    is_early : bool
+        Whether the step is not complete yet; the button then stands back.
     """
 
     text: str
     why_not: str = ""
     at_screen: bool = False
+    is_early: bool = False
 
 
 def step_titles() -> dict[str, str]:

@@ -3,8 +3,17 @@
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QFileDialog, QLineEdit, QPushButton, QSizePolicy, QWidget
+from PySide6.QtGui import QKeyEvent, QPaintEvent
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QLineEdit,
+    QPushButton,
+    QSizePolicy,
+    QStyle,
+    QStyleOptionFrame,
+    QStylePainter,
+    QWidget,
+)
 from typing_extensions import override
 
 from lightpen_app.look.layouts import horizontal_layout
@@ -17,8 +26,24 @@ QUOTES = "\"'"
 class EnterEdit(QLineEdit):
     """A line edit whose Enter key only ends editing.
 
-    Where nothing was edited, Enter is left to the window.
+    Where nothing was edited, Enter is left to the window. Without the focus it shows
+    the end of a text that is too long.
     """
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        option = QStyleOptionFrame()
+        self.initStyleOption(option)
+        line = QStyle.SubElement.SE_LineEditContents
+        area = self.style().subElementRect(line, option, self).adjusted(2, 0, -2, 0)
+        left = Qt.TextElideMode.ElideLeft
+        shown = self.fontMetrics().elidedText(self.text(), left, area.width())
+        if self.hasFocus() or shown == self.text():
+            super().paintEvent(event)
+            return
+        painter = QStylePainter(self)
+        painter.drawPrimitive(QStyle.PrimitiveElement.PE_PanelLineEdit, option)
+        painter.drawText(area, Qt.AlignmentFlag.AlignVCenter, shown)
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -381,7 +381,8 @@ class TracePlot(Plot):
         if not len(x):
             self._show_nothing()
             return
-        self._item.getAxis("left").setStyle(showValues=True)
+        for side in ("left", "bottom"):
+            self._item.getAxis(side).setStyle(showValues=True)
         n_hidden = int((1 - self._tail) * len(x))
         in_sight = [self._height(value)[n_hidden:] for value in values]
         if self._limit_at is not None:
@@ -407,6 +408,7 @@ class TracePlot(Plot):
             top = np.maximum(top, self._height(np.array([LABEL_ROOM * self._limit_at])))
         y_range = (0.0, float(top[0]))
         self._item.getAxis("left").setStyle(showValues=self._limit_at is not None)
+        self._item.getAxis("bottom").setStyle(showValues=False)
         self._item.setRange(xRange=(1, N_LEAST), yRange=y_range, padding=0.01)
 
     def _place_words(self) -> None:

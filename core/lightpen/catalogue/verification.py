@@ -12,6 +12,7 @@ MESSAGES = {
     "option.surface": "Contact",
     "option.unknown": "not specified",
     "option.certificate-uncertainty": "U (k = 2) of certificate",
+    "table.point": "Point {number}",
     "table.points": "Probed points in the camera frame / mm",
     "table.average": "Average",
     "table.deviation": "Std. deviation",

@@ -10,7 +10,7 @@ import numpy as np
 from lightpen.measuring.characteristics import IS_ANGLE, Measured
 from lightpen.measuring.compensation import ROUND, Evidence
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
-from lightpen.measuring.plan import Nominal, Side
+from lightpen.measuring.plan import Nominal, PlannedCharacteristic, Side
 from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind
 from lightpen.messages import Message, message
 from lightpen.model.decision_rules import Decision
@@ -35,10 +35,10 @@ EVIDENCES = {
 
 @dataclass(frozen=True)
 class PartRow:
-    """A row of a table: numbers, None for a blank, and a word behind them."""
+    """A row of a table: numbers or words, None for a blank, and a remark."""
 
     name: str
-    values: tuple[float | None, ...]
+    values: tuple[float | str | None, ...]
     remark: Message | str
 
 
@@ -79,12 +79,13 @@ def _kind_and_side(one: Measured) -> Message:
 
 
 def characteristic_rows(part: MeasuredPart) -> Iterator[PartRow]:
-    """Yield nominal, actual, deviation, U, U of independent points, P, decision."""
+    """Yield nominal, tolerance, actual, deviation, U, U alone, P and decision."""
     for result in part.results:
         yield PartRow(
             result.planned.label,
             (
                 result.planned.nominal,
+                _tolerance(result.planned),
                 result.value.value,
                 result.deviation,
                 result.value.uncertainty,
@@ -93,6 +94,18 @@ def characteristic_rows(part: MeasuredPart) -> Iterator[PartRow]:
             ),
             DECISIONS[result.decision],
         )
+
+
+def _tolerance(planned: PlannedCharacteristic) -> str:
+    """Return the limits of a geometrical deviation, else of the deviation."""
+    lower, upper = (limit - (planned.nominal or 0.0) for limit in planned.limits)
+    if np.isinf(upper):
+        return ""
+    if np.isinf(lower):
+        return f"\N{LESS-THAN OR EQUAL TO} {upper:.6g}"
+    if np.isclose(lower, -upper):
+        return f"\N{PLUS-MINUS SIGN}{upper:.6g}"
+    return f"{lower:+.6g} / {upper:+.6g}"
 
 
 def part_entries(part: MeasuredPart) -> dict[str, Any]:

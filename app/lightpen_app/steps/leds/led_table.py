@@ -158,7 +158,7 @@ class LedTable(Translated, QTableView):
     @override
     def _retranslate(self) -> None:
         self._model.retranslate()
-        self.setAccessibleName(self.tr("LED coordinates / mm"))
+        self.setAccessibleName(self.tr("LED coordinates"))
 
 
 class _DraftModel(QAbstractTableModel):
@@ -272,15 +272,16 @@ class _DraftModel(QAbstractTableModel):
         if section == 0:
             return self.tr("LED")
         if section == MISFIT:
-            return self.tr("Error / px")
-        return COLUMNS[section - 1]
+            return self.tr("RMS / px")
+        name = COLUMNS[section - 1]
+        return f"{name} / mm" if section <= N_COORDINATES else name
 
     def _text(self, row: int, column: int) -> str:
         if column == 0:
             return str(row + 1)
         if column == MISFIT:
             misfit = self._misfits.get(row + 1)
-            return "" if misfit is None else f"{misfit:.2f}"
+            return "" if misfit is None else f"{misfit:.3f}"
         return self.draft.rows[row][column - 1]
 
     def _shown(self, row: int, column: int) -> str:

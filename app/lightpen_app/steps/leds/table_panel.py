@@ -171,9 +171,9 @@ class LedTablePanel(Translated, QGroupBox):
 
     def _refresh(self) -> None:
         self.setTitle(
-            self.tr("LED coordinates / mm (modified)")
+            self.tr("LED coordinates (modified)")
             if self._changes is Changes.EDITED
-            else self.tr("LED coordinates / mm")
+            else self.tr("LED coordinates")
         )
         n_leds, chosen = self._value.n_leds, self._table.chosen()
         self._add.setEnabled(n_leds < MAX_LEDS)

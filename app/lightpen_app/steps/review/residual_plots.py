@@ -14,7 +14,7 @@ from lightpen_app.look.theme import GRID, TextSize, colors_of, font
 from lightpen_app.widgets.plots import Axes, Plot
 
 LIMIT_REST = 1.1  # times the largest misfit, where nothing is above the line
-LIMIT_GRIP = 0.98  # of the width, where it has a grip
+LIMIT_GRIP = 0.94
 LIMIT_LABEL = {"position": 0.5, "anchors": [(0.5, 1.0), (0.5, 1.0)]}  # above the line
 LEAST_WORDED = 22 * GRID  # px of height, from which the words fit above the line
 HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the edge

@@ -169,8 +169,8 @@ class ResultPanel(Translated, QFrame):
 
     def _heading_text(self, outcome: ReviewedResult | None) -> str:
         if outcome is None:
-            return self.tr("Tip in the pen frame / mm, U (k = 2)")
-        text = self.tr("Tip {0} in the frame of pen {1} / mm, U\xa0(k\xa0=\xa02)")
+            return self.tr("Tip in the pen frame, U (k = 2)")
+        text = self.tr("Tip {0} in the frame of pen {1}, U\xa0(k\xa0=\xa02)")
         return text.format(shortened(outcome.names.tip), shortened(outcome.names.pen))
 
     def _halves_figures(self, solution: Solution) -> Figures:
@@ -230,7 +230,7 @@ def _tip_value(outcome: ReviewedResult) -> TipValue:
         before = outcome.tip_pen - change.difference
         value = replace(
             value,
-            previous=_texts(before / MICROMETRES, u / MICROMETRES),
+            previous=_in_mm(before, u),
             change=_with_u(change.difference, change.expanded_uncertainty),
             since=f"{local_time(last.accepted):%Y-%m-%d}",
         )
@@ -239,7 +239,7 @@ def _tip_value(outcome: ReviewedResult) -> TipValue:
         value = replace(
             value,
             nominal=tuple(f"{each:g}" for each in nominal.tolist()),
-            deviation=_texts(outcome.tip_pen - nominal, u),
+            deviation=_in_mm(outcome.tip_pen - nominal, u),
         )
     return value
 
@@ -260,6 +260,12 @@ def _with_u(values: FloatArray, u: FloatArray) -> tuple[str, ...]:
     """Return lengths in micrometres, each with its U."""
     pairs = zip(_texts(values, u), _texts(u, u), strict=True)
     return tuple(f"{value} \N{PLUS-MINUS SIGN} {within}" for value, within in pairs)
+
+
+def _in_mm(values: FloatArray, uncertainties: FloatArray) -> tuple[str, ...]:
+    """Return lengths in mm, to the digit that their uncertainty warrants."""
+    pairs = zip(values.tolist(), uncertainties.tolist(), strict=True)
+    return tuple(number_text(value, decimals_for(u)) for value, u in pairs)
 
 
 def _texts(values: FloatArray, uncertainties: FloatArray) -> tuple[str, ...]:

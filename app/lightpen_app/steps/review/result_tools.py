@@ -1,4 +1,4 @@
-"""Buttons for the result: open its folder, copy the tip, save it, press test."""
+"""Buttons for the result: copy the tip, save it, press test."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QMenu, QWidget
 
 from lightpen.record.exports.formats import FORMATS, ExportFormat
-from lightpen_app.look.layouts import horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
@@ -26,7 +26,7 @@ EXPORTS = (ALL, *(Export((each,)) for each in FORMATS), PLOTS)
 
 
 class ResultTools(Translated, QWidget):
-    """Four buttons; that to save has a menu.
+    """Three buttons; that to save has a menu.
 
     Signals
     -------
@@ -51,7 +51,6 @@ class ResultTools(Translated, QWidget):
         super().__init__(parent)
 
         # Widgets
-        self._folder = PushButton()
         self._copy = PushButton()
         self._save = PushButton()
         self._save.setProperty("menu", True)
@@ -59,37 +58,31 @@ class ResultTools(Translated, QWidget):
         self._actions = [(export, menu.addAction("")) for export in EXPORTS]
         menu.addSeparator()
         menu.setToolTipsVisible(True)
-        self._paper = menu.addAction("")
+        self._paper, self._folder = menu.addAction(""), menu.addAction("")
         self._save.setMenu(menu)
-        self._buttons = (self._folder, self._copy, self._save)
         self._press = PushButton()
 
         # Layout
-        layout = vertical_layout(self)
-        horizontal_layout(layout, *((button, 1) for button in self._buttons))
-        layout.addWidget(self._press)
+        horizontal_layout(self, (self._copy, 1), (self._save, 1), (self._press, 1))
 
         # Connections
-        self._folder.clicked.connect(self.folder_requested)
         self._copy.clicked.connect(self.copy_requested)
         for export, action in self._actions:
             action.triggered.connect(
                 lambda _=False, export=export: self.save_requested.emit(export)
             )
         self._paper.triggered.connect(self.paper_requested)
+        self._folder.triggered.connect(self.folder_requested)
         self._press.clicked.connect(self.press_requested)
 
         self._retranslate()
 
     def set_why_not(self, why_not: str) -> None:
         """Disable all with a reason, or enable them."""
-        tooltips = (
-            self.tr("Open the folder of the swing"),
-            self.tr("Copy x, y, z in mm, separated by tabs"),
-            self.tr("Save results and plots, named by pen, tip and date"),
-        )
-        for button, words in zip(self._buttons, tooltips, strict=True):
-            button.set_why_not(why_not, words)
+        words = self.tr("Copy x, y, z in mm, separated by tabs")
+        self._copy.set_why_not(why_not, words)
+        words = self.tr("Save results and plots, named by pen, tip and date")
+        self._save.set_why_not(why_not, words)
 
     def set_paper_why_not(self, why_not: str) -> None:
         """Disable the report with a reason, or enable it."""
@@ -108,6 +101,7 @@ class ResultTools(Translated, QWidget):
         self._press.setText(self.tr("Press test"))
         self._paper.setText(self.tr("Calibration report..."))
         self._folder.setText(self.tr("Open folder"))
+        self._folder.setToolTip(self.tr("Open the folder of the swing"))
         self._copy.setText(self.tr("Copy tip"))
         self._save.setText(self.tr("Save..."))
         for export, action in self._actions:

@@ -28,7 +28,7 @@ class TipValue:
     previous, nominal : tuple of str
         Previous result and centre by design, mm; empty without one.
     change, deviation : tuple of str
-        The tip less these, um; the change with its U (k = 2).
+        The tip less these: the change with its U (k = 2) in um, the deviation in mm.
     since : str
         Date of the previous result.
     """
@@ -126,7 +126,7 @@ class TipReadout(Translated, QWidget):
         words = (
             *(self.tr("Value\nmm"), self.tr("U\nmm")),
             *(self.tr("Previous\nmm"), self.tr("Change\n\xb5m")),
-            *(self.tr("Nominal\nmm"), self.tr("Deviation\n\xb5m")),
+            *(self.tr("Nominal\nmm"), self.tr("Deviation\nmm")),
         )
         for head, text in zip(self._heads, words, strict=True):
             head.setText(text)

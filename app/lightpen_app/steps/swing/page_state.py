@@ -212,7 +212,7 @@ def main_action(status: SwingStatus) -> MainAction:
         has_images = state is not None and state.n_kept > 0
         why_not = translate("SwingPage", "No image captured yet")
         finish = translate("SwingPage", "Finish early")
-        return MainAction(finish, "" if has_images else why_not)
+        return MainAction(finish, "" if has_images else why_not, is_early=True)
     return MainAction(translate("SwingPage", "Review"), _why_no_review(status))
 
 

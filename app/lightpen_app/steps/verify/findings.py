@@ -225,10 +225,7 @@ def figures_of(table: ResultTable) -> Figures:
         tuple(_words(row.name) for row in table.rows),
         tuple(
             (
-                *(
-                    "" if x is None else number_text(x, row.decimals)
-                    for x in row.values
-                ),
+                *(_cell(x, row.decimals) for x in row.values),
                 *([_words(row.remark)] if len(row.values) < len(table.columns) else ()),
             )
             for row in table.rows
@@ -258,6 +255,12 @@ def live_posture(setup: SessionSetup, state: SessionState) -> Posture | None:
     if not touching.held or touching.n_lost:
         return None
     return posture_of(setup.instrument.pen, touching.held[-1].frame.rotation)
+
+
+def _cell(value: float | str | None, decimals: int) -> str:
+    if value is None or isinstance(value, str):
+        return value or ""
+    return number_text(value, decimals)
 
 
 def _words(name: Message | str) -> str:

@@ -159,7 +159,7 @@ class VerifyPresenter(QObject):
             return MainAction(self.tr("Back to Start"))
         has_points = status.state is not None and bool(status.state.touches)
         why_not = "" if has_points else self.tr("No point is recorded yet.")
-        return MainAction(self.tr("Finish early"), why_not)
+        return MainAction(self.tr("Finish early"), why_not, is_early=True)
 
     def _title(self, task: AnyTask) -> StatusMessage:
         """Return the name of a task, with its progress if selected."""

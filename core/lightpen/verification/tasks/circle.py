@@ -458,7 +458,7 @@ def _figures_so_far(
     if fit is None:
         return (ResultTable(title),)
     rows = tuple(
-        ResultRow(str(i), off.tolist())
+        ResultRow(message("table.point", number=i), off.tolist())
         for i, off in enumerate(residuals_of(fit, [p.point_cam for p in points]), 1)
     )
     columns = message("circle.radial"), message("circle.axial")

@@ -354,7 +354,10 @@ def _figures_so_far(
 
 def _points(title: Message, places: FloatArray) -> ResultTable:
     """Return the coordinates of each point: the paper's Table 2."""
-    rows = (ResultRow(str(i), place) for i, place in enumerate(places.tolist(), 1))
+    rows = (
+        ResultRow(message("table.point", number=i), place)
+        for i, place in enumerate(places.tolist(), 1)
+    )
     return ResultTable(title, tuple("uvw"), tuple(rows))
 
 

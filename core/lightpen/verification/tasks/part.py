@@ -316,21 +316,24 @@ def _refined(refinement: Refinement, instrument: Instrument) -> Message:
 
 def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
     part = found.part
-    in_part, in_camera = message("part.in-part"), message("part.in-camera")
+    in_part = message("part.features-in-part")
+    in_camera = message("part.features-in-camera")
     features = ResultTable(
-        message("part.features"),
+        in_camera if part.alignment is None else in_part,
         (
-            *("x", "y", "z", "U"),
-            *(message("part.size"), "U", message("part.form")),
+            *("x", "y", "z", message("part.position-uncertainty")),
+            *(message("part.size"), message("part.size-uncertainty")),
+            message("part.form"),
             message("part.kind"),
         ),
         _rows(feature_rows(part)),
-        (in_camera if part.alignment is None else in_part, *_notes(found, conditions)),
+        tuple(_notes(found, conditions)),
     )
     characteristics = ResultTable(
         message("part.characteristics"),
         (
             message("part.nominal"),
+            message("part.tolerance"),
             message("part.actual"),
             message("part.deviation"),
             message("table.uncertainty"),
@@ -367,7 +370,8 @@ def _figures_so_far(
     title = message("part.touches", name=now.planned.name, kind=kind)
     rows = tuple(
         ResultRow(
-            str(i), [*point.point_cam.tolist(), off if np.isfinite(off) else None]
+            message("table.point", number=i),
+            [*point.point_cam.tolist(), off if np.isfinite(off) else None],
         )
         for i, (point, off) in enumerate(
             zip(progress.points, now.deviations.tolist(), strict=True), start=1

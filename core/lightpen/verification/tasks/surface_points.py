@@ -96,7 +96,9 @@ def residuals_table(
 ) -> ResultTable:
     """Return coordinates of points and their residuals from a surface."""
     rows = tuple(
-        ResultRow(str(i), [*point.point_cam.tolist(), residual])
+        ResultRow(
+            message("table.point", number=i), [*point.point_cam.tolist(), residual]
+        )
         for i, (point, residual) in enumerate(
             zip(points, residuals.tolist(), strict=True), start=1
         )

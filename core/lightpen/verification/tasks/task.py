@@ -178,7 +178,7 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class ResultRow:
-    """A row of a table: its name, and a number for each column or None for a blank.
+    """A row of a table: its name, and a value for each column or None for a blank.
 
     Attributes
     ----------
@@ -187,7 +187,7 @@ class ResultRow:
     """
 
     name: Message | str
-    values: Sequence[float | None]
+    values: Sequence[float | str | None]
     decimals: int = 4
     remark: Message | str = ""
 
@@ -437,7 +437,7 @@ def points_table(points: Sequence[ProbedPoint]) -> ResultTable:
         message("table.points"),
         tuple("uvw") if points else (),
         tuple(
-            ResultRow(str(i), point.point_cam.tolist())
+            ResultRow(message("table.point", number=i), point.point_cam.tolist())
             for i, point in enumerate(points, start=1)
         ),
     )
