@@ -381,8 +381,7 @@ class TracePlot(Plot):
         if not len(x):
             self._show_nothing()
             return
-        for side in ("left", "bottom"):
-            self._item.getAxis(side).setStyle(showValues=True)
+        self._show_numbers(True)
         n_hidden = int((1 - self._tail) * len(x))
         in_sight = [self._height(value)[n_hidden:] for value in values]
         if self._limit_at is not None:
@@ -402,14 +401,17 @@ class TracePlot(Plot):
             self._show_range()
 
     def _show_nothing(self) -> None:
-        """Show the axes, without numbers unless a limit is among them."""
+        """Show the axes without numbers, and the limit."""
         top = np.ones(1)
         if self._limit_at is not None and self._y_log:
             top = np.maximum(top, self._height(np.array([LABEL_ROOM * self._limit_at])))
         y_range = (0.0, float(top[0]))
-        self._item.getAxis("left").setStyle(showValues=self._limit_at is not None)
-        self._item.getAxis("bottom").setStyle(showValues=False)
+        self._show_numbers(False)
         self._item.setRange(xRange=(1, N_LEAST), yRange=y_range, padding=0.01)
+
+    def _show_numbers(self, shown: bool) -> None:
+        for side in ("left", "bottom"):
+            self._item.getAxis(side).setStyle(showValues=shown)
 
     def _place_words(self) -> None:
         """Put the words of the limit where they cover the least of the curves."""

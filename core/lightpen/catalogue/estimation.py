@@ -68,7 +68,7 @@ MESSAGES = {
     "time.late": "{time} late",
     "time.early": "{time} early",
     "warning.led-noise": "LED {led} is noisier than the others: {sigma:.3f} px, usual is {usual:.3f} px; its weight is reduced accordingly. Clean it, and check its brightness and its supply.",
-    "warning.self-check": "Half of the LEDs predict the others only to {value:.2f} times their uncertainty (at most {limit:.2f} by chance), depending on the posture: LEDs, pen or lens deviate from the model, and U may be too small. Check for bent or unevenly bright LEDs, a loose pen and a window before the lens, then verify the tip on an artefact.",
+    "warning.self-check": "Self-check of the LEDs {value:.2f}, limit {limit:.2f}: errors follow the posture, so LEDs, pen or lens deviate from the model and U may be too small. Check for bent LEDs, a loose pen and a window before the lens, then verify the tip.",
     "warning.frame-of-file": "The pen frame depends on LED {leds}: the tip is {by_file} mm by the LED file without it, {by_all} mm by all LEDs as they are. Result and U refer to the former. Measure with this result, which contains the LEDs as they are; to measure with the LED file, leave out LED {leds}.",
     "warning.frame-of-all": "The pen frame depends on LED {leds}: the tip is {by_file} mm by the LED file without it, {by_all} mm by all LEDs as they are. Result and U refer to the latter. Measure with this result, which contains the LEDs as they are; to measure with the LED file, use the former tip and leave out LED {leds}.",
     "warning.own-images": "Camera or LEDs were found from these images. They count once: only what was known before them is taken from the files.",

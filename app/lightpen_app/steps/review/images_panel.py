@@ -267,7 +267,7 @@ class ImagesPanel(Translated, QWidget):
             self._view.set_arrows(arrows)
         detail = seen_by.details[index]
         if fitted.any():
-            text = self.tr("Image {0}; arrows: residuals \xd7 {1}")
+            text = self.tr("Image {0}, residuals \xd7 {1}")
             self._caption.setText(text.format(number, f"{scale:g}"))
         else:
             text = self.tr("Image {0}: pen not found. {1}")
