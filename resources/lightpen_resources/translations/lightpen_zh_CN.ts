@@ -1646,16 +1646,16 @@
         <translation>自动剔除：{0}</translation>
     </message>
     <message>
+        <source>Image {0}, residuals × {1}</source>
+        <translation>图像 {0}，残差 × {1}</translation>
+    </message>
+    <message>
         <source>Image {0}: pen not found. {1}</source>
         <translation>图像 {0}：未找到光笔。{1}</translation>
     </message>
     <message>
         <source>Image not available</source>
         <translation>无法显示该图像</translation>
-    </message>
-    <message>
-        <source>Image {0}; arrows: residuals × {1}</source>
-        <translation>图像 {0}；箭头：残差 × {1}</translation>
     </message>
 </context>
 <context>
@@ -2386,8 +2386,8 @@
 <context>
     <name>LedTable</name>
     <message>
-        <source>LED coordinates / mm</source>
-        <translation>LED 坐标 / mm</translation>
+        <source>LED coordinates</source>
+        <translation>LED 坐标</translation>
     </message>
 </context>
 <context>
@@ -2397,12 +2397,12 @@
         <translation>光笔至少需要 {0} 个 LED。</translation>
     </message>
     <message>
-        <source>LED coordinates / mm (modified)</source>
-        <translation>LED 坐标 / mm（已修改）</translation>
+        <source>LED coordinates (modified)</source>
+        <translation>LED 坐标（已修改）</translation>
     </message>
     <message>
-        <source>LED coordinates / mm</source>
-        <translation>LED 坐标 / mm</translation>
+        <source>LED coordinates</source>
+        <translation>LED 坐标</translation>
     </message>
     <message>
         <source>Add an LED at the end</source>
@@ -3591,8 +3591,8 @@
     </message>
     <message>
         <source>images
-needed</source>
-        <translation>所需
+still needed</source>
+        <translation>尚需
 图像</translation>
     </message>
     <message>
@@ -3871,10 +3871,6 @@ needed</source>
         <translation>计入 {0} / {1} 幅图像</translation>
     </message>
     <message>
-        <source>Tip in the pen frame / mm, U (k = 2)</source>
-        <translation>光笔坐标系中的测头 / mm，U (k = 2)</translation>
-    </message>
-    <message>
         <source>U (k = 2)</source>
         <translation>U (k = 2)</translation>
     </message>
@@ -3891,6 +3887,14 @@ needed</source>
         <translation>奇数 - 偶数</translation>
     </message>
     <message>
+        <source>Tip in the pen frame, U (k = 2)</source>
+        <translation>光笔坐标系中的测头中心，U (k = 2)</translation>
+    </message>
+    <message>
+        <source>Tip {0} in the frame of pen {1}, U&#xa0;(k&#xa0;=&#xa0;2)</source>
+        <translation>测头 {0} 在光笔 {1} 坐标系中的中心，U&#xa0;(k&#xa0;=&#xa0;2)</translation>
+    </message>
+    <message>
         <source>As found: {0} mm from the previous calibration (no limit set)</source>
         <translation>标定前状态：与上次标定相差 {0} mm（未设限值）</translation>
     </message>
@@ -3901,10 +3905,6 @@ needed</source>
     <message>
         <source>Odd and even images differ significantly</source>
         <translation>奇数与偶数图像差异显著</translation>
-    </message>
-    <message>
-        <source>Tip {0} in the frame of pen {1} / mm, U&#xa0;(k&#xa0;=&#xa0;2)</source>
-        <translation>测头 {0}（光笔 {1} 坐标系）/ mm，U&#xa0;(k&#xa0;=&#xa0;2)</translation>
     </message>
     <message>
         <source>Odd and even images agree</source>
@@ -5316,9 +5316,9 @@ mm</translation>
     </message>
     <message>
         <source>Deviation
-µm</source>
+mm</source>
         <translation>偏差
-µm</translation>
+mm</translation>
     </message>
 </context>
 <context>
@@ -5680,8 +5680,8 @@ mm</translation>
         <translation>LED</translation>
     </message>
     <message>
-        <source>Error / px</source>
-        <translation>误差 / px</translation>
+        <source>RMS / px</source>
+        <translation>残差 / px</translation>
     </message>
 </context>
 <context>
@@ -5802,10 +5802,6 @@ mm</translation>
         <translation>改变姿态</translation>
     </message>
     <message>
-        <source>Characteristics / mm, degrees</source>
-        <translation>特性 / mm，度</translation>
-    </message>
-    <message>
         <source>Check nominal diameter, ball diameter and cleanliness; then verify the tip.</source>
         <translation>请检查标称直径、测球直径和清洁情况，然后验证测头。</translation>
     </message>
@@ -5836,14 +5832,6 @@ mm</translation>
     <message>
         <source>Contact</source>
         <translation>触测部位</translation>
-    </message>
-    <message>
-        <source>Coordinates in the frame of the camera, U (k = 2).</source>
-        <translation>相机坐标系中的坐标，U (k = 2)。</translation>
-    </message>
-    <message>
-        <source>Coordinates in the frame of the part, U (k = 2).</source>
-        <translation>工件坐标系中的坐标，U (k = 2)。</translation>
     </message>
     <message>
         <source>Covered / °</source>
@@ -5922,10 +5910,6 @@ mm</translation>
         <translation>预期标准差</translation>
     </message>
     <message>
-        <source>Features / mm</source>
-        <translation>要素 / mm</translation>
-    </message>
-    <message>
         <source>File name too long</source>
         <translation>文件名过长</translation>
     </message>
@@ -5972,10 +5956,6 @@ mm</translation>
     <message>
         <source>GigE and USB3 Vision (Aravis)</source>
         <translation>GigE 和 USB3 Vision (Aravis)</translation>
-    </message>
-    <message>
-        <source>Half of the LEDs predict the others only to {value:.2f} times their uncertainty (at most {limit:.2f} by chance), depending on the posture: LEDs, pen or lens deviate from the model, and U may be too small. Check for bent or unevenly bright LEDs, a loose pen and a window before the lens, then verify the tip on an artefact.</source>
-        <translation>一半 LED 对其余 LED 的预测误差为其不确定度的 {value:.2f} 倍（偶然最多 {limit:.2f} 倍），且与姿态有关：LED、光笔或镜头偏离模型，U 可能偏小。请检查 LED 是否弯斜或亮度不均、光笔是否松动、镜头前是否有玻璃窗，然后用标准器验证测头。</translation>
     </message>
     <message>
         <source>Harvesters is not installed. With the GenTL producer of its vendor it drives any GenICam camera: {python} -m pip install harvesters genicam</source>
@@ -7814,6 +7794,10 @@ mm</translation>
         <translation>相机 {serial} 拒绝一项设置：{why}。请另选。</translation>
     </message>
     <message>
+        <source>Characteristics: lengths / mm, angles / degrees</source>
+        <translation>特性：长度 / mm，角度 / 度</translation>
+    </message>
+    <message>
         <source>Columns {first} and {second} of {name} both contain {column}. Remove one of them.</source>
         <translation>{name} 的第 {first} 列和第 {second} 列都是 {column}。请删除其中一列。</translation>
     </message>
@@ -7916,6 +7900,14 @@ mm</translation>
     <message>
         <source>Feature {name}: {said}</source>
         <translation>要素 {name}：{said}</translation>
+    </message>
+    <message>
+        <source>Features in the camera frame / mm, angles / degrees, k = 2</source>
+        <translation>相机坐标系中的要素 / mm，角度 / 度，k = 2</translation>
+    </message>
+    <message>
+        <source>Features in the part frame / mm, angles / degrees, k = 2</source>
+        <translation>工件坐标系中的要素 / mm，角度 / 度，k = 2</translation>
     </message>
     <message>
         <source>Fewer than {least} views have the board tilted {sides}. Add such views.</source>
@@ -8298,6 +8290,10 @@ mm</translation>
         <translation>各姿态下该点的标准差：u {u:.4f}、v {v:.4f}、w {w:.4f} mm。</translation>
     </message>
     <message>
+        <source>Point {number}</source>
+        <translation>测点 {number}</translation>
+    </message>
+    <message>
         <source>Points and tip refined by the known form of {names}: tip shifted by {shift:.4f} mm, its U (k = 2) {before:.4f} mm before and {after:.4f} mm after.</source>
         <translation>已按 {names} 的已知形状修正测点和测头：测头移动 {shift:.4f} mm，其 U (k = 2) 修正前 {before:.4f} mm，修正后 {after:.4f} mm。</translation>
     </message>
@@ -8380,6 +8376,10 @@ mm</translation>
     <message>
         <source>Scale factor of the pen from this length: {factor:.6f}, U (k = 2) {uncertainty:.1f} ppm; before {before:.1f} ppm.</source>
         <translation>由该长度得到的光笔比例系数：{factor:.6f}，U (k = 2) {uncertainty:.1f} ppm；此前为 {before:.1f} ppm。</translation>
+    </message>
+    <message>
+        <source>Self-check of the LEDs {value:.2f}, limit {limit:.2f}: errors follow the posture, so LEDs, pen or lens deviate from the model and U may be too small. Check for bent LEDs, a loose pen and a window before the lens, then verify the tip.</source>
+        <translation>LED 自检 {value:.2f}，限值 {limit:.2f}：误差随姿态变化，说明 LED、光笔或镜头与模型不符，U 可能偏小。请检查 LED 是否弯曲、光笔是否松动、镜头前是否有窗玻璃，然后验证测头。</translation>
     </message>
     <message>
         <source>Settings not saved: {file} cannot be written ({reason}). Check free space and write permission of its folder.</source>
@@ -9370,6 +9370,10 @@ mm</translation>
         <translation>朝自己右侧，程序由此得知您的站位。</translation>
     </message>
     <message>
+        <source>Tolerance</source>
+        <translation>公差</translation>
+    </message>
+    <message>
         <source>Turn the LEDs towards the camera.</source>
         <translation>请将 LED 朝向相机。</translation>
     </message>
@@ -9412,6 +9416,14 @@ mm</translation>
     <message>
         <source>U alone: U (k = 2) if the points shared no error. P: probability of conformity (JCGM 106).</source>
         <translation>单独 U：各点无共同误差时的 U (k = 2)。P：合格概率 (JCGM 106)。</translation>
+    </message>
+    <message>
+        <source>U(size)</source>
+        <translation>U（尺寸）</translation>
+    </message>
+    <message>
+        <source>U(x y z)</source>
+        <translation>U（x y z）</translation>
     </message>
     <message>
         <source>Verification complete. You can put the pen down.</source>
@@ -9888,6 +9900,14 @@ mm</translation>
     <message>
         <source>{value:.3g} ms</source>
         <translation>{value:.3g} ms</translation>
+    </message>
+    <message>
+        <source>{value:.3g} s</source>
+        <translation>{value:.3g} s</translation>
+    </message>
+    <message>
+        <source>{value:.3g} µs</source>
+        <translation>{value:.3g} µs</translation>
     </message>
     <message>
         <source>{where} Check that the file matches the current camera positions, or calibrate the rig again.</source>
@@ -11411,10 +11431,6 @@ mm</translation>
     <message>
         <source>{0} See the list in Review.</source>
         <translation>{0}见“复核”中的列表。</translation>
-    </message>
-    <message>
-        <source>{0} Accept at the computer.</source>
-        <translation>{0}请在计算机上接受。</translation>
     </message>
     <message>
         <source>form of ball, cone</source>

@@ -85,10 +85,9 @@ def test_some_missing_sides_are_named_and_many_are_not() -> None:
 
 
 def test_what_to_do_at_the_screen_is_reported_there_alone() -> None:
-    good = message(Code.GOOD, uncertainty=0.00412)
+    dropped = message(Code.MANY_DROPPED, n_dropped=3, n_images=60)
 
-    assert str(good) == "U (k = 2) of the tip is 0.0041 mm."
-    assert phrase(good).hint == f"{good} Accept at the computer."
+    assert phrase(dropped).hint == f"{dropped} See the list in Review."
     assert phrase(PAUSED).hint == "Press Space to continue."
 
 

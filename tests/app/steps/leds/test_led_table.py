@@ -76,7 +76,7 @@ def test_what_is_typed_outlives_what_the_live_match_tells_meanwhile(
     QApplication.processEvents()
 
     assert shown(table, 3, 2) == "121.5"
-    assert shown(table, 3, MISFIT) == "0.80"
+    assert shown(table, 3, MISFIT) == "0.800"
 
 
 def test_a_bad_cell_is_marked_and_reported(table: LedTable) -> None:
@@ -106,7 +106,7 @@ def test_enter_opens_a_cell_and_goes_no_further(table: LedTable) -> None:
 def test_the_misfit_of_each_led_is_shown_where_it_is_known(table: LedTable) -> None:
     table.set_misfits({7: 1.468})
 
-    assert shown(table, 7, MISFIT) == "1.47"
+    assert shown(table, 7, MISFIT) == "1.468"
     assert shown(table, 6, MISFIT) == ""
 
 

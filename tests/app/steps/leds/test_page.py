@@ -1154,7 +1154,7 @@ def test_it_can_be_used_by_keys_alone(
 
     assert names >= {
         *("LED file", "Open...", "Save as...", "Use file of the simulated pen"),
-        *("LED coordinates / mm", "Add", "Diameter of the LED discs, mm"),
+        *("LED coordinates", "Add", "Diameter of the LED discs, mm"),
         *("Nominal tip centre, x, mm", "The LEDs in space", "Live image"),
     }
 

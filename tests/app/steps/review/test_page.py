@@ -576,7 +576,7 @@ def test_the_result_says_which_tip_it_is_of(bed: Bed, workbench: Workbench) -> N
     bed.solve()
     page = bed.show()
     texts = [each.text() for each in page.findChildren(QLabel)]
-    assert "Tip T-10 in the frame of pen LP-04 / mm, U\xa0(k\xa0=\xa02)" in texts
+    assert "Tip T-10 in the frame of pen LP-04, U\xa0(k\xa0=\xa02)" in texts
     assert remarks(page) == ""
 
     names = replace(workbench.selection.preparation.names, tip="T-11")
@@ -804,20 +804,25 @@ def test_the_folder_of_the_swing_is_opened(
     reported: list[str] = []
     bed.workbench.notifications.status_changed.connect(reported.append)
 
-    click(page, "Open folder")
+    choose(page, "Open folder")
     assert opened == [str(bed.swing)]
     assert reported[-1] == ""
 
     can_show = False
-    click(page, "Open folder")
+    choose(page, "Open folder")
     assert reported[-1] == f"No file manager found. Folder: {bed.swing}"
+
+
+def choose(page: ReviewPage, what: str) -> None:
+    """Choose from the menu of the button that saves."""
+    (menu,) = button(page, "Save...").findChildren(QMenu)
+    (action,) = [each for each in menu.actions() if each.text() == what]
+    action.trigger()
 
 
 def save(bed: Bed, page: ReviewPage, what: str, folder: Path) -> None:
     """Choose what to save from the menu, and the folder."""
-    (menu,) = button(page, "Save...").findChildren(QMenu)
-    (action,) = [each for each in menu.actions() if each.text() == what]
-    action.trigger()
+    choose(page, what)
     (dialog,) = [d for d in page.findChildren(QFileDialog) if d.isVisible()]
     with bed.qtbot.waitSignal(bed.workbench.notifications.status_changed):
         dialog.fileSelected.emit(str(folder))
