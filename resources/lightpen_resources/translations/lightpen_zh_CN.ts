@@ -5802,6 +5802,10 @@ mm</translation>
         <translation>改变姿态</translation>
     </message>
     <message>
+        <source>Changes of other stations to the tip library that a supervisor has not signed yet: {n}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Check nominal diameter, ball diameter and cleanliness; then verify the tip.</source>
         <translation>请检查标称直径、测球直径和清洁情况，然后验证测头。</translation>
     </message>
@@ -5890,6 +5894,10 @@ mm</translation>
         <translation>请输入主管的姓名。</translation>
     </message>
     <message>
+        <source>Entries after entry {after} without a timestamp: {n}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Entry {number} of leds in {name} is LED {led:g}. List the LEDs from 1 in ascending order, each once.</source>
         <translation>{name} 中 leds 的第 {number} 项是 LED {led:g}。请从 1 开始按升序列出 LED，每个一次。</translation>
     </message>
@@ -5968,6 +5976,10 @@ mm</translation>
     <message>
         <source>Images (CSV)</source>
         <translation>图像 (CSV)</translation>
+    </message>
+    <message>
+        <source>Images excluded manually: {n_excluded}. Include them again, or repeat the swing.</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Input/output error</source>
@@ -6264,6 +6276,22 @@ mm</translation>
     <message>
         <source>Points</source>
         <translation>测点数</translation>
+    </message>
+    <message>
+        <source>Points excluded because they lie elsewhere: {n_left_out} of {n_touches}, the first {first}. The pen was lifted or slipped.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Points excluded because they lie off the plane: {n_left_out}, the first {first}. The pen was lifted or slipped.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Points excluded because they lie off the ring: {n_left_out}, the first {first}. The pen was lifted or slipped.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Points excluded because they lie off the sphere: {n_left_out}, the first {first}. The pen was lifted or slipped.</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Points of {name} ({kind}), camera frame / mm</source>
@@ -6582,6 +6610,10 @@ mm</translation>
         <translation>长度 {length:g} mm 与 LED {first} 和 {second} 不符：光笔文件中两者的距离为 {sketched:.2f} mm。请核对测量的是哪两个 LED，并检查文件。</translation>
     </message>
     <message>
+        <source>The measured diameter is {measured:.3f} mm, the certified one {certified} mm. Check that this sphere was probed, that its diameter and not its radius is stated, and the ball diameter of the tip.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The normal of LED {led} points away from the viewer (nz = {nz:.3f}); nz must be positive in the pen frame. Change its sign.</source>
         <translation>LED {led} 的法向量背向观察者 (nz = {nz:.3f})；在光笔坐标系中 nz 必须为正。请改变其符号。</translation>
     </message>
@@ -6600,6 +6632,10 @@ mm</translation>
     <message>
         <source>The points lie in one place or on a line, which determines no plane. Probe the plate all over.</source>
         <translation>各测点位于同一处或一条直线上，不能确定平面。请在整个平板上触测。</translation>
+    </message>
+    <message>
+        <source>The points lie on no plane: {n_off} of {n_points} are outliers, and the others deviate by up to {off:.2f} mm. Probe one plate, and hold the pen on it.</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>The program failed on this image ({kind}: {problem}). Keep the image, and report it.</source>
@@ -6660,6 +6696,10 @@ mm</translation>
     <message>
         <source>This place of the plate was probed before. Probe it elsewhere.</source>
         <translation>平板的这一处已触测过。请触测别处。</translation>
+    </message>
+    <message>
+        <source>Timestamps with a signature that was not verified: {n}. The certificate of the time stamping authority is not set.</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Tip (CSV)</source>
@@ -6892,18 +6932,6 @@ mm</translation>
     <message>
         <source>{n_found} LEDs are found; the sketch has {n_sketched}. Give a sketch with all LEDs of the pen, or none.</source>
         <translation>找到 {n_found} 个 LED；草图中有 {n_sketched} 个。请给出包含光笔全部 LED 的草图，或不给草图。</translation>
-    </message>
-    <message>
-        <source>{n_left_out} points lie off the plane and are excluded, the first {first}: the pen was lifted or slipped.</source>
-        <translation>{n_left_out} 个测点不在平面上，已排除，第一个为 {first}：光笔曾抬起或滑动。</translation>
-    </message>
-    <message>
-        <source>{n_left_out} points lie off the sphere and are excluded, the first {first}: the pen was lifted or slipped.</source>
-        <translation>{n_left_out} 个点偏离球面，已排除，第一个为 {first}：光笔被抬起或打滑。</translation>
-    </message>
-    <message>
-        <source>{n_off} of {n_points} points do not lie on the plane of the others, and these scatter by {off:.2f} mm. Probe one plate, and hold the pen on it.</source>
-        <translation>{n_points} 个测点中有 {n_off} 个不在其余各点的平面上，其余各点的离散为 {off:.2f} mm。请只触测一块平板，并使光笔与其保持接触。</translation>
     </message>
     <message>
         <source>{n_points} of {needed} points</source>
@@ -8830,10 +8858,6 @@ mm</translation>
         <translation>此处保存的内容与{entry}不相接。可能是数据文件夹被复制后两份都在继续使用，或条目被改动过。请检查两边的档案库。</translation>
     </message>
     <message>
-        <source>The measured diameter is {measured:.3f} mm, the certified one {certified} mm. Check that it is this sphere, that a diameter and no radius is stated, and that the ball diameter of the tip is.</source>
-        <translation>测得直径为 {measured:.3f} mm，校准值为 {certified} mm。请检查是否为该球、给出的是否为直径而非半径，以及是否给出了测头的测球直径。</translation>
-    </message>
-    <message>
         <source>The measured length {measured:g} mm (stated {stated:g}, U {u:g} mm) is not valid: all must be above 0, and U at most a twentieth of the length. Measure over as many squares as possible.</source>
         <translation>测得长度 {measured:g} mm（标称 {stated:g}，U {u:g} mm）无效：均须大于 0，且 U 不超过长度的二十分之一。请跨尽可能多的方格测量。</translation>
     </message>
@@ -9032,10 +9056,6 @@ mm</translation>
     <message>
         <source>The signature of entry {number} of chain {chain} is missing or wrong: the entry or its signature was changed.</source>
         <translation>链 {chain} 的第 {number} 条记录的签名缺失或错误：记录或其签名被更改。</translation>
-    </message>
-    <message>
-        <source>The signatures of {n} timestamps were not verified: the certificate of the time stamping authority is not set.</source>
-        <translation>{n} 个时间戳的签名未经验证：未设置时间戳机构的证书。</translation>
     </message>
     <message>
         <source>The station key {file} was changed or damaged. Restore it from a copy, or remove it and let a supervisor introduce another (documents: security).</source>
@@ -9466,10 +9486,6 @@ mm</translation>
         <translation>可以放下光笔。</translation>
     </message>
     <message>
-        <source>You excluded {n_excluded} images. Undo, or repeat the swing.</source>
-        <translation>您剔除了 {n_excluded} 幅图像。请撤销，或重新摆动。</translation>
-    </message>
-    <message>
         <source>Zoom, focus or camera changed at {name}: fx, cx, cy are {before:.1f}, {cx_before:.1f}, {cy_before:.1f} px in the {n_before} views before it and {after:.1f}, {cx_after:.1f}, {cy_after:.1f} px in the {n_after} views from there on. Lock zoom and focus, and take all views again.</source>
         <translation>变焦、对焦或相机在 {name} 处发生了变化：其前 {n_before} 个视图的 fx、cx、cy 为 {before:.1f}、{cx_before:.1f}、{cy_before:.1f} px，其后 {n_after} 个视图为 {after:.1f}、{cx_after:.1f}、{cy_after:.1f} px。请锁定变焦和对焦，并重新拍摄所有视图。</translation>
     </message>
@@ -9798,14 +9814,6 @@ mm</translation>
         <translation>{n_poses} 个位姿中有 {n_left_out} 个为离群值，已剔除：{poses}。请检查跟踪是否受到干扰。</translation>
     </message>
     <message>
-        <source>{n_left_out} of {n_touches} points lie elsewhere and are excluded, the first {first}: the pen was lifted or slipped.</source>
-        <translation>{n_touches} 个测点中有 {n_left_out} 个位于别处，已排除，第一个为 {first}：光笔曾抬起或滑动。</translation>
-    </message>
-    <message>
-        <source>{n_left_out} points lie off the ring and are excluded, the first {first}: the pen was lifted or slipped.</source>
-        <translation>{n_left_out} 个测点不在环上，已排除，第一个为 {first}：光笔曾抬起或滑动。</translation>
-    </message>
-    <message>
         <source>{n_named} of {n_views} images are rotated by 180°: {names}. Rotate them back, or leave them out; the camera must not be turned during a calibration, and viewers must not rotate its images.</source>
         <translation>{n_views} 幅图像中有 {n_named} 幅旋转了 180°：{names}。请转回或剔除；标定期间不得转动相机，看图软件也不得旋转其图像。</translation>
     </message>
@@ -9852,14 +9860,6 @@ mm</translation>
     <message>
         <source>{name} is not valid YAML. Check that this is the right file.</source>
         <translation>{name} 不是有效的 YAML。请检查是否选对了文件。</translation>
-    </message>
-    <message>
-        <source>{n} changes of other stations to the tip library wait for a supervisor to sign them.</source>
-        <translation>其他工位对测头库的 {n} 项更改等待主管签署。</translation>
-    </message>
-    <message>
-        <source>{n} entries after entry {after} have no timestamp yet.</source>
-        <translation>记录 {after} 之后的 {n} 条记录尚无时间戳。</translation>
     </message>
     <message>
         <source>{one} and {other} hold the same tip to the last digit. Give each calibration once.</source>
@@ -9960,10 +9960,6 @@ mm</translation>
     <message>
         <source>{text} is not a scale check. Enter the stated length, the measured length and its U (k = 2) in mm, such as 200 200.12 0.04; for a screen the pixel pitch and its U, such as 0.2331 0.0002.</source>
         <translation>{text} 不是比例核查。请输入标称长度、实测长度及其 U (k = 2)，单位 mm，例如 200 200.12 0.04；屏幕则输入像素间距及其 U，例如 0.2331 0.0002。</translation>
-    </message>
-    <message>
-        <source>{told} They have the size of {other}: check that the images are in the order of the cameras of the rig file.</source>
-        <translation>{told}它们的尺寸与 {other} 相符：给出图像的顺序可能与相机组文件中相机的顺序不同。</translation>
     </message>
     <message>
         <source>{touch} is {distance:.2f} mm from the other points: the pen was lifted or slipped. Probe that posture again.</source>
@@ -10216,6 +10212,10 @@ mm</translation>
     <message>
         <source>{run}: none of the {n_images} images shows the pen ({why}). {advice}</source>
         <translation>{run}：{n_images} 幅图像均未显示光笔（{why}）。{advice}</translation>
+    </message>
+    <message>
+        <source>{told} Their size is that of {other}. Give the images in the order of the cameras in the rig file.</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>{usable}; the tip needs at least {needed}. {advice}</source>
