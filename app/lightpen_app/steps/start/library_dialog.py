@@ -42,7 +42,7 @@ from lightpen_app.widgets.supervisor_fields import SupervisorFields
 from lightpen_app.widgets.translated import Translated
 
 LEAST_ROWS = 7
-WIDTHS = (12, 18, 13, 11, 14, 20)  # of the columns but the last, in GRID
+WIDTHS = (11, 16, 12, 11, 13, 20)  # of the columns but the last, in GRID
 NUMBERS = (3, 4)  # columns of them
 LIST_HEIGHT = 47 * GRID  # px, at least: its lead may take two lines
 PICTURE_SIZE = QSize(15 * GRID, 26 * GRID)  # px
@@ -158,6 +158,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         panel = vertical_layout(self._panel, *parts, margins=margins)
         horizontal_layout(panel, (self._reason, 1), self._leave, self._save)
         self.setMinimumWidth(100 * GRID)
+        self.resize(130 * GRID, 70 * GRID)
 
         # Connections
         self._tabs.currentChanged.connect(self._on_kind_changed)
