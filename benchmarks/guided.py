@@ -29,8 +29,8 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.swing.rules import advance_swing
-from lightpen.swing.state import Phase, SwingSetup, SwingState, start_swing
+from lightpen.swing.capture.rules import advance_swing
+from lightpen.swing.capture.state import Phase, SwingSetup, SwingState, start_swing
 
 SEEDS = tuple(range(20))
 N_ROUND = 8  # of these for the hand that goes round

@@ -30,8 +30,8 @@ from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.names import Names
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
+from lightpen.swing.capture.state import Phase
 from lightpen.swing.image_sources import SourceChoice
-from lightpen.swing.state import Phase
 from lightpen_app.application import Wizard, ended, make_application
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Settings

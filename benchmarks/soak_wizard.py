@@ -29,7 +29,7 @@ from typing_extensions import override
 from lightpen.formats.decoding import keep_freed_memory
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.names import Names
-from lightpen.swing.state import Phase
+from lightpen.swing.capture.state import Phase
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Preferences, Settings

@@ -40,7 +40,7 @@ from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.image_plans import ImagePlan, render_plan
 from lightpen.simulator.scenes import LEDS, Scene
 from lightpen.simulator.swings import leds_in_camera, simulate_centers, swing_poses
-from lightpen.swing.kept_images import keep, kept_before
+from lightpen.swing.capture.kept_images import keep, kept_before
 
 N_IMAGES = 50  # of the camera, at 20 a second
 FRAME_RATE = 20.0

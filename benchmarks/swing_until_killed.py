@@ -20,8 +20,8 @@ from lightpen.live.sources import sample_files
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.names import Names
+from lightpen.swing.capture.state import SwingEvent, SwingEventKind
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.state import SwingEvent, SwingEventKind
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 

@@ -61,11 +61,11 @@ from lightpen.simulator.motion import lean_vectors, postures_of
 from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers
+from lightpen.swing.capture.rules import advance_swing
+from lightpen.swing.capture.state import SwingSetup, SwingState, start_swing
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.rules import advance_swing
-from lightpen.swing.state import SwingSetup, SwingState, start_swing
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session import advance_session
 from lightpen.verification.session.session_state import SessionSetup, SessionState

@@ -14,7 +14,7 @@ NO_RIGHT, NO_SPACE = 8, 9  # exit status of the installer
 SMALL_DISK = "60m"
 # A source, and the file with the compiled form of all, without which the program runs.
 VICTIMS = (
-    "runtime/Lib/site-packages/lightpen/swing/rules.py",
+    "runtime/Lib/site-packages/lightpen/swing/capture/rules.py",
     "runtime/compiled_modules.bin",
 )
 

@@ -564,10 +564,10 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
     from lightpen.simulator.scene_files import write_sample_files
     from lightpen.simulator.scenes import Scene
     from lightpen.simulator.swings import paper_camera
+    from lightpen.swing.capture.state import start_swing
     from lightpen.swing.image_sources import SecondCamera
     from lightpen.swing.preparation import Preparation
     from lightpen.swing.record_header import record_header
-    from lightpen.swing.state import start_swing
     from lightpen.swing.swing_recorder import capture_image
 
     scene = Scene(camera=paper_camera(binning=2))

@@ -39,7 +39,7 @@ from lightpen.record.swings.interrupted import (find_unfinished,)
 from lightpen.swing.resuming import read_resumable
 from lightpen.record.swings.names import Names
 from lightpen.live.sources import SourceEnvironment, sample_files
-from lightpen.swing.state import (SwingEventKind,)
+from lightpen.swing.capture.state import (SwingEventKind,)
 from lightpen.model.limits import SwingLimits
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera

@@ -7,7 +7,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.swings.names import Names
 from lightpen.simulator.plate import plate_plan
-from lightpen.swing.state import Phase
+from lightpen.swing.capture.state import Phase
 from lightpen.verification.tasks.part_course import PartOptions
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow

@@ -29,8 +29,8 @@ from lightpen.simulator.samples import eight_led_pen
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_pen
+from lightpen.swing.capture.state import Phase
 from lightpen.swing.image_sources import SourceChoice
-from lightpen.swing.state import Phase
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station
 
@@ -65,7 +65,8 @@ def prepared(
 
     It begins a second after the tip was seated; whole swings are walked elsewhere.
     """
-    for module in ("lightpen.swing.rules", "lightpen_app.steps.swing.view_state"):
+    rules, view = "lightpen.swing.capture.rules", "lightpen_app.steps.swing.view_state"
+    for module in (rules, view):
         monkeypatch.setattr(f"{module}.COUNTDOWN", 1.0)
     settings.set_station(STATION, LONG)
     settings.set_last_station(STATION)

@@ -28,11 +28,11 @@ from lightpen.simulator.hand import Operator
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
+from lightpen.swing.capture.state import Phase, SwingEvent, SwingEventKind, SwingState
 from lightpen.swing.image_sources import SecondCamera
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.runner import SwingRunner
-from lightpen.swing.state import Phase, SwingEvent, SwingEventKind, SwingState
 from lightpen.swing.status import SwingStatus
 
 TIMEOUT = 60.0  # s until a test gives up, on a machine that does other things besides

@@ -14,8 +14,8 @@ from lightpen.messages import COMMA, Message
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
 from lightpen.model.origin import Origin
 from lightpen.model.posture import Posture
+from lightpen.swing.capture.state import Pause, Phase
 from lightpen.swing.preparation import MissingInput
-from lightpen.swing.state import Pause, Phase
 from lightpen.swing_messages import MOST_SIDES, SIDES, Code
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.translatable import QT_TRANSLATE_NOOP

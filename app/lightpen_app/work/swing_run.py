@@ -12,8 +12,8 @@ from lightpen.archive.lazy_logbook import LazyLogbook, server_address
 from lightpen.errors import FileError
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.simulator.follower import GuidedOperator
+from lightpen.swing.capture.state import SwingEvent
 from lightpen.swing.runner import SwingRunner
-from lightpen.swing.state import SwingEvent
 from lightpen.swing.status import SwingStatus
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.run_view import RunView

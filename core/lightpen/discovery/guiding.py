@@ -12,8 +12,8 @@ from lightpen.model.information import inverse
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.posture import Posture
-from lightpen.swing.guidance import GuidanceInput, next_posture, visible_fields
-from lightpen.swing.shortfall import turn_range
+from lightpen.swing.capture.guidance import GuidanceInput, next_posture, visible_fields
+from lightpen.swing.capture.shortfall import turn_range
 
 N_PER_FIELD = 3  # images
 TURNS_NEEDED = (-0.35, 0.35)  # rad, about the pen's own axis

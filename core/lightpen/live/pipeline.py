@@ -35,8 +35,8 @@ from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.detection.spots import Spots, detect_spots, have_moved
 from lightpen.errors import LightpenError
 from lightpen.streaming.server import PoseStream
+from lightpen.swing.capture.state import Phase, SwingSetup
 from lightpen.swing.runner import SwingRunner
-from lightpen.swing.state import Phase, SwingSetup
 from lightpen.verification.runner import VerificationRunner
 
 LONGEST_WAIT = 0.1  # s until the start of a swing is noticed

@@ -4,7 +4,7 @@ from math import pi
 
 from lightpen.model.posture import Posture
 from lightpen.simulator.hand import Operator
-from lightpen.swing.state import Phase, SwingState
+from lightpen.swing.capture.state import Phase, SwingState
 from lightpen.swing_messages import SWING_TO_SEAT
 
 FIRST_LEAN = Posture(tilt=0.35, direction=0.0, turn=0.0)

@@ -1,1 +1,1 @@
-"""The capture of a swing: states, rules, guidance and workflow."""
+"""A swing: the choices for it, its capture, and the workflow up to acceptance."""

@@ -8,8 +8,8 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.rig_pose import fit_rig_poses
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.messages import Message, message
-from lightpen.swing.kept_images import AcceptedImages
-from lightpen.swing.state import SwingSetup
+from lightpen.swing.capture.kept_images import AcceptedImages
+from lightpen.swing.capture.state import SwingSetup
 from lightpen.swing_messages import Code
 
 

@@ -20,6 +20,7 @@ from lightpen.model.pen import Pen
 from lightpen.record.library.tip_library import ListedTip
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
+from lightpen.swing.capture.state import SwingSetup
 from lightpen.swing.image_sources import (
     N_CAMERAS,
     CameraInUse,
@@ -27,7 +28,6 @@ from lightpen.swing.image_sources import (
     SourceChoice,
     SourceKind,
 )
-from lightpen.swing.state import SwingSetup
 
 
 class MissingInput(StrEnum):

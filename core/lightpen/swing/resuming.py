@@ -20,11 +20,11 @@ from lightpen.record.swings.reading import (
 )
 from lightpen.record.swings.recorded_source import source
 from lightpen.record.swings.writing import RecordWriter
+from lightpen.swing.capture.kept_images import kept_before
+from lightpen.swing.capture.rules import start_again
+from lightpen.swing.capture.shortfall import limits_for_more
+from lightpen.swing.capture.state import SwingSetup, SwingState
 from lightpen.swing.image_sources import SourceChoice
-from lightpen.swing.kept_images import kept_before
-from lightpen.swing.rules import start_again
-from lightpen.swing.shortfall import limits_for_more
-from lightpen.swing.state import SwingSetup, SwingState
 
 ROUNDING = 1e-6  # of a rotation
 

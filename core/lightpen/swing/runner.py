@@ -18,9 +18,9 @@ from lightpen.record.library.supervision import Signature
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.runners.serial_queue import SerialQueue
+from lightpen.swing.capture.state import SwingSetup
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import Resumable
-from lightpen.swing.state import SwingSetup
 from lightpen.swing.status import SwingListener, SwingStatus
 from lightpen.swing.workflow import SwingWorkflow
 

@@ -12,8 +12,14 @@ from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.solving import Solution
+from lightpen.swing.capture.state import (
+    Pause,
+    Phase,
+    SwingEvent,
+    SwingSetup,
+    SwingState,
+)
 from lightpen.swing.failed_swing import FailedSwing
-from lightpen.swing.state import Pause, Phase, SwingEvent, SwingSetup, SwingState
 
 
 class Activity(StrEnum):

@@ -17,9 +17,9 @@ from lightpen.formats.decoding import encode_png
 from lightpen.messages import message
 from lightpen.record.swings.reading import DISCARDED, Record
 from lightpen.record.swings.writing import RecordWriter, SecondaryView
-from lightpen.swing.kept_images import keep
-from lightpen.swing.rules import Transition, advance_swing, finish
-from lightpen.swing.state import (
+from lightpen.swing.capture.kept_images import keep
+from lightpen.swing.capture.rules import Transition, advance_swing, finish
+from lightpen.swing.capture.state import (
     Phase,
     Progress,
     SwingEvent,
@@ -123,7 +123,7 @@ def take_recorded_image(
     Returns
     -------
     Transition
-        As `lightpen.swing.rules.advance` returns it.
+        As `lightpen.swing.capture.rules.advance` returns it.
     """
     state = replace(_further(state, n_images), time=time)
     events: tuple[SwingEvent, ...] = ()

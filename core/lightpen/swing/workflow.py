@@ -40,13 +40,8 @@ from lightpen.record.swings.writing import (
 )
 from lightpen.runners.faults import FaultReporter
 from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread, Task
-from lightpen.swing.failed_swing import failed_swing
-from lightpen.swing.operator_presence import OperatorPresence
-from lightpen.swing.preparation import Preparation
-from lightpen.swing.record_header import record_header
-from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
-from lightpen.swing.rig_sighting import seen_by_rig
-from lightpen.swing.rules import (
+from lightpen.swing.capture.rig_sighting import seen_by_rig
+from lightpen.swing.capture.rules import (
     Transition,
     advance_swing,
     conclude,
@@ -57,13 +52,18 @@ from lightpen.swing.rules import (
     resume,
     stillness,
 )
-from lightpen.swing.state import (
+from lightpen.swing.capture.state import (
     Phase,
     SwingEvent,
     SwingEventKind,
     SwingSetup,
     SwingState,
 )
+from lightpen.swing.failed_swing import failed_swing
+from lightpen.swing.operator_presence import OperatorPresence
+from lightpen.swing.preparation import Preparation
+from lightpen.swing.record_header import record_header
+from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
 from lightpen.swing.status import Activity, SwingListener, SwingStatus
 from lightpen.swing.swing_recorder import SwingRecorder
 from lightpen.swing_messages import Code

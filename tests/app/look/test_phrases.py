@@ -7,7 +7,7 @@ import pytest
 
 from lightpen.messages import CATALOGUE, Message, message
 from lightpen.model.posture import Posture
-from lightpen.swing.state import Pause, Phase
+from lightpen.swing.capture.state import Pause, Phase
 from lightpen.swing_messages import (
     FOLLOW_ARROW,
     HOLD_STILL,

@@ -15,9 +15,9 @@ from lightpen.cameras.clock import SkippingClock
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.hand import Operator
+from lightpen.swing.capture.state import Phase, SwingEventKind, SwingState
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.state import Phase, SwingEventKind, SwingState
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
 

@@ -30,7 +30,7 @@ from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.reading import open_record
 from lightpen.simulator.samples import SAMPLE_PENS
 from lightpen.streaming.server import LOOPBACK, PoseStream, StreamPlace
-from lightpen.swing.state import Phase, SwingEventKind
+from lightpen.swing.capture.state import Phase, SwingEventKind
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station

@@ -16,7 +16,7 @@ from lightpen.simulator.follower import (
 )
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.swings import paper_camera, paper_pen
-from lightpen.swing.state import Phase, SwingSetup, SwingState, start_swing
+from lightpen.swing.capture.state import Phase, SwingSetup, SwingState, start_swing
 from lightpen.swing_messages import HOLD_STILL, SEAT_TIP, SWING_TO_SEAT
 
 ASKED = Posture(tilt=0.3, direction=2.0, turn=0.1)

@@ -31,9 +31,8 @@ from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP, paper_camera
-from lightpen.swing.resuming import resume_swing
-from lightpen.swing.rules import Transition
-from lightpen.swing.state import (
+from lightpen.swing.capture.rules import Transition
+from lightpen.swing.capture.state import (
     Phase,
     SwingEvent,
     SwingEventKind,
@@ -41,6 +40,7 @@ from lightpen.swing.state import (
     SwingState,
     start_swing,
 )
+from lightpen.swing.resuming import resume_swing
 from lightpen.swing.swing_recorder import capture_image
 
 FRAME_RATE = 10.0  # 1/s: half of the usual one, as looking at an image takes long

@@ -15,9 +15,9 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
+from lightpen.swing.capture.kept_images import keep, none_kept
+from lightpen.swing.capture.state import SwingSetup
 from lightpen.swing.failed_swing import FailedSwing, failed_swing
-from lightpen.swing.kept_images import keep, none_kept
-from lightpen.swing.state import SwingSetup
 from lightpen.swing_messages import Code
 
 CAMERA, PEN = paper_camera(), paper_pen()

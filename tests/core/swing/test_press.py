@@ -11,7 +11,7 @@ from lightpen.record.results.acceptance import accept
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.solving import solve_record
-from lightpen.swing.state import Phase
+from lightpen.swing.capture.state import Phase
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station

@@ -25,9 +25,9 @@ from lightpen.model.origin import Origin
 from lightpen.record.swings.reading import open_record, recorded_origin
 from lightpen.record.swings.recorded_source import source
 from lightpen.record.swings.solving import solve_record
+from lightpen.swing.capture.state import Phase, Progress, SwingEventKind
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.state import Phase, Progress, SwingEventKind
 from lightpen.swing_messages import Code
 
 if TYPE_CHECKING:

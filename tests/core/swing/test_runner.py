@@ -25,8 +25,8 @@ from lightpen.record.swings.reading import DISCARDED, IMAGES, open_record
 from lightpen.record.swings.solving import solve_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.samples import SAMPLE_PENS
+from lightpen.swing.capture.state import Pause, Phase, SwingEventKind
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.state import Pause, Phase, SwingEventKind
 from lightpen.swing_messages import Code
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ import pytest
 
 from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.reading import DISCARDED, IMAGES, open_record
+from lightpen.swing.capture.state import Phase
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput, Preparation
-from lightpen.swing.state import Phase
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station

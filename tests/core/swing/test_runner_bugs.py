@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from lightpen.record.swings.reading import open_record
+from lightpen.swing.capture.state import Phase
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.state import Phase
 from lightpen.swing.status import Activity
 
 if TYPE_CHECKING:

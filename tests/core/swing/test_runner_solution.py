@@ -22,10 +22,10 @@ from lightpen.record.swings.reading import (
     recorded_limits,
 )
 from lightpen.record.swings.solving import Solution, record_inputs, solve_record
+from lightpen.swing.capture.rules import stillness
+from lightpen.swing.capture.state import Phase, SwingEventKind
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.rules import stillness
 from lightpen.swing.runner import SwingRunner
-from lightpen.swing.state import Phase, SwingEventKind
 from lightpen.swing.status import Activity
 from lightpen.swing_messages import Code
 

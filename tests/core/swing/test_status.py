@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from lightpen.swing.capture.rules import pause
+from lightpen.swing.capture.state import Pause, Phase, SwingState, start_swing
 from lightpen.swing.preparation import Preparation
-from lightpen.swing.rules import pause
-from lightpen.swing.state import Pause, Phase, SwingState, start_swing
 from lightpen.swing.status import Activity, SwingStatus
 
 

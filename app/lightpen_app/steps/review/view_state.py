@@ -10,7 +10,7 @@ from lightpen.messages import Message
 from lightpen.model.origin import Origin
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
-from lightpen.swing.state import Phase
+from lightpen.swing.capture.state import Phase
 from lightpen.swing.status import Activity, SwingStatus
 from lightpen.swing_messages import Code
 from lightpen_app.look.grades import GRADE_MARKS

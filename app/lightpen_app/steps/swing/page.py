@@ -5,8 +5,8 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.cameras.worker_events import Connection
+from lightpen.swing.capture.state import SwingEvent, SwingEventKind
 from lightpen.swing.image_sources import SourceKind
-from lightpen.swing.state import SwingEvent, SwingEventKind
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import first_missing
 from lightpen_app.look.sounds import Sound, Sounds

@@ -9,10 +9,10 @@ from PySide6.QtCore import QCoreApplication, QObject
 
 from lightpen.cameras.worker_events import Connection
 from lightpen.model.limits import SwingLimits
-from lightpen.swing.kept_images import AcceptedImages
-from lightpen.swing.rules import stillness
-from lightpen.swing.shortfall import Shortfall, measure_shortfall, missing
-from lightpen.swing.state import Pause, Phase, SwingEventKind
+from lightpen.swing.capture.kept_images import AcceptedImages
+from lightpen.swing.capture.rules import stillness
+from lightpen.swing.capture.shortfall import Shortfall, measure_shortfall, missing
+from lightpen.swing.capture.state import Pause, Phase, SwingEventKind
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.phrases import phrase
 from lightpen_app.look.sounds import Sound

@@ -6,9 +6,9 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from lightpen.arrays import FloatArray
-from lightpen.swing.kept_images import AcceptedImages
-from lightpen.swing.seat import tip_offsets
-from lightpen.swing.state import SwingState
+from lightpen.swing.capture.kept_images import AcceptedImages
+from lightpen.swing.capture.seat import tip_offsets
+from lightpen.swing.capture.state import SwingState
 from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.quantities import MICROMETRES
 from lightpen_app.look.theme import GRID

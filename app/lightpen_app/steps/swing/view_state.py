@@ -14,9 +14,9 @@ from lightpen.messages import Message, message
 from lightpen.model.origin import Origin
 from lightpen.model.posture import Posture, posture_of
 from lightpen.simulator.follower import FIRST_LEAN
-from lightpen.swing.rules import COUNTDOWN, has_just_slipped
-from lightpen.swing.shortfall import Shortfall, out_of_reach, turn_range
-from lightpen.swing.state import Pause, Phase, SwingSetup, SwingState
+from lightpen.swing.capture.rules import COUNTDOWN, has_just_slipped
+from lightpen.swing.capture.shortfall import Shortfall, out_of_reach, turn_range
+from lightpen.swing.capture.state import Pause, Phase, SwingSetup, SwingState
 from lightpen.swing_messages import SHOW_PEN, Code
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import (

@@ -59,6 +59,8 @@ from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import swing_from_postures
 from lightpen.simulator.view import still_view
+from lightpen.swing.capture.shortfall import N_MORE
+from lightpen.swing.capture.state import SwingState
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import (
@@ -67,8 +69,6 @@ from lightpen.swing.resuming import (
     read_resumable,
     recorded_setup,
 )
-from lightpen.swing.shortfall import N_MORE
-from lightpen.swing.state import SwingState
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone, colors_of
 from lightpen_app.print_report.preview import PrintReportWindow

@@ -29,9 +29,9 @@ from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, Record, open_record
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
+from lightpen.swing.capture.state import Pause, Phase, SwingState
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen.swing.resuming import Resumable, read_for_more
-from lightpen.swing.state import Pause, Phase, SwingState
 from lightpen_app.look.phrases import grade_text, phrase
 from lightpen_app.look.sounds import Sound
 from lightpen_app.shell.main_window import MainWindow

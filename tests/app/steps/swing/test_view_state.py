@@ -10,8 +10,8 @@ from lightpen.estimation.reports.verdict import Grade, Verdict
 from lightpen.messages import message
 from lightpen.model.limits import SwingLimits
 from lightpen.simulator.swings import paper_camera, paper_pen
-from lightpen.swing.shortfall import measure_shortfall
-from lightpen.swing.state import (
+from lightpen.swing.capture.shortfall import measure_shortfall
+from lightpen.swing.capture.state import (
     Pause,
     Phase,
     Progress,

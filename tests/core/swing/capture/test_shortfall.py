@@ -19,8 +19,8 @@ from lightpen.simulator.swings import (
     swing_from_postures,
     swing_poses,
 )
-from lightpen.swing.kept_images import kept_before
-from lightpen.swing.shortfall import (
+from lightpen.swing.capture.kept_images import kept_before
+from lightpen.swing.capture.shortfall import (
     N_MORE,
     guided,
     limits_for_more,
@@ -31,7 +31,7 @@ from lightpen.swing.shortfall import (
     out_of_reach,
     turn_range,
 )
-from lightpen.swing.state import SwingSetup, SwingState, start_swing
+from lightpen.swing.capture.state import SwingSetup, SwingState, start_swing
 from lightpen.swing_messages import SIDES, Code
 
 CAMERA, PEN = paper_camera(), paper_pen()

@@ -20,7 +20,7 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.swing.kept_images import (
+from lightpen.swing.capture.kept_images import (
     AcceptedImages,
     distance_unit,
     keep,

@@ -15,7 +15,7 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_from_postures,
 )
-from lightpen.swing.seat import fit_seat, tip_distances, tip_offsets
+from lightpen.swing.capture.seat import fit_seat, tip_distances, tip_offsets
 
 CAMERA, PEN = paper_camera(), paper_pen()
 

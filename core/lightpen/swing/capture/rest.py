@@ -8,9 +8,9 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.pivot.pivot import outlier_distance
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
 from lightpen.model.pen import Pen
-from lightpen.swing.kept_images import distance_unit
-from lightpen.swing.seat import Seat, fit_seat, tip_distances, tip_offsets
-from lightpen.swing.state import RecentDetection, SwingState
+from lightpen.swing.capture.kept_images import distance_unit
+from lightpen.swing.capture.seat import Seat, fit_seat, tip_distances, tip_offsets
+from lightpen.swing.capture.state import RecentDetection, SwingState
 
 BATCH = 1.0  # s, of images in which the tip must rest
 FULL = 0.8  # of a batch, that its images must span

@@ -24,8 +24,8 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.swing.kept_images import kept_before
-from lightpen.swing.rules import (
+from lightpen.swing.capture.kept_images import kept_before
+from lightpen.swing.capture.rules import (
     Transition,
     advance_swing,
     conclude,
@@ -36,9 +36,9 @@ from lightpen.swing.rules import (
     start_again,
     stillness,
 )
-from lightpen.swing.seat import Seat
-from lightpen.swing.shortfall import missing
-from lightpen.swing.state import (
+from lightpen.swing.capture.seat import Seat
+from lightpen.swing.capture.shortfall import missing
+from lightpen.swing.capture.state import (
     Pause,
     Phase,
     SwingEvent,

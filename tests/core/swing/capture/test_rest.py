@@ -15,8 +15,19 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_from_postures,
 )
-from lightpen.swing.rest import in_place, offset, rests_in_place, seat_of, steady_seat
-from lightpen.swing.state import RecentDetection, SwingSetup, SwingState, start_swing
+from lightpen.swing.capture.rest import (
+    in_place,
+    offset,
+    rests_in_place,
+    seat_of,
+    steady_seat,
+)
+from lightpen.swing.capture.state import (
+    RecentDetection,
+    SwingSetup,
+    SwingState,
+    start_swing,
+)
 
 CAMERA, PEN = paper_camera(), paper_pen()
 STILL = np.zeros((21, 3))

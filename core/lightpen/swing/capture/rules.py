@@ -21,11 +21,27 @@ from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
 from lightpen.messages import Message, message
 from lightpen.model.posture import angles_between, posture_of
-from lightpen.swing.kept_images import AcceptedImages, keep, none_kept, without_slipped
-from lightpen.swing.rest import BATCH, in_place, offset, rests_in_place, steady_seat
-from lightpen.swing.seat import Seat
-from lightpen.swing.shortfall import guided, is_upright, measure_shortfall, oriented
-from lightpen.swing.state import (
+from lightpen.swing.capture.kept_images import (
+    AcceptedImages,
+    keep,
+    none_kept,
+    without_slipped,
+)
+from lightpen.swing.capture.rest import (
+    BATCH,
+    in_place,
+    offset,
+    rests_in_place,
+    steady_seat,
+)
+from lightpen.swing.capture.seat import Seat
+from lightpen.swing.capture.shortfall import (
+    guided,
+    is_upright,
+    measure_shortfall,
+    oriented,
+)
+from lightpen.swing.capture.state import (
     Pause,
     Phase,
     RecentDetection,
@@ -177,7 +193,7 @@ def start_again(
     Parameters
     ----------
     kept : AcceptedImages
-        See `lightpen.swing.kept_images.kept_before`.
+        See `lightpen.swing.capture.kept_images.kept_before`.
     next_number : int
         Of the next image in the swing's record.
     time : float

@@ -5,7 +5,7 @@
                                                 v
                                              SOLVING -> VERDICT
 
-`lightpen.swing.rules` has the rules.
+`lightpen.swing.capture.rules` has the rules.
 """
 
 from collections import Counter
@@ -27,13 +27,13 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.posture import Posture
 from lightpen.model.rig import Rig, rig_of
-from lightpen.swing.kept_images import (
+from lightpen.swing.capture.kept_images import (
     MIN_JOINT,
     AcceptedImages,
     first_images,
     none_kept,
 )
-from lightpen.swing.seat import Seat
+from lightpen.swing.capture.seat import Seat
 from lightpen.swing_messages import SHOW_PEN, Code
 
 N_TRACED = 12  # estimates of a swing that is gone on with

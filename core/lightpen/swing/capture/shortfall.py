@@ -18,9 +18,9 @@ from lightpen.model.posture import (
     rotations_of,
     turns_of,
 )
-from lightpen.swing.guidance import GuidanceInput, next_posture, visible_fields
-from lightpen.swing.seat import Seat
-from lightpen.swing.state import SwingSetup, SwingState
+from lightpen.swing.capture.guidance import GuidanceInput, next_posture, visible_fields
+from lightpen.swing.capture.seat import Seat
+from lightpen.swing.capture.state import SwingSetup, SwingState
 from lightpen.swing_messages import UNKNOWN, Code, too_little_tilt
 
 UPRIGHT_HELD = 0.5  # s

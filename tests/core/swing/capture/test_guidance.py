@@ -19,7 +19,7 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.swing.guidance import (
+from lightpen.swing.capture.guidance import (
     TILTS,
     TURNS,
     GuidanceInput,

@@ -20,8 +20,8 @@ from lightpen.model.coverage import MIN_SPREAD, posture_spread
 from lightpen.model.pen import Pen
 from lightpen.model.quantiles import chi_quantile
 from lightpen.model.rig import Rig
-from lightpen.swing.rig_sighting import fit_moments
-from lightpen.swing.seat import Seat, fit_seat, tip_distances
+from lightpen.swing.capture.rig_sighting import fit_moments
+from lightpen.swing.capture.seat import Seat, fit_seat, tip_distances
 
 MIN_JOINT = 8  # images of the first joint fit
 LEAVING = 0.01  # chance that an image is left out though the tip rests
