@@ -22,6 +22,7 @@ import lightpen_app
 
 USUAL = "C"  # in which the demo is played by tests/app/test_demo.py
 LETTERS, NUMBERS, DATES = "tr_TR", "fa_IR", "de_DE"  # each unusual in its own way
+SOURCE = Path("/usr/share/i18n/locales") / LETTERS
 
 DEMO = """
 import sys
@@ -178,7 +179,10 @@ def test_a_property_that_is_set_by_keyword_is_noticed() -> None:
     ]
 
 
-@pytest.mark.skipif(not shutil.which("localedef"), reason="needs a Turkish locale")
+@pytest.mark.skipif(
+    not (shutil.which("localedef") and SOURCE.exists()),
+    reason="needs localedef and the source of a Turkish locale (Debian: locales)",
+)
 @pytest.mark.skipif(PySide6.__version_info__ >= (6, 12), reason="PySide6 6.12 mends it")
 def test_the_turkish_locale_of_these_tests_has_what_made_the_window_fail(
     environment_of: EnvironmentOf,
