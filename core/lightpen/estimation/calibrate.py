@@ -31,6 +31,8 @@ from lightpen.estimation.bundle.disc_diameter import read_diameter
 from lightpen.estimation.bundle.effect_findings import FoundEffect, found_effects
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import Priors, priors_of, thermal_growth
+from lightpen.estimation.bundle.self_check import SelfCheck, check_prediction
+from lightpen.estimation.bundle.tip_frames import TipFrames, tip_frames
 from lightpen.estimation.contact.camera_motion import (
     CameraPath,
     SteadyImages,
@@ -58,8 +60,6 @@ from lightpen.estimation.rigs.initial_extrinsics import find_initial_extrinsics
 from lightpen.estimation.rigs.rig_conventions import require_usual_rig
 from lightpen.estimation.rigs.rig_poses import RigPoses, join_poses
 from lightpen.estimation.rigs.synchrony import TimeLag
-from lightpen.estimation.self_check import SelfCheck, check_prediction
-from lightpen.estimation.tip_frames import TipFrames, tip_frames
 from lightpen.estimation.uncertainty.budget import (
     Budget,
     SplitHalfCheck,

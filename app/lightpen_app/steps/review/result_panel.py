@@ -7,8 +7,8 @@ import numpy as np
 from PySide6.QtWidgets import QFrame, QSizePolicy, QWidget
 
 from lightpen.arrays import FloatArray
+from lightpen.estimation.bundle.self_check import SelfCheck
 from lightpen.estimation.reports.verdict import halves_agree
-from lightpen.estimation.self_check import SelfCheck
 from lightpen.local_time import local_time
 from lightpen.model.coverage import Coverage
 from lightpen.record.results.assessment import SwingAssessment

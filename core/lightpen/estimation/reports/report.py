@@ -8,6 +8,8 @@ from msgspec import structs
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import EXACT_SIGMA
+from lightpen.estimation.bundle.self_check import SelfCheck
+from lightpen.estimation.bundle.tip_frames import TipFrames
 from lightpen.estimation.calibrate import Calibration, CameraImages
 from lightpen.estimation.reports.calibration_record import (
     AdjustedParameter,
@@ -42,8 +44,6 @@ from lightpen.estimation.reports.calibration_record import (
 from lightpen.estimation.reports.methods import METHODS, Method, result_of
 from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
 from lightpen.estimation.reports.verdict import judge
-from lightpen.estimation.self_check import SelfCheck
-from lightpen.estimation.tip_frames import TipFrames
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR, ContributionName
 from lightpen.estimation.uncertainty.distance import distance_repeatability
 from lightpen.estimation.uncertainty.instrument import Instrument

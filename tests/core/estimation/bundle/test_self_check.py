@@ -10,11 +10,11 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.linearised import BundleState, views_at
+from lightpen.estimation.bundle.self_check import SelfCheck, check_prediction
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import judge
-from lightpen.estimation.self_check import SelfCheck, check_prediction
 from lightpen.formats.observation_files import Centers
 from lightpen.model.limits import SwingLimits
 from lightpen.simulator.swings import (
