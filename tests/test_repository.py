@@ -3,6 +3,8 @@
 import re
 import shutil
 import subprocess
+import sys
+from importlib.metadata import metadata
 from pathlib import Path
 
 import pytest
@@ -54,7 +56,8 @@ def test_a_release_is_of_a_tag_approved_signed_checked_and_summed() -> None:
     text = (ROOT / ".github" / "workflows" / "release.yml").read_text("utf-8")
 
     assert re.search(r'^on:\n  push:\n    tags: \["v\*"\]\n\n', text, re.MULTILINE)
-    steps = ["environment: release", "LIGHTPEN_SIGN", "check.py", "dossier.py"]
+    steps = ["build_deb.py", "check_deb.sh", "environment: release", "LIGHTPEN_SIGN"]
+    steps += ["check.py", "dossier.py"]
     places = [text.find(step) for step in [*steps, "SHA256SUMS", "--verify-tag"]]
     assert -1 not in places
     assert places == sorted(places)
@@ -76,6 +79,30 @@ def test_the_version_to_cite_is_that_of_the_program() -> None:
     stated = (ROOT / "CITATION.cff").read_text("utf-8")
 
     assert f"\nversion: {__version__}\n" in stated
+
+
+def test_the_package_states_both_licences_and_what_it_runs_on() -> None:
+    stated = metadata("lightpen")
+
+    assert stated["License-Expression"] == "MIT AND OFL-1.1"
+    assert stated["Requires-Python"] == ">=3.11"
+    assert {f"Programming Language :: Python :: 3.{n}" for n in (11, 12, 13)} <= set(
+        stated.get_all("Classifier") or ()
+    )
+
+
+@pytest.mark.parametrize("name", ["run", "run.ps1"])
+def test_a_python_of_32_bits_is_not_used_and_named(name: str) -> None:
+    script = (ROOT / name).read_text("utf-8")
+    (condition,) = re.findall(r"^ *.*?(import ensurepip[^']*)'", script, re.MULTILINE)
+    words = [sys.executable, "-c"]
+
+    usual = subprocess.run([*words, condition], check=False).returncode
+    narrow = f"import sys; sys.maxsize = 2**31 - 1\n{condition}"
+    small = subprocess.run([*words, narrow], check=False).returncode
+
+    assert (usual, small) == (0, 1)
+    assert "32-bit" in script
 
 
 def test_no_profile_of_a_user_changes_what_powershell_runs() -> None:

@@ -603,7 +603,7 @@ def _use_all_windows(walker: "Walker", title: str) -> None:
 
 
 @pytest.mark.slow
-def test_about_tells_the_versions(prepared: "Walker") -> None:
+def test_about_tells_the_versions_and_licences(prepared: "Walker") -> None:
     reported: list[str] = []
 
     def read_and_close() -> None:
@@ -619,7 +619,8 @@ def test_about_tells_the_versions(prepared: "Walker") -> None:
     prepared.choose("About Lightpen")
     timer.stop()
 
-    assert any("PySide6" in text for text in reported)
+    for part in ("PySide6 ", "Qt, PySide6 and psycopg: LGPL 3", "FFmpeg", "Noto Sans"):
+        assert any(part in text for text in reported), part
 
 
 @pytest.mark.slow

@@ -56,6 +56,11 @@ class Walk(QObject):
     -------
     ended()
         The tip is accepted.
+
+    Attributes
+    ----------
+    doing : str
+        What it waits for, on which page, and why the main button cannot be pressed.
     """
 
     ended = Signal()
@@ -66,6 +71,7 @@ class Walk(QObject):
         self._workbench = wizard.workbench
         self._swing = swing
         self._next: Callable[[], bool] = self._open
+        self.doing = ""
         self._timer = QTimer(self)
         self._timer.setInterval(TICK_MS)
         self._timer.timeout.connect(self._on_tick)
@@ -75,6 +81,9 @@ class Walk(QObject):
         self._timer.start()
 
     def _on_tick(self) -> None:
+        page = self._window.page()
+        why_not = page.main_action().why_not
+        self.doing = f"{self._next.__name__} on the page {page.key}: {why_not}"
         if self._next():
             self._timer.stop()
             self.ended.emit()
@@ -178,6 +187,7 @@ class Desk:
         self._files = folder / "files"
         self._settings = folder / "lightpen.json"
         self._record = self._data / RECORDS / "self-test"
+        self._walk: Walk | None = None
         if not has_display():
             os.environ["QT_QPA_PLATFORM"] = "offscreen"
         self._application = make_application(sys.argv[:1])
@@ -221,7 +231,7 @@ class Desk:
         around = SourceEnvironment(SCENE, SkippingClock(rests=True))
         settings = Settings(self._settings)
         wizard = Wizard(self._application, make_pages, settings, self._data, around)
-        walk = Walk(wizard, self._record)
+        self._walk = walk = Walk(wizard, self._record)
         faults: list[str] = []
 
         def end() -> None:
@@ -250,6 +260,10 @@ class Desk:
         if faults:
             raise SelfTestError(" ".join(faults))
         return "opened, finished, reviewed and accepted"
+
+    def doing(self) -> str:
+        """Return what the walk through the wizard waits for; it may run or hang."""
+        return "" if self._walk is None else self._walk.doing
 
     def tested_result(self) -> str:
         """Return pen, folder and grade of the accepted result, which is current."""

@@ -5,7 +5,7 @@ import platform
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -49,7 +49,15 @@ class Tip:
 
 @dataclass
 class Report:
-    """Grows with each check, and can be written at any time, from any thread."""
+    """Grows with each check, and can be written at any time, from any thread.
+
+    Attributes
+    ----------
+    last_lines, doing : callable
+        Return the last lines of the log, and what is done just now.
+    threads : mapping of str to sequence of str
+        Where each thread was when the test was given up, by its name.
+    """
 
     file: Path
     checks: list[Check] = field(default_factory=list)
@@ -58,6 +66,8 @@ class Report:
     versions: dict[str, str] = field(default_factory=dict)
     is_complete: bool = False
     last_lines: Callable[[], Sequence[str]] = tuple
+    doing: Callable[[], str] = str
+    threads: Mapping[str, Sequence[str]] = field(default_factory=dict)
     _lock: Lock = field(default_factory=Lock)
 
     @property
@@ -94,6 +104,8 @@ class Report:
             "tip": None if self.tip is None else asdict(self.tip),
             "screenshot": self.screenshot,
             "log": list(self.last_lines()),
+            "doing": self.doing(),
+            "threads": self.threads,
         }
         with self._lock:
             text = json.dumps(entries, indent=1, ensure_ascii=False)

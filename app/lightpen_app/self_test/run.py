@@ -7,12 +7,14 @@ import importlib
 import logging
 import os
 import sys
+import threading
 from contextlib import ExitStack
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Timer
+from traceback import extract_stack
 
 from lightpen_app.self_test.report import Report, SelfTestError, Tip
 
@@ -103,6 +105,7 @@ def _test_all(report: Report, folder: Path, stack: ExitStack) -> None:
     with report.check("record") as found:
         found.append(desk.tested_record())
     with report.check("wizard") as found:
+        report.doing = desk.doing
         picture = report.file.with_suffix(".png")
         found.append(desk.walked_wizard(picture))
         report.screenshot = str(picture)
@@ -140,6 +143,11 @@ def _say(text: str) -> None:
 
 
 def _give_up(report: Report) -> None:
-    """End a process that hangs, from the thread of the watchdog."""
+    """End a process that hangs, from the thread of the watchdog, and report where."""
+    names = {thread.ident: thread.name for thread in threading.enumerate()}
+    report.threads = {
+        names.get(ident, str(ident)): [str(each) for each in extract_stack(frame)]
+        for ident, frame in sys._current_frames().items()
+    }
     report.write()
     os._exit(HUNG)
