@@ -192,7 +192,7 @@ class Wizard(QObject):
         self._stream()
 
     def _stream(self) -> None:
-        """Let others follow the pen where that is chosen."""
+        """Start the stream of pen poses if it is enabled."""
         now = self._preferences
         place = StreamPlace(now.stream_address, now.stream_port)
         self.workbench.streaming.want(place if now.streams else None)

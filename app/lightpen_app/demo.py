@@ -23,7 +23,7 @@ LONGEST_S = 200.0  # on a page, s; a slow machine takes a minute for the swing
 
 
 class Demo(QObject):
-    """Goes on from each page when its step is done, swings the pen, measures a part.
+    """Leaves each page when its step is complete, swings the pen, measures a part.
 
     Parameters
     ----------

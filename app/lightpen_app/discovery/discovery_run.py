@@ -41,7 +41,7 @@ N_USUAL, N_MOST = 300, 600  # images
 
 @dataclass(frozen=True, eq=False)
 class DiscoveryState:
-    """A swing without files at one moment.
+    """State of a swing without files.
 
     Attributes
     ----------
@@ -314,7 +314,7 @@ class DiscoveryRun(QObject):
         self._become(is_saved=True)
 
     def _on_selected(self) -> None:
-        """Announce the files once the first of the recorded images is there."""
+        """Announce the files with the first recorded image."""
         now = self._workbench.selection.preparation
         if self._state.is_saved and now.image_size is not None:
             self._become(is_saved=False)

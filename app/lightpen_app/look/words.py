@@ -29,7 +29,7 @@ def breakable(text: str) -> str:
 
 
 def unbroken(text: str) -> str:
-    """Return a text as it was before `breakable`."""
+    """Undo `breakable`."""
     return text.replace(BREAK, "")
 
 

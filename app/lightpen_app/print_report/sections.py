@@ -213,7 +213,7 @@ def laboratory_blocks(laboratory: Laboratory | None) -> Iterable[Block]:
 
 
 def traced_blocks(traced: Sequence[TracedItem]) -> Iterable[Block]:
-    """Return the certificates of what was measured with."""
+    """Return the certificates of the equipment used."""
     kinds = {
         ItemKind.CAMERA: translate("paper", "Camera (intrinsics)"),
         ItemKind.PEN: translate("paper", "Pen (LED measurement)"),

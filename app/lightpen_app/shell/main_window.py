@@ -164,7 +164,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._focus_page()
 
     def pages(self) -> tuple[Page, ...]:
-        """Return the pages in the order of the steps; make what is not made yet."""
+        """Return the pages in the order of the steps; create missing ones."""
         while self._make_page():
             pass
         return tuple(self._pages)

@@ -88,7 +88,7 @@ class OptionsMenu(Translated, QMenu):
         self._choose(data_folder=folder)
 
     def set_stream(self, is_on: bool, place: StreamPlace) -> None:
-        """Let others follow the pen from now on, or not."""
+        """Start or stop the stream of pen poses."""
         self._choose(
             streams=is_on, stream_address=place.address, stream_port=place.port
         )

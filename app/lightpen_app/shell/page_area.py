@@ -140,7 +140,7 @@ class PageArea(QFrame):
         return self._notice.text(), self._title.text(), self._lead.text()
 
     def add_page(self, page: QWidget) -> None:
-        """Keep a page that is shown later."""
+        """Add a page without showing it."""
         _let_ask(page, False)
         self._stack.addWidget(page)
 

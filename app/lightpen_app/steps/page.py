@@ -149,7 +149,7 @@ class Page(Translated, QWidget):
         """Begin: the page is now shown."""
 
     def left(self) -> None:
-        """Stop what only a shown page does; another page or none is shown next."""
+        """Stop everything that only a visible page does."""
 
     def unsaved(self) -> str:
         """Return the question to ask before the window closes, or nothing."""

@@ -26,7 +26,7 @@ class SimulatorControls(Translated, QFrame):
         live.connection_changed.connect(self._follow_connection)
 
     def _follow_connection(self) -> None:
-        """Show it for a simulated operator; each opened camera has its own."""
+        """Show the controls for a simulated operator; each camera has its own."""
         self.setVisible(self._live.operator is not None)
 
     def _command(self, act: Callable[[Operator], object]) -> None:

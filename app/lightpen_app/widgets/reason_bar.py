@@ -28,7 +28,7 @@ def n_letters(text: str) -> int:
 
 
 def usual_reasons() -> tuple[str, ...]:
-    """Return why a result that needs checking may be accepted."""
+    """Return the usual reasons for accepting a result that needs checking."""
     translate = QCoreApplication.translate
     return (
         translate("ReasonBar", "The tip was replaced or refitted."),

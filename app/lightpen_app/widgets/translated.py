@@ -19,7 +19,7 @@ class Translated(_Base):
     """
 
     def _retranslate(self) -> None:
-        """Set every text."""
+        """Set all texts in the current language."""
         raise NotImplementedError
 
     @override

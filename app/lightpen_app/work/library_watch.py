@@ -135,7 +135,7 @@ class LibraryWatch(QObject):
         job.start()
 
     def look_at_shared(self) -> None:
-        """Tell what was taken over from other stations, and read it."""
+        """Report changes copied from other stations, and read them."""
         shared = self._logbook.shared()
         if len(shared) == self._n_shared:
             return

@@ -53,12 +53,12 @@ class PenFiles(QObject):
         library.changed.connect(self._on_library_changed)
 
     def doubt(self) -> str:
-        """Return why the file in use is not that of the pen, a sentence, or nothing."""
+        """Return a sentence if the file in use is for another pen, or nothing."""
         now = self._selection.preparation
         return "" if now.pen_file is None else self.doubt_about(now.pen_file)
 
     def doubt_about(self, file: PenFile) -> str:
-        """Return why a file is not that of the pen that is chosen, or nothing."""
+        """Return a sentence if a file is for another pen, or nothing."""
         pen, library = self._selection.preparation.names.pen, self._library.library
         if _is_simulated(self._selection.preparation) or not file.sha256 or not pen:
             return ""

@@ -31,7 +31,7 @@ class SavePlace:
     now: Callable[[], datetime]
 
     def folder(self) -> Path:
-        """Return the folder chosen last; that of the user's documents at first."""
+        """Return the last folder; at first the user's documents."""
         chosen = self.settings.export_folder()
         if chosen:
             return Path(chosen)

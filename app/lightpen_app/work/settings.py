@@ -70,7 +70,7 @@ Group = TypeVar("Group", Preferences, Station, CameraSettings, DueRule, CameraFi
 
 
 class Settings(QObject):
-    """What was chosen; a value that is missing or makes no sense gives the default.
+    """The settings; missing and invalid values give the default.
 
     Signals
     -------

@@ -71,7 +71,7 @@ class Streaming(QObject):
         return self._fault
 
     def want(self, place: StreamPlace | None) -> None:
-        """Let others listen at a place; nowhere if it is None."""
+        """Stream to an address; None stops the stream."""
         self._wanted = place
         self._follow()
 

@@ -40,7 +40,7 @@ class _Accepted(Struct):
 
 
 def check_notes(database: Database, data: Path) -> Iterator[Message]:
-    """Yield what is to be known of the archive of a data folder.
+    """Yield notes on the archive of a data folder.
 
     Files without entries, a missing seal, keys that nobody approved, clocks that were
     set back, and tips that were accepted before they were computed.

@@ -91,7 +91,7 @@ class Database:
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
-        """Write all of something or nothing of it; others wait meanwhile."""
+        """Write within one exclusive transaction."""
         options = self.engine.execution_options(is_writing=True)
         with self._used(options) as connection:
             yield connection

@@ -27,7 +27,7 @@ def server_address() -> str:
 
 
 class LazyLogbook:
-    """Costs nothing until then, so that the start of the program need not wait for it.
+    """Logbook that is opened at its first use, so that the program starts sooner.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class LazyLogbook:
         return () if logbook is None else logbook.shared
 
     def close(self) -> None:
-        """Let go of the archive; nothing is entered any more.
+        """Close the archive; later entries are refused.
 
         Raises
         ------

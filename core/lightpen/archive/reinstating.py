@@ -57,7 +57,7 @@ def due_doubts(
     now: datetime,
     rule: DueRule,
 ) -> Iterator[Message]:
-    """Yield what is overdue of the tip of an entry.
+    """Yield the overdue items of the tip of an entry.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ class ArchivePlace:
 
 
 def with_entry(file: CalibrationFile) -> CalibrationFile:
-    """Return a calibration with whether it is entered, if anybody accepted it.
+    """Return a calibration that states, if accepted, whether it is entered.
 
     Raises
     ------

@@ -86,7 +86,7 @@ def read_seal(archive: Path) -> Seal | None:
 
 
 def lost_heads(database: Database, seal: Seal) -> tuple[SealedHead, ...]:
-    """Return the last entries of then that an archive does not hold any more."""
+    """Return the sealed last entries that are missing in an archive."""
     with database.reading() as connection:
         return tuple(
             head

@@ -50,7 +50,7 @@ class WebcamFeatures:
         raise setting_refused(self._place, name)
 
     def choose(self, name: str, entry: str) -> None:
-        """Take the only pixel format there is."""
+        """Choose the only pixel format."""
 
     def switch_on(self, name: str) -> None:
         """Raise `ConfigError`."""

@@ -314,7 +314,7 @@ class CameraWorker:
             self._on_event(FaultRaised(_too_slow(self._n_missed, self._n_offered)))
 
     def _report_keeping_up(self) -> None:
-        """Report that no image is skipped any more."""
+        """Report that images are no longer skipped."""
         if not self._skipping_reported:
             return
         is_slow = is_too_slow(self._n_missed, self._n_offered)

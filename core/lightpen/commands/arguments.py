@@ -108,7 +108,7 @@ def add_pen_options(parser: argparse.ArgumentParser) -> None:
 def add_conditions(
     parser: argparse.ArgumentParser, *names: str, meaning: str = "for the record"
 ) -> None:
-    """Add what was measured of the environment.
+    """Add options for the measured environment.
 
     Parameters
     ----------

@@ -169,7 +169,7 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
 
 
 def _note_unacknowledged(names: Sequence[str]) -> None:
-    """Tell of images that take no part because no journal names them."""
+    """Report images that are excluded because no journal names them."""
     if not names:
         return
     if len(names) == 1:
@@ -184,7 +184,7 @@ def _note_unacknowledged(names: Sequence[str]) -> None:
 
 
 def _note_doubts(camera: Camera, options: argparse.Namespace, name: str = "") -> None:
-    """Tell why the intrinsics of a camera, of a rig if named, may not hold any more."""
+    """Report why the intrinsics of a camera, of a rig if named, may be outdated."""
     for doubt in unmodelled_effects_of(camera, local_now().date(), options.temperature):
         _note(of_camera(name, doubt) if name else doubt)
 

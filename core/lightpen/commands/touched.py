@@ -90,7 +90,7 @@ def add_touch_inputs(parser: argparse.ArgumentParser, tip_help: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredRuns:
-    """The points of all runs, and what they were measured with.
+    """The points of all runs, and the instrument.
 
     Attributes
     ----------

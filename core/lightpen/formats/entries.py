@@ -47,7 +47,7 @@ class Entries:
         return Entries(name, values)
 
     def has(self, *names: str) -> bool:
-        """Return whether an entry is there."""
+        """Return whether an entry exists."""
         return any(_plain(name) in self.values for name in names)
 
     def entry(self, *names: str) -> tuple[str, Tree]:

@@ -144,7 +144,7 @@ class Design:
     def effects(
         self, x: FloatArray, covariance: FloatArray, components: VarianceComponents
     ) -> tuple[FloatArray, FloatArray]:
-        """Return how many effects are known, and their sum of squares.
+        """Return the number of known effects, and their sum of squares.
 
         Both of the points in their plane, out of it, and of each lens.
         """

@@ -160,7 +160,7 @@ class Task:
         self._thread.start()
 
     def cancel(self) -> None:
-        """Stop at the next report; nothing of it is done any more."""
+        """Cancel the work at its next report; its result is dropped."""
         self._cancelled.set()
 
     @property

@@ -250,7 +250,7 @@ def _numbers(columns: int, rows: int, first: int) -> IntArray:
 def _markers_white(
     board: Board, numbers: IntArray, u: FloatArray, v: FloatArray
 ) -> BoolArray:
-    """Tell what is white at places within markers, 0 to 1 along their sides."""
+    """Return the mask of white places within markers, 0 to 1 along their sides."""
     dictionary = marker_dictionary(board)
     n_cells = dictionary.markerSize + 2
     cells = np.stack(

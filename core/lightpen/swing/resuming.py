@@ -92,7 +92,7 @@ def read_resumable(folder: Path) -> Resumable:
 
 
 def read_for_more(folder: Path) -> Resumable:
-    """Read a swing that has all it needs, to capture more images nevertheless.
+    """Read a complete swing, to capture more images.
 
     The record notes it, so that the swing continues likewise when it is interrupted.
 

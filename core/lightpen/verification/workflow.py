@@ -319,7 +319,7 @@ class VerificationWorkflow:
         self._publish(replace(self._status, reading=ReadingState.NOTHING))
 
     def shut_down(self) -> None:
-        """Write what is still queued."""
+        """Write pending records and stop."""
         self._task.drop()
         self._give_up()
         self._write()

@@ -119,7 +119,7 @@ class BoardCalibration(QObject):
         job.start()
 
     def print_board(self, board: Board, path: Path) -> None:
-        """Write a board as a PDF page at true scale, and say so."""
+        """Write a board as a PDF page at true scale, and report it."""
         job = Job(lambda _: write_whole(path, board_page(board)), self)
 
         # Connections

@@ -228,5 +228,5 @@ def sight_message(state: CaptureState) -> StatusMessage | None:
 
 
 def fault_message(message: Message) -> StatusMessage:
-    """Return a message as that of a fault."""
+    """Return a message marked as a fault."""
     return StatusMessage(worded(message), Sign.CROSS, Tone.BAD)

@@ -83,7 +83,7 @@ class BoardPicture(QWidget):
 
 
 def _cells(board: Board) -> tuple[np.ndarray, float]:
-    """Return the middles of what is black, (N, 2), and its side or diameter, mm."""
+    """Return the centres of the black marks, (N, 2), and their side or diameter, mm."""
     if board.kind.is_circles:
         return board.points[:, :2], board.detail
     extra = 0 if board.kind.has_markers else 1

@@ -194,7 +194,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         return StatusMessage(words.format(sent, made_for), Sign.WARNING, Tone.BAD)
 
     def _doubt_message(self, camera: Camera | None) -> StatusMessage:
-        """Return why the file may not hold any more."""
+        """Return why the file may no longer be valid."""
         if camera is None:
             return StatusMessage()
         doubts = unmodelled_effects_of(camera, local_now().date(), serial=self._serial)

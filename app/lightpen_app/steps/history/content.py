@@ -277,7 +277,7 @@ class HistoryContent(Translated, QWidget):
     def _enter(
         self, function: Callable[[Report], T], on_succeeded: Callable[[T], object]
     ) -> None:
-        """Enter something, whatever is done to the archive as a whole meanwhile."""
+        """Enter something, also during operations on the whole archive."""
         job = Job(function, self)
 
         # Connections

@@ -132,7 +132,7 @@ class LedFileControl(QObject):
         before = self._leds.state.draft
 
         def take(opened: OpenedPen) -> None:
-            """Show it, but ask if the table was changed meanwhile."""
+            """Show the file; ask first if the table has unsaved changes."""
             act = partial(self._on_opened, opened)
             if self._leds.state.draft == before:
                 act()

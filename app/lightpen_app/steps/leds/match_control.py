@@ -160,7 +160,7 @@ class MatchControl(QObject):
         return self._panel.doubt_of(match)
 
     def retranslate(self) -> None:
-        """Show what is missing for the detection of the pen."""
+        """Show the missing inputs of the pen detection."""
         preparation = self._selection.preparation
         if not self._live.is_open:
             why = self.tr("No camera is open. See the step Camera.")

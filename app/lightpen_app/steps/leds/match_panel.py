@@ -166,7 +166,7 @@ class MatchPanel(Translated, QGroupBox):
         self._refresh_state()
 
     def set_why_unknown(self, sentence: str) -> None:
-        """Show what is missing for the detection of the pen."""
+        """Show the missing inputs of the pen detection."""
         if sentence != self._why_none:
             self._why_none = sentence
             self._refresh()

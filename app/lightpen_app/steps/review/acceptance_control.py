@@ -11,7 +11,7 @@ from lightpen_app.work.swing_run import SwingRun
 
 
 class AcceptanceControl(QObject):
-    """Asks in the view of Review, and tells the runner what was answered."""
+    """Asks in the view of Review and forwards the answers to the runner."""
 
     def __init__(self, selection: Selection, run: SwingRun, view: ReviewView) -> None:
         super().__init__(view)

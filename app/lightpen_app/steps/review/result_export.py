@@ -71,7 +71,7 @@ class ResultExport(QObject):
         tools.paper_requested.connect(self._show_paper)
 
     def shut_down(self) -> None:
-        """Tell of nothing any more."""
+        """Disconnect from all signals."""
         self._paper.shut_down()
         if self._saving is not None:
             self._saving.cancel()

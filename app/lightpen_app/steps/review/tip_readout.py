@@ -17,7 +17,7 @@ BLANK = ("", "", "")
 
 @dataclass(frozen=True)
 class TipValue:
-    """A point and its uncertainty, with what it is compared with.
+    """A point with uncertainty, and its reference value.
 
     Attributes
     ----------

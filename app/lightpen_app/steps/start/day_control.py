@@ -108,7 +108,7 @@ class DayControl(QObject):
         return MainAction(names[amber.step])
 
     def run_main_action(self) -> None:
-        """Do it."""
+        """Run the action of the main button."""
         amber = self._first_amber()
         if amber is not None and amber.step == "temperature":
             self._view.take_temperature()

@@ -77,7 +77,7 @@ class TemperatureField(NumberField):
 
 
 class DayView(Translated, QWidget):
-    """Shows what a day needs; what is set up once is elsewhere.
+    """Daily settings; the station setup is a view of its own.
 
     Signals
     -------
@@ -187,7 +187,7 @@ class DayView(Translated, QWidget):
     def set_ready(
         self, place: str, items: Sequence[ReadinessItem], *, can_swing: bool
     ) -> None:
-        """Show who is where, and what is ready; offer a swing where not all is."""
+        """Show station, operator and readiness; offer a swing if it is incomplete."""
         self._ready.set_place(place)
         names = (
             *(self.tr("Camera"), self.tr("LEDs")),
@@ -245,7 +245,7 @@ class DayView(Translated, QWidget):
         return cells
 
     def _on_step_requested(self, step: str) -> None:
-        """Lead to a step, or to what is set up on this one."""
+        """Go to a step, or to the setup on this one."""
         if step == "temperature":
             self.take_temperature()
         else:

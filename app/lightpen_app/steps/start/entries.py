@@ -114,7 +114,7 @@ class EntryPresenter(QObject):
             self._selection.set_preparation(replace(now, names=names))
 
     def _on_unknown_declined(self) -> None:
-        """Have the tip chosen again: a barcode was that of another one."""
+        """Ask for the tip again: the barcode belongs to another one."""
         self._take_names()
         now = self._selection.preparation
         self._selection.set_preparation(now.renamed(replace(now.names, tip="")))

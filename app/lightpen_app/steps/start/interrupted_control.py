@@ -95,7 +95,7 @@ class InterruptedControl(QObject):
             probing.refused.connect(self._on_verification_troubled)
 
     def search(self) -> None:
-        """Look for what has no end, once the window is on the screen."""
+        """Search for interrupted swings and verifications in the background."""
         self._searching.start()
 
     def shut_down(self) -> None:
@@ -138,7 +138,7 @@ class InterruptedControl(QObject):
         function: Callable[[Report], T],
         on_succeeded: Callable[[T], None],
     ) -> None:
-        """Do something to one of the list, which waits meanwhile."""
+        """Apply an action to an item; the list is disabled until it ends."""
         self._panel.set_waiting(waiting)
         self._work = Job(function, self)
 
@@ -336,7 +336,7 @@ class InterruptedControl(QObject):
 
 @dataclass(frozen=True, eq=False)
 class Interrupted:
-    """What was found that has no end."""
+    """The interrupted swings and verifications that were found."""
 
     swings: InterruptedSwings
     verifications: tuple[InterruptedVerification, ...]

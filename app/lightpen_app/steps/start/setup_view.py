@@ -17,7 +17,7 @@ from lightpen_app.work.workbench import Workbench
 
 
 class SetupView(Translated, QWidget):
-    """Shows what is set up at a station.
+    """Setup of a station.
 
     Signals
     -------
@@ -85,7 +85,7 @@ class SetupView(Translated, QWidget):
             column.insertWidget(0, self.newcomer)
 
     def set_why_not_done(self, why_not: str) -> None:
-        """Show what is missing for the day page."""
+        """Show the missing inputs of the day page."""
         self._done.set_why_not(why_not)
 
     def _retranslate(self) -> None:

@@ -137,7 +137,7 @@ def _sweep_record(folder: Path) -> None:
 
 
 def _has_never_begun(folder: Path) -> bool:
-    """Return whether a record was being made here, and is not any more."""
+    """Return whether a record was made here and was not completed."""
     names = {path.name for path in folder.iterdir()}
     others = {name for name in names if not name.startswith(("camera.", "pen."))}
     if HEADER in names or not others <= {JOURNAL, IMAGES, OPENER}:

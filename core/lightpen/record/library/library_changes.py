@@ -160,7 +160,7 @@ def retire_item(
 def adopt_change(
     data: Path, change: LibraryChange, signature: Signature | None
 ) -> Library:
-    """Keep the change of another station as one of this library; return the library.
+    """Store a change of another station in this library; return the library.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Traceability of a result: the certificates of what it was measured with."""
+"""Traceability of a result: the certificates of its equipment."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass

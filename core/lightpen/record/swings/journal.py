@@ -60,7 +60,7 @@ class ImageLine(Struct, tag_field="kind", tag="image", omit_defaults=True):
 
 
 class OutLine(Struct, tag_field="kind", tag="out"):
-    """These images take no part any more, too."""
+    """Further images that are excluded."""
 
     numbers: tuple[int, ...]
     reason: str

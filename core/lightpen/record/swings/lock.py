@@ -45,7 +45,7 @@ def unlock_journal(journal: IO[bytes]) -> None:
 
 
 def is_locked(path: Path) -> bool:
-    """Return whether anybody writes to the record of a journal.
+    """Return whether a program writes to the record of a journal.
 
     Raises
     ------

@@ -193,7 +193,7 @@ def _growth(
 
 
 def _has_size(swing: CalibrationFile) -> bool:
-    """Return whether its distance is that of the files, which then cancel."""
+    """Return whether its distance is from the files, whose errors then cancel."""
     return not (swing.is_of_rig or swing.calibration.adjusted.contradictions)
 
 

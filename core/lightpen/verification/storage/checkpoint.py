@@ -169,7 +169,7 @@ class CheckpointFile:
         self._descriptor = descriptor
 
     def note(self, value: VerificationCheckpoint) -> None:
-        """Write it if it has changed."""
+        """Write the checkpoint if it has changed."""
         if value == self._written:
             return
         self.hold()
@@ -194,7 +194,7 @@ class CheckpointFile:
             self._path.with_suffix(LOCK).unlink(missing_ok=True)
 
     def put_aside(self) -> None:
-        """Leave a damaged file under another name, under which it is not offered.
+        """Rename a damaged file, so that it is not offered.
 
         Raises
         ------

@@ -137,7 +137,7 @@ class PointImages:
         return name
 
     def follow(self, before: SessionState, transition: SessionTransition) -> None:
-        """Take out what does not count any more, and end a run that is done."""
+        """Remove images that no longer count, and end a completed run."""
         state = transition.state
         has_ended = transition.finished is not None or n_done(state) > n_done(before)
         counting = before if has_ended else state

@@ -96,7 +96,7 @@ class SessionRecords:
         )
 
     def begin(self, files: tuple[Path, ...] = ()) -> None:
-        """Begin another session, of which these are written already."""
+        """Begin another session with files already written."""
         self._files = list(files)
 
     def add(self, kept: PendingRecord) -> None:
@@ -259,7 +259,7 @@ class SessionKeeping:
             self._records.add(concluding(tip, conclusion, self._file))
 
     def accept(self, tip: CurrentTip, conclusion: Conclusion) -> None:
-        """Write that a tip is accepted all the same."""
+        """Write the acceptance of a tip despite findings."""
         self._records.write_now(concluding(tip, conclusion, None))
 
     def give_up(self, status: VerificationStatus) -> None:

@@ -42,7 +42,7 @@ class VerificationAssessment:
 
 
 def worst(found: Iterable[VerificationAssessment]) -> VerificationAssessment:
-    """Return the worst of several; of those that pass one that verifies the tip."""
+    """Return the worst assessment; of passing ones, one that verifies the tip."""
 
     def badness(each: VerificationAssessment) -> tuple[int, bool]:
         return WORST.index(each.grade), each.is_accepted and each.next_step == USE_TIP

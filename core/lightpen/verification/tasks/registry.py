@@ -1,4 +1,4 @@
-"""The verification tasks, in the order in which they are done, and that of a part."""
+"""The verification tasks in their order, and the task of a part."""
 
 from functools import reduce
 from operator import or_

@@ -208,7 +208,7 @@ def worse_finding(
 def with_power(
     reason: Message, found: TipEvidence, limits: VerificationLimits
 ) -> VerificationAssessment:
-    """Return a passed task with what it verifies of the tip."""
+    """Return a passed assessment that states the detectable tip error."""
     if found.verifies_tip(limits):
         power = message("tip.verified", detectable=found.detectable)
         return accepted(message("tip.with-power", reason=reason, power=power))
