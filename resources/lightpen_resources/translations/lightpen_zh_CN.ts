@@ -5803,7 +5803,7 @@ mm</translation>
     </message>
     <message>
         <source>Changes of other stations to the tip library that a supervisor has not signed yet: {n}.</source>
-        <translation type="unfinished"></translation>
+        <translation>其他工位对测头库的更改中，主管尚未签署的有 {n} 项。</translation>
     </message>
     <message>
         <source>Check nominal diameter, ball diameter and cleanliness; then verify the tip.</source>
@@ -5895,7 +5895,7 @@ mm</translation>
     </message>
     <message>
         <source>Entries after entry {after} without a timestamp: {n}.</source>
-        <translation type="unfinished"></translation>
+        <translation>条目 {after} 之后没有时间戳的条目数：{n}。</translation>
     </message>
     <message>
         <source>Entry {number} of leds in {name} is LED {led:g}. List the LEDs from 1 in ascending order, each once.</source>
@@ -5979,7 +5979,7 @@ mm</translation>
     </message>
     <message>
         <source>Images excluded manually: {n_excluded}. Include them again, or repeat the swing.</source>
-        <translation type="unfinished"></translation>
+        <translation>已手动剔除 {n_excluded} 幅图像。请恢复这些图像，或重新摆动。</translation>
     </message>
     <message>
         <source>Input/output error</source>
@@ -6279,19 +6279,19 @@ mm</translation>
     </message>
     <message>
         <source>Points excluded because they lie elsewhere: {n_left_out} of {n_touches}, the first {first}. The pen was lifted or slipped.</source>
-        <translation type="unfinished"></translation>
+        <translation>{n_touches} 个测点中有 {n_left_out} 个位于别处而被剔除，第一个是 {first}：光笔被抬起或滑动。</translation>
     </message>
     <message>
         <source>Points excluded because they lie off the plane: {n_left_out}, the first {first}. The pen was lifted or slipped.</source>
-        <translation type="unfinished"></translation>
+        <translation>{n_left_out} 个测点偏离平面而被剔除，第一个是 {first}：光笔被抬起或滑动。</translation>
     </message>
     <message>
         <source>Points excluded because they lie off the ring: {n_left_out}, the first {first}. The pen was lifted or slipped.</source>
-        <translation type="unfinished"></translation>
+        <translation>{n_left_out} 个测点偏离圆环而被剔除，第一个是 {first}：光笔被抬起或滑动。</translation>
     </message>
     <message>
         <source>Points excluded because they lie off the sphere: {n_left_out}, the first {first}. The pen was lifted or slipped.</source>
-        <translation type="unfinished"></translation>
+        <translation>{n_left_out} 个测点偏离球面而被剔除，第一个是 {first}：光笔被抬起或滑动。</translation>
     </message>
     <message>
         <source>Points of {name} ({kind}), camera frame / mm</source>
@@ -6611,7 +6611,7 @@ mm</translation>
     </message>
     <message>
         <source>The measured diameter is {measured:.3f} mm, the certified one {certified} mm. Check that this sphere was probed, that its diameter and not its radius is stated, and the ball diameter of the tip.</source>
-        <translation type="unfinished"></translation>
+        <translation>测得直径为 {measured:.3f} mm，证书直径为 {certified} mm。请检查触测的是否为该球、输入的是否为直径而非半径，以及测头的球径。</translation>
     </message>
     <message>
         <source>The normal of LED {led} points away from the viewer (nz = {nz:.3f}); nz must be positive in the pen frame. Change its sign.</source>
@@ -6635,7 +6635,7 @@ mm</translation>
     </message>
     <message>
         <source>The points lie on no plane: {n_off} of {n_points} are outliers, and the others deviate by up to {off:.2f} mm. Probe one plate, and hold the pen on it.</source>
-        <translation type="unfinished"></translation>
+        <translation>各测点不在同一平面上：{n_points} 个测点中有 {n_off} 个为离群点，其余最大偏差 {off:.2f} mm。请只触测一块平板，并使测头保持接触。</translation>
     </message>
     <message>
         <source>The program failed on this image ({kind}: {problem}). Keep the image, and report it.</source>
@@ -6699,7 +6699,7 @@ mm</translation>
     </message>
     <message>
         <source>Timestamps with a signature that was not verified: {n}. The certificate of the time stamping authority is not set.</source>
-        <translation type="unfinished"></translation>
+        <translation>{n} 个时间戳的签名未经验证：未设置时间戳机构的证书。</translation>
     </message>
     <message>
         <source>Tip (CSV)</source>
@@ -10215,7 +10215,7 @@ mm</translation>
     </message>
     <message>
         <source>{told} Their size is that of {other}. Give the images in the order of the cameras in the rig file.</source>
-        <translation type="unfinished"></translation>
+        <translation>{told} 其尺寸与 {other} 的相同。请按相机组文件中的相机顺序给出图像。</translation>
     </message>
     <message>
         <source>{usable}; the tip needs at least {needed}. {advice}</source>
