@@ -1,6 +1,6 @@
 """Write the validation dossier of a release: requirement, test, result, version.
 
-    ./run test -n auto --dist loadfile --junitxml=dist/tests.xml
+    ./run test --slow -n auto --dist loadfile --junitxml=dist/tests.xml
     .venv/bin/python validation/dossier.py dist/tests.xml --out dist
 
 writes ``Lightpen-<version>-validation.json`` and ``.pdf``, with the test of feature
