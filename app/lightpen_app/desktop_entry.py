@@ -14,7 +14,7 @@ from pathlib import Path
 from lightpen.errors import FileError, UsageError
 from lightpen.formats.files import printable, write_whole
 from lightpen.formats.system_reasons import strerror
-from lightpen_app.look.theme import RESOURCES
+from lightpen_resources import RESOURCES
 
 MIME_TYPE = "application/x-lightpen-swing"
 ENTRY = """\

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-TRANSLATIONS = Path(__file__).parent / "translations"
+RESOURCES = Path(__file__).parent
+TRANSLATIONS = RESOURCES / "translations"
 SOURCE_LANGUAGE = "en"  # of the texts in the program
 
 

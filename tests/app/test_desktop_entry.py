@@ -48,6 +48,17 @@ def test_the_entry_opens_the_files_of_swings_with_this_program(data: Path) -> No
     assert (data / "icons/hicolor/scalable/apps/lightpen.svg").is_file()
 
 
+def test_the_entry_is_written_where_the_libraries_of_qt_are_missing(data: Path) -> None:
+    code = (
+        "import sys; sys.modules['PySide6'] = None;"
+        "from lightpen_app.desktop_entry import install_entry; install_entry()"
+    )
+
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+    assert (data / "applications" / "lightpen.desktop").is_file()
+
+
 def test_the_entry_is_valid_by_the_standard(data: Path) -> None:
     checker = shutil.which("desktop-file-validate")
     if checker is None:

@@ -7,16 +7,14 @@ style sheet in resources; so a change of theme reaches every widget by itself.
 import sys
 from dataclasses import asdict, dataclass
 from enum import Enum, IntEnum, StrEnum
-from pathlib import Path
 from string import Template
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
-import lightpen_resources
+from lightpen_resources import RESOURCES
 
-RESOURCES = Path(lightpen_resources.__file__).parent
 FAMILIES = ("Lightpen Sans", "Lightpen Sans SC")
 GRID = 8  # px; every margin, gap and height is a multiple of it, or half of it
 # Points of the system's font without a request for larger text.

@@ -14,10 +14,10 @@ from PySide6.QtWidgets import QTextBrowser, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.look.theme import GRID, RESOURCES
+from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.translated import Translated
-from lightpen_resources import SOURCE_LANGUAGE
+from lightpen_resources import RESOURCES, SOURCE_LANGUAGE
 
 HELP = RESOURCES / "help"
 _PROPORTIONAL = QTextBlockFormat.LineHeightTypes.ProportionalHeight.value

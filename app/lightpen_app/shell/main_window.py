@@ -19,7 +19,7 @@ from typing_extensions import override
 from lightpen.streaming.server import StreamPlace
 from lightpen_app.crash import versions
 from lightpen_app.look.layouts import grid_layout
-from lightpen_app.look.theme import GRID, RESOURCES, Tone
+from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.shell.about import About
 from lightpen_app.shell.action_bar import ActionBar
 from lightpen_app.shell.help_window import HelpWindow
@@ -36,6 +36,7 @@ from lightpen_app.widgets.prompt_bar import AskingBar
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.settings import Preferences, Settings, data_folder
+from lightpen_resources import RESOURCES
 
 LEAST_SIZE = QSize(104 * GRID, 60 * GRID)  # for the wizard; fits 1280 x 800 at 150 %
 FIRST_SIZE = QSize(160 * GRID, 100 * GRID)

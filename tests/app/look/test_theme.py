@@ -19,7 +19,6 @@ from lightpen_app.look.theme import (
     FAMILIES,
     GRID,
     LIGHT,
-    RESOURCES,
     Appearance,
     Colors,
     TextSize,
@@ -36,6 +35,7 @@ from lightpen_app.look.theme import (
 )
 from lightpen_app.self_test.desk import CLASSES_WITH_FONTS
 from lightpen_app.widgets.state_banner import StateBanner
+from lightpen_resources import RESOURCES
 
 PALETTES = pytest.mark.parametrize("colors", [DARK, LIGHT], ids=["dark", "light"])
 GROUNDS = ("window", "panel", "raised")

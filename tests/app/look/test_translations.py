@@ -16,9 +16,9 @@ from PySide6.QtWidgets import QAbstractButton, QApplication
 from pytestqt.qtbot import QtBot
 
 from lightpen_app.look.languages import LanguageSwitch, own_name
-from lightpen_app.look.theme import FAMILIES, RESOURCES, font
+from lightpen_app.look.theme import FAMILIES, font
 from lightpen_app.shell.page_area import NoticeBar
-from lightpen_resources import SOURCE_LANGUAGE, languages
+from lightpen_resources import RESOURCES, SOURCE_LANGUAGE, languages
 
 ROOT = RESOURCES.parents[1]
 APPLICATION = ROOT / "app" / "lightpen_app"
