@@ -13,6 +13,7 @@ from typing import TypeAlias, Union
 
 from lightpen.catalogue import (
     archive,
+    camera_and_pen_files,
     cameras,
     command_line,
     desktop,
@@ -20,6 +21,7 @@ from lightpen.catalogue import (
     discovery,
     estimation,
     files,
+    images,
     intrinsics,
     measuring,
     model,
@@ -28,7 +30,10 @@ from lightpen.catalogue import (
     simulator,
     streaming,
     swing,
+    tables,
     verification,
+    verification_history,
+    verification_tasks,
 )
 
 Value: TypeAlias = Union[str, int, float, "Message", tuple["Message", ...]]
@@ -36,12 +41,14 @@ Translate: TypeAlias = Callable[[str], str]
 
 TRANSLATED = (
     archive,
+    camera_and_pen_files,
     cameras,
     desktop,
     detection,
     discovery,
     estimation,
     files,
+    images,
     intrinsics,
     measuring,
     model,
@@ -50,7 +57,10 @@ TRANSLATED = (
     simulator,
     streaming,
     swing,
+    tables,
     verification,
+    verification_history,
+    verification_tasks,
 )
 CATALOGUE: Mapping[str, str] = ChainMap(
     *(area.MESSAGES for area in (*TRANSLATED, command_line))
