@@ -41,6 +41,13 @@ class LazyLogbook:
         self._opened: Logbook | None = None
         self._is_closed = False
 
+    @classmethod
+    def none(cls) -> "LazyLogbook":
+        """Return a closed logbook, in which nothing is entered."""
+        logbook = cls(Path())
+        logbook._is_closed = True
+        return logbook
+
     def enter_owed(
         self, report: Callable[[float], None] = lambda fraction: None
     ) -> tuple[Message, ...]:

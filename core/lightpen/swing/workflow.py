@@ -104,7 +104,9 @@ class SwingWorkflow:
         self._listener = listener
         self._now = now
         self._faults = FaultReporter(listener)
-        self._entries = _LogbookEntries(logbook, start, self._faults.report)
+        self._logbook = logbook or LazyLogbook.none()
+        self._start_beside = start
+        self._catching_up: Task | None = None  # with events in files only
         self._status = SwingStatus()
         self._presence = OperatorPresence()
         self._recorder: SwingRecorder | None = None
@@ -394,7 +396,11 @@ class SwingWorkflow:
         else:
             self._recorder.discard()
         self.abandon()
-        self._faults.trying(lambda: self._entries.enter_set_aside(status, self._now()))
+        self._faults.trying(
+            lambda: self._logbook.enter_set_aside(
+                status.solution, status.assessment, self._now()
+            )
+        )
 
     def start_over(self) -> None:
         """Discard the swing, unless it is accepted, and begin a new one."""
@@ -586,7 +592,7 @@ class SwingWorkflow:
             result = accept(self._archive, solution, now, reason, signature)
             status = replace(status, result=result)
             self._faults.end()
-            self._faults.trying(self._entries.enter_owed)
+            self._faults.trying(self._enter_owed)
         except AcceptanceError:  # something else has come into force meanwhile
             record = open_record(solution.source.folder)
             assessment = assess(self._archive, record, solution)
@@ -612,18 +618,33 @@ class SwingWorkflow:
         status, own = self._status, self._status.result
         if own is not None and own.record == result.record:
             status = replace(status, result=None)
-        self._faults.trying(self._entries.enter_owed)
+        self._faults.trying(self._enter_owed)
         self._publish(replace(status, revoked=result))
 
     def open_logbook(self) -> None:
         """Enter events that are in files only, in the background."""
-        self._entries.catch_up()
+        self._catching_up = self._start_beside(
+            self._logbook.enter_owed,
+            self._on_caught_up,
+            self._faults.report,
+            lambda: None,
+            lambda fraction: None,
+        )
+
+    def _enter_owed(self) -> None:
+        """Enter events in the archive that only files hold so far."""
+        self._logbook.enter_owed()
+
+    def _on_caught_up(self, faults: tuple[Message, ...]) -> None:
+        for fault in faults:
+            self._faults.report(fault)
 
     def shut_down(self) -> None:
         """Suspend the swing, whose record stays on disk, and close the archive."""
         self.abandon()
-        self._entries.stop()
-        self._faults.trying(self._entries.close)
+        if self._catching_up is not None:
+            self._catching_up.cancel()
+        self._faults.trying(self._logbook.close)
 
 
 def _log_change(
@@ -659,53 +680,3 @@ class _Solved:
 
     solution: Solution
     assessment: SwingAssessment
-
-
-class _LogbookEntries:
-    """Enters the outcome of swings in the logbook, where there is one."""
-
-    def __init__(
-        self,
-        logbook: LazyLogbook | None,
-        start: StartThread,
-        report_fault: Callable[[Message], None],
-    ) -> None:
-        self._logbook = logbook
-        self._start = start
-        self._report_fault = report_fault
-        self._catching_up: Task | None = None
-
-    def catch_up(self) -> None:
-        """Enter events that are in files only, in the background."""
-        if self._logbook is not None:
-            self._catching_up = self._start(
-                self._logbook.enter_owed,
-                self._on_caught_up,
-                self._report_fault,
-                lambda: None,
-                lambda fraction: None,
-            )
-
-    def _on_caught_up(self, faults: tuple[Message, ...]) -> None:
-        for fault in faults:
-            self._report_fault(fault)
-
-    def enter_owed(self) -> None:
-        """Enter events in the archive that only files hold so far."""
-        if self._logbook is not None:
-            self._logbook.enter_owed()
-
-    def enter_set_aside(self, swing: SwingStatus, now: datetime) -> None:
-        """Enter a discarded swing."""
-        if self._logbook is not None:
-            self._logbook.enter_set_aside(swing.solution, swing.assessment, now)
-
-    def stop(self) -> None:
-        """Stop catching up."""
-        if self._catching_up is not None:
-            self._catching_up.cancel()
-
-    def close(self) -> None:
-        """Close the logbook."""
-        if self._logbook is not None:
-            self._logbook.close()
