@@ -103,8 +103,11 @@ class Wizard(QObject):
         self.workbench = Workbench(settings, folder, around, self)
         pages = iter(make_pages(self.workbench, self._sounds))
         self.window = MainWindow(
-            *((next(pages),), settings, self._preferences),
-            *(self.workbench.notifications, pages),
+            (next(pages),),
+            settings,
+            self._preferences,
+            self.workbench.notifications,
+            pages,
         )
         self.window.setMinimumSize(LEAST_SIZE)
         # Last: under a style sheet Qt styles all of a widget whenever it gets a parent,

@@ -97,7 +97,9 @@ def read_kept_verification(path: Path) -> KeptVerification:
     names = Names(done.station, done.operator, done.pen, done.tip)
     certified = certified_values(json.loads(file.content or b"{}"))
     return KeptVerification(
-        *(file, done, entry_of_file(path, file.sha256)),
+        file,
+        done,
+        entry_of_file(path, file.sha256),
         traced_items(library, names, done.camera_serials, certified),
     )
 
@@ -156,7 +158,9 @@ class PrintReportControl(QObject):
         from lightpen_app.print_report.printing import paper_of, paper_stem
 
         paper = paper_of(
-            *(found.calibration_file, found.reestimated, found.entered),
+            found.calibration_file,
+            found.reestimated,
+            found.entered,
             self._place.settings.laboratory(),
         )
         self._open(paper, paper_stem(found.calibration_file))

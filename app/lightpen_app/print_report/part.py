@@ -191,7 +191,9 @@ def _refinement(refinement: dict[str, Any] | None) -> Iterator[Block]:
             ", ".join(refinement["features"]),
             translate("paper", "used") if is_used else translate("paper", "not used"),
             ", ".join(map(_text, refinement["tip_shift_pen_mm"])),
-            *(before, after, number_text(refinement["chi_square"], 1)),
+            before,
+            after,
+            number_text(refinement["chi_square"], 1),
             refinement["degrees_of_freedom"],
         )
     )

@@ -165,7 +165,10 @@ def record_swing(folder: Path, files: Path) -> None:
                     f"The pen is not found in rendered image {image_plan.index + 1}."
                 )
             writer.append(
-                *(image, seen.pixels, seen.rotation, seen.translation),
+                image,
+                seen.pixels,
+                seen.rotation,
+                seen.translation,
                 image_plan.index * PERIOD,
             )
 

@@ -97,7 +97,9 @@ class BoardView(ImageView):
         pixels = np.ascontiguousarray(colors[0] + shares * (colors[1] - colors[0]))
         picture = QImage(
             pixels.astype(np.uint8).tobytes(),
-            *(columns, rows, 4 * columns),
+            columns,
+            rows,
+            4 * columns,
             QImage.Format.Format_RGBA8888,
         )
         # The samples lie on the border of the image, those of a picture within.

@@ -26,7 +26,10 @@ def live_markers(seen: LiveImage) -> tuple[Marker, ...]:
     other = Tone.ACTIVE if seen.detection is None else Tone.WARN
     return tuple(
         Marker(
-            *(x, y, radius, numbers.get(i, "")),
+            x,
+            y,
+            radius,
+            numbers.get(i, ""),
             tone=Tone.GOOD if i in numbers else other,
             label_angle=angle,
         )

@@ -389,9 +389,7 @@ class TracePlot(Plot):
             in_sight.append(self._height(self._limit_at * np.array(reach)))
         n_steps = max(math.ceil((x.max() - x.min() + 1) / N_LEAST), 1)
         room = np.append(x, x.min() + n_steps * N_LEAST - 1)
-        self._fit(
-            *(room, np.concatenate(in_sight)), y_zero=self._y_zero, is_rounded=True
-        )
+        self._fit(room, np.concatenate(in_sight), y_zero=self._y_zero, is_rounded=True)
         self._place_words()
         if self._limit_at is not None and self.words_cover():
             self._make_room()

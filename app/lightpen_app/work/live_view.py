@@ -185,7 +185,12 @@ class LiveView(QObject):
         listener.image_shown.connect(self.image_shown)
         listener.event_received.connect(self._on_event_received)
         self._live = live = Live(
-            *(cameras, settings, listener, self._run.runner, clock, known),
+            cameras,
+            settings,
+            listener,
+            self._run.runner,
+            clock,
+            known,
             verifiers=[each.runner for each in self._verifications],
             stream=self._stream,
         )

@@ -65,7 +65,7 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
         self._archive = FolderArchive(folder, self.logbook.confirm)
         self.follower: GuidedOperator | None = None
         self.runner = SwingRunner(
-            *(self.records_folder, self.archive, self, now), self.logbook
+            self.records_folder, self.archive, self, now, self.logbook
         )
 
     @property

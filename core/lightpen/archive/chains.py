@@ -298,9 +298,7 @@ class ArchivedFiles:
     def read(self) -> None:
         """Read the entries added since the last call."""
         wanted = (
-            select(
-                *(ENTRIES.c.number, ENTRIES.c.result, ENTRIES.c.swing, ENTRIES.c.kind)
-            )
+            select(ENTRIES.c.number, ENTRIES.c.result, ENTRIES.c.swing, ENTRIES.c.kind)
             .where(ENTRIES.c.chain == self._chain, ENTRIES.c.number > self._n_read)
             .order_by(ENTRIES.c.number)
         )
@@ -370,8 +368,7 @@ def _head(connection: Connection, chain: str) -> ChainHead:
     """Return the last entry of a chain as the entries have it."""
     last = (
         select(
-            *(ENTRIES.c.number, ENTRIES.c.sha256),
-            *(ENTRIES.c.since_us, ENTRIES.c.signature),
+            ENTRIES.c.number, ENTRIES.c.sha256, ENTRIES.c.since_us, ENTRIES.c.signature
         )
         .where(ENTRIES.c.chain == chain)
         .order_by(ENTRIES.c.number.desc())

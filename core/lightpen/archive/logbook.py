@@ -248,7 +248,10 @@ class Logbook:
                 event.names.pen, event.names.tip, is_simulated=event.is_simulated
             )
             doubts = due_doubts(
-                *(self.database, entry, self._results.library(), now),
+                self.database,
+                entry,
+                self._results.library(),
+                now,
                 supervision.limits_at(by.station, StationLimits()).due,
             )
             result = replace(

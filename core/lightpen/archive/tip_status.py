@@ -33,7 +33,9 @@ def statuses(
         pair = event.names.pen, event.names.tip
         u = event.expanded_uncertainty_mm
         in_force[pair] = CurrentResult(
-            *(tip.calibrated, tip.due, tip.is_due(now)),
+            tip.calibrated,
+            tip.due,
+            tip.is_due(now),
             None if u is None else max(u),
             Grade(event.grade) if event.grade else None,
         )

@@ -118,7 +118,8 @@ def add_conditions(
         What the temperature is for.
     """
     parser.add_argument(
-        *(*names, "--pen-temperature"),
+        *names,
+        "--pen-temperature",
         type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),
         metavar="CELSIUS",
         help=f"pen temperature, {meaning}",

@@ -300,7 +300,9 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
     origin = _origin(options.rig, options.pen, *rig_file.camera_files, *files[:1])
     return _Calibrated(
         calibrate_rig(
-            *(rig, pen, [_timed(each, options) for each in observations]),
+            rig,
+            pen,
+            [_timed(each, options) for each in observations],
             assumptions_of(options),
         ),
         pen.nominal_tip,

@@ -92,10 +92,7 @@ def read_pen(
 
 
 def read_raw_pen(
-    path: Path,
-    units: str | None = None,
-    diameter: float | None = None,
-    nominal_tip: FloatArray | None = None,
+    path: Path, units: str | None = None, diameter: float | None = None
 ) -> Pen:
     """Read a pen of the paper's layout from a measuring machine's coordinates.
 
@@ -103,7 +100,7 @@ def read_raw_pen(
     ----------
     path : Path
         File as for `read_pen`, in any right-handed frame.
-    units, diameter, nominal_tip
+    units, diameter
         As for `read_pen`.
 
     Returns
@@ -129,7 +126,7 @@ def read_raw_pen(
         check_frame(pen)
     except FileError as error:
         raise _flawed(path, error) from error
-    return pen if nominal_tip is None else replace(pen, nominal_tip=nominal_tip)
+    return pen
 
 
 def read_unchecked_pen(path: Path, units: str | None = None) -> Pen:

@@ -67,7 +67,7 @@ def cameras_of(
     rig = beside(scene.camera, scene.cone_cam)
     return first, *(
         SimulatedCamera(
-            *(scene, around.clock, first.operator), serial=SECOND_SERIAL, rig=rig
+            scene, around.clock, first.operator, serial=SECOND_SERIAL, rig=rig
         )
         if isinstance(other, SimulatedCamera)
         else other

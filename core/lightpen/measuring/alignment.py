@@ -105,9 +105,7 @@ def align_321(primary: Quantity, secondary: Quantity, origin: Quantity) -> Align
     return Alignment(derive(motion, primary, secondary, origin), np.zeros(0))
 
 
-def align_points(
-    points: Sequence[Quantity], nominals: FloatArray, weights: FloatArray | None = None
-) -> Alignment:
+def align_points(points: Sequence[Quantity], nominals: FloatArray) -> Alignment:
     """Align by points with known positions in the part.
 
     Parameters
@@ -116,8 +114,6 @@ def align_points(
         Features; their origins count.
     nominals : (N, 3) array
         Places of them in the part, mm.
-    weights : (N,) array, optional
-        One each unless given.
 
     References
     ----------
@@ -129,13 +125,11 @@ def align_points(
         raise CalibrationError("measuring.few-datums", n_points=n, needed=MIN_POINTS)
     if min(_thinness(actual), _thinness(nominals)) < THIN:
         raise CalibrationError("measuring.datums-on-line")
-    share = np.ones(n) if weights is None else np.asarray(weights, dtype=float)
-    share = share / share.sum()
 
     def motion(places: FloatArray) -> FloatArray:
         here = places.reshape(n, 3)
-        middle, there = share @ here, share @ nominals
-        R = nearest_rotation((nominals - there).T @ (share[:, None] * (here - middle)))
+        middle, there = here.mean(axis=0), nominals.mean(axis=0)
+        R = nearest_rotation((nominals - there).T @ (here - middle))
         return _as_motion(R, there - R @ middle)
 
     places = stacked(

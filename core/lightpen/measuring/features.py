@@ -209,7 +209,7 @@ def _feature(kind: FeatureKind, points: FloatArray, at: Start) -> Feature:
     distances = values.reshape(n, k)
     offsets = np.einsum("nk,nkd->nd", distances, by_point)
     return Feature(
-        *(kind, origin, axes, sizes, distances, by_points, by_distances, offsets)
+        kind, origin, axes, sizes, distances, by_points, by_distances, offsets
     )
 
 

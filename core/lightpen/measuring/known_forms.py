@@ -96,8 +96,13 @@ def refine(
     chi_square = float(y @ np.linalg.solve(S, y))
     is_used = chi_square <= chi_square_quantile(len(y), BY_CHANCE)
     refinement = Refinement(
-        *(tuple(each.name for each in known), is_used, z[n_inputs:], covariance),
-        *(after[n_inputs:, n_inputs:], chi_square, len(y)),
+        tuple(each.name for each in known),
+        is_used,
+        z[n_inputs:],
+        covariance,
+        after[n_inputs:, n_inputs:],
+        chi_square,
+        len(y),
     )
     if not is_used:
         return touches, refinement

@@ -269,11 +269,9 @@ class Plan(_Entry, frozen=True):
         )
 
 
-def free_plan(
-    name: str, touches: int = UNKNOWN_TOUCHES, n_features: int = MAX_FREE
-) -> Plan:
+def free_plan(name: str, touches: int = UNKNOWN_TOUCHES) -> Plan:
     """Return a plan of features that are recognised from their touches."""
-    names = (f"F{i}" for i in range(1, n_features + 1))
+    names = (f"F{i}" for i in range(1, MAX_FREE + 1))
     return Plan(name, tuple(PlannedFeature(each, touches=touches) for each in names))
 
 

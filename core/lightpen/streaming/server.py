@@ -283,7 +283,9 @@ class PoseStream:
         self._status = status
         _logger.info(
             "stream at %s, %d clients, %d slow",
-            *(status.place, status.n_clients, status.n_slow),
+            status.place,
+            status.n_clients,
+            status.n_slow,
         )
         self._on_change(status)
 

@@ -216,8 +216,7 @@ class VerificationWorkflow:
         supervision = self._archive.supervision()
         supervisor, key = accepting_supervisor(supervision, found, signature)
         conclusion = Conclusion(
-            *(TrialOutcome.ACCEPTED, began, self._now(), found, reason),
-            *(supervisor, key),
+            TrialOutcome.ACCEPTED, began, self._now(), found, reason, supervisor, key
         )
         self._keeping.accept(tip, conclusion)
         _logger.info("accepted, reason %r", reason)
@@ -259,8 +258,10 @@ class VerificationWorkflow:
         work = partial(read_runs, task, place, tip, setup, rules)
         images = ReadImages(task.kind, place, is_still)
         self._start(
-            *(ReadingState.IMAGES, work),
-            *(partial(self._on_runs_read, images), self._on_runs_unread),
+            ReadingState.IMAGES,
+            work,
+            partial(self._on_runs_read, images),
+            self._on_runs_unread,
         )
 
     def go_on(self, interrupted: InterruptedVerification) -> None:
@@ -281,8 +282,10 @@ class VerificationWorkflow:
             resume_verification, self._archive, self._data, preparation, again
         )
         self._start(
-            *(ReadingState.IMAGES, work),
-            *(partial(self._on_gone_on, interrupted.path), self._on_runs_unread),
+            ReadingState.IMAGES,
+            work,
+            partial(self._on_gone_on, interrupted.path),
+            self._on_runs_unread,
         )
 
     def _on_gone_on(self, path: Path, before: ResumedVerification) -> None:
@@ -425,8 +428,10 @@ class VerificationWorkflow:
         self._task.drop()
         archive = self._archive
         self._start(
-            *(ReadingState.TIP, lambda _: read_tip_in_force(archive, preparation)),
-            *(self._on_tip_read, self._on_no_tip),
+            ReadingState.TIP,
+            lambda _: read_tip_in_force(archive, preparation),
+            self._on_tip_read,
+            self._on_no_tip,
         )
 
     def _on_tip_read(self, tip: CurrentTip) -> None:

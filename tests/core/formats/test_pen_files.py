@@ -395,11 +395,9 @@ def test_raw_coordinates_are_put_into_the_pen_frame(tmp_path: Path, units: str) 
     raw = LEDS @ R.T + [400, 300, -100]
     scale = {"mm": 1, "m": 1000}[units]
     path = saved(tmp_path, table(raw / scale, header=""))
-    pen = read_raw_pen(path, units, nominal_tip=np.array([0, -90.0, -24]))
+    pen = read_raw_pen(path, units)
     np.testing.assert_allclose(pen.leds, LEDS, atol=1e-9)
     np.testing.assert_array_equal(pen.normals, FACING)
-    assert pen.nominal_tip is not None
-    np.testing.assert_array_equal(pen.nominal_tip, [0, -90, -24])
 
 
 def test_normals_and_tip_in_raw_coordinates_are_turned_too(tmp_path: Path) -> None:

@@ -85,7 +85,9 @@ def reestimate_poses(calibration: CalibrationRecord) -> ReestimatedPoses | None:
     if first is None:
         return None
     running = fit_running_tip(
-        *(poses.rotations, poses.translations, poses.covariances),
+        poses.rotations,
+        poses.translations,
+        poses.covariances,
         np.array(calibration.tip_pen_mm),
         first,
     )
@@ -106,7 +108,12 @@ def _camera(fitted: InstrumentRecord, pixels: FloatArray) -> Camera:
     fx, fy, cx, cy, *distortion = fitted.intrinsics
     width, height = np.ceil(np.nanmax(pixels, axis=(0, 1))).astype(int).tolist()
     return Camera(
-        *(width + 1, height + 1, fx, fy, cx, cy),
+        width + 1,
+        height + 1,
+        fx,
+        fy,
+        cx,
+        cy,
         distortion=np.array(distortion),
         lens=lens_model_of(len(distortion)),
     )

@@ -124,7 +124,7 @@ def read_verification(content: bytes, file: Path) -> StoredVerification:
     data = data_folder_of_verification(file)
     if data is not None:
         read_supervision(data).require_signed(
-            *(data, file, content), has_supervisor=bool(done.supervisor)
+            data, file, content, has_supervisor=bool(done.supervisor)
         )
     return done
 

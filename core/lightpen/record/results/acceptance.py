@@ -188,7 +188,9 @@ def _result(
         record=record.folder,
         images=_images_of(record),
         calibration=calibration_record(
-            *(solution.calibration, record_inputs(solution.source), "joint"),
+            solution.calibration,
+            record_inputs(solution.source),
+            "joint",
             assessment.limits,
         ),
         origin=recorded_origin(record),

@@ -136,7 +136,12 @@ class FolderArchive:
         if file is None or not _is_same(self.read(file), result):
             raise FileError("results.not-in-force", tip=names.tip, pen=names.pen)
         withdrawal = Withdrawal(
-            *(file.stem, now, operator, names.pen, names.tip, reason.strip()),
+            file.stem,
+            now,
+            operator,
+            names.pen,
+            names.tip,
+            reason.strip(),
             supervisor=""
             if signature is None or key is None
             else signature.name.strip(),
@@ -321,7 +326,7 @@ def signed_heading(
     """
     heading = parse_heading(start, file)
     supervision.require_signed(
-        *(data, file, head_of(start)), has_supervisor=bool(heading.supervisor)
+        data, file, head_of(start), has_supervisor=bool(heading.supervisor)
     )
     return heading
 

@@ -142,7 +142,11 @@ def supervisor_key(password: str, salt: bytes) -> SigningKey:
     seed = hash_secret_raw(
         password.encode("utf-8", "surrogatepass"),
         salt,
-        *(_TIME_COST, _MEMORY_KIB, _LANES, _SEED_LENGTH, Type.ID),
+        _TIME_COST,
+        _MEMORY_KIB,
+        _LANES,
+        _SEED_LENGTH,
+        Type.ID,
     )
     return SigningKey(Ed25519PrivateKey.from_private_bytes(seed))
 

@@ -70,7 +70,8 @@ def signatures_of(text: bytes, place: str) -> FoundSignatures:
     before_station, station = _parted(body, _STATION)
     before_supervisor, supervisor = _parted(before_station, _SUPERVISOR)
     return FoundSignatures(
-        *(station, supervisor),
+        station,
+        supervisor,
         _content(before_station, place),
         _content(before_supervisor, place),
     )

@@ -258,8 +258,7 @@ def fit_held(calibration: Calibration, rig: Rig, pen: Pen) -> JointFit:
     ]
     model = ContactModel(rig, pen, np.stack(views, axis=1)[calibration.used])
     return fit_contact(
-        *(model, joint.rotations[joint.used.any(axis=1)]),
-        *(joint.tip_pen, joint.cone_cam),
+        model, joint.rotations[joint.used.any(axis=1)], joint.tip_pen, joint.cone_cam
     )
 
 

@@ -171,7 +171,7 @@ def repeatability_of(
     in_order = sorted(measured, key=lambda each: each.entry.since)
     tips = [tip_of(each) for each in in_order]
     return measure_repeatability(
-        *(tips, limits), tolerance=tolerance, reference=reference, touched=touched
+        tips, limits, tolerance=tolerance, reference=reference, touched=touched
     )
 
 

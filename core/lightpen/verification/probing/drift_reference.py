@@ -81,7 +81,8 @@ class LampObservations:
     ) -> "LampObservations":
         """Return a copy with one more image of each camera that sees the pen."""
         views = zip(
-            *((frame, *frame.others), (detection, *detection.others)),
+            (frame, *frame.others),
+            (detection, *detection.others),
             region.regions,
             strict=False,
         )

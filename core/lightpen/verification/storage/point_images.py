@@ -122,7 +122,10 @@ class PointImages:
             )
         others = frame.others[: len(seen.others)]
         number = self._writer.append(
-            *(frame.image, seen.pixels, seen.rotation, seen.translation),
+            frame.image,
+            seen.pixels,
+            seen.rotation,
+            seen.translation,
             frame.host_ts_ns * 1e-9,
             frame.device_ts_ns,
             others=[

@@ -138,7 +138,7 @@ def resume_verification(
     files = tuple(root / name for name in (*under_way.files, *since.files))
     unwritten = tuple(task for task in under_way.unwritten if task not in since.kinds)
     return ResumedVerification(
-        *(under_way, tip, setup, state, files, unwritten, lamps), tuple(done)
+        under_way, tip, setup, state, files, unwritten, lamps, tuple(done)
     )
 
 
@@ -169,7 +169,8 @@ def abandon_interrupted(
         with suppress(FileError):
             files.append(hashed(root / name))
     record = conclusion_record(
-        *(under_way.names, under_way.origin),
+        under_way.names,
+        under_way.origin,
         InputFile(Path(under_way.tip_file), under_way.tip_sha256),
         Conclusion(TrialOutcome.ABANDONED, under_way.began, now),
         tuple(files),

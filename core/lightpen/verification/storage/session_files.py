@@ -123,7 +123,7 @@ class SessionRecords:
     def _write(self, kept: PendingRecord, files: list[Path]) -> None:
         record = kept.record_of(all_hashed(files))
         file = keep_verification(
-            *(self._data, record, kept.supervisor), is_simulated=kept.is_simulated
+            self._data, record, kept.supervisor, is_simulated=kept.is_simulated
         )
         files.append(file)
         _logger.info("verification written: %s", files[-1])

@@ -195,10 +195,7 @@ def with_tip(
 
 
 def on_surface(
-    touch: ProbedPoint,
-    ball_radius: float,
-    direction_cam: FloatArray | None = None,
-    stylus_axis_pen: FloatArray = UPRIGHT_AXIS,
+    touch: ProbedPoint, ball_radius: float, direction_cam: FloatArray | None = None
 ) -> ProbedPoint:
     """Return a touch moved from the centre of its ball to the surface that it touched.
 
@@ -208,15 +205,12 @@ def on_surface(
         mm; less than 0 against the direction.
     direction_cam : (3,) array, optional
         Unit vector from the ball to the surface; if not given, the approach, or along
-        the axis of the stylus where none is known.
-    stylus_axis_pen : (3,) array
-        Axis of the stylus from the ball into the pen, pen frame, of length 1; that of
-        the pen unless given.
+        the axis of the pen where none is known.
     """
     if direction_cam is None:
         direction_cam = touch.approach_cam
     if direction_cam is None:
-        direction_cam = -touch.rotation @ stylus_axis_pen
+        direction_cam = -touch.rotation @ UPRIGHT_AXIS
     return replace(touch, point_cam=touch.point_cam + ball_radius * direction_cam)
 
 

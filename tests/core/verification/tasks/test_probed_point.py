@@ -159,18 +159,6 @@ def test_a_ball_is_compensated_along_approach_or_axis(touching: Touching) -> Non
     np.testing.assert_allclose(by_approach.point_cam - touch.point_cam, [2, 0, 0])
 
 
-def test_a_ball_on_a_slanting_stylus_is_compensated_along_that(
-    touching: Touching,
-) -> None:
-    (touch,) = touching(PAPER_CONE[None], tilt=0.0)
-    slanting = np.array([0.0, 0.8, 0.6])
-
-    moved = on_surface(touch, 2.0, stylus_axis_pen=slanting)
-    np.testing.assert_allclose(
-        moved.point_cam - touch.point_cam, -2 * touch.rotation @ slanting
-    )
-
-
 def test_another_tip_moves_the_point_with_the_pen(
     instrument: Instrument, touching: Touching
 ) -> None:
