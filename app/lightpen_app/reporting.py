@@ -39,8 +39,6 @@ def write_paper(result: Path, out: Path | None, language: str) -> Path:
 
     Raises
     ------
-    FileError
-        The calibration cannot be read, or the PDF not be written.
     UsageError
         The file holds no calibration, or not all that is put on paper.
     """

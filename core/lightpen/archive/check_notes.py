@@ -44,11 +44,6 @@ def check_notes(database: Database, data: Path) -> Iterator[Message]:
 
     Files without entries, a missing seal, keys that nobody approved, clocks that were
     set back, and tips that were accepted before they were computed.
-
-    Raises
-    ------
-    ArchiveError, FileError
-        The archive, or a folder, cannot be read.
     """
     home = chain_at_home(database)
     yield from _missing_seal(database)

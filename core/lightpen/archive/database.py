@@ -164,13 +164,7 @@ def look_into(path: Path) -> Database:
 
 
 def is_open(path: Path) -> bool:
-    """Return whether a program has the archive in a file open, or was killed so.
-
-    Raises
-    ------
-    ArchiveError
-        It is not accessible.
-    """
+    """Return whether a program has the archive in a file open, or was killed so."""
     with _looking_at(path):
         return Path(f"{path}-wal").exists()
 

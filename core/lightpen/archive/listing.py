@@ -29,11 +29,6 @@ def save_entries(database: Database, wanted: EntryFilter, path: Path) -> int:
     ----------
     path : Path
         ``.csv`` for a table, else JSON; what is there is replaced.
-
-    Raises
-    ------
-    ArchiveError, FileError
-        They cannot be read, or not be written.
     """
     entries = tuple(_all(database, wanted))
     is_table = path.suffix.lower() == ".csv"

@@ -158,11 +158,6 @@ class Logbook:
         -------
         tuple of Message
             Why some files cannot be entered; they stay owed.
-
-        Raises
-        ------
-        ArchiveError
-            Nothing can be entered.
         """
         with self._lock:
             self._entered.read()
@@ -189,13 +184,7 @@ class Logbook:
             self._enter(account_of_refused(self._results, solution, assessment, at))
 
     def enter_note(self, about: StoredEntry, text: str, operator: str) -> None:
-        """Enter a comment on an entry.
-
-        Raises
-        ------
-        ArchiveError
-            It cannot be entered.
-        """
+        """Enter a comment on an entry."""
         of = about.entry.event
         event = Event(
             kind=Kind.NOTE,
@@ -302,13 +291,7 @@ class Logbook:
                 self.shared += () if notice in self.shared else (notice,)
 
     def close(self) -> None:
-        """Close the archive, and seal its file unless another process has it open.
-
-        Raises
-        ------
-        ArchiveError, FileError
-            It cannot be sealed.
-        """
+        """Close the archive, and seal its file unless another process has it open."""
         if self._replicator is not None:
             self._replicator.close(LONGEST_FAREWELL_S)
         with self._lock:

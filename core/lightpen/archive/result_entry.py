@@ -57,8 +57,6 @@ def entry_of_file(result: Path, sha256: str) -> ArchivePlace | None:
 
     Raises
     ------
-    ArchiveError
-        The archive is there, but cannot be read.
     FileError
         It is not the file that was entered.
     """

@@ -49,11 +49,6 @@ def close_sealed(database: Database) -> None:
 
     A seal that is damaged, or names entries which the archive does not hold, stays
     as it is, to be found.
-
-    Raises
-    ------
-    ArchiveError, FileError
-        It cannot be read any more, or the seal not be written.
     """
     archive = database.file
     try:
@@ -68,13 +63,7 @@ def close_sealed(database: Database) -> None:
 
 
 def read_seal(archive: Path) -> Seal | None:
-    """Return the seal of an archive; None where there is none.
-
-    Raises
-    ------
-    FileError
-        It is damaged, or cannot be read.
-    """
+    """Return the seal of an archive; None where there is none."""
     path = seal_of(archive)
     if not path.exists():
         return None

@@ -90,11 +90,6 @@ def newer_elsewhere(
         A change that is dated later, by a clock that is ahead, does not count.
     server : Database, optional
         Archive of the plant.
-
-    Raises
-    ------
-    ArchiveError, FileError
-        An archive or the library cannot be read.
     """
     home, found = chain_at_home(database), list(_copied(database))
     if server is not None:

@@ -88,8 +88,6 @@ def request_timestamp(database: Database, data: Path, by: Authority) -> Timestam
     ArchiveError
         There is no new entry or no package for it; the authority gives no answer or
         one that is not valid, or the clock of the station is ahead.
-    FileError
-        The certificate cannot be read, or the answer not be stored.
     """
     home = chain_at_home(database)
     number = next((each.number for each in heads(database) if each.chain == home), 0)

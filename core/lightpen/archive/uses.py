@@ -22,13 +22,7 @@ class UseCount:
 
     @contextmanager
     def one(self) -> Iterator[None]:
-        """Use it.
-
-        Raises
-        ------
-        ArchiveError
-            It was closed.
-        """
+        """Use it."""
         with self._changed:
             if self._is_over:
                 raise closed()

@@ -33,11 +33,6 @@ def printing(command: Callable[[argparse.Namespace], int | None]) -> Command:
     """Give a command an exit status also where its output cannot be written.
 
     A command that returns none is done.
-
-    Raises
-    ------
-    FileError
-        A file or a folder is not accessible.
     """
 
     @wraps(command)

@@ -59,11 +59,6 @@ def keep_record(
         The tip, whose data folder has the archive; None of LED centres alone.
     origin : Origin, optional
         Of the images; by default of the tip.
-
-    Raises
-    ------
-    ArchiveError, FileError
-        It cannot be written, or not be entered.
     """
     names = NOBODY if tip is None else tip.names
     own = None if tip is None else tip.origin

@@ -79,11 +79,6 @@ def read_image(path: Path) -> Image:
 
     The bytes are read first and decoded then: `cv2.imread` fails on names outside
     the code page of Windows.
-
-    Raises
-    ------
-    FileError
-        The file is missing, empty, too large, damaged or no image.
     """
     with opened(path, IMAGE_FILE, MAX_FILE_SIZE) as stream:
         header = read_image_header(stream, path.name)
@@ -94,13 +89,7 @@ def read_image(path: Path) -> Image:
 
 
 def decode_image(data: bytes, name: str) -> Image:
-    """Decode the bytes of an image file as grey values of 8 or 16 bit, (H, W).
-
-    Raises
-    ------
-    FileError
-        The image is damaged, too large or no image.
-    """
+    """Decode the bytes of an image file as grey values of 8 or 16 bit, (H, W)."""
     header = read_image_header(BytesIO(data), name)
     with _MEMORY.given(_needed(header, len(data), name)):
         return _decoded(data, name)

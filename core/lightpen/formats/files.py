@@ -140,11 +140,6 @@ def write_whole(path: Path, data: bytes) -> None:
     The data goes to a new file in the same folder, which takes the place of the old
     one only when all of it is on the disk; what a write that was killed has left there
     is removed. Pipes and devices are written straight to.
-
-    Raises
-    ------
-    FileError
-        The file cannot be written; the text says why and what to do.
     """
     _require_file(path)
     try:
@@ -173,8 +168,6 @@ def create_whole(path: Path, data: bytes, mode: int = 0o666) -> None:
     ------
     NameTakenError
         The file exists.
-    FileError
-        The file cannot be written; the text says why and what to do.
     """
     _require_file(path)
     sweep_parts(path.parent)

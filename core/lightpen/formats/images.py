@@ -145,11 +145,6 @@ def find_images(*places: str) -> ImageSource:
     *places : str
         One folder, pattern or video, or several image files, as a shell makes them of
         a pattern. Images are taken in the natural order of their names: 2 before 10.
-
-    Raises
-    ------
-    FileError
-        The place is missing, holds no image, or cannot be read.
     """
     if len(places) > 1:
         return image_files(sorted(map(Path, places), key=_by_name))

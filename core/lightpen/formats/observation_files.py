@@ -130,13 +130,7 @@ def read_centers(path: Path, n_leds: int) -> Centers:
 
 
 def read_unlabelled_centers(path: Path) -> UnlabelledCenters:
-    """Read centres of unknown LEDs; see the module for the layout.
-
-    Raises
-    ------
-    FileError
-        The file cannot be read, or has cells that are not numbers.
-    """
+    """Read centres of unknown LEDs; see the module for the layout."""
     table = read_table(path, message("file.centers"), OBSERVATION_FILE_LIMIT)
     columns = table.columns(_UNLABELLED, message("table.of-centers"))
     frame_of_row = table.whole_numbers(columns[0])

@@ -88,11 +88,6 @@ def read_rig(path: Path, camera_files: Sequence[Path] = ()) -> RigFile:
     ----------
     camera_files : sequence of Path, optional
         One a camera, in place of those that it names, as for a copy.
-
-    Raises
-    ------
-    FileError
-        One of them cannot be read, or is not what it must be.
     """
     name = printable(path.name)
     entries = Entries.of(

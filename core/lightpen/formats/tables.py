@@ -205,11 +205,6 @@ def read_table(path: Path, what: Message, limit: int) -> Table:
         File type for messages.
     limit : int
         Largest size, bytes.
-
-    Raises
-    ------
-    FileError
-        The file cannot be read or is not such a table.
     """
     return parse_table(read_text(path, what, limit), printable(path.name))
 

@@ -73,13 +73,7 @@ class Resumable:
 
 
 def read_resumable(folder: Path) -> Resumable:
-    """Read an interrupted swing and fit its images again.
-
-    Raises
-    ------
-    FileError
-        The record or one of its files cannot be read.
-    """
+    """Read an interrupted swing and fit its images again."""
     record = open_record(folder)
     setup = recorded_setup(record)
     if not _shows(record, setup.pen, setup.rig):
@@ -95,11 +89,6 @@ def read_for_more(folder: Path) -> Resumable:
     """Read a complete swing, to capture more images.
 
     The record notes it, so that the swing continues likewise when it is interrupted.
-
-    Raises
-    ------
-    FileError
-        The record or one of its files cannot be read, or the record be written.
     """
     swing = read_resumable(folder)
     limits = limits_for_more(swing.setup.limits, swing.state.n_kept)
@@ -148,13 +137,7 @@ def resume_swing(setup: SwingSetup, record: Record, time: float = 0.0) -> SwingS
 
 
 def recorded_setup(record: Record) -> SwingSetup:
-    """Return the setup of a record, from its own copies of the files.
-
-    Raises
-    ------
-    FileError
-        The copy of the camera or pen file cannot be read.
-    """
+    """Return the setup of a record, from its own copies of the files."""
     found = source(record)
     return SwingSetup(
         found.camera,

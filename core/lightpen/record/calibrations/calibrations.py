@@ -239,8 +239,6 @@ def parse_calibration(data: bytes, path: Path) -> CalibrationFile:
 
     Raises
     ------
-    FileError
-        It is not as it was written.
     UsageError
         It is no calibration.
     """

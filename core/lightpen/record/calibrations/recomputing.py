@@ -69,8 +69,6 @@ def recompute(path: Path) -> Recomputed:
     ------
     UsageError
         It does not hold the files, or not the images in the second of two cones.
-    FileError
-        It cannot be read, or is not as it was written.
     CalibrationError
         It does not determine the tip.
     """

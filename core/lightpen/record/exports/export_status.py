@@ -23,13 +23,7 @@ NOT_ENTERED = "NOT ENTERED"  # in the archive
 
 
 def with_status(file: CalibrationFile, now: datetime) -> CalibrationFile:
-    """Return a calibration with what its data folder says of it, its pen and its tip.
-
-    Raises
-    ------
-    FileError
-        The library or the limits of the data folder cannot be read.
-    """
+    """Return a calibration with the status of its pen and tip in the data folder."""
     data = data_folder_of(file.path)
     if data is None:
         return file

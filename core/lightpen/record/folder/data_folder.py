@@ -20,13 +20,7 @@ from lightpen.record.swings.reading import IMAGES, OPENER
 
 
 def check_writable(data: Path) -> None:
-    """Write to a folder, which is made if it is not there, and leave nothing in it.
-
-    Raises
-    ------
-    FileError
-        It cannot be written; the text says why and what to do.
-    """
+    """Write to a folder, which is made if it is not there, and leave nothing in it."""
     try:
         data.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=data) as file:

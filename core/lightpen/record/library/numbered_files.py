@@ -54,13 +54,7 @@ def newest_number(folder: Path) -> int:
 
 
 def make_folder(folder: Path) -> None:
-    """Create a folder and its parents.
-
-    Raises
-    ------
-    FileError
-        It cannot be made.
-    """
+    """Create a folder and its parents."""
     try:
         new = [each for each in folder.parents if not each.exists()]
         folder.mkdir(parents=True, exist_ok=True)

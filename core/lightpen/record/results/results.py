@@ -330,11 +330,6 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
     ----------
     locate : callable
         Returns the folder of a swing by what is written.
-
-    Raises
-    ------
-    FileError
-        It is damaged, or written by a later version of the program.
     """
     try:
         head = head_of(data)

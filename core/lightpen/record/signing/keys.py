@@ -114,13 +114,7 @@ def make_station_key() -> SigningKey:
 
 
 def station_key(name: str) -> SigningKey | None:
-    """Return the private key named so by `chain_of`; None if it is not in this account.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, or its file was changed.
-    """
+    """Return the private key of a chain (`chain_of`); None if not in this account."""
     file = _file_of(name)
     if not file.exists():
         return None

@@ -58,13 +58,7 @@ class _StationFile(Struct):
 
 
 def station_name(data: Path) -> str:
-    """Return the name of the first station key of a data folder, made if need be.
-
-    Raises
-    ------
-    FileError
-        It cannot be stored or read.
-    """
+    """Return the name of the first station key of a data folder, made if need be."""
     file = data / STATION_FILE
     if not file.exists():
         public = make_station_key().public

@@ -57,11 +57,6 @@ def find_unfinished(root: Path) -> InterruptedSwings:
     Of a concluded record only the end is read, so that thousands of them cost little. A
     folder in which there is nothing of a swing is passed over, be it that a record was
     just being made when the program was killed.
-
-    Raises
-    ------
-    FileError
-        The folder of the records itself cannot be read.
     """
     try:
         folders = list(root.iterdir()) if root.is_dir() else []

@@ -95,13 +95,7 @@ def line_bytes(line: Line) -> bytes:
 
 
 def journal_bytes(folder: Path) -> bytes:
-    """Return the journal of a record.
-
-    Raises
-    ------
-    FileError
-        There is no journal, or it cannot be read.
-    """
+    """Return the journal of a record."""
     return read_bytes(folder / JOURNAL, message("file.journal"), LIMIT)
 
 
@@ -109,11 +103,6 @@ def read_lines(folder: Path) -> list[bytes]:
     """Return the lines of the journal in a folder, without their ends.
 
     What a crash or a power cut left of the last one is not among them.
-
-    Raises
-    ------
-    FileError
-        There is no journal, or it cannot be read.
     """
     path = folder / JOURNAL
     if path.is_file() and path.stat().st_size == 0:

@@ -232,13 +232,7 @@ def record_files(record: Record) -> tuple[Path, ...]:
 
 
 def is_record(folder: Path) -> bool:
-    """Return whether a folder is a record.
-
-    Raises
-    ------
-    FileError
-        The folder may not be looked into.
-    """
+    """Return whether a folder is a record."""
     try:
         return (folder / HEADER).is_file() and (folder / JOURNAL).is_file()
     except OSError as error:

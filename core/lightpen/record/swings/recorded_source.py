@@ -68,13 +68,7 @@ class RecordSource:
 
 
 def source(record: Record) -> RecordSource:
-    """Return the input of the calibration of a record.
-
-    Raises
-    ------
-    FileError
-        The copy of the camera or pen file cannot be read.
-    """
+    """Return the input of the calibration of a record."""
     header = record.header
     camera_file = record.folder / copy_name(CAMERA_STEM, header.camera_file)
     pen_file = record.folder / copy_name(PEN_STEM, header.pen_file)

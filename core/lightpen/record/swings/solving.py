@@ -139,13 +139,7 @@ def solve_again(solution: Solution, taken_out: Mapping[int, str]) -> Solution:
 
 
 def load_image(solution: Solution, number: int, camera: int = 0) -> Image:
-    """Read an image of a solved record again, (H, W), by its number and camera.
-
-    Raises
-    ------
-    FileError
-        The image is missing or damaged.
-    """
+    """Read an image of a solved record again, (H, W), by its number and camera."""
     index = int(np.searchsorted(solution.numbers, number))
     source = solution.source
     images = (source.images, *source.other_images)[camera]

@@ -299,11 +299,6 @@ def make_record_folder(root: Path, names: Names, now: datetime) -> Path:
     ----------
     root : Path
         Folder of the records.
-
-    Raises
-    ------
-    FileError
-        No folder can be made there.
     """
     name = folder_name(names, now)
     try:

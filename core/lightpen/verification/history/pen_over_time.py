@@ -83,13 +83,7 @@ class NewLedFile:
 def read_pen_over_time(
     archive: FolderArchive, preparation: Preparation, report: Tell = lambda _: None
 ) -> PenOverTime:
-    """Read the accepted swings of the pen that is chosen.
-
-    Raises
-    ------
-    FileError
-        The archive or the LED file cannot be read.
-    """
+    """Read the accepted swings of the pen that is chosen."""
     pen_file, camera_file = preparation.pen_file, preparation.camera_file
     if pen_file is None:
         raise ValueError("`pen_file` must be chosen.")

@@ -93,13 +93,7 @@ def viewers_of_rig(file: RigFile) -> PenCameras:
 
 
 def read_viewers(camera_file: Path | None, rig_file: Path | None) -> PenCameras | None:
-    """Read a camera file or a rig file; None of neither.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, or is not what it must be.
-    """
+    """Read a camera file or a rig file; None of neither."""
     if rig_file is not None:
         return viewers_of_rig(read_rig(rig_file))
     if camera_file is not None:
@@ -115,11 +109,6 @@ def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> ImageLocation
     rig : Rig, optional
         Rig of the images. The place then lists one place per camera, or is a folder
         with one sub-folder per camera.
-
-    Raises
-    ------
-    FileError
-        There is nothing there, or it cannot be read.
     """
     folder = Path(where[0])
     if len(where) == 1 and is_record(folder):

@@ -194,13 +194,7 @@ class CheckpointFile:
             self._path.with_suffix(LOCK).unlink(missing_ok=True)
 
     def put_aside(self) -> None:
-        """Rename a damaged file, so that it is not offered.
-
-        Raises
-        ------
-        FileError
-            It cannot be renamed.
-        """
+        """Rename a damaged file, so that it is not offered."""
         try:
             self._path.replace(self._path.with_suffix(DAMAGED))
         except OSError as error:

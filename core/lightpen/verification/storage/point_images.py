@@ -173,11 +173,6 @@ class PointImages:
         ----------
         folder : Path
             Folder of all records of touches.
-
-        Raises
-        ------
-        FileError
-            A record cannot be read, or be written to.
         """
         self.forget_but(())
         done = []
@@ -276,13 +271,7 @@ class LivePoints:
         detection: PenDetection,
         region: RegionOfInterest,
     ) -> SessionTransition:
-        """Process an image and return the transition of the verification.
-
-        Raises
-        ------
-        FileError
-            A required image cannot be stored.
-        """
+        """Process an image and return the transition of the verification."""
         if state.touching.phase is ProbingPhase.HOLDING:
             self._lamps = self._lamps.with_frame(frame, detection, region)
         together = see_together(setup.instrument.rig, setup.instrument.pen, detection)

@@ -148,11 +148,6 @@ def abandon_interrupted(
     """Conclude an interrupted verification as abandoned; its files are kept.
 
     A damaged file is set aside.
-
-    Raises
-    ------
-    FileError
-        Something cannot be written.
     """
     under_way, held = interrupted.under_way, CheckpointFile(interrupted.path)
     held.hold()
