@@ -11,6 +11,7 @@ Conventions used everywhere in this package:
 * A point carries its frame as a suffix: ``tip_pen``, ``cone_cam``.
 * Arrays over frames have the frame as first axis, arrays over LEDs the LED as
   the axis before the coordinates.
+* ``data`` is a data folder; ``now`` returns date and time with the time zone.
 * What reads or writes files raises `FileError` where they cannot be read or written, or
   are damaged; the archive `ArchiveError`. A docstring names other errors only.
 """

@@ -35,8 +35,6 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
     ----------
     folder : Path
         Records and results are kept in it.
-    now : callable
-        Returns date and time with the time zone.
 
     Attributes
     ----------

@@ -54,8 +54,6 @@ def fetch(
 
     Parameters
     ----------
-    data : Path
-        Data folder.
     chain : str
         Start of the name of the chain of a folder that has none yet; not needed where
         the server shows one alone.

@@ -30,8 +30,6 @@ def require_restorable(
     ----------
     chain : str
         Own chain of the data folder.
-    data : Path
-        Data folder.
 
     Raises
     ------
@@ -87,8 +85,6 @@ def restored_result(
     ----------
     record : str or None
         Record of the entry: the file of its result.
-    data : Path
-        Data folder.
     by : Names
         Operator who reinstates it, and station.
 

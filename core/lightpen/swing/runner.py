@@ -35,8 +35,6 @@ class SwingRunner:
     ----------
     records : Path
         Folder that a new swing's record is made in.
-    now : callable
-        Returns date and time with the time zone.
     logbook : LazyLogbook, optional
         Archive for the outcome of swings; without it the outcome is only in files.
     """

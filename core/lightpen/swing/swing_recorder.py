@@ -123,7 +123,7 @@ def take_recorded_image(
     Returns
     -------
     Transition
-        As `lightpen.swing.capture.rules.advance` returns it.
+        As `lightpen.swing.capture.rules.advance_swing` returns it.
     """
     state = replace(_further(state, n_images), time=time)
     events: tuple[SwingEvent, ...] = ()

@@ -84,8 +84,6 @@ class SwingWorkflow:
     ----------
     records : Path
         Folder that a new swing's record is made in.
-    now : callable
-        Returns date and time with the time zone.
     logbook : LazyLogbook or None
         Archive for the outcome of swings; without it the outcome is only in files.
     """

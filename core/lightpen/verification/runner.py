@@ -33,8 +33,6 @@ class VerificationRunner:
     ----------
     data : Path
         Data folder, in which results are kept.
-    now : callable
-        Returns date and time with the time zone.
     """
 
     def __init__(

@@ -90,8 +90,6 @@ class VerificationWorkflow:
     ----------
     data : Path
         Data folder, in which results are kept.
-    now : callable
-        Returns date and time with the time zone.
     """
 
     def __init__(

@@ -19,11 +19,6 @@ from lightpen_app.work.notifications import Notifications
 class DataFolderPanel(Translated, QGroupBox):
     """Shows and opens the data folder, and other windows that use it.
 
-    Parameters
-    ----------
-    folder : Path
-        The data folder.
-
     Signals
     -------
     change_requested()

@@ -58,7 +58,7 @@ def reestimate_poses(calibration: CalibrationRecord) -> ReestimatedPoses | None:
 
     Returns
     -------
-    Retraced or None
+    ReestimatedPoses or None
         None of several cameras or two cones, and where the file does not keep enough.
     """
     fitted = calibration.instrument

@@ -46,7 +46,7 @@ def seen_by_rig(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:
 
     Returns
     -------
-    Sighting
+    PenDetection
         Its pose is rig_from_pen.
     """
     for c, seen in enumerate((detection, *detection.others)):

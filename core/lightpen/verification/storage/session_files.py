@@ -154,8 +154,6 @@ class SessionKeeping:
         Folder that it is kept in.
     new_record : callable
         Makes a record for the images of the run at hand.
-    now : callable
-        Returns date and time with the time zone.
 
     Attributes
     ----------
