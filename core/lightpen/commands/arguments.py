@@ -90,6 +90,31 @@ def add_camera_and_pen(parser: argparse.ArgumentParser) -> None:
     add_pen_options(parser)
 
 
+def add_cameras_and_pen(parser: argparse.ArgumentParser, rig_images: str) -> None:
+    """Add ``--camera`` or ``--rig``, ``--pen``, and the options of the pen.
+
+    Parameters
+    ----------
+    rig_images : str
+        How the images of several cameras are given.
+    """
+    parser.add_argument(
+        "--camera",
+        type=Path,
+        metavar="FILE",
+        help="camera file: intrinsics of the camera",
+    )
+    parser.add_argument(
+        "--rig",
+        type=Path,
+        metavar="FILE",
+        help="rig file with the extrinsics of several cameras, instead of --camera; "
+        f"{rig_images}",
+    )
+    parser.add_argument("--pen", type=Path, metavar="FILE", help="LED file of the pen")
+    add_pen_options(parser)
+
+
 def add_pen_options(parser: argparse.ArgumentParser) -> None:
     """Add options for what a pen file may omit."""
     parser.add_argument(

@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from lightpen.commands.arguments import (
+    add_cameras_and_pen,
     add_conditions,
     add_json,
-    add_pen_options,
     finite,
     number_from,
 )
@@ -44,23 +44,9 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
             "recomputes the tip from it"
         ),
     )
-    parser.add_argument(
-        "--camera",
-        type=Path,
-        metavar="FILE",
-        help="camera file: intrinsics of the camera",
+    add_cameras_and_pen(
+        parser, "give IMAGES (or FILE.csv) once per camera, in the order of this file"
     )
-    parser.add_argument(
-        "--rig",
-        type=Path,
-        metavar="FILE",
-        help=(
-            "rig file with the extrinsics of several cameras, instead of --camera; "
-            "give IMAGES (or FILE.csv) once per camera, in the order of this file"
-        ),
-    )
-    parser.add_argument("--pen", type=Path, metavar="FILE", help="LED file of the pen")
-    add_pen_options(parser)
     parser.add_argument(
         "--fps",
         type=number_from(0.01, 10_000.0, "image rate", "images a second"),

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpen.commands.arguments import add_pen_options, limits_by
+from lightpen.commands.arguments import add_cameras_and_pen, limits_by
 from lightpen.commands.console import lacking, progress, require_other_file
 from lightpen.detection.observations import Observations, Report, observe_centers
 from lightpen.errors import CalibrationError, UsageError
@@ -56,24 +56,10 @@ from lightpen.verification.tasks.task import Conditions
 
 def add_touch_inputs(parser: argparse.ArgumentParser, tip_help: str) -> None:
     """Add the options for camera, pen, tip and images of a touch."""
-    parser.add_argument(
-        "--camera",
-        type=Path,
-        metavar="FILE",
-        help="camera file: intrinsics of the camera",
+    add_cameras_and_pen(
+        parser,
+        "give a folder that contains one folder per camera, named as in this file",
     )
-    parser.add_argument(
-        "--rig",
-        type=Path,
-        metavar="FILE",
-        help=(
-            "rig file with the extrinsics of several cameras, instead of --camera; "
-            "give a folder that contains one folder per camera, named as in this "
-            "file"
-        ),
-    )
-    parser.add_argument("--pen", type=Path, metavar="FILE", help="LED file of the pen")
-    add_pen_options(parser)
     parser.add_argument(
         "--tip", type=Path, required=True, metavar="RESULT.json", help=tip_help
     )

@@ -225,7 +225,7 @@ def detections_of(
 
     Returns
     -------
-    list of Sighting
+    list of PenDetection
         One per image, with the rough pose of its labels.
     """
     n_leds = len(labels[0].spot)

@@ -96,7 +96,7 @@ def see_together(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:
 
     Returns
     -------
-    Sighting
+    PenDetection
         Its pose is rig_from_pen, with its cofactors and its noise.
     """
     views = (detection, *detection.others)

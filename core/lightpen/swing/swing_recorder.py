@@ -203,13 +203,7 @@ class FrameCounters:
 
 
 class SwingRecorder:
-    """A record that takes in the images of its swing, until it is closed.
-
-    Raises
-    ------
-    RecordError
-        If the record cannot be opened for writing.
-    """
+    """A record that takes in the images of its swing, until it is closed."""
 
     def __init__(self, record: Record) -> None:
         self._writer = RecordWriter.resume(record)
