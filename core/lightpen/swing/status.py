@@ -1,5 +1,6 @@
 """Snapshot of a swing at one moment."""
 
+import logging
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -20,6 +21,8 @@ from lightpen.swing.capture.state import (
     SwingState,
 )
 from lightpen.swing.failed_swing import FailedSwing
+
+_logger = logging.getLogger(__name__)
 
 
 class Activity(StrEnum):
@@ -92,9 +95,12 @@ class SwingStatus:
     @property
     def failure(self) -> FailedSwing | None:
         """Why there is no tip, once its computation has failed."""
-        state = self.state
-        is_judged = state is not None and state.phase is Phase.VERDICT
-        return self.failed if is_judged and self.solution is None else None
+        return self.failed if self.has_verdict and self.solution is None else None
+
+    @property
+    def has_verdict(self) -> bool:
+        """Whether its computation has ended, with a tip or without."""
+        return self.state is not None and self.state.phase is Phase.VERDICT
 
     @property
     def is_capturing(self) -> bool:
@@ -137,3 +143,24 @@ class SwingListener(Protocol):
 
     def on_fault_cleared(self, message: Message) -> None:
         """Handle a fault that is cleared."""
+
+
+def log_change(
+    before: SwingStatus, now: SwingStatus, events: tuple[SwingEvent, ...]
+) -> None:
+    """Log what has changed in a status, and the events."""
+    for event in events:
+        _logger.debug("event: %s %s", event.what, event.numbers or "")
+    if now.record_folder != before.record_folder and now.record_folder is not None:
+        _logger.info("swing started or continued: %s", now.record_folder)
+    elif now.record_folder is None and before.record_folder is not None:
+        _logger.info("swing left: %s", before.record_folder)
+    phases = [status.state and status.state.phase for status in (before, now)]
+    if phases[0] is not phases[1]:
+        _logger.info("phase: %s", phases[1])
+    if now.assessment is not None and now.assessment is not before.assessment:
+        verdict = now.assessment.verdict
+        _logger.info("verdict: %s: %s", verdict.grade, verdict.reason)
+    result = now.result
+    if result is not None and result is not before.result:
+        _logger.info("accepted: tip %s, reason %r", result.names.tip, result.reason)

@@ -4,7 +4,6 @@ Nothing here knows threads: the owner makes all calls in turn, and runs long
 computations elsewhere.
 """
 
-import logging
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -64,15 +63,13 @@ from lightpen.swing.operator_presence import OperatorPresence
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
-from lightpen.swing.status import Activity, SwingListener, SwingStatus
+from lightpen.swing.status import Activity, SwingListener, SwingStatus, log_change
 from lightpen.swing.swing_recorder import SwingRecorder
 from lightpen.swing_messages import Code
 
 T = TypeVar("T")
 PRESS_IMAGES = 60  # at least, with firm pressure
 PRESS_UNCERTAINTY = 1.0  # mm: U of that tip ends no swing
-
-_logger = logging.getLogger(__name__)
 
 
 class SwingWorkflow:
@@ -136,13 +133,13 @@ class SwingWorkflow:
 
     def _publish(self, status: SwingStatus, *events: SwingEvent) -> None:
         """Set the status and notify."""
-        is_open = status.is_capturing or _is_judged(status)
+        is_open = status.is_capturing or (status.has_verdict and not status.result)
         has_others = is_open and self._presence.has_other_choices
         before = self._status
         self._status = replace(
             status, refusal=self._presence.refusal, has_other_choices=has_others
         )
-        _log_change(before, self._status, events)
+        log_change(before, self._status, events)
         self._listener.on_swing(self._status, events)
 
     def _republish(self) -> None:
@@ -643,33 +640,6 @@ class SwingWorkflow:
         if self._catching_up is not None:
             self._catching_up.cancel()
         self._faults.trying(self._logbook.close)
-
-
-def _log_change(
-    before: SwingStatus, now: SwingStatus, events: tuple[SwingEvent, ...]
-) -> None:
-    for event in events:
-        _logger.debug("event: %s %s", event.what, event.numbers or "")
-    if now.record_folder != before.record_folder and now.record_folder is not None:
-        _logger.info("swing started or continued: %s", now.record_folder)
-    elif now.record_folder is None and before.record_folder is not None:
-        _logger.info("swing left: %s", before.record_folder)
-    phases = [status.state and status.state.phase for status in (before, now)]
-    if phases[0] is not phases[1]:
-        _logger.info("phase: %s", phases[1])
-    if now.assessment is not None and now.assessment is not before.assessment:
-        verdict = now.assessment.verdict
-        _logger.info("verdict: %s: %s", verdict.grade, verdict.reason)
-    result = now.result
-    if result is not None and result is not before.result:
-        _logger.info("accepted: tip %s, reason %r", result.names.tip, result.reason)
-
-
-def _is_judged(status: SwingStatus) -> bool:
-    """Return whether a swing has its verdict, but is not accepted."""
-    state = status.state
-    is_accepted = status.result is not None
-    return state is not None and state.phase is Phase.VERDICT and not is_accepted
 
 
 @dataclass(frozen=True, eq=False)
