@@ -33,7 +33,7 @@ from lightpen.archive.database import look_into
 from lightpen.archive.exchange import deliver
 from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.archive.server import open_server
-from lightpen.record.signing.keys import KEYS
+from lightpen.record.library.signing.keys import KEYS
 
 SEED = 25
 N_HISTORIES = 1000

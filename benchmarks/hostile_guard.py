@@ -43,6 +43,8 @@ from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.record.folder.verifications import CONCLUSION
 from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.library_changes import Author, add_item
+from lightpen.record.library.signing.keys import KEYS, chain_of, key_folder
+from lightpen.record.library.signing.station import memory_file
 from lightpen.record.library.supervision import (
     Signature,
     read_supervision,
@@ -55,8 +57,6 @@ from lightpen.record.library.supervision_changes import (
 )
 from lightpen.record.library.tip_library import LIBRARY, ListedTip, read_library
 from lightpen.record.results.result_folder import RECORDS, RESULTS, FolderArchive
-from lightpen.record.signing.keys import KEYS, chain_of, key_folder
-from lightpen.record.signing.station import memory_file
 from lightpen.verification.storage.verification_files import keep_verification
 
 N_MUTATIONS, N_KILLS, SEED = 10_000, 40, 7

@@ -18,9 +18,9 @@ from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.archive.seal import close_sealed
 from lightpen.commands.supervisor import PASSWORD
 from lightpen.local_time import local_now
+from lightpen.record.library.signing.keys import key_folder
 from lightpen.record.library.supervision import Signature, read_supervision
 from lightpen.record.library.supervision_changes import set_password
-from lightpen.record.signing.keys import key_folder
 
 Run = Callable[..., CompletedProcess[str]]
 

@@ -28,7 +28,7 @@ from lightpen.errors import UsageError
 from lightpen.formats.files import printable
 from lightpen.live.sources import SourceEnvironment
 from lightpen.logs import end_log, write_log_to
-from lightpen.record.signing.keys import KEYS
+from lightpen.record.library.signing.keys import KEYS
 from lightpen.simulator.camera import SERIAL
 from lightpen.streaming.server import StreamPlace
 from lightpen_app.crash import CrashHook, versions

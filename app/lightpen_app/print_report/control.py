@@ -13,22 +13,22 @@ from lightpen.archive.result_entry import ArchivePlace, entry_of_file
 from lightpen.formats.hashes import InputFile, with_content
 from lightpen.local_time import local_now
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.calibrations.export_status import with_status
 from lightpen.record.calibrations.reestimated_poses import (
     ReestimatedPoses,
     reestimate_poses,
 )
-from lightpen.record.exports.export_status import with_status
+from lightpen.record.calibrations.traceability import (
+    TracedItem,
+    certified_values,
+    traced_items,
+)
 from lightpen.record.folder.verifications import (
     StoredVerification,
     data_folder_of_verification,
     read_verification,
 )
 from lightpen.record.library.tip_library import Library, read_library
-from lightpen.record.library.traceability import (
-    TracedItem,
-    certified_values,
-    traced_items,
-)
 from lightpen.record.swings.names import Names
 from lightpen_app.work.job import Job
 from lightpen_app.work.save_place import SavePlace

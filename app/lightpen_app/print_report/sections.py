@@ -11,10 +11,10 @@ from lightpen.archive.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import CalibrationFile
+from lightpen.record.calibrations.export_status import OVERDUE, RETIRED
 from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
-from lightpen.record.exports.export_status import OVERDUE, RETIRED
+from lightpen.record.calibrations.traceability import TracedItem
 from lightpen.record.library.tip_library import ItemKind
-from lightpen.record.library.traceability import TracedItem
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import LIGHT

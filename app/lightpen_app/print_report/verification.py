@@ -16,8 +16,8 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.hashes import InputFile
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
+from lightpen.record.calibrations.traceability import TracedItem
 from lightpen.record.folder.verifications import StoredVerification
-from lightpen.record.library.traceability import TracedItem
 from lightpen.verification.tasks.part import PART
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.sentences import worded

@@ -7,7 +7,7 @@ from PySide6.QtCore import QObject, Qt, Signal
 from lightpen.cameras.clock import Clock
 from lightpen.errors import LightpenError
 from lightpen.local_time import local_now
-from lightpen.record.exports.export_status import with_status
+from lightpen.record.calibrations.export_status import with_status
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.streaming.messages import StreamedTip, tip_metadata
 from lightpen.streaming.server import PoseStream, StreamPlace, StreamStatus

@@ -39,8 +39,8 @@ from lightpen.archive.tables import CHAIN_WRITERS, CHAINS, ENTRIES, RECORDS
 from lightpen.errors import ArchiveError, FileError
 from lightpen.formats.own_json import DamagedError
 from lightpen.messages import Message, message
-from lightpen.record.signing.keys import chain_of, make_station_key
-from lightpen.record.signing.station import station_name
+from lightpen.record.library.signing.keys import chain_of, make_station_key
+from lightpen.record.library.signing.station import station_name
 
 SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
 _AT_HOME = select(CHAINS.c.chain).where(CHAINS.c.is_own)

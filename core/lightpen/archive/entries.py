@@ -18,6 +18,7 @@ from msgspec import Meta, Struct, to_builtins
 
 from lightpen import __version__
 from lightpen.formats.files import printable
+from lightpen.formats.json_records import Plain
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,
@@ -31,7 +32,6 @@ from lightpen.messages import Message, message
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.record.results.results import TipChange
-from lightpen.record.swings.assumed import Plain
 from lightpen.record.swings.names import Names
 
 NOTHING_BEFORE = "0" * 64  # in place of a hash, in the first entry of a chain

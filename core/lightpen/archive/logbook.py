@@ -61,6 +61,7 @@ from lightpen.messages import Message, message
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.numbered_files import number_of, numbered_files
+from lightpen.record.library.signing.keys import chain_of, station_key
 from lightpen.record.library.supervision import (
     Signature,
     Supervision,
@@ -72,7 +73,6 @@ from lightpen.record.results.acceptance import require_in_use
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import Result
-from lightpen.record.signing.keys import chain_of, station_key
 from lightpen.record.swings.journal import JOURNAL, last_verdict
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, open_record

@@ -3,7 +3,7 @@
 An entry is signed as it is entered: over its hash, and so over all entries before it.
 The signature is kept beside the text: 64 hexadecimal digits of the public key, then 128
 of the signature. As the name of a chain is the hash of its first key, nobody else can
-continue it, nor begin one of that name, see `lightpen.record.signing.keys`.
+continue it, nor begin one of that name, see `lightpen.record.library.signing.keys`.
 
 A chain gets another key by an entry of limits whose settings have ``station_key``, with
 the signature of `key_change` by the key before, or by a supervisor whose key an earlier
@@ -23,7 +23,7 @@ from lightpen.record.library.key_changes import (
     SUPERVISOR_SIGNATURE,
     key_change,
 )
-from lightpen.record.signing.keys import chain_of, is_signed, station_key
+from lightpen.record.library.signing.keys import chain_of, is_signed, station_key
 
 UNAPPROVED = "archive.key-unapproved"  # of a station without a supervisor
 _KEY_LENGTH = 64

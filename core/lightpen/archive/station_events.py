@@ -7,6 +7,7 @@ from pathlib import Path
 from lightpen.archive.entries import Event, FileHash, Kind, this_program
 from lightpen.archive.event_extraction import ExtractedEvent, file_text
 from lightpen.formats.files import LARGEST_RECORD, read_bytes
+from lightpen.formats.json_records import Plain
 from lightpen.record.folder.camera_calibrations import (
     CAMERA_CALIBRATIONS,
     WHAT,
@@ -28,7 +29,6 @@ from lightpen.record.library.key_changes import (
 from lightpen.record.library.numbered_files import numbered_files
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
-from lightpen.record.swings.assumed import Plain
 from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.names import Names
 

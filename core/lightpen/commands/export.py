@@ -12,7 +12,7 @@ from lightpen.formats.machine_settings import machine_settings
 from lightpen.local_time import local_now
 from lightpen.model.laboratory import PLACES, Laboratory, is_country
 from lightpen.record.calibrations.calibrations import read_calibration
-from lightpen.record.exports.export_status import with_status
+from lightpen.record.calibrations.export_status import with_status
 from lightpen.record.exports.formats import FORMATS
 
 LABORATORY = {

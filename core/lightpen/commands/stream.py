@@ -30,7 +30,7 @@ from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.record.calibrations.calibrations import read_calibration
-from lightpen.record.exports.export_status import with_status
+from lightpen.record.calibrations.export_status import with_status
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.recordings import FilesBeside, files_beside
 from lightpen.streaming.messages import StreamedTip, tip_metadata

@@ -8,7 +8,7 @@ from base64 import b64encode
 from collections.abc import Mapping
 from datetime import datetime
 from math import isfinite
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from msgspec import Struct, to_builtins
@@ -18,6 +18,8 @@ from lightpen.formats.hashes import InputFile
 from lightpen.formats.own_json import Digest, require_path, with_checksum
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import Message
+
+Plain: TypeAlias = str | int | float | bool | None
 
 
 class ProgramName(Struct, frozen=True):

@@ -18,7 +18,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.record.calibrations.calibrations import CalibrationFile
-from lightpen.record.exports.export_status import status_of
+from lightpen.record.calibrations.export_status import status_of
 from lightpen.record.swings.names import Names
 from lightpen.verification.tasks.probed_point import (
     ProbingFrame,

@@ -2,12 +2,12 @@
 
 from lightpen import __version__
 from lightpen.formats.camera_files import CAMERA_FILE
-from lightpen.formats.json_records import plain
+from lightpen.formats.json_records import Plain, plain
 from lightpen.formats.pen_files import PEN_FILE
 from lightpen.formats.rig_files import RIG_FILE
 from lightpen.local_time import local_now
 from lightpen.model.origin import Origin
-from lightpen.record.swings.assumed import Plain, assumption_entries
+from lightpen.record.swings.assumed import assumption_entries
 from lightpen.record.swings.header import FileCopy, Header, RigCopies
 from lightpen.record.swings.recordings import is_simulated_recording
 from lightpen.swing.image_sources import CameraInUse, SecondCamera

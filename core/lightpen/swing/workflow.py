@@ -16,13 +16,13 @@ from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
 from lightpen.errors import AcceptanceError, LightpenError
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.json_records import Plain
 from lightpen.messages import Message, message
 from lightpen.record.library.supervision import Signature
 from lightpen.record.results.acceptance import accept
 from lightpen.record.results.assessment import SwingAssessment, assess
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
-from lightpen.record.swings.assumed import Plain
 from lightpen.record.swings.interrupted import discard_swing
 from lightpen.record.swings.reading import (
     PRESS_TEST,

@@ -22,7 +22,7 @@ from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.calibrations.reestimated_poses import reestimate_poses
-from lightpen.record.library.traceability import TracedItem
+from lightpen.record.calibrations.traceability import TracedItem
 from lightpen.record.results.results import Result, result_bytes
 from lightpen.record.swings.names import Names
 from lightpen.swing_messages import Code

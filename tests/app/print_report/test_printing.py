@@ -18,9 +18,9 @@ from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import message
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
-from lightpen.record.exports.export_status import OVERDUE, RETIRED
+from lightpen.record.calibrations.export_status import OVERDUE, RETIRED
+from lightpen.record.calibrations.traceability import TracedItem
 from lightpen.record.library.tip_library import ItemKind, ListedPen
-from lightpen.record.library.traceability import TracedItem
 from lightpen.record.results.results import Result, TipChange, result_bytes
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.sentences import worded

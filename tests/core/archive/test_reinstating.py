@@ -32,13 +32,13 @@ from lightpen.model.limits import DueRule
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.library_changes import Author, add_item, retire_item
+from lightpen.record.library.signing.keys import key_folder, station_key
+from lightpen.record.library.signing.station import memory_file
 from lightpen.record.library.supervision import Signature, read_supervision
 from lightpen.record.library.supervision_changes import renew_station_key, set_password
 from lightpen.record.library.tip_library import ItemKind, ListedTip
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import result_bytes
-from lightpen.record.signing.keys import key_folder, station_key
-from lightpen.record.signing.station import memory_file
 from lightpen.record.swings.names import Names
 
 BEA = Names("Hall 7", "Bea")

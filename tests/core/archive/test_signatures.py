@@ -16,7 +16,7 @@ from lightpen.archive.history import lines
 from lightpen.archive.queries import EntryFilter
 from lightpen.archive.tables import ENTRIES
 from lightpen.errors import ArchiveError
-from lightpen.record.signing.keys import key_folder, make_station_key
+from lightpen.record.library.signing.keys import key_folder, make_station_key
 
 
 def head_of(station: Station) -> ChainHead:

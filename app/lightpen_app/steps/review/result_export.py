@@ -11,7 +11,7 @@ from lightpen.archive.result_entry import with_entry
 from lightpen.local_time import local_now
 from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import read_calibration
-from lightpen.record.exports.export_status import with_status
+from lightpen.record.calibrations.export_status import with_status
 from lightpen.record.exports.exports import copied_tip, exported_solution, save_new
 from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog

@@ -25,8 +25,8 @@ from lightpen.formats.own_json import DamagedError, has_checksum, parse_checked
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import message
 from lightpen.model.origin import Origin
+from lightpen.record.calibrations.traceability import TracedItem
 from lightpen.record.library.supervision import read_supervision
-from lightpen.record.library.traceability import TracedItem
 from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.result_folder import signed_heading
 from lightpen.record.results.results import TipChange, has_head, parse_result

@@ -20,8 +20,8 @@ from lightpen.local_time import local_now
 from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.decision_rule import decision_rule
-from lightpen.record.exports.export_status import status_of
-from lightpen.record.library.traceability import TracedItem
+from lightpen.record.calibrations.export_status import status_of
+from lightpen.record.calibrations.traceability import TracedItem
 
 VERSION = "3.2.1"
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"

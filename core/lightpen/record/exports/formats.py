@@ -3,9 +3,9 @@
 Another format is a function from `CalibrationFile` to text and an entry of `FORMATS`,
 which the command ``lightpen export`` and the menu of the wizard offer. All state the
 tip, its origin (live, recorded, simulated), its grade and its status, see
-`lightpen.record.exports.export_status`; the record as JSON has no place for a status of
-the library. Transforms keep the axes of the pen: the tip is the origin of a frame
-parallel to the pen frame.
+`lightpen.record.calibrations.export_status`; the record as JSON has no place for a
+status of the library. Transforms keep the axes of the pen: the tip is the origin of a
+frame parallel to the pen frame.
 """
 
 from collections import Counter
@@ -24,8 +24,8 @@ from lightpen.local_time import local_time
 from lightpen.messages import Message, message
 from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import CalibrationFile
+from lightpen.record.calibrations.export_status import status_of
 from lightpen.record.exports.dcc import dcc_text
-from lightpen.record.exports.export_status import status_of
 
 MILLIMETRES = 1000.0  # in a metre, the unit of ROS
 N_DECIMALS = 6  # of a length in mm in a file for statistics

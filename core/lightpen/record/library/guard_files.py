@@ -1,10 +1,11 @@
 """Changes of what guards a data folder: password, limits and station key, one a file.
 
 Each file has the hash of the one before and the signatures of the station and of the
-supervisor who made the change, see `lightpen.record.signing`. The first introduces the
-station key. Where a supervisor introduces a key or a password, the hashes of the files
-that count until then are listed: all others must be signed by the new one.
-All files have the mode 0600: a password can be guessed by its salt and public key.
+supervisor who made the change, see `lightpen.record.library.signing`. The first
+introduces the station key. Where a supervisor introduces a key or a password, the
+hashes of the files that count until then are listed: all others must be signed by the
+new one. All files have the mode 0600: a password can be guessed by its salt and public
+key.
 """
 
 from collections.abc import Mapping
@@ -29,14 +30,14 @@ from lightpen.formats.upgrades import LaterFormatError, parse_upgraded
 from lightpen.messages import message
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.numbered_files import make_folder, numbered_file
-from lightpen.record.signing.keys import (
+from lightpen.record.library.signing.keys import (
     PRIVATE,
     SALT_LENGTH,
     PublicKey,
     SigningKey,
     supervisor_key,
 )
-from lightpen.record.signing.signed_text import Signers, place_in
+from lightpen.record.library.signing.signed_text import Signers, place_in
 
 LIMITS_FOLDER = "limits"
 LIMIT = 8 * MEGABYTE  # some 80,000 files are listed in that
@@ -84,8 +85,8 @@ class LimitsChange(Struct, omit_defaults=True, kw_only=True):
         `lightpen.record.library.key_changes.key_change`.
     known : mapping of str to str or None
         Hashes of the files that count as they are, by their places, see
-        `lightpen.record.signing.signed_text.entries_sha256`; with each password, and
-        each station key that a supervisor introduces.
+        `lightpen.record.library.signing.signed_text.entries_sha256`; with each
+        password, and each station key that a supervisor introduces.
     """
 
     format: int

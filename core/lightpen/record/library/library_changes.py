@@ -25,6 +25,7 @@ from lightpen.record.library.numbered_files import (
     newest_number,
     numbered_file,
 )
+from lightpen.record.library.signing.signed_text import place_in
 from lightpen.record.library.supervision import (
     Signature,
     read_supervision,
@@ -47,7 +48,6 @@ from lightpen.record.library.tip_library import (
     Picture,
     read_library,
 )
-from lightpen.record.signing.signed_text import place_in
 
 LARGEST_PLACE = 10_000.0  # mm
 SEPARATORS = set("/\\")  # of folders

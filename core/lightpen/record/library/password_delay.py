@@ -15,7 +15,7 @@ from lightpen.formats.files import read_bytes, write_whole
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import DamagedError, parse_own_json
 from lightpen.messages import message
-from lightpen.record.signing.keys import key_folder
+from lightpen.record.library.signing.keys import key_folder
 
 FREE = 2  # wrong passwords without a delay
 LONGEST_S = 300.0

@@ -27,14 +27,19 @@ from lightpen.record.library.guard_files import (
 from lightpen.record.library.key_changes import key_change
 from lightpen.record.library.numbered_files import number_of, numbered_files
 from lightpen.record.library.password_delay import note_attempt, require_patience
-from lightpen.record.signing.keys import SigningKey, chain_of, is_signed, station_key
-from lightpen.record.signing.signed_text import (
+from lightpen.record.library.signing.keys import (
+    SigningKey,
+    chain_of,
+    is_signed,
+    station_key,
+)
+from lightpen.record.library.signing.signed_text import (
     Signers,
     entries_sha256,
     place_in,
     signatures_of,
 )
-from lightpen.record.signing.station import memory_file, remembered
+from lightpen.record.library.signing.station import memory_file, remembered
 
 
 @dataclass(frozen=True)

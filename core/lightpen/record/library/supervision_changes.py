@@ -31,6 +31,20 @@ from lightpen.record.library.guard_files import (
 )
 from lightpen.record.library.key_changes import key_change
 from lightpen.record.library.numbered_files import numbered_files
+from lightpen.record.library.signing.keys import (
+    SALT_LENGTH,
+    SigningKey,
+    chain_of,
+    make_station_key,
+    station_key,
+    supervisor_key,
+)
+from lightpen.record.library.signing.signed_text import (
+    Signers,
+    entries_sha256,
+    place_in,
+)
+from lightpen.record.library.signing.station import remember, station_name
 from lightpen.record.library.supervision import (
     Signature,
     Supervision,
@@ -39,16 +53,6 @@ from lightpen.record.library.supervision import (
     require_supervisor,
 )
 from lightpen.record.library.tip_library import LIBRARY
-from lightpen.record.signing.keys import (
-    SALT_LENGTH,
-    SigningKey,
-    chain_of,
-    make_station_key,
-    station_key,
-    supervisor_key,
-)
-from lightpen.record.signing.signed_text import Signers, entries_sha256, place_in
-from lightpen.record.signing.station import remember, station_name
 
 LEAST_PASSWORD = 8  # characters
 SIGNED_FOLDERS = (

@@ -21,6 +21,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats import upgrades
 from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.json_records import Plain
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,
@@ -33,7 +34,6 @@ from lightpen.messages import Message, message
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
 from lightpen.record.library.numbered_files import numbered_files
 from lightpen.record.library.supervision import Supervision, read_supervision
-from lightpen.record.swings.assumed import Plain
 
 LIBRARY = "library"
 PICTURES = "pictures"  # folder in that one

@@ -21,6 +21,7 @@ from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.verdict import Grade, Verdict
 from lightpen.formats.files import printable
 from lightpen.formats.stored_messages import StoredMessage
+from lightpen.record.library.signing.keys import SigningKey
 from lightpen.record.library.supervision import (
     Signature,
     Supervision,
@@ -29,7 +30,6 @@ from lightpen.record.library.supervision import (
 from lightpen.record.results.assessment import SwingAssessment, assess
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result, TipChange
-from lightpen.record.signing.keys import SigningKey
 from lightpen.record.swings.interrupted import InterruptedSwings
 from lightpen.record.swings.reading import (
     Record,

@@ -17,6 +17,8 @@ from lightpen.errors import FileError
 from lightpen.formats.files import LARGEST_RECORD, opened, printable, read_bytes
 from lightpen.messages import message
 from lightpen.record.library.numbered_files import add_numbered, numbered_files
+from lightpen.record.library.signing.keys import SigningKey
+from lightpen.record.library.signing.signed_text import place_in
 from lightpen.record.library.supervision import (
     Signature,
     Supervision,
@@ -36,8 +38,6 @@ from lightpen.record.results.results import (
     result_bytes,
     withdrawal_bytes,
 )
-from lightpen.record.signing.keys import SigningKey
-from lightpen.record.signing.signed_text import place_in
 
 RECORDS, RESULTS = "records", "results"
 SIMULATED = "simulated"  # that the files of the simulated pen, and its results, are in

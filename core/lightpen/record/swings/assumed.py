@@ -2,11 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TypeAlias
 
+from lightpen.formats.json_records import Plain
 from lightpen.model.assumptions import USUAL, Assumptions
 
-Plain: TypeAlias = str | int | float | bool | None
 PREFIX = "assumed_"
 
 

@@ -19,6 +19,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.json_records import Plain
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,
@@ -39,7 +40,7 @@ from lightpen.formats.upgrades import (
 )
 from lightpen.messages import Message, message
 from lightpen.model.limits import SwingLimits
-from lightpen.record.swings.assumed import Plain, recorded_assumptions
+from lightpen.record.swings.assumed import recorded_assumptions
 
 HEADER = "header.json"
 HEADER_LIMIT = MEGABYTE

@@ -18,12 +18,12 @@ from lightpen.formats.json_records import file_entry, plain, record_heading
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.record.folder.verifications import CONCLUSION
+from lightpen.record.library.signing.keys import SigningKey
 from lightpen.record.library.supervision import (
     Signature,
     Supervision,
     require_supervisor,
 )
-from lightpen.record.signing.keys import SigningKey
 from lightpen.record.swings.names import Names
 from lightpen.verification.tasks.assessment import VerificationAssessment
 

@@ -11,7 +11,7 @@ from lightpen.formats.hashes import InputFile, all_hashed
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.record.folder.verifications import TOUCHES
-from lightpen.record.signing.keys import SigningKey
+from lightpen.record.library.signing.keys import SigningKey
 from lightpen.verification.probing.current_tip import CurrentTip
 from lightpen.verification.probing.drift_reference import LampDrift
 from lightpen.verification.session.session_state import SessionState

@@ -17,10 +17,10 @@ from lightpen.formats.own_json import with_checksum
 from lightpen.model.origin import Origin
 from lightpen.record.folder.verifications import VERIFICATIONS
 from lightpen.record.library.numbered_files import add_numbered
+from lightpen.record.library.signing.keys import SigningKey
+from lightpen.record.library.signing.signed_text import place_in
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.result_folder import SIMULATED
-from lightpen.record.signing.keys import SigningKey
-from lightpen.record.signing.signed_text import place_in
 from lightpen.verification.probing.current_tip import CurrentTip
 from lightpen.verification.probing.drift_reference import LampDrift, lamp_drift_entries
 from lightpen.verification.probing.image_locations import PenCameras

@@ -15,9 +15,9 @@ from msgspec import structs
 from lightpen.formats.json_records import record_bytes
 from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.calibrations.traceability import TracedItem
 from lightpen.record.exports.dcc import DCC, NO_CERTIFICATE, SI, VERSION, dcc_text
 from lightpen.record.library.tip_library import ItemKind, ListedCamera
-from lightpen.record.library.traceability import TracedItem
 from lightpen.record.swings.names import Names
 
 if TYPE_CHECKING:

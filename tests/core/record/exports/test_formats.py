@@ -21,7 +21,7 @@ from lightpen.formats.json_records import record_bytes
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.record.exports.export_status import (
+from lightpen.record.calibrations.export_status import (
     OVERDUE,
     RETIRED,
     status_of,

@@ -21,6 +21,14 @@ from lightpen.record.library.guard_files import (
 )
 from lightpen.record.library.key_changes import key_change
 from lightpen.record.library.password_delay import FREE
+from lightpen.record.library.signing.keys import (
+    SALT_LENGTH,
+    chain_of,
+    key_folder,
+    station_key,
+)
+from lightpen.record.library.signing.signed_text import Signers
+from lightpen.record.library.signing.station import memory_file, station_name
 from lightpen.record.library.supervision import (
     Signature,
     read_supervision,
@@ -31,9 +39,6 @@ from lightpen.record.library.supervision_changes import (
     set_limits,
     set_password,
 )
-from lightpen.record.signing.keys import SALT_LENGTH, chain_of, key_folder, station_key
-from lightpen.record.signing.signed_text import Signers
-from lightpen.record.signing.station import memory_file, station_name
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 EVE = Signature("Eve", "correct horse")

@@ -3,6 +3,7 @@
 from datetime import UTC, date, datetime
 from pathlib import Path
 
+from lightpen.record.calibrations.traceability import certified_values, traced_items
 from lightpen.record.library.library_changes import Author, add_item, retire_item
 from lightpen.record.library.tip_library import (
     ItemKind,
@@ -11,7 +12,6 @@ from lightpen.record.library.tip_library import (
     ListedTip,
     read_library,
 )
-from lightpen.record.library.traceability import certified_values, traced_items
 from lightpen.record.swings.names import Names
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)

@@ -11,8 +11,8 @@ from lightpen.local_time import local_time
 from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile
+from lightpen.record.calibrations.traceability import traced_items
 from lightpen.record.library.tip_library import ItemKind
-from lightpen.record.library.traceability import traced_items
 from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.header import Header

@@ -26,7 +26,7 @@ from lightpen.formats.files import (
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import DamagedError, Digest, parse_own_json
 from lightpen.messages import message
-from lightpen.record.signing.keys import (
+from lightpen.record.library.signing.keys import (
     PublicKey,
     chain_of,
     key_folder,

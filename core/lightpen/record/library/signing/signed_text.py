@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from lightpen.formats.own_json import CHECKSUM
-from lightpen.record.signing.keys import SigningKey, is_signed
+from lightpen.record.library.signing.keys import SigningKey, is_signed
 
 _SUPERVISOR = b', "supervisor_signature": "'
 _STATION = b', "station_signature": "'
