@@ -36,6 +36,10 @@ class VarianceComponents:
         Of each of six motions of the board in a view of a further camera, px rms.
     lenses : tuple of float
         Amplitude of the residual field of each camera, px.
+    lines : float
+        Of the mean offset of a column of points along the rows, or of a row along the
+        columns, mm; by independent points it is that of a point by the root of their
+        number.
     """
 
     noise: float
@@ -44,6 +48,7 @@ class VarianceComponents:
     view: float
     between: float
     lenses: tuple[float, ...]
+    lines: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +74,8 @@ class Design:
         Information of the priors of the board adjustment, and their gradient.
     fields : tuple of LensField
         Of amplitude 1, one a camera.
+    lines : (3 N, g) array
+        Orthonormal offsets of whole rows and columns of the board.
     """
 
     normal: FloatArray
@@ -83,6 +90,7 @@ class Design:
     shared_prior: FloatArray
     prior_pull: FloatArray
     fields: tuple[LensField, ...]
+    lines: FloatArray
     n_points: int
 
     @property
@@ -127,6 +135,8 @@ class Design:
         at = np.arange(self.of_points.start, self.of_points.stop)
         deviations = [components.in_plane, components.in_plane, components.out_of_plane]
         prior[at, at] = np.tile(np.power(deviations, -2.0), self.n_points)
+        further = self._line_variance(components) ** -1 - components.in_plane**-2
+        prior[self.of_points, self.of_points] += further * self.lines @ self.lines.T
         for c, amplitude in enumerate(components.lenses):
             own = self.of_field(c)
             prior[own, own] = self._node_information(c) / amplitude**2
@@ -134,7 +144,9 @@ class Design:
 
     def prior_logarithm(self, components: VarianceComponents) -> float:
         """Return the logarithm of the priors' determinant, but for a constant."""
-        logarithm = -2 * self.n_points * np.log(components.in_plane**2)
+        n_lines = self.lines.shape[1]
+        logarithm = -(2 * self.n_points - n_lines) * np.log(components.in_plane**2)
+        logarithm -= n_lines * np.log(self._line_variance(components))
         logarithm -= self.n_points * np.log(components.out_of_plane**2)
         for field, amplitude in zip(self.fields, components.lenses, strict=True):
             known = np.linalg.slogdet(field.node_information)[1]
@@ -146,15 +158,26 @@ class Design:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the number of known effects, and their sum of squares.
 
-        Both of the points in their plane, out of it, and of each lens.
+        Both of the points in their plane, out of it, of lines of them, and of each
+        lens. Squares of lines are those of means.
         """
-        points = x[self.of_points].reshape(-1, 3)
-        spread = np.diag(covariance)[self.of_points].reshape(-1, 3)
+        at, L = self.of_points, self.lines
+        points = x[at].reshape(-1, 3)
+        spread = np.diag(covariance)[at].reshape(-1, 3)
+        of_lines = float(np.sum((L.T @ x[at]) ** 2))
+        spread_of_lines = float(np.sum(L * (covariance[at, at] @ L)))
+        n_lines = L.shape[1]
+        in_plane = spread[:, :2].sum() - spread_of_lines
         known: list[float] = [
-            2 * self.n_points - spread[:, :2].sum() / components.in_plane**2,
+            2 * self.n_points - n_lines - in_plane / components.in_plane**2,
             self.n_points - spread[:, 2].sum() / components.out_of_plane**2,
+            n_lines - spread_of_lines / self._line_variance(components),
         ]
-        squares = [float(np.sum(points[:, :2] ** 2)), float(np.sum(points[:, 2] ** 2))]
+        squares = [
+            float(np.sum(points[:, :2] ** 2)) - of_lines,
+            float(np.sum(points[:, 2] ** 2)),
+            of_lines / self.n_in_line,
+        ]
         for c, amplitude in enumerate(components.lenses):
             own = self.of_field(c)
             information = self._node_information(c)
@@ -162,6 +185,14 @@ class Design:
             known.append(float(own.stop - own.start - unknown))
             squares.append(float(x[own] @ information @ x[own]))
         return np.array(known), np.array(squares)
+
+    @property
+    def n_in_line(self) -> float:
+        """Mean number of points of a row or column."""
+        return 2 * self.n_points / int(self.lines.shape[1])
+
+    def _line_variance(self, components: VarianceComponents) -> float:
+        return float(self.n_in_line * components.lines**2)
 
     def _node_information(self, camera: int) -> FloatArray:
         return np.asarray(
@@ -255,6 +286,7 @@ def design_of(views: Views, fitted: BoardFit, length: float) -> Design:
         fitted.prior,
         pull,
         fields,
+        _lines(views.board),
         n_points,
     )
 
@@ -279,6 +311,21 @@ def _weights(views: Views, residuals: FloatArray) -> FloatArray:
     noise = np.sqrt(np.square(left).sum(axis=(0, 2, 3)) / np.maximum(2 * n_free, 1))
     noise = np.maximum(noise, FINEST)
     return np.asarray(np.exp(np.mean(np.log(noise))) / noise)
+
+
+@cache
+def _lines(board: Board) -> FloatArray:
+    """Return the offsets of whole columns along x, and of rows along y, (3 N, g)."""
+    offsets = []
+    for axis in range(2):
+        places = np.round(board.points[:, axis] / board.pitch, 3)
+        for place in np.unique(places):
+            offset = np.zeros((len(places), 3))
+            offset[places == place, axis] = 1.0
+            offsets.append(offset.ravel() / np.linalg.norm(offset))
+    lines = np.stack(offsets, axis=1)
+    lines.flags.writeable = False
+    return lines
 
 
 @cache

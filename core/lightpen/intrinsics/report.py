@@ -353,7 +353,8 @@ def _effects_lines(effects: MixedFit) -> list[str]:
     lines = [
         f"{'Effects':<{TITLE}}noise {found.noise:.4f} px, smooth error of a view "
         f"{found.view:.4f} px, points of the board {found.in_plane:.4f} mm in plane "
-        f"and {found.out_of_plane:.4f} mm out of plane"
+        f"and {found.out_of_plane:.4f} mm out of plane, its rows and columns "
+        f"{found.lines:.4f} mm"
         + (f", motion between the exposures {found.between:.4f} px" if is_pair else "")
     ]
     lines += [
@@ -373,6 +374,7 @@ def _effects_record(effects: MixedFit) -> dict[str, Any]:
         "between_exposures_px": found.between if len(effects.fields) > 1 else None,
         "board_in_plane_mm": found.in_plane,
         "board_out_of_plane_mm": found.out_of_plane,
+        "board_lines_mm": found.lines,
         "lens_fields": [
             field and {"amplitude_px": field.amplitude, "length_px": field.length}
             for field in effects.fields

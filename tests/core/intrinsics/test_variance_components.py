@@ -27,6 +27,11 @@ def fitted(views: Views) -> MixedFit:
 def uneven(views: Views, camera: Camera, sigma: float, seed: int = 5) -> Views:
     """Return the views of a board whose points are off in its plane, mm."""
     off = np.random.default_rng(seed).normal(0, sigma, (views.board.n_points, 2))
+    return moved(views, camera, off)
+
+
+def moved(views: Views, camera: Camera, off: FloatArray) -> Views:
+    """Return the views of a board with points that are off by that, (N, 2), mm."""
     state = fit_camera(views, BoardTolerances(), camera).state
     points = views.board.points.copy()
     points[:, :2] += off
@@ -37,8 +42,8 @@ def uneven(views: Views, camera: Camera, sigma: float, seed: int = 5) -> Views:
             points @ np.swapaxes(poses.rotations, 1, 2) + poses.translations[:, None]
         )
 
-    moved = seen(points) - seen(views.board.points)
-    return replace(views, pixels=views.pixels + moved[:, None])
+    shift = seen(points) - seen(views.board.points)
+    return replace(views, pixels=views.pixels + shift[:, None])
 
 
 def through_field(views: Views, amplitude: float, seed: int = 6) -> Views:
@@ -91,6 +96,20 @@ def test_uneven_squares_are_found_and_make_the_camera_better(
         for each in (found.adjustment, by_noise)
     ]
     assert errors[0] < errors[1]
+
+
+def test_rows_and_columns_that_are_off_as_a_whole_are_found(
+    make_views: MakeViews, camera: Camera
+) -> None:
+    views = make_views(n_views=20)
+    rng, board = np.random.default_rng(7), views.board
+    off = np.zeros((board.n_points, 2))
+    off[:, 0] = np.tile(rng.normal(0, 0.05, board.columns), board.rows)
+    off[:, 1] = np.repeat(rng.normal(0, 0.05, board.rows), board.columns)
+    found = fitted(moved(views, camera, off)).components
+
+    assert found.lines == pytest.approx(0.05, rel=0.5)
+    assert found.in_plane < 0.005
 
 
 def test_a_lens_field_is_found(make_views: MakeViews) -> None:
