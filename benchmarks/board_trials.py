@@ -44,6 +44,21 @@ CAMERA = Camera(
     *(400, 300, 560.0, 559.7, 201.4, 148.8),
     distortion=np.array([-0.1, 0.05, 3e-4, -2e-4, 0.0]),
 )
+CAMERAS = {
+    "400x300": CAMERA,
+    "640x360": Camera(
+        *(640, 360, 700.0, 699.7, 321.2, 178.3),
+        distortion=np.array([-0.12, 0.08, 3e-4, -2e-4, 0.02]),
+    ),
+    "640x480": Camera(
+        *(640, 480, 620.0, 619.6, 318.7, 242.4),
+        distortion=np.array([0.08, -0.2, 4e-4, -3e-4, 0.1]),
+    ),
+    "1280x960": Camera(
+        *(1280, 960, 1500.0, 1499.0, 646.3, 475.1),
+        distortion=np.array([-0.2, 0.15, -3e-4, 2e-4, -0.05]),
+    ),
+}
 N_VIEWS, N_RENDERED = (12, 18), (12, 18)
 NOISE = 0.02, 0.06  # px
 UNEVEN = 0.0, 0.05  # mm
@@ -55,30 +70,51 @@ TOLERANCES = BoardTolerances()
 
 
 class Trial(NamedTuple):
-    """Errors of one set in standard uncertainties, (9,) each, and its messages."""
+    """Errors of one set in standard uncertainties, (9,) each, and its messages.
+
+    `single` are the scores of single views over what they may be, rms over the views.
+    """
 
     errors: FloatArray
     halves: FloatArray
     repeated: FloatArray
+    single: FloatArray
     remarks: tuple[str, ...]
 
 
-def draw_field(rng: np.random.Generator) -> LensField:
+def draw_field(rng: np.random.Generator, camera: Camera = CAMERA) -> LensField:
     """Return the residual field of a lens."""
     amplitude, share = rng.uniform(*FIELD), rng.uniform(*LENGTH)
-    field = LensField.of(*CAMERA.image_size, amplitude, share * CAMERA.width)
+    field = LensField.of(*camera.image_size, amplitude, share * camera.width)
     values, vectors = np.linalg.eigh(field.covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     return replace(field, values=root @ rng.standard_normal(field.values.shape))
 
 
 def draw_points(
-    board: Board, poses: BoardPoses, field: LensField, rng: np.random.Generator
+    camera: Camera,
+    board: Board,
+    poses: BoardPoses,
+    field: LensField,
+    rng: np.random.Generator,
 ) -> FloatArray:
     """Return where the points are seen, (V, N, 2), px."""
     true = board.points.copy()
-    true[:, :2] += rng.normal(0, rng.uniform(*UNEVEN), (board.n_points, 2))
-    return observe_points(CAMERA, board, true, poses, field, rng)
+    true[:, :2] += draw_uneven(board, rng)
+    return observe_points(camera, board, true, poses, field, rng)
+
+
+def draw_uneven(board: Board, rng: np.random.Generator) -> FloatArray:
+    """Return by how much points are off, (N, 2), mm.
+
+    In every second set columns and rows are off as a whole, too, as by a printer.
+    """
+    off = rng.normal(0, rng.uniform(*UNEVEN), (board.n_points, 2))
+    if rng.random() < 0.5:
+        sigma = rng.uniform(*UNEVEN)
+        off[:, 0] += np.tile(rng.normal(0, sigma, board.columns), board.rows)
+        off[:, 1] += np.repeat(rng.normal(0, sigma, board.rows), board.columns)
+    return off
 
 
 def observe_points(
@@ -100,28 +136,32 @@ def observe_points(
 
 
 def render_points(
-    board: Board, poses: BoardPoses, field: LensField, rng: np.random.Generator
+    camera: Camera,
+    board: Board,
+    poses: BoardPoses,
+    field: LensField,
+    rng: np.random.Generator,
 ) -> FloatArray:
     """Return the points that are found in images, (V, N, 2), px."""
-    uneven = rng.normal(0, rng.uniform(*UNEVEN), (board.n_points, 2))
+    uneven = draw_uneven(board, rng)
     found = []
     for R, t in zip(poses.rotations, poses.translations, strict=True):
-        light = render_board(CAMERA, board, R, t, field=field, uneven=uneven)
+        light = render_board(camera, board, R, t, field=field, uneven=uneven)
         points = find_points(expose_board(light, Sensor(), rng), board)
         if points is not None:
             found.append(points)
     return np.array(found)
 
 
-def run_trial(seed: int, *, rendered: bool) -> Trial | str:
+def run_trial(seed: int, *, rendered: bool, size: str = "400x300") -> Trial | str:
     """Return the errors of a set drawn at random, or why it was refused."""
-    rng = np.random.default_rng([STREAM, seed])
+    rng, camera = np.random.default_rng([STREAM, seed]), CAMERAS[size]
     board = parse_board(BOARD)
     n_views = int(rng.integers(*(N_RENDERED if rendered else N_VIEWS), endpoint=True))
-    poses = simulate_board_poses(CAMERA, board, n_views, rng)
-    field = draw_field(rng)
+    poses = simulate_board_poses(camera, board, n_views, rng)
+    field = draw_field(rng, camera)
     draw = render_points if rendered else draw_points
-    views = _views(board, draw(board, poses, field, rng))
+    views = _views(camera, board, draw(camera, board, poses, field, rng))
     try:
         found = calibrate_camera(views, TOLERANCES)
     except CalibrationError as error:
@@ -129,13 +169,14 @@ def run_trial(seed: int, *, rendered: bool) -> Trial | str:
     if found.choice.n_coefficients != FEW:
         return found.choice.message.code
     adjustment = found.adjustment
-    errors = _intrinsics(adjustment) - CAMERA.intrinsics
+    errors = _intrinsics(adjustment) - camera.intrinsics
     change = _change(found, rng)
     stated, repeated = (np.full(len(errors), np.nan),) * 2 if change is None else change
     return Trial(
         errors / _sigmas(adjustment.covariance),
         stated,
         repeated,
+        _single(found),
         tuple(remark.code for remark in found.remarks),
     )
 
@@ -164,13 +205,22 @@ def _change(
     )
 
 
+def _single(found: CameraCalibration) -> FloatArray:
+    """Return what each view would change, over its standard uncertainty, rms."""
+    scores, n = found.effects.scores, found.views.n_views
+    at = found.adjustment.of_intrinsics(0)
+    changes = [scores.change(one) for one in np.eye(n)]
+    z = [score[at] ** 2 / np.diag(known)[at] for score, known in changes]
+    return np.asarray(np.sqrt(np.mean(z, axis=0)))
+
+
 def _fit(views: Views, near: BoardFit) -> MixedFit:
     return fit_effects(views, fit_camera(views, TOLERANCES, near.state.cameras[0]))
 
 
-def _views(board: Board, pixels: FloatArray) -> Views:
+def _views(camera: Camera, board: Board, pixels: FloatArray) -> Views:
     names = tuple(map(str, range(len(pixels))))
-    return Views(board, names, pixels[:, None], (CAMERA.image_size,))
+    return Views(board, names, pixels[:, None], (camera.image_size,))
 
 
 def _intrinsics(fitted: BoardFit) -> FloatArray:
@@ -178,7 +228,7 @@ def _intrinsics(fitted: BoardFit) -> FloatArray:
 
 
 def _sigmas(covariance: FloatArray) -> FloatArray:
-    return np.sqrt(np.diag(covariance)[: len(CAMERA.intrinsics)])
+    return np.sqrt(np.diag(covariance)[: 4 + FEW])
 
 
 def main() -> None:
@@ -188,6 +238,7 @@ def main() -> None:
     parser.add_argument("--rendered", type=int, default=12)
     parser.add_argument("--first", type=int, default=0, help="number of the first set")
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--camera", choices=CAMERAS, default="400x300")
     parser.add_argument("--save", default="", help="beginning of the file names")
     options = parser.parse_args()
     for words, rendered, count in (
@@ -199,7 +250,8 @@ def main() -> None:
         seeds = range(options.first, options.first + count)
         with ProcessPoolExecutor(options.workers) as pool:
             trials = []
-            for trial in pool.map(partial(run_trial, rendered=rendered), seeds):
+            run = partial(run_trial, rendered=rendered, size=options.camera)
+            for trial in pool.map(run, seeds):
                 trials.append(trial)
                 if options.save:
                     path = Path(f"{options.save}-{words}-{options.first}")
@@ -214,7 +266,7 @@ def _print(words: str, trials: list[Trial | str]) -> None:
     z = np.array([trial.errors for trial in good])
     covered = 100 * np.mean(np.abs(z) < NORMAL_95, axis=0)
     print(f"  errors: in 95 % intervals {np.round(covered, 1)} %")
-    for name in ("halves", "repeated"):
+    for name in ("halves", "repeated", "single"):
         z = np.array([getattr(trial, name) for trial in good])
         each, together = np.sqrt(np.nanmean(z**2, axis=0)), np.sqrt(np.nanmean(z**2))
         print(f"  {name}: z {np.round(each, 2)}, together {together:.2f}")

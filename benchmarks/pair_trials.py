@@ -19,8 +19,8 @@ from benchmarks.board_trials import (
     NORMAL_95,
     STREAM,
     TOLERANCES,
-    UNEVEN,
     draw_field,
+    draw_uneven,
     observe_points,
 )
 
@@ -72,7 +72,7 @@ def draw_pair(rng: np.random.Generator) -> Views:
             rotations.append(R)
             translations.append(t)
     true = board.points.copy()
-    true[:, :2] += rng.normal(0, rng.uniform(*UNEVEN), (board.n_points, 2))
+    true[:, :2] += draw_uneven(board, rng)
     first = np.array(rotations), np.array(translations)
     motion = rng.uniform(*MOTION)
     turns = rotation_from_vector(rng.normal(0, motion / ARM, (N_VIEWS, 3)))
