@@ -67,7 +67,8 @@ def add_intrinsics(parser: argparse.ArgumentParser) -> None:
         "--form",
         choices=[form.value for form in CameraForm],
         default=CameraForm.OPENCV.value,
-        help="layout of the camera file (opencv)",
+        help="layout of the camera file (opencv); kalibr holds no k3, so that the lens "
+        "model is then one without",
     )
     _add_temperature(parser)
     parser.add_argument(
@@ -209,13 +210,18 @@ def _intrinsics(options: argparse.Namespace) -> None:
         views = observed.views
         _require_known(options.leave_out, source.names)
         kept = ~np.isin(views.names, options.leave_out)
+        form = CameraForm(options.form)
         calibration = calibrate_camera(
-            views.chosen(kept), tolerances, local_now().date(), _part(report, 0.7, 1.0)
+            views.chosen(kept),
+            tolerances,
+            local_now().date(),
+            _part(report, 0.7, 1.0),
+            has_k3=form is not CameraForm.KALIBR,
         )
     camera = replace(
         calibration.camera, serial=options.serial, temperature_c=options.temperature
     )
-    write_camera(camera, options.out, CameraForm(options.form))
+    write_camera(camera, options.out, form)
     print(shown(intrinsics_text(calibration, observed)))
     print(shown(f"\nThe camera file is {options.out}."))
     if options.json is not None:

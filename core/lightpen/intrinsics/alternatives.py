@@ -1,11 +1,11 @@
 """Alternatives to a wrong board: views that are not from one unchanged camera.
 
-Each alternative is fitted to the views: the camera changed at some image, some images
-are turned by 180 degrees, the images are of two cameras, the rows of pixels are not
-perpendicular to the columns. The one that describes the points in the fewest digits is
-chosen [1]_: residuals, numbers of the further parameters, and which view belongs to
-which group are counted together. The points of the board are estimated with each of
-them, as uneven squares are with any camera.
+Each alternative is fitted to the views: the camera changed at some image or drifted,
+some images are turned by 180 degrees, the images are of two cameras or settings, the
+rows of pixels are not perpendicular to the columns. The one that describes the points
+in the fewest digits is chosen [1]_: residuals, numbers of the further parameters, and
+which view belongs to which group are counted together. The points of the board are
+estimated with each of them, as uneven squares are with any camera.
 
 References
 ----------
@@ -14,6 +14,7 @@ References
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,12 +22,20 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import FINEST, adjust_board, fit_board_poses
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit
-from lightpen.intrinsics.camera_change import FEWEST, CameraChange
-from lightpen.intrinsics.distortion import fit_camera, rough_poses
+from lightpen.intrinsics.camera_change import (
+    CHANCE,
+    FEWEST,
+    CameraChange,
+    message_on_change,
+)
+from lightpen.intrinsics.distortion import FEW, FISHEYE, fit_determined, rough_poses
+from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.intrinsics.uncertainty_map import moved_in_image
 from lightpen.intrinsics.unevenness import fit_unevenness
 from lightpen.intrinsics.views import BoardTolerances, Views, listed_names
+from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
+from lightpen.model.quantiles import chi_square_quantile
 
 MAX_ROUNDS = 8
 CORRELATED = 4.0  # points of a view that tell as much as an independent one
@@ -35,6 +44,10 @@ ENOUGH = 0.998  # of the rms before, or one turned view more is not worth it
 LESSENED = 0.97  # of the rms without it, or an alternative is no explanation
 HALVED = 0.5  # the same, of views that no single camera fits
 USELESS = 0.001  # of the image's longer side, by which a change moves the image
+OTHER_CENTER = 0.005  # of that side, and SIGMAS: no zoom moves the principal point so
+OTHER_ASPECT = 0.002  # of fx by fy, likewise
+OTHER_DISTORTION = 0.002  # of that side, by which the distortion moves the image
+SIGMAS = 3.0
 SHEARED = 0.01  # of the slope of the columns, first step
 MOST_SINGLE = 40  # views that are turned one by one
 
@@ -62,7 +75,13 @@ def explain(
     """
     near = fitted.state.cameras[0]
     n = 2 * int(views.seen.sum()) / CORRELATED
-    nothing = _rms_by(views, tolerances, near)
+    one_camera = [
+        (n * np.log(max(rms, FINEST) ** 2) + len(lens.intrinsics) * np.log(n), rms)
+        for lens in (near, *_other_lenses(near))
+        for rms in [_rms_by(views, tolerances, lens)]
+    ]
+    n_digits, nothing = min(one_camera)
+    n_digits -= len(near.intrinsics) * np.log(n)
     cost_of_groups = 2 * np.log(2) * views.n_views
     cost_of_camera = len(near.intrinsics) * np.log(n)
     found: list[tuple[float, float, CalibrationError | None]] = []
@@ -79,31 +98,22 @@ def explain(
             "intrinsics.turned", names=names, n_named=n_named, n_views=views.n_views
         )
         consider(rms, cost_of_groups, turned_error)
-    if change is not None and change.name:
-        after = np.arange(views.n_views) >= views.names.index(change.name)
-        parted = _two_cameras(views, tolerances, near, after, rounds=0)
-        if parted is not None and _differ(parted[2]):
-            which, rms, cameras = parted
-            consider(
-                rms,
-                cost_of_camera + 2 * np.log(views.n_views),
-                _change_error(views, which, cameras),
-            )
+    if change is not None:
+        order = np.arange(views.n_views)
+        first = views.names.index(change.name) if change.name else views.n_views // 2
+        parted = _two_cameras(views, tolerances, near, order >= first, rounds=0)
+        if parted is not None and _differ(parted):
+            error = _groups_error(views, parted)
+            if not change.name:
+                error = CalibrationError(message_on_change(change))
+            cost = cost_of_camera + 2 * np.log(views.n_views)
+            consider(parted.rms, cost, error)
             if change.in_image > USELESS * max(views.image_sizes[0]):
-                useless = _change_error(views, which, cameras)
+                useless = error
     groups = _best_groups(views, tolerances, near)
-    if groups is not None and _differ(groups[2]):
-        which, rms, cameras = groups
-        names, n_named = _fewer(views, which)
-        error = CalibrationError(
-            "intrinsics.two-cameras",
-            names=names,
-            n_named=n_named,
-            n_views=views.n_views,
-            fx=cameras[0].fx,
-            other_fx=cameras[1].fx,
-        )
-        consider(rms, cost_of_camera + cost_of_groups, error)
+    if groups is not None and _differ(groups):
+        error = _groups_error(views, groups)
+        consider(groups.rms, cost_of_camera + cost_of_groups, error)
     skewed = _skewed(views, tolerances, near)
     if skewed is not None:
         skew, rms = skewed
@@ -115,15 +125,36 @@ def explain(
     if released is not None:
         rms = _rms_by(views, released, near)
         consider(rms, N_SHAPE * np.log(n), None)
-    n_digits = n * np.log(max(nothing, FINEST) ** 2)
     best = min(found, key=lambda each: each[0], default=(np.inf, np.inf, None))
     is_better = best[0] < n_digits and best[1] < lessened * nothing
     return best[2] if is_better else useless
 
 
-def _differ(cameras: tuple[Camera, Camera]) -> bool:
+def _other_lenses(camera: Camera) -> list[Camera]:
+    """Return cameras of the other lens models that image nearly the same."""
+    few = convert_lens(camera, FEW)
+    many = few and replace(few, distortion=np.append(few.distortion, np.zeros(3)))
+    all_models = (few, many, convert_lens(camera, FISHEYE))
+    own = len(camera.distortion)
+    return [each for each in all_models if each and len(each.distortion) != own]
+
+
+class _Groups(NamedTuple):
+    """Views of two cameras: which are of the second, the px rms, and their fits."""
+
+    which: BoolArray
+    rms: float
+    fits: tuple[BoardFit, BoardFit]
+
+    @property
+    def cameras(self) -> tuple[Camera, Camera]:
+        one, other = self.fits
+        return one.state.cameras[0], other.state.cameras[0]
+
+
+def _differ(groups: _Groups) -> bool:
     """Return whether two cameras image a point at places that matter."""
-    one, other = cameras
+    one, other = groups.cameras
     try:
         in_image = moved_in_image(one, other.intrinsics - one.intrinsics)
     except CalibrationError:  # one of them folds the image
@@ -131,22 +162,50 @@ def _differ(cameras: tuple[Camera, Camera]) -> bool:
     return in_image > USELESS * max(one.image_size)
 
 
-def _change_error(
-    views: Views, which: BoolArray, cameras: tuple[Camera, Camera]
-) -> CalibrationError:
-    """Return the error of a camera that was another from some view on."""
+def _are_two_cameras(groups: _Groups) -> bool:
+    """Return whether more differs than zoom and focus of one camera may."""
+    one, other = groups.cameras
+    longer, at = max(one.image_size), groups.fits[0].of_intrinsics(0)
+    known = np.sum([fit.covariance[at, at] for fit in groups.fits], axis=0)
+    change, sigmas = other.intrinsics - one.intrinsics, np.sqrt(np.diag(known))
+    shift = np.abs(change[2:4]) - SIGMAS * sigmas[2:4]
+    aspect = abs(other.fx / other.fy / (one.fx / one.fy) - 1)
+    of_ratio = np.array([1, -1]) / one.fx
+    aspect -= SIGMAS * float(np.sqrt(of_ratio @ known[:2, :2] @ of_ratio))
+    bend, n = change[4:], len(change) - 4
+    size = float(bend @ np.linalg.solve(known[4:, 4:], bend))
+    bends = moved_in_image(one, np.r_[np.zeros(4), bend]) / longer
+    is_bent = size > chi_square_quantile(n, CHANCE) and bends > OTHER_DISTORTION
+    return bool(shift.max() > OTHER_CENTER * longer or aspect > OTHER_ASPECT or is_bent)
+
+
+def _groups_error(views: Views, groups: _Groups) -> CalibrationError:
+    """Return the error of two cameras, or of one with two settings."""
+    which, (one, other) = groups.which, groups.cameras
+    if which[0]:
+        which, one, other = ~which, other, one
     first = int(np.argmax(which))
-    return CalibrationError(
-        "intrinsics.changed",
-        name=views.names[first],
-        before=cameras[0].fx,
-        cx_before=cameras[0].cx,
-        cy_before=cameras[0].cy,
-        after=cameras[1].fx,
-        cx_after=cameras[1].cx,
-        cy_after=cameras[1].cy,
-        n_before=int(np.sum(~which)),
-        n_after=int(np.sum(which)),
+    before, after = _setting(views, ~which, one), _setting(views, which, other)
+    if _are_two_cameras(groups):
+        return CalibrationError("intrinsics.two-cameras", one=before, other=after)
+    if which[first:].all():
+        name = views.names[first]
+        return CalibrationError(
+            "intrinsics.changed", name=name, before=before, after=after
+        )
+    return CalibrationError("intrinsics.two-settings", one=before, other=after)
+
+
+def _setting(views: Views, which: BoolArray, camera: Camera) -> Message:
+    """Return the intrinsics of some of the views, and the views' names."""
+    names = tuple(n for n, own in zip(views.names, which, strict=True) if own)
+    return message(
+        "intrinsics.setting",
+        fx=camera.fx,
+        cx=camera.cx,
+        cy=camera.cy,
+        n_views=len(names),
+        names=listed_names(names),
     )
 
 
@@ -167,7 +226,7 @@ def _fitted_groups(
 ) -> list[BoardFit] | None:
     """Return the fits of a camera to each group, with one uneven board for all."""
     try:
-        fits = [fit_camera(views, tolerances, near) for views in groups]
+        fits = [fit_determined(views, tolerances, near) for views in groups]
         offsets, _ = fit_unevenness(groups, fits)
         fits = [
             adjust_board(
@@ -185,7 +244,7 @@ def _fitted_groups(
 def _rms_by(views: Views, tolerances: BoardTolerances, near: Camera) -> float:
     """Return the residuals of a camera and an uneven board, px rms."""
     try:
-        return fit_unevenness((views,), [fit_camera(views, tolerances, near)])[1]
+        return fit_unevenness((views,), [fit_determined(views, tolerances, near)])[1]
     except CalibrationError:
         return np.inf
 
@@ -240,7 +299,7 @@ def _turned(
 
 def _best_groups(
     views: Views, tolerances: BoardTolerances, near: Camera
-) -> tuple[BoolArray, float, tuple[Camera, Camera]] | None:
+) -> _Groups | None:
     """Return the best of some ways of taking the views for those of two cameras."""
     alone = _fitted(views, tolerances, near)
     order = np.arange(views.n_views)
@@ -255,7 +314,7 @@ def _best_groups(
         for start in starts
         if (found := _two_cameras(views, tolerances, near, start)) is not None
     ]
-    return min(tried, key=lambda each: each[1], default=None)
+    return min(tried, key=lambda each: each.rms, default=None)
 
 
 def _outwards(views: Views) -> FloatArray:
@@ -270,8 +329,8 @@ def _two_cameras(
     near: Camera,
     which: BoolArray,
     rounds: int = MAX_ROUNDS,
-) -> tuple[BoolArray, float, tuple[Camera, Camera]] | None:
-    """Return the views that belong to the second of two cameras, the rms, and them."""
+) -> _Groups | None:
+    """Return the views that belong to the second of two cameras, and both."""
     for left in range(rounds, -1, -1):
         if min(which.sum(), (~which).sum()) < FEWEST:
             return None
@@ -287,7 +346,7 @@ def _two_cameras(
                 continue
         squares = sum(np.nansum(np.square(fit.residuals)) for fit in (one, other))
         rms = float(np.sqrt(squares / (2 * views.seen.sum())))
-        return which, rms, (one.state.cameras[0], other.state.cameras[0])
+        return _Groups(which, rms, (one, other))
     return None
 
 

@@ -25,15 +25,18 @@ from lightpen.intrinsics.board_findings import (
 )
 from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.camera_change import (
+    CameraChange,
     detectable_zoom,
     find_alternation,
     find_change,
     message_on_alternation,
     message_on_change,
+    with_change,
 )
 from lightpen.intrinsics.distortion import (
     FEW,
     FOLDING,
+    NO_K3,
     PULLS,
     Choice,
     choose_distortion,
@@ -107,6 +110,9 @@ class CameraCalibration:
         The final fit, with what board, lens and single views do beside the model.
     duplicates : tuple of str
         Views in which the board is where it was in another.
+    change : CameraChange or None
+        Of the camera in time, or of every second view, too small to refuse the set; U
+        contains it.
     halves : ViewHalves or None
         None where there are too few views.
     remarks : tuple of Message
@@ -121,6 +127,7 @@ class CameraCalibration:
     n_points_left_out: int
     choice: Choice
     held_out: FloatArray
+    change: CameraChange | None
     halves: ViewHalves | None
     remarks: tuple[Message, ...]
 
@@ -146,8 +153,15 @@ def calibrate_camera(
     tolerances: BoardTolerances,
     calibrated_on: date | None = None,
     report: Callable[[float], None] = lambda fraction: None,
+    *,
+    has_k3: bool = True,
 ) -> CameraCalibration:
     """Calibrate a camera by views of a board.
+
+    Parameters
+    ----------
+    has_k3 : bool
+        Whether the lens model may be one that the form of Kalibr does not hold.
 
     Raises
     ------
@@ -167,7 +181,7 @@ def calibrate_camera(
     require_views(views)
     first = fit_camera(views, tolerances, start)
     try:
-        found = _calibrated(views, tolerances, first, report)
+        found = _calibrated(views, tolerances, first, report, has_k3)
     except CalibrationError as error:
         raise (
             explain(views, tolerances, first, None, lessened=HALVED) or error
@@ -190,18 +204,25 @@ def calibrate_camera(
         remarks.append(message_on_change(change))
     elif alternation is not None:
         remarks.append(message_on_alternation(alternation))
-    open_lens = _message_on_projection(found.adjustment)
+    open_lens = _message_on_projection(found.adjustment, found.choice.apart)
     remarks += [each for each in (found.choice.remark, open_lens) if each is not None]
     at = found.adjustment.of_intrinsics(0)
+    camera = found.adjustment.state.cameras[0]
+    if found.choice.pull == NO_K3:
+        camera = replace(camera, distortion=np.append(camera.distortion[:4], 0.0))
     camera = replace(
-        found.adjustment.state.cameras[0],
+        camera,
         covariance=found.adjustment.covariance[at, at],
         calibrated_on=calibrated_on,
         lens_field=found.effects.fields[0],
     )
+    found_change = change or alternation
+    if found_change is not None:
+        camera = with_change(camera, found_change)
     return CameraCalibration(
         camera=camera,
         views=found.views,
+        change=found_change,
         effects=found.effects,
         duplicates=duplicates,
         left_out=unplaced + found.left_out,
@@ -235,7 +256,7 @@ class _Found:
         return bool(
             self.denied.any()
             or self.left_out
-            or self.choice.pull is not None
+            or self.choice.remark is not None
             or self.effects.clustering > CLUSTERED
             or components.view > UNEVEN_VIEWS * components.noise
             or components.lenses[0] > UNEVEN_LENS * components.noise
@@ -247,6 +268,7 @@ def _calibrated(
     tolerances: BoardTolerances,
     first: BoardFit,
     report: Callable[[float], None],
+    has_k3: bool,
 ) -> _Found:
     kept = without_outliers(views, first)
     require_views(kept)
@@ -257,7 +279,9 @@ def _calibrated(
         tolerances = released_tolerances(tolerances)
         fitted = fit_camera(kept, tolerances, fitted.state.cameras[0])
     report(0.2)
-    choice, fitted, held_out = choose_distortion(kept, tolerances, fitted, report)
+    choice, fitted, held_out = choose_distortion(
+        kept, tolerances, fitted, report, has_k3=has_k3
+    )
     _require_determined(fitted)
     _require_no_fold(fitted.state.cameras[0])
     _message_on_projection(fitted)
@@ -356,8 +380,13 @@ def _require_no_fold(camera: Camera) -> None:
         raise CalibrationError("intrinsics.folds")
 
 
-def _message_on_projection(fitted: BoardFit) -> Message | None:
+def _message_on_projection(fitted: BoardFit, apart: float = 0.0) -> Message | None:
     """Return the message on a lens that the views leave open.
+
+    Parameters
+    ----------
+    apart : float
+        See `Choice`.
 
     Raises
     ------
@@ -369,7 +398,9 @@ def _message_on_projection(fitted: BoardFit) -> Message | None:
     share = px / max(camera.image_size)
     if share > MOST_UNCERTAIN:
         raise CalibrationError("intrinsics.uncertain", px=px)
-    return message("intrinsics.uncertain", px=px) if share > UNCERTAIN else None
+    px = float(np.hypot(px, apart))
+    is_open = px > UNCERTAIN * max(camera.image_size)
+    return message("intrinsics.uncertain", px=px) if is_open else None
 
 
 def _require_determined(fitted: BoardFit) -> None:

@@ -1,6 +1,6 @@
 """Change of a camera while its views were taken, by the scores of the views."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -91,6 +91,18 @@ def _most_significant(
                 most = squares / least
                 best = number, difference, moved_in_image(camera, difference)
     return best
+
+
+def with_change(camera: Camera, change: CameraChange) -> Camera:
+    """Return a camera whose covariance holds that it is as before or as after."""
+    added = np.outer(change.difference, change.difference) / 4
+    field, covariance = camera.lens_field, camera.covariance
+    if field is not None and field.intrinsics_covariance is not None:
+        beside = field.intrinsics_covariance + added
+        field = replace(field, intrinsics_covariance=beside)
+    if covariance is not None:
+        covariance = covariance + added
+    return replace(camera, covariance=covariance, lens_field=field)
 
 
 def detectable_zoom(mixed: MixedFit) -> float:

@@ -18,6 +18,7 @@ from lightpen.intrinsics.adjustment import FINEST, adjust_board, fit_board_poses
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
+from lightpen.intrinsics.uncertainty_map import apart_in_image
 from lightpen.intrinsics.unevenness import fit_unevenness
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.messages import Message, message
@@ -27,10 +28,13 @@ FEW, MANY, FISHEYE = 5, 8, 4  # distortion coefficients
 WIDE = 0.6  # distance in the normalised plane: 31 degrees off the axis
 FOLDING = {FEW: [4], MANY: [5, 6, 7]}  # which of them fold: k3, and the denominator's
 PULLS = (0.1, 0.03, 0.01, 0.003, 0.001, 1e-4, 1e-10)  # the weakest first
+NO_K3 = 1e-12  # the pull of a model without k3
 N_FOLDS = 5
 WORTH = 0.01  # by which 8 coefficients must lessen the held-out error
+ALIKE = 1.5  # times the held-out error: another model that is near to the views
 EVEN = np.zeros(3)  # mm: all points lie where the board has them
-SIGMAS = 2.0  # of the mean gain of a view
+SIGMAS = 2.0  # of the gain of all views
+MUCH = 1.0  # gain of all views together, of the logarithm of their errors
 
 
 @dataclass(frozen=True)
@@ -47,16 +51,22 @@ class Choice:
     pull : float or None
         Standard deviation about 0 that was assumed of k3, or of k4 k5 k6, as they
         folded the image; None where they did not.
+    apart : float
+        Between images of the chosen model and of the other one of a wide lens that is
+        near to the views, px rms over the image: mostly where no view shows the board.
     """
 
     n_coefficients: int
     held_out: dict[int, float]
     pull: float | None = None
+    apart: float = 0.0
 
     @property
     def message(self) -> Message:
         """The reason as text."""
         own = self.held_out[self.n_coefficients]
+        if self.pull == NO_K3:
+            return message("intrinsics.four", held_out=own)
         others = tuple(
             _other_model(n, rms)
             for n, rms in self.held_out.items()
@@ -67,7 +77,7 @@ class Choice:
     @property
     def remark(self) -> Message | None:
         """Message if the corners of the image are undetermined."""
-        if self.pull is None:
+        if self.pull is None or self.pull == NO_K3:
             return None
         return message(
             "intrinsics.drawn-in",
@@ -119,26 +129,39 @@ def choose_distortion(
     tolerances: BoardTolerances,
     fitted: BoardFit,
     report: Callable[[float], None],
+    *,
+    has_k3: bool = True,
 ) -> tuple[Choice, BoardFit, FloatArray]:
     """Return the lens model, its fit, and the cross-validation errors.
 
     A model other than that of 5 coefficients must be better.
+
+    Parameters
+    ----------
+    has_k3 : bool
+        Without, lens models are a fisheye and that of 4 coefficients, k3 being 0.
     """
     first = _Drawn(fitted, None)
     others: list[Callable[[], _Drawn | None]]
-    if first.camera.lens is LensModel.BROWN:
+    if not has_k3:
+        plain = convert_lens(first.camera, FEW) or first.camera
+        others = [lambda: _converted(views, tolerances, first.camera, FISHEYE)]
+        if len(plain.distortion) == FEW:
+            first = _Drawn(fit_camera(views, tolerances, plain, NO_K3), NO_K3)
+    elif first.camera.lens is LensModel.BROWN:
         if folds(first.camera):
             first = _unfolded(views, tolerances, first.camera) or first
-        others = [lambda: _richer(views, tolerances, first)]
+        others = [lambda: _richer(views, tolerances, first.camera)]
         if _is_wide(first.camera, views):
             others.append(lambda: _converted(views, tolerances, first.camera, FISHEYE))
     else:
         others = [
             lambda: _converted(views, tolerances, first.camera, FEW),
-            lambda: _converted(views, tolerances, first.camera, MANY),
+            lambda: _rational(views, tolerances, first.camera),
         ]
     best, errors = first, _held_out(views, tolerances, first)
     held_out = {best.n_coefficients: rms_together(errors, views)}
+    tried = {best.n_coefficients: best.camera}
     report(0.5)
     for other in others:
         with suppress(CalibrationError):  # a part of the views does not show so many
@@ -148,6 +171,7 @@ def choose_distortion(
             trial_errors = _held_out(views, tolerances, trial)
             rms = rms_together(trial_errors, views)
             held_out[trial.n_coefficients] = rms
+            tried[trial.n_coefficients] = trial.camera
             before = held_out[best.n_coefficients]
             if trial.n_coefficients == FEW:  # the plain lens, if nothing denies it
                 is_better = not is_significantly_less(before, rms, errors, trial_errors)
@@ -156,7 +180,13 @@ def choose_distortion(
             if is_better:
                 best, errors = trial, trial_errors
     report(0.8)
-    return Choice(best.n_coefficients, held_out, best.pull), best.fitted, errors
+    own = best.n_coefficients
+    another = {FEW: FISHEYE, FISHEYE: FEW}.get(own, own)
+    apart = 0.0
+    if another in tried and held_out[another] < ALIKE * held_out[own]:
+        seen = views.pixels[views.seen]
+        apart = apart_in_image(best.camera, tried[another], seen)
+    return Choice(own, held_out, best.pull, apart), best.fitted, errors
 
 
 def is_significantly_less(
@@ -171,11 +201,13 @@ def is_significantly_less(
     errors, errors_before : (V,) array
         That of each image, px.
     """
-    # By how many times, so that no one image decides alone.
+    # By how many times, so that no one image decides alone...
     gains = np.log(np.maximum(errors_before, FINEST) / np.maximum(errors, FINEST))
-    chance = float(gains.std(ddof=1)) / len(gains) ** 0.5
-    is_less = rms < (1 - WORTH) * rms_before
-    return bool(is_less and gains.mean() > SIGMAS * chance)
+    chance = float(gains.std(ddof=1)) * len(gains) ** 0.5
+    # ... unless it gains much more than others lose: few may reach the rim.
+    losses = float(np.sqrt(2 * np.sum(np.minimum(gains, 0.0) ** 2)))
+    least = SIGMAS * min(chance, max(losses, MUCH / SIGMAS))
+    return bool(rms < (1 - WORTH) * rms_before and gains.sum() > least)
 
 
 def _is_wide(camera: Camera, views: Views) -> bool:
@@ -190,14 +222,32 @@ def _converted(
 ) -> "_Drawn | None":
     """Return the fit of another lens model."""
     near = convert_lens(camera, n_coefficients)
-    if near is None:
-        return None
-    found = _Drawn(fit_camera(views, tolerances, near), None)
-    if not folds(found.camera):
-        return found
-    if n_coefficients == FISHEYE:
-        return None
-    return _unfolded(views, tolerances, near)
+    return None if near is None else _fit_whole(views, tolerances, near)
+
+
+def _rational(
+    views: Views, tolerances: BoardTolerances, fisheye: Camera
+) -> "_Drawn | None":
+    """Return the fit with all coefficients, from a fisheye near to it."""
+    few = convert_lens(fisheye, FEW)
+    if few is None:
+        return _converted(views, tolerances, fisheye, MANY)
+    return _richer(views, tolerances, few)
+
+
+def _fit_whole(
+    views: Views, tolerances: BoardTolerances, near: Camera
+) -> "_Drawn | None":
+    """Return the fit that does not fold the image, the prior as weak as it may be."""
+    try:
+        free = _Drawn(fit_camera(views, tolerances, near), None)
+        if not folds(free.camera):
+            return free
+    except CalibrationError:  # the views do not determine so many coefficients
+        if len(near.distortion) != MANY:
+            raise
+    is_fisheye = near.lens is LensModel.KANNALA_BRANDT
+    return None if is_fisheye else _unfolded(views, tolerances, near)
 
 
 def fit_camera(
@@ -228,6 +278,22 @@ def fit_camera(
         (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE), offsets
     )
     return adjust_board(views, state, tolerances, (known,))
+
+
+def fit_determined(
+    views: Views,
+    tolerances: BoardTolerances,
+    near: Camera,
+    pull: float | None = None,
+    offsets: FloatArray = EVEN,
+) -> BoardFit:
+    """Fit as `fit_camera`, by the weakest prior where the views leave a lens open."""
+    try:
+        return fit_camera(views, tolerances, near, pull, offsets)
+    except CalibrationError:
+        if pull is not None or len(near.distortion) != MANY:
+            raise
+        return fit_camera(views, tolerances, near, PULLS[0], offsets)
 
 
 def rms_together(errors: FloatArray, views: Views) -> float:
@@ -264,20 +330,10 @@ def _unfolded(views: Views, tolerances: BoardTolerances, near: Camera) -> _Drawn
     return None
 
 
-def _richer(views: Views, tolerances: BoardTolerances, few: _Drawn) -> _Drawn | None:
-    """Return the fit with all coefficients, if the views determine them."""
-    camera = few.camera
-    near = replace(
-        camera, distortion=np.append(camera.distortion, np.zeros(MANY - FEW))
-    )
-    try:
-        free = _Drawn(fit_camera(views, tolerances, near), None)
-        if not folds(free.camera):
-            return free
-    except CalibrationError:
-        if few.pull is None:
-            return None
-    return _unfolded(views, tolerances, near)
+def _richer(views: Views, tolerances: BoardTolerances, few: Camera) -> _Drawn | None:
+    """Return the fit with all coefficients."""
+    more = np.append(few.distortion, np.zeros(MANY - FEW))
+    return _fit_whole(views, tolerances, replace(few, distortion=more))
 
 
 def _held_out(views: Views, tolerances: BoardTolerances, found: _Drawn) -> FloatArray:
@@ -289,10 +345,10 @@ def _held_out(views: Views, tolerances: BoardTolerances, found: _Drawn) -> Float
     fold_of = np.arange(views.n_views) % min(N_FOLDS, views.n_views)
     for fold in range(int(fold_of.max()) + 1):
         others, own = views.chosen(fold_of != fold), views.chosen(fold_of == fold)
-        fitted = fit_camera(others, tolerances, found.camera, found.pull)
+        fitted = fit_determined(others, tolerances, found.camera, found.pull)
         uneven, _ = fit_unevenness((others,), [fitted])
         near, pull = fitted.state.cameras[0], found.pull
-        state = fit_camera(others, tolerances, near, pull, uneven).state
+        state = fit_determined(others, tolerances, near, pull, uneven).state
         poses = rough_poses(found.camera, own)
         residuals = fit_board_poses(own, replace(state, poses=poses))
         squares = np.square(residuals).sum(axis=-1)

@@ -23,6 +23,7 @@ from lightpen.intrinsics.calibration import (
     calibrate_camera,
     without_outliers,
 )
+from lightpen.intrinsics.camera_change import with_change
 from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.variance_components import MixedFit, fit_effects
@@ -211,7 +212,7 @@ def calibrate_pair(
         fitted = adjust_board(views, state, released, stated)
     effects = fit_effects(views, fitted)
     fitted = effects.adjustment
-    rig = _rig(effects, names, tolerances)
+    rig = _rig(effects, names, tolerances, alone)
     remarks = [
         of_camera(name, remark)
         for name, each in zip(names, alone, strict=False)
@@ -249,7 +250,12 @@ def _as_alone(views: Views, alone: tuple[CameraCalibration, ...]) -> Views:
     return replace(views, pixels=pixels)
 
 
-def _rig(effects: MixedFit, names: tuple[str, str], tolerances: BoardTolerances) -> Rig:
+def _rig(
+    effects: MixedFit,
+    names: tuple[str, str],
+    tolerances: BoardTolerances,
+    alone: tuple[CameraCalibration, ...],
+) -> Rig:
     fitted = effects.adjustment
     state, at = fitted.state, fitted.of_places
     covariance = fitted.covariance[at, at].copy()
@@ -260,9 +266,10 @@ def _rig(effects: MixedFit, names: tuple[str, str], tolerances: BoardTolerances)
         zip(state.cameras, effects.fields, strict=True)
     ):
         own = fitted.of_intrinsics(c)
-        cameras.append(
-            replace(camera, covariance=fitted.covariance[own, own], lens_field=field)
-        )
+        known = fitted.covariance[own, own]
+        camera = replace(camera, covariance=known, lens_field=field)
+        change = alone[c].change if alone else None
+        cameras.append(camera if change is None else with_change(camera, change))
     return Rig(tuple(cameras), state.rotations, state.translations, covariance, names)
 
 

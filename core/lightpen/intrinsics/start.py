@@ -76,7 +76,8 @@ def _bend(camera: Camera, views: Views) -> float:
         if H is None:
             continue
         lifted = np.concatenate([flat, np.ones((len(flat), 1))], axis=1) @ H.T
-        there = camera.pixels(lifted[:, :2] / lifted[:, 2:])
+        with np.errstate(all="ignore"):  # a homography of something else
+            there = camera.pixels(lifted[:, :2] / lifted[:, 2:])
         squares += float(np.sum(np.square(there - pixels[seen][near])))
         count += 2 * len(flat)
     return float(np.sqrt(squares / count)) if count else np.inf

@@ -17,6 +17,7 @@ from lightpen.model.camera import Camera
 
 MakeViews = Callable[..., Views]
 NOISE = 0.03  # px
+SLOWLY = np.linspace(0.0, 0.01, 20)  # zoom
 OTHER = Camera(
     *(640, 480, 870.0, 869.0, 310.0, 251.0),
     distortion=np.array([-0.15, 0.1, -5e-4, 3e-4, 0.0]),
@@ -113,7 +114,9 @@ def test_the_least_zoom_that_is_said_to_be_found_is(
 
 
 @pytest.mark.slow
-def test_a_small_change_is_a_finding(make_views: MakeViews, camera: Camera) -> None:
+def test_a_small_change_is_a_finding_that_the_uncertainty_holds(
+    make_views: MakeViews, camera: Camera
+) -> None:
     before = make_views(n_views=24)
     after = make_views(n_views=24, of=replace(camera, cx=camera.cx + 3.0))
     found = calibrated(merged(before, after, np.arange(24) >= 12))
@@ -122,6 +125,8 @@ def test_a_small_change_is_a_finding(make_views: MakeViews, camera: Camera) -> N
         "intrinsics.step",
         "intrinsics.drift",
     }
+    # It may be as before or as after.
+    assert expanded(found)[2] > 0.8 * 3.0
 
 
 @pytest.mark.slow
@@ -146,9 +151,43 @@ def test_two_cameras_in_one_set_are_named_as_such(make_views: MakeViews) -> None
     odd = np.arange(20) % 3 == 1
     mixed = merged(make_views(n_views=20), make_views(n_views=20, of=OTHER), odd)
 
-    with pytest.raises(CalibrationError, match="two cameras") as caught:
+    with pytest.raises(CalibrationError, match="from two cameras") as caught:
         calibrated(mixed)
-    assert caught.value.message.values["n_named"] == odd.sum()
+    said = str(caught.value)
+    assert "13 views (view_01.png, view_03.png, view_04.png" in said
+    assert "7 views (view_02.png, view_05.png, view_08.png" in said
+
+
+@pytest.mark.slow
+def test_two_cameras_one_after_the_other_are_not_taken_for_a_zoom(
+    make_views: MakeViews,
+) -> None:
+    after = np.arange(20) >= 10
+    mixed = merged(make_views(n_views=20), make_views(n_views=20, of=OTHER), after)
+
+    with pytest.raises(CalibrationError, match="from two cameras") as caught:
+        calibrated(mixed)
+    assert "10 views (view_11.png, view_12.png" in str(caught.value)
+
+
+@pytest.mark.slow
+def test_two_settings_in_turns_are_not_taken_for_two_cameras(
+    make_views: MakeViews, camera: Camera
+) -> None:
+    odd = np.arange(20) % 3 == 1
+    other = make_views(n_views=20, of=zoomed(camera, 1.02))
+
+    with pytest.raises(CalibrationError, match="two settings of zoom or focus"):
+        calibrated(merged(make_views(n_views=20), other, odd))
+
+
+@pytest.mark.slow
+def test_a_drift_is_refused(make_views: MakeViews, camera: Camera) -> None:
+    shots = [make_views(n_views=20, of=zoomed(camera, 1 + by)).pixels for by in SLOWLY]
+    pixels = np.stack([shot[v] for v, shot in enumerate(shots)])
+
+    with pytest.raises(CalibrationError, match="drifts during the set"):
+        calibrated(replace(make_views(n_views=20), pixels=pixels))
 
 
 @pytest.mark.parametrize("uneven", [0.0, 0.2])

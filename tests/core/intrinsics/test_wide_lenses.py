@@ -2,14 +2,23 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
+from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.camera_files import read_camera
 from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
-from lightpen.intrinsics.distortion import FEW, FISHEYE, choose_distortion, fit_camera
+from lightpen.intrinsics.distortion import (
+    FEW,
+    FISHEYE,
+    MANY,
+    choose_distortion,
+    fit_camera,
+)
 from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.intrinsics.start import start_camera
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
@@ -29,17 +38,22 @@ ROUND = Camera(  # whose corners lie beyond 90 degrees
     lens=LensModel.KANNALA_BRANDT,
 )
 
+RATIONAL = Camera(
+    *(640, 480, 510.6, 511.1, 322.0, 238.0),
+    distortion=np.array([0.38, 0.035, -5e-4, 1e-4, 0.0147, 0.764, 0.0858, 0.0329]),
+)
+
 FOLDING_BEYOND = np.array([0.11, -0.08, 0.36, -0.64])
 
 
-def held_before(camera: Camera, n_views: int, seed: int) -> Views:
+def held_before(camera: Camera, n_views: int, seed: int, least: float = 0.12) -> Views:
     """Return views of a board that faces the camera wherever it is held."""
     board = parse_board("chessboard:9x6:20")
     rng, size = np.random.default_rng(seed), np.array(camera.image_size)
     longer = 2 * float(np.abs(board.points[:, :2]).max())
     seen: list[FloatArray] = []
     while len(seen) < n_views:
-        place = rng.uniform(0.12, 0.88, 2) * size
+        place = rng.uniform(least, 1 - least, 2) * size
         ray = np.append(camera.unproject(place), 1.0)
         ray /= np.linalg.norm(ray)
         axis = np.array([-ray[1], ray[0], 0.0]) / np.hypot(*ray[:2])
@@ -118,6 +132,39 @@ def test_a_fisheye_that_folds_beyond_its_image_sees_all_of_it() -> None:
 
     assert camera.sees(corners).all()
     assert convert_lens(camera, FEW) is not None
+
+
+def test_a_camera_that_images_nothing_has_no_other_model() -> None:
+    """Its normal equations have no solution, which is no bug of the caller."""
+    flat = replace(WIDE, fx=1e-9, fy=1e-9)
+
+    assert convert_lens(flat, MANY) is None
+
+
+def test_a_fisheye_that_folds_beyond_its_image_is_read_as_written(
+    tmp_path: Path,
+) -> None:
+    camera = replace(WIDE, fx=1100.0, fy=1100.0, distortion=FOLDING_BEYOND)
+    write_camera(camera, tmp_path / "camera.yaml")
+    found = read_camera(tmp_path / "camera.yaml")
+
+    assert found.lens is LensModel.KANNALA_BRANDT
+    np.testing.assert_array_equal(found.intrinsics, camera.intrinsics)
+
+
+@pytest.fixture(scope="module")
+def rational() -> Views:
+    """Return views in the middle of the image of a lens of the rational form."""
+    return held_before(RATIONAL, 20, 4, least=0.3)
+
+
+def test_a_lens_that_corners_leave_open_is_not_taken_for_a_changed_camera(
+    rational: Views,
+) -> None:
+    found = calibrate_camera(rational, BoardTolerances())
+    codes = {each.code for each in found.remarks}
+    assert codes <= {"intrinsics.uncertain", "intrinsics.drawn-in"}
+    assert found.held_out_rms < 1.2 * NOISE * 2**0.5
 
 
 def test_a_plain_lens_is_kept_though_a_fisheye_was_begun_with(
