@@ -65,7 +65,7 @@ def test_a_swing_of_centres_and_a_length_give_pen_camera_and_record(
     assert np.linalg.eigvalsh(matrix).min() > -1e-12
     assert {"mirrored", "focal_length_px", "misfit_px"} <= set(record["hypotheses"][0])
     assert record["scale"] == "measured"
-    assert pen.normal_sigma is not None
+    assert pen.normal_covariance is not None
     assert "tip x" in capsys.readouterr().out
 
 

@@ -40,7 +40,7 @@ MESSAGES = {
     "pen-file.led": "LED {led} of {name}",
     "pen-file.list": "{name} is a list; an LED file is a mapping with leds and units. Correct the file.",
     "pen-file.unknown-units-in-file": "{name} has the unit {unit}, which is not supported. Use one of {known}.",
-    "pen-file.no-covariance": "The led_covariance of {name} is not a covariance matrix: it must be symmetric with no negative variance. Correct or remove it.",
+    "pen-file.no-covariance": "The {what} of {name} is not a covariance matrix: it must be symmetric with no negative variance. Correct or remove it.",
     "pen-file.no-led-list": 'leds in {name} is no list of LEDs. Write it as [{{"led": 1, "x": 0, "y": 0, "z": -30}}, ...].',
     "pen-file.some-normals": "LED {led} of {name} has no normal, but others have. Give the normals of all LEDs or of none.",
     "pen-file.led-no-mapping": '{place} is not a mapping. Write it as {{"led": 1, "x": 0, "y": 0, "z": -30}}.',

@@ -7,7 +7,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.discovery.hypotheses import Hypothesis
 from lightpen.discovery.normals import FACING
-from lightpen.discovery.numbering import frame_by, framed, moved, turn_of_leds
+from lightpen.discovery.numbering import frame_by, framed
 from lightpen.discovery.scale import (
     farthest_apart,
     with_led_covariance,
@@ -16,13 +16,16 @@ from lightpen.discovery.scale import (
 from lightpen.discovery.starts import KnownLength
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
-from lightpen.estimation.uncertainty.disc_normals import effect_of_normals
+from lightpen.estimation.uncertainty.disc_normals import (
+    across_normals,
+    effect_of_normals,
+)
 from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mixing
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.intrinsics.distortion import Choice
 from lightpen.model.camera import Camera
 from lightpen.model.information import inverse
-from lightpen.model.pen import Pen, order_of_paper
+from lightpen.model.pen import Pen, moved, order_of_paper
 from lightpen.model.self_calibration import FoundCamera, FoundPen, marks_of
 
 
@@ -119,7 +122,7 @@ def discovery_of(
     # The start found the normal, by the same images.
     normals = effect_of_normals(bundle)
     of_turn = inverse(normals.information + FACING**-2 * np.eye(2))
-    by = instrument_mixing(bundle)
+    by, axes = instrument_mixing(bundle), across_normals(state.pen.normals)
     covariance = instrument.covariance + by @ normals.covariance(of_turn) @ by.T
     at = instrument.parameters
     budget = calibration.budget.covariance[:3, :3] - instrument.covariance[:3, :3]
@@ -138,7 +141,7 @@ def discovery_of(
     pen = replace(
         with_led_covariance(state.pen, covariance[at.leds, at.leds]),
         diameter_sigma=diameter_sigma,
-        normal_sigma=float(np.sqrt(np.linalg.eigvalsh(of_turn)[-1])),
+        normal_covariance=axes.T @ of_turn @ axes,
         nominal_tip=None,
         expansion=None,
         found=_pen_before(bundle.unknowns.start.pen, marks),
@@ -194,7 +197,7 @@ def _in_frame(found: Discovery, R: FloatArray, t: FloatArray) -> Discovery:
     at = found.parameters
     turn = np.eye(at.number)
     turn[at.tip, at.tip] = R
-    turn[at.leds, at.leds] = turn_of_leds(found.pen.n_leds, R)
+    turn[at.leds, at.leds] = np.kron(np.eye(found.pen.n_leds), R)
     covariance = turn @ found.covariance @ turn.T
     return replace(
         found,

@@ -1,6 +1,5 @@
 """Numbers of the LEDs and the frame of the pen: by definition, or by a sketch."""
 
-from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -10,7 +9,7 @@ from lightpen.discovery.normals import towards_camera
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.model.assignment import assigned_columns
-from lightpen.model.pen import Pen, order_of_paper, pen_frame_from_raw
+from lightpen.model.pen import Pen, moved, order_of_paper, pen_frame_from_raw
 from lightpen.model.rigid import fit_rigid
 
 ROW = 0.02  # of the pen's size: LEDs of one row differ less in height
@@ -118,28 +117,6 @@ def frame_by(pen: Pen, origin: int, along: int) -> tuple[FloatArray, FloatArray]
     z = _normalised(z - (z @ y) * y)
     R = np.stack([np.cross(y, z), y, z])
     return R, -R @ pen.leds[origin]
-
-
-def moved(pen: Pen, R: FloatArray, t: FloatArray) -> Pen:
-    """Return a pen in another frame."""
-    turn, covariance, found = turn_of_leds(pen.n_leds, R), pen.led_covariance, pen.found
-    if covariance is not None:
-        covariance = turn @ covariance @ turn.T
-    if found is not None:
-        before = turn @ found.led_covariance @ turn.T
-        found = replace(found, led_covariance=before)
-    return replace(
-        pen,
-        leds=pen.leds @ R.T + t,
-        normals=pen.normals @ R.T,
-        led_covariance=covariance,
-        found=found,
-    )
-
-
-def turn_of_leds(n_leds: int, R: FloatArray) -> FloatArray:
-    """Return the turn of all LED coordinates, (3 L, 3 L), by that of one."""
-    return np.asarray(np.kron(np.eye(n_leds), R))
 
 
 def _normalised(vector: FloatArray) -> FloatArray:

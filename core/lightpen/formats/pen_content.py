@@ -28,7 +28,6 @@ RANGES = {
     "led_sigma": (0.0, 10.0),
     "scale_sigma": (0.0, 0.01),
     "diameter_sigma": (0.0, 10.0),
-    "normal_sigma": (0.0, 1.0),
     "expansion": (-1e-5, 1e-4),
     "expansion_sigma": (0.0, 1e-4),
     "temperature_c": (-50.0, 100.0),
@@ -46,6 +45,7 @@ class PenContent:
     name: str = ""
     stated: Mapping[str, float] = field(default_factory=dict)
     covariance: FloatArray | None = None
+    normal_covariance: FloatArray | None = None
     found: FoundPen | None = None
 
 

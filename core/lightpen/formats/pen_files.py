@@ -19,7 +19,8 @@ A JSON file has
 ``led_sigma``   standard uncertainty of one LED coordinate, optional
 ``scale_sigma`` of all coordinates together, relative, optional
 ``diameter_sigma`` of the diameter, optional
-``normal_sigma`` of a turn common to all normals, rad, optional
+``normal_covariance`` of a rotation vector common to all normals, rad^2, 3 rows of 3,
+                optional
 ``expansion``   of the pen, 1/K, optional
 ``expansion_sigma`` standard uncertainty of that, 1/K, optional
 ``temperature_c`` at which the LEDs were measured, degrees C, optional
@@ -167,7 +168,7 @@ def write_pen(pen: Pen, path: Path, parent_sha256: str = "") -> None:
     if suffix == ".json":
         text = json_text(pen, parent_sha256)
     elif suffix == ".csv":
-        extras = pen.nominal_tip, pen.led_covariance
+        extras = pen.nominal_tip, pen.led_covariance, pen.normal_covariance
         if pen.name or any(each is not None for each in extras):
             raise UsageError("pen-file.table-has-no-place", name=printable(path.name))
         text = csv_text(pen)
@@ -199,6 +200,7 @@ def _pen(
         content.name,
         **content.stated,
         led_covariance=content.covariance,
+        normal_covariance=content.normal_covariance,
         found=found,
     )
 

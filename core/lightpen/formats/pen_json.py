@@ -29,7 +29,7 @@ _LED_KEYS = {"led", "x", "y", "z", "normal"}
 _FILE_KEYS = {
     *("units", "leds", "diameter", "nominal_tip", "name", "comment"),
     *("led_sigma", "scale_sigma", "diameter_sigma", "led_covariance"),
-    "normal_sigma",
+    "normal_covariance",
     *("expansion", "expansion_sigma", "temperature_c"),
     "parent_sha256",
     "found_from",
@@ -77,9 +77,11 @@ def from_json(tree: Tree, units: str | None, name: str) -> PenContent:
     nominal_tip = None
     if entries.has("nominal_tip") and entries.value("nominal_tip") is not None:
         nominal_tip = entries.counted(3, "nominal_tip") * unit
-    covariance = None
+    covariance = of_normals = None
     if entries.has("led_covariance"):
-        covariance = _covariance(entries, len(leds), unit, name)
+        covariance = unit**2 * _covariance(entries, len(leds), "led_covariance")
+    if entries.has("normal_covariance"):
+        of_normals = _covariance(entries, 1, "normal_covariance")
     return PenContent(
         leds=np.array(coordinates) * unit,
         normals=_listed_normals(leds, name),
@@ -96,6 +98,7 @@ def from_json(tree: Tree, units: str | None, name: str) -> PenContent:
             if entries.has(what)
         },
         covariance=covariance,
+        normal_covariance=of_normals,
         found=_found(entries, len(leds), unit, name),
     )
 
@@ -105,19 +108,19 @@ def _found(entries: Entries, n_leds: int, unit: float, name: str) -> FoundPen | 
         return None
     part = entries.part("found_from")
     part.refuse_others(*_FOUND_KEYS)
-    covariance = _covariance(part, n_leds, unit, name)
+    covariance = unit**2 * _covariance(part, n_leds, "led_covariance")
     diameter = float(part.counted(1, "diameter")[0]) * unit
     check_diameter(diameter, name)
     return FoundPen(part.points("images"), diameter, covariance)
 
 
-def _covariance(entries: Entries, n_leds: int, unit: float, name: str) -> FloatArray:
-    n = 3 * n_leds
-    matrix = entries.counted(n * n, "led_covariance").reshape(n, n) * unit**2
+def _covariance(entries: Entries, n_vectors: int, what: str) -> FloatArray:
+    n = 3 * n_vectors
+    matrix = entries.counted(n * n, what).reshape(n, n)
     off = float(np.abs(matrix - matrix.T).max())
     size = float(np.abs(np.diag(matrix)).max())
     if off > ASYMMETRY * size or np.linalg.eigvalsh(matrix)[0] < -ASYMMETRY * size:
-        raise FileError("pen-file.no-covariance", name=name)
+        raise FileError("pen-file.no-covariance", what=what, name=entries.name)
     return matrix
 
 
@@ -173,6 +176,8 @@ def json_text(pen: Pen, parent_sha256: str) -> str:
     ]
     if pen.led_covariance is not None:
         entries.append(_matrix("led_covariance", pen.led_covariance))
+    if pen.normal_covariance is not None:
+        entries.append(_matrix("normal_covariance", pen.normal_covariance))
     if pen.found is not None:
         found = [
             _matrix("images", pen.found.marks.round(MARK_DIGITS)),

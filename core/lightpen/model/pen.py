@@ -77,9 +77,9 @@ class Pen:
         Its standard uncertainty, 1/K; None if not stated.
     temperature_c : float or None
         Temperature of the LED measurement, degrees Celsius; None if not stated.
-    normal_sigma : float or None
-        Standard uncertainty of a turn common to all normals about each axis across
-        them, rad; None if not stated: they are taken as exact.
+    normal_covariance : (3, 3) array or None
+        Of a rotation vector common to all normals, rad^2; None if not stated: they are
+        taken as exact.
     led_covariance : (3 L, 3 L) array or None
         Of all LED coordinates but for the scale that they share, mm^2; None if no more
         than ``led_sigma`` is known.
@@ -100,7 +100,7 @@ class Pen:
     expansion_sigma: float | None = None
     temperature_c: float | None = None
     led_covariance: FloatArray | None = None
-    normal_sigma: float | None = None
+    normal_covariance: FloatArray | None = None
     found: FoundPen | None = None
 
     @property
@@ -280,13 +280,30 @@ def in_pen_frame(raw: Pen) -> Pen:
     raw : Pen
         LEDs, normals and nominal tip in any right-handed frame.
     """
-    R, t = pen_frame_from_raw(raw.leds)
+    return moved(raw, *pen_frame_from_raw(raw.leds))
+
+
+def moved(pen: Pen, R: FloatArray, t: FloatArray) -> Pen:
+    """Return a pen in another frame."""
+    tip, of_leds, of_normals = pen.nominal_tip, pen.led_covariance, pen.normal_covariance
+    found = pen.found
+    if found is not None:
+        found = replace(found, led_covariance=_turned(found.led_covariance, R))
     return replace(
-        raw,
-        leds=raw.leds @ R.T + t,
-        normals=raw.normals @ R.T,
-        nominal_tip=None if raw.nominal_tip is None else R @ raw.nominal_tip + t,
+        pen,
+        leds=pen.leds @ R.T + t,
+        normals=pen.normals @ R.T,
+        nominal_tip=None if tip is None else R @ tip + t,
+        led_covariance=None if of_leds is None else _turned(of_leds, R),
+        normal_covariance=None if of_normals is None else _turned(of_normals, R),
+        found=found,
     )
+
+
+def _turned(covariance: FloatArray, R: FloatArray) -> FloatArray:
+    """Return a covariance of vectors, (3 P, 3 P), in a frame turned by R."""
+    turn = np.kron(np.eye(len(covariance) // 3), R)
+    return np.asarray(turn @ covariance @ turn.T)
 
 
 def _check_separation(leds: FloatArray, diameter: float) -> None:

@@ -54,7 +54,10 @@ from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, axes_of_cone
 from lightpen.estimation.bundle.unknowns import whole_moves
 from lightpen.estimation.contact.joint import JointFit
-from lightpen.estimation.uncertainty.disc_normals import effect_of_normals
+from lightpen.estimation.uncertainty.disc_normals import (
+    covariance_of_turn,
+    effect_of_normals,
+)
 from lightpen.model.quantiles import chi_square_quantile
 
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty
@@ -276,9 +279,8 @@ def contributions_of(
     if priors.reading is not None:
         along_normals = priors.reading.shift * _by_shift_along_normals(bundle)
         biased += np.outer(along_normals, along_normals)
-    facing = bundle.unknowns.start.pen.normal_sigma
-    if facing is not None and bundle.state.rig.n_cameras == 1:
-        of_turn = facing**2 * np.eye(2)
+    of_turn = covariance_of_turn(bundle.unknowns.start.pen)
+    if of_turn is not None and bundle.state.rig.n_cameras == 1:
         biased += effect_of_normals(bundle).covariance(of_turn)[:6, :6]
     size = bundle.part(at.scale)
     warm = float(priors.temperature.covariance[0, 0] / priors.size_covariance[0, 0])

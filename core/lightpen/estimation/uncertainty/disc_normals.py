@@ -21,6 +21,7 @@ from lightpen.estimation.bundle.linearised import (
 )
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.information import inverse
+from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
 
 TURN = 1e-3  # rad, of a difference
@@ -77,6 +78,14 @@ def effect_of_normals(bundle: Bundle) -> NormalEffect:
     gain = -inverse(information[np.ix_(old, old)] + known) @ coupling
     own = information[np.ix_(turn, turn)] + coupling.T @ gain
     return NormalEffect(gain, own)
+
+
+def covariance_of_turn(pen: Pen) -> FloatArray | None:
+    """Return what a pen states of the turn, (2, 2), rad^2; None if nothing."""
+    if pen.normal_covariance is None:
+        return None
+    axes = across_normals(pen.normals)
+    return np.asarray(axes @ pen.normal_covariance @ axes.T)
 
 
 def with_normal(view: CameraView, state: BundleState) -> CameraView:

@@ -16,7 +16,10 @@ from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.priors import Priors, priors_of
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.uncertainty.budget import Budget, ContributionName
-from lightpen.estimation.uncertainty.disc_normals import effect_of_normals
+from lightpen.estimation.uncertainty.disc_normals import (
+    covariance_of_turn,
+    effect_of_normals,
+)
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -96,9 +99,8 @@ def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
     shrinkage_shift = unshrunk.values - bundle.values
     shrinkage_shift[:6] = adjustment.shrinkage_shift
     spread = spread + np.outer(shrinkage_shift, shrinkage_shift)
-    facing = state.pen.normal_sigma
-    if facing is not None and state.rig.n_cameras == 1:
-        of_turn = facing**2 * np.eye(2)
+    of_turn = covariance_of_turn(state.pen)
+    if of_turn is not None and state.rig.n_cameras == 1:
         spread = spread + effect_of_normals(unshrunk).covariance(of_turn)
     mixing = instrument_mixing(bundle)
     return Instrument(

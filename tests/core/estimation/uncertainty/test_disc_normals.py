@@ -22,7 +22,7 @@ CAMERA, PEN = paper_camera(), replace(paper_pen(), led_sigma=0.002)
 TURN = np.array([0.03, -0.02])  # rad
 
 
-def calibrated(turn: FloatArray, normal_sigma: float | None = None) -> Calibration:
+def calibrated(turn: FloatArray, sigma: float | None = None) -> Calibration:
     """Return the calibration by a pen file whose normals are turned."""
     rng = np.random.default_rng(3)
     swing = swing_poses(120, rng, pen=PEN, camera=CAMERA)
@@ -30,8 +30,9 @@ def calibrated(turn: FloatArray, normal_sigma: float | None = None) -> Calibrati
         CAMERA, PEN, swing.rotations, swing.translations, 0.005, rng
     )
     centers = Centers(np.arange(len(pixels)), pixels, Path("centers.csv"))
+    of_normals = None if sigma is None else sigma**2 * np.eye(3)
     pen = replace(
-        PEN, normals=turned_normals(PEN.normals, turn), normal_sigma=normal_sigma
+        PEN, normals=turned_normals(PEN.normals, turn), normal_covariance=of_normals
     )
     return calibrate(CAMERA, pen, observe_centers(centers, CAMERA, pen))
 
@@ -64,7 +65,7 @@ def test_the_effect_of_a_turn_is_found_beside_that_of_a_stylus_that_gives_way() 
     translations = swing.translations + 0.03 * sideways
     pixels = simulate_centers(CAMERA, PEN, swing.rotations, translations, 0.005, rng)
     centers = Centers(np.arange(len(pixels)), pixels, Path("centers.csv"))
-    pen = replace(PEN, normal_sigma=0.3)
+    pen = replace(PEN, normal_covariance=0.3**2 * np.eye(3))
 
     bundle = calibrate(CAMERA, pen, observe_centers(centers, CAMERA, pen)).bundle
 
