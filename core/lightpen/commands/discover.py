@@ -37,7 +37,7 @@ from lightpen.formats.images import SUFFIXES, find_images
 from lightpen.formats.observation_files import read_unlabelled_centers
 from lightpen.formats.pen_files import read_unchecked_pen, write_pen
 from lightpen.model.camera import Camera
-from lightpen.model.pen import DISC_DIAMETER, Pen
+from lightpen.model.pen import DISC_DIAMETER, Pen, check_leds
 
 LONGEST = "longest"
 CALIPER = 0.02  # mm, standard uncertainty of a length unless given
@@ -199,6 +199,7 @@ def _discover(options: argparse.Namespace) -> None:
     if options.out_camera is not None:
         require_lens(found.camera)
     if options.out_pen is not None:
+        check_leds(found.pen.leds, found.pen.diameter)
         write_pen(found.pen, options.out_pen)
     if options.out_camera is not None:
         write_camera(found.camera, options.out_camera)

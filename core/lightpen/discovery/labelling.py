@@ -3,7 +3,7 @@
 Rotations are fitted outwards from the images that are solved, with the tip in the cone.
 A piece of a track that stays where an LED is predicted is that LED; one that does not,
 yet is seen from all sides to be fixed to the pen, is an LED not known before. Images
-where all tracks broke are found again by the postures of others.
+where all tracks broke are found again among all postures within a hand's reach.
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,8 @@ SURE = 0.0015  # of the image width, of an LED in an image that is found again
 FIXED_TO_PEN = 1.0e-3  # of the image width: rms of a spot that goes with the pen
 MIN_TRIANGULATED = 12  # images that show a spot that may be a new LED
 MIN_PARALLAX = 0.1  # rad, between its rays
-ANEW = 40  # postures that an image is sought among
+REACH, GRID = 4, np.radians(8)  # steps of a turn to each side, and rad a step
+N_NEAREST = 8  # postures that an image found again is begun with
 ROUNDS = 400
 STEPS = 8
 RIDGE = 1e-9
@@ -105,6 +106,7 @@ class _Search:
         self.rotations = np.tile(np.eye(3), (n, 1, 1))
         self.solved = np.zeros(n, bool)
         self.failed = np.zeros(n, bool)
+        self.sought = np.zeros(n, bool)
         self.led = np.full(pieces.spots.shape[1], -1)
 
     @classmethod
@@ -124,10 +126,10 @@ class _Search:
         search.name_pieces()
         return search
 
-    def predicted(self, images: IntArray) -> FloatArray:
-        """Return where the LEDs are in images that are solved, (M, L, 2), px."""
+    def predicted(self, rotations: FloatArray) -> FloatArray:
+        """Return where the LEDs are by rotations (M, 3, 3), (M, L, 2), px."""
         state, camera = self.state, self.state.rig.cameras[0]
-        leds = state.pen.leds @ np.swapaxes(self.rotations[images], 1, 2)
+        leds = state.pen.leds @ np.swapaxes(rotations, 1, 2)
         with np.errstate(all="ignore"):
             return camera.project(leds + state.cone_rig)
 
@@ -199,7 +201,7 @@ class _Search:
     def name_pieces(self) -> bool:
         """Name the pieces that are LEDs by where LEDs are predicted, or add LEDs."""
         images = np.flatnonzero(self.solved)
-        there = self.predicted(images)
+        there = self.predicted(self.rotations[images])
         named = False
         lengths = (self.pieces.spots[images] >= 0).sum(axis=0)
         for p in np.argsort(-lengths, kind="stable"):
@@ -252,32 +254,36 @@ class _Search:
                     ),
                 )
                 self.led[p] = pen.n_leds
+                self.sought[:] = False
                 return True
         return False
 
     def find_again(self) -> bool:
-        """Look for an image in which tracks broke among the postures of others."""
-        solved = np.flatnonzero(self.solved)
-        some = solved[np.unique(np.linspace(0, len(solved) - 1, ANEW).astype(int))]
-        there = self.predicted(some)
-        waiting = np.flatnonzero(~self.solved).tolist()
-        tried = [i for i in waiting if len(self.spots[i]) >= MIN_FOUND]
-        for i in tried:
+        """Look for an image in which tracks broke, by all spots and any posture."""
+        u, _, vt = np.linalg.svd(self.rotations[self.solved].mean(axis=0))
+        steps = GRID * np.arange(-REACH, REACH + 1)
+        turns = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
+        rotations = rotation_from_vector(turns) @ (u @ vt)
+        there = self.predicted(rotations)
+        for i in np.flatnonzero(~self.solved & ~self.sought).tolist():
             spots = self.spots[i]
+            if len(spots) < MIN_FOUND:
+                continue
+            self.sought[i] = True
             apart = np.linalg.norm(there[:, :, None] - spots, axis=3).min(axis=2)
-            near = np.argsort(apart.mean(axis=1))[:4]
-            for k in near:
-                self.rotations[i] = self.rotations[some[k]]
+            for k in np.argsort(apart.mean(axis=1))[:N_NEAREST]:
+                self.rotations[i] = rotations[k]
                 if self._settles(i, spots):
                     self.solved[i] = True
-                    break
-        return any(self.solved[i] for i in tried)
+                    return True
+        return False
 
     def _settles(self, i: int, spots: FloatArray) -> bool:
         """Fit the rotation of an image to all its spots, closer and closer."""
         image = np.array([i])
-        for gate in (0.03, 0.01, AT_LED, SURE):
-            match = assign(self.predicted(image)[0], spots, gate * self.width)
+        for gate in (0.06, 0.03, 0.01, AT_LED, SURE):
+            there = self.predicted(self.rotations[image])[0]
+            match = assign(there, spots, gate * self.width)
             found = match >= 0
             if found.sum() < MIN_FOUND:
                 return False
@@ -291,7 +297,7 @@ class _Search:
         """Return the spot of each LED in each image that is solved, (N, L)."""
         labels = np.full((len(self.spots), self.state.pen.n_leds), -1)
         images = np.flatnonzero(self.solved)
-        there = self.predicted(images)
+        there = self.predicted(self.rotations[images])
         for i, predicted in zip(images.tolist(), there, strict=True):
             labels[i] = assign(predicted, self.spots[i], AT_LED * self.width)
         return labels

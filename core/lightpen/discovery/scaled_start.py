@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lightpen.arrays import FloatArray, IntArray
+from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.pose import NOISE_FLOOR
 from lightpen.discovery.hypotheses import camera_prior
 from lightpen.discovery.labelling import Labelled
@@ -32,6 +32,7 @@ from lightpen.model.rigid import fit_rigid
 N_ADJUSTED = 100  # images that the start is adjusted to
 N_HALF_STEPS = 15
 MIN_SHARE, MIN_SEEN = 0.05, 10  # of the images, and images, in which an LED is seen
+APART, TOGETHER = 0.03, 0.1  # of the pen's size, and of the images of the LED seen less
 USUAL_DISC = 0.05  # of the largest distance of two LEDs
 RELATIVE = 100.0  # the largest distance of two LEDs, where no length is known
 LEAST_LENGTH_SIGMA = 1e-4  # mm
@@ -54,9 +55,16 @@ class ScaledStart(NamedTuple):
 
 
 def numbered(found: Labelled, request: Request) -> Labelled:
-    """Return the labelling by LED numbers, without LEDs that hardly any image shows."""
-    n_seen = (found.spots >= 0).sum(axis=0)
-    good = np.flatnonzero(n_seen >= max(MIN_SHARE * len(found.spots), MIN_SEEN))
+    """Return the labelling by LED numbers.
+
+    Without LEDs that hardly any image shows, and without the reflections of others.
+    """
+    seen = (found.spots >= 0).astype(int)
+    n_seen = seen.sum(axis=0)
+    is_good = n_seen >= max(MIN_SHARE * len(seen), MIN_SEEN)
+    good = np.flatnonzero(
+        is_good & ~_are_in_place_of_others(found.state.pen.leds, seen)
+    )
     if len(good) < MIN_LEDS:
         raise CalibrationError(
             "discover.too-few-leds", n_leds=len(good), needed=MIN_LEDS
@@ -70,6 +78,16 @@ def numbered(found: Labelled, request: Request) -> Labelled:
     return replace(
         found, state=_of_leds(state, order), spots=found.spots[:, good[order]]
     )
+
+
+def _are_in_place_of_others(leds: FloatArray, seen: IntArray) -> BoolArray:
+    """Return which LEDs (L, 3) only show, beside one seen more, where that does not."""
+    n_seen = seen.sum(axis=0)
+    apart = np.linalg.norm(leds[:, None] - leds, axis=2)
+    is_near = apart < APART * apart.max()
+    is_alternative = seen.T @ seen < TOGETHER * n_seen[:, None]
+    is_less = n_seen[:, None] < n_seen
+    return np.asarray((is_near & is_alternative & is_less).any(axis=1))
 
 
 def _of_leds(state: BundleState, order: IntArray) -> BundleState:

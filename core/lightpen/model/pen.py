@@ -285,8 +285,8 @@ def in_pen_frame(raw: Pen) -> Pen:
 
 def moved(pen: Pen, R: FloatArray, t: FloatArray) -> Pen:
     """Return a pen in another frame."""
-    tip, of_leds, of_normals = pen.nominal_tip, pen.led_covariance, pen.normal_covariance
-    found = pen.found
+    tip, found = pen.nominal_tip, pen.found
+    of_leds, of_normals = pen.led_covariance, pen.normal_covariance
     if found is not None:
         found = replace(found, led_covariance=_turned(found.led_covariance, R))
     return replace(
