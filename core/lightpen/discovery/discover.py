@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpen.arrays import FloatArray, IntArray
+from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.discovery.found import Discovery, discovery_of
 from lightpen.discovery.hypotheses import Hypothesis, solve_seed
 from lightpen.discovery.labelling import Labelled, label, pixels_of
@@ -43,6 +43,8 @@ from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import fit_rigid
+
+SLIPPED = 0.03  # of the images, that are left out after a slip
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,9 +97,17 @@ def discover(
 
 
 def _adjusted(
-    swing: _Swing, request: Request, report: Report = lambda fraction: None
+    swing: _Swing,
+    request: Request,
+    report: Report = lambda fraction: None,
+    *,
+    is_cleared: bool = False,
 ) -> Discovery:
-    """Return tip, pen and camera by a swing with numbered LEDs."""
+    """Return tip, pen and camera by a swing with numbered LEDs.
+
+    Where many images are left out, as after a slip, all is begun anew without them:
+    they have shifted the start, which gives the lens model and the normal of the discs.
+    """
     sightings = swing.sightings
     pixels = pixels_of(swing.found.spots, swing.centers)
     scaled = start, lengths, choice = scaled_start(request, swing.found, pixels)
@@ -117,6 +127,10 @@ def _adjusted(
     camera = _camera_to_adjust(start, request)
     pen = with_lengths_known(start.pen, lengths)
     calibration = calibrate(camera, pen, observations, second=second)
+    fits = calibration.used[swing.found.images]
+    if not is_cleared and np.mean(~fits) > SLIPPED:
+        cleared = replace(swing, found=_of_images(swing.found, fits))
+        return _adjusted(cleared, request, report, is_cleared=True)
     require_length(calibration, request, lengths)
     report(0.95)
     discovery = discovery_of(
@@ -149,6 +163,12 @@ def _labelled_swing(sightings: Sightings, request: Request, report: Report) -> _
     found = label(seed, joined, certain, centers, width)
     require_no_second_pen(found)
     return _Swing(sightings, centers, kept, found, seed.hypotheses, len(lamps))
+
+
+def _of_images(found: Labelled, some: BoolArray) -> Labelled:
+    """Return the labelling with some of the images that have a rotation."""
+    state = replace(found.state, rotations=found.state.rotations[some])
+    return replace(found, state=state, images=found.images[some])
 
 
 def _with_second(

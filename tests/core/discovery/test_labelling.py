@@ -1,10 +1,10 @@
-"""Images of which the LEDs are known by the shape of the pen alone."""
+"""Swings during which LEDs are covered, reflected, or the tip slips."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_stations import Station, errors_of, random_station
+from tests.simulated_stations import Station, errors_of, random_station, seen_station
 
 from lightpen.discovery.discover import discover
 from lightpen.discovery.found import Discovery
@@ -40,3 +40,16 @@ def test_a_reflection_in_place_of_an_led_for_a_while_is_no_led() -> None:
 
     assert found.pen.n_leds == STATION.pen.n_leds
     require_true(found, station)
+
+
+@pytest.mark.slow
+def test_a_small_slip_shifts_neither_lens_nor_normal() -> None:
+    rng = np.random.default_rng(34007)
+    before = random_station(34007)
+    slip = rng.standard_normal(3)
+    translations = before.swing.translations.copy()
+    translations[140:160] += 0.1 * slip / np.linalg.norm(slip)  # mm
+    swing = replace(before.swing, translations=translations)
+    station = seen_station(before.camera, before.pen, swing, 0.03, 0.02, rng)
+
+    require_true(discover(station.sightings, station.request), station)
