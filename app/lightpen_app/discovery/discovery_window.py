@@ -1,5 +1,6 @@
 """The window in which tip, pen and camera are found without files."""
 
+import numpy as np
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QWidget
@@ -12,7 +13,7 @@ from lightpen.discovery.request import Request
 from lightpen.discovery.scale import MeasuredLength
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.model.pen import DISC_DIAMETER
-from lightpen_app.discovery.discovery_run import DiscoveryRun, DiscoveryState
+from lightpen_app.discovery.discovery_run import N_USUAL, DiscoveryRun, DiscoveryState
 from lightpen_app.look.layouts import (
     fill,
     grid_layout,
@@ -39,6 +40,7 @@ SIDE_WIDTH = 52 * GRID
 LEAST_PICTURE = 34 * GRID  # px, of the pen and of the dial
 LONGEST, LARGEST_U, LARGEST_DISC = 2000.0, 10.0, 100.0  # mm
 USUAL_U = 0.04  # mm, of a caliper
+SIMULATED_U = 0.002  # mm, of the length of the simulated pen
 UM = 1000.0
 
 
@@ -57,6 +59,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         super().__init__(parent, Qt.WindowType.Window)
         self.setObjectName("discovery")
         self.resize(150 * GRID, 96 * GRID)
+        self._workbench = workbench
         self._run = DiscoveryRun(workbench, self)
 
         # Widgets
@@ -174,9 +177,12 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
     def _refresh(self) -> None:
         state = self._run.state
         self._begin.setText(self.tr("Stop") if state.is_capturing else self.tr("Start"))
-        self._count.setText(self.tr("Images: {0}").format(state.n_images))
+        n_wanted = max(N_USUAL, state.n_images)
+        words = self.tr("Images: {0} of {1}").format(state.n_images, n_wanted)
+        self._count.setText(words)
         self._instruction.set_value(self._instructed(state))
         self._dial.set_value(_dial_value(state))
+        self._dial.setVisible(state.is_capturing or state.found is None)
         why_not = "" if state.found else self.tr("Swing the pen first.")
         if not why_not and not self._length.value():
             why_not = self.tr("Enter the length.")
@@ -191,9 +197,10 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
     def _show_found(self) -> None:
         """Show pen, camera and numbers of the last solution."""
         found, is_final = self._run.state.found, self._run.state.is_final
-        self._dial.setVisible(not is_final)
         self._pen.setVisible(found is not None)
         pair = _longest_pair(found)
+        if pair and not self._length.value():
+            self._enter_simulated_length()
         self._how.setText(self._how_to_measure(pair))
         if is_final:
             words = self.tr(
@@ -218,13 +225,24 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
             return StatusMessage(words, Sign.WAIT, Tone.QUIET)
         if state.fault:
             return StatusMessage(state.fault, Sign.WARNING, Tone.WARN)
-        if state.is_final:
+        limit = self._workbench.selection.preparation.limits.max_uncertainty
+        if state.found is not None and state.is_final:
+            U = float(state.found.expanded_uncertainty.max())
+            if limit < U:
+                words = self.tr(
+                    "U of the tip is {0:.3f} mm; the limit is {1:g} mm. Swing again "
+                    "with more images and tilt, or measure the length better."
+                )
+                words = words.format(U, limit)
+                return StatusMessage(words, Sign.WARNING, Tone.WARN)
             words = self.tr(
                 "Pen and camera found. The image shows the projection uncertainty / px."
             )
             return StatusMessage(words, Sign.CHECK, Tone.GOOD)
         if not state.is_capturing and state.found is not None:
             words = self.tr("Enter the distance between the two marked LEDs.")
+            if self._length.value():
+                words = self.tr("Check the length, and compute pen and camera.")
         elif not state.is_capturing:
             words = self.tr(
                 "Lock zoom, focus and exposure. Seat the tip in the cone, hold the "
@@ -250,6 +268,14 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
             "Measure at the temperature of the swing."
         )
         return words.format(*pair)
+
+    def _enter_simulated_length(self) -> None:
+        if self._workbench.live.operator is None:
+            return
+        leds = self._workbench.around.scene.pen.leds
+        apart = np.linalg.norm(leds[:, None] - leds, axis=2)
+        self._length.setValue(float(apart.max()))
+        self._u.setValue(SIMULATED_U)
 
     def _found_text(self, found: Discovery | None) -> str:
         if found is None:
