@@ -22,13 +22,13 @@ from benchmarks.hostile_records import make_data
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
-from lightpen.archive.chains import append, copy_entries, own_chain
-from lightpen.archive.check import check_archive
-from lightpen.archive.database import Database, look_into, open_file
-from lightpen.archive.entries import ChainHead, Event, Kind, chained, text_sha256
-from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.queries import EntryFilter, last_accepted, newest
-from lightpen.archive.seal import seal_of
+from lightpen.archive.chains.chains import append, copy_entries, own_chain
+from lightpen.archive.chains.entries import ChainHead, Event, Kind, chained, text_sha256
+from lightpen.archive.chains.seal import seal_of
+from lightpen.archive.checks.check import check_archive
+from lightpen.archive.history.queries import EntryFilter, last_accepted, newest
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.store.database import Database, look_into, open_file
 from lightpen.errors import ArchiveError
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.names import Names

@@ -40,11 +40,11 @@ from benchmarks.hostile_records import make_data
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
-from lightpen.archive.chains import entries_of, heads
-from lightpen.archive.check import check_archive
-from lightpen.archive.database import Database, look_into
-from lightpen.archive.entries import StoredEntry
-from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.archive.chains.chains import entries_of, heads
+from lightpen.archive.chains.entries import StoredEntry
+from lightpen.archive.checks.check import check_archive
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.store.database import Database, look_into
 from lightpen.errors import LightpenError, NoArchiveError
 from lightpen.record.library.tip_library import library_files
 from lightpen.record.results.result_folder import FolderArchive

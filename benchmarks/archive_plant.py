@@ -25,12 +25,12 @@ from benchmarks.postgres_server import Postgres, postgres_programs
 from benchmarks.relay import Line, Relay
 from benchmarks.rows import Row, table
 
-from lightpen.archive.chains import chain_at_home, entries_of, heads
-from lightpen.archive.check import check_archive
-from lightpen.archive.database import look_into
-from lightpen.archive.lazy_logbook import SERVER
-from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.server import open_server
+from lightpen.archive.chains.chains import chain_at_home, entries_of, heads
+from lightpen.archive.checks.check import check_archive
+from lightpen.archive.logbook.lazy_logbook import SERVER
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.replication.server import open_server
+from lightpen.archive.store.database import look_into
 from lightpen.errors import ArchiveError
 
 STATIONS = ("Hall 2", "Hall 3")

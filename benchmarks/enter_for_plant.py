@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.hostile_records import NAMES, make_data
 
-from lightpen.archive.lazy_logbook import SERVER
-from lightpen.archive.logbook import Logbook
+from lightpen.archive.logbook.lazy_logbook import SERVER
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.record.results.result_folder import FolderArchive
 
 PAUSE_S = 0.1  # between two tips

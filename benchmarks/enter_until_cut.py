@@ -23,10 +23,10 @@ from benchmarks.hostile_records import NAMES, NOON
 from benchmarks.write_until_killed import tell
 from msgspec import structs
 
-from lightpen.archive.chains import copy_entries, heads
-from lightpen.archive.entries import ChainHead, Event, Kind, chained, text_sha256
-from lightpen.archive.logbook import Logbook
-from lightpen.archive.queries import EntryFilter, newest
+from lightpen.archive.chains.chains import copy_entries, heads
+from lightpen.archive.chains.entries import ChainHead, Event, Kind, chained, text_sha256
+from lightpen.archive.history.queries import EntryFilter, newest
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.errors import LightpenError
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.record.library.library_changes import Author, add_item, change_item

@@ -27,12 +27,12 @@ from benchmarks.machine import description
 from benchmarks.postgres_server import Postgres, postgres_programs
 from benchmarks.rows import Row, table
 
-from lightpen.archive.check import check_file
-from lightpen.archive.comparison import check_server, require_same
-from lightpen.archive.database import look_into
-from lightpen.archive.exchange import deliver
-from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.server import open_server
+from lightpen.archive.checks.check import check_file
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.replication.comparison import check_server, require_same
+from lightpen.archive.replication.exchange import deliver
+from lightpen.archive.replication.server import open_server
+from lightpen.archive.store.database import look_into
 from lightpen.record.library.signing.keys import KEYS
 
 SEED = 25

@@ -32,12 +32,12 @@ from benchmarks.json_mutations import mutated
 from benchmarks.mutations import mutated as mutated_bytes
 from benchmarks.rows import Row
 
-from lightpen.archive.chains import entries_of, heads
-from lightpen.archive.check import check_archive
-from lightpen.archive.database import look_into, open_file
-from lightpen.archive.exchange import export_entries, import_entries
-from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.station_events import account_of_station
+from lightpen.archive.chains.chains import entries_of, heads
+from lightpen.archive.checks.check import check_archive
+from lightpen.archive.events.station_events import account_of_station
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.replication.exchange import export_entries, import_entries
+from lightpen.archive.store.database import look_into, open_file
 from lightpen.errors import LightpenError
 from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.record.folder.verifications import CONCLUSION

@@ -11,7 +11,7 @@ SECRET = "geheim ä 密"
 # Reads it as the program does for an address that names the keyring.
 KEEP_PASSWORD = f"""
 import compiled_modules; compiled_modules.install()
-import keyring; from lightpen.archive.server import _url
+import keyring; from lightpen.archive.replication.server import _url
 place = "lightpen-trial", "hall_2"
 keyring.set_password(*place, {SECRET!a})
 read = _url("postgresql://hall_2@server/archive?keyring=lightpen-trial").password

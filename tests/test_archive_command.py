@@ -11,11 +11,11 @@ from subprocess import CompletedProcess
 import pytest
 from tests.core.archive.conftest import accepted
 
-from lightpen.archive.chains import append, own_chain
-from lightpen.archive.database import open_file
-from lightpen.archive.lazy_logbook import SERVER
-from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.seal import close_sealed
+from lightpen.archive.chains.chains import append, own_chain
+from lightpen.archive.chains.seal import close_sealed
+from lightpen.archive.logbook.lazy_logbook import SERVER
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.store.database import open_file
 from lightpen.commands.supervisor import PASSWORD
 from lightpen.local_time import local_now
 from lightpen.record.library.signing.keys import key_folder

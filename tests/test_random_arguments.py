@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from lightpen.archive.lazy_logbook import SERVER
+from lightpen.archive.logbook.lazy_logbook import SERVER
 from lightpen.cli import COMMANDS, _parser
 
 NAMES = sorted({"archive", "tips", *(name for name, _, _ in COMMANDS)})
@@ -125,8 +125,8 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A data folder with an archive of one entry."""
     from tests.core.archive.conftest import accepted
 
-    from lightpen.archive.chains import append, own_chain
-    from lightpen.archive.database import open_file
+    from lightpen.archive.chains.chains import append, own_chain
+    from lightpen.archive.store.database import open_file
 
     folder = tmp_path_factory.mktemp("archive") / "data"
     database = open_file(folder / "archive.sqlite")

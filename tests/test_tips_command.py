@@ -8,10 +8,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from subprocess import CompletedProcess
 
-from lightpen.archive.chains import entries_of, own_chain
-from lightpen.archive.database import open_file
-from lightpen.archive.entries import Kind
-from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.archive.chains.chains import entries_of, own_chain
+from lightpen.archive.chains.entries import Kind
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.store.database import open_file
 from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import set_password

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from tests.accepted_tip import accept_tip
 
-from lightpen.archive.chains import chain_at_home, entries_of
-from lightpen.archive.database import look_into
-from lightpen.archive.entries import Event
-from lightpen.archive.logbook import ARCHIVE
+from lightpen.archive.chains.chains import chain_at_home, entries_of
+from lightpen.archive.chains.entries import Event
+from lightpen.archive.logbook.logbook import ARCHIVE
+from lightpen.archive.store.database import look_into
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen

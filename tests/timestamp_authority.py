@@ -23,7 +23,7 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from lightpen.archive.timestamps import Authority
+from lightpen.archive.checks.timestamps import Authority
 
 CONFIG = """[tsa]
 default_tsa = one

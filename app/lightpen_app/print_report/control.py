@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
-from lightpen.archive.result_entry import ArchivePlace, entry_of_file
+from lightpen.archive.logbook.result_entry import ArchivePlace, entry_of_file
 from lightpen.formats.hashes import InputFile, with_content
 from lightpen.local_time import local_now
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration

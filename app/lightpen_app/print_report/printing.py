@@ -14,7 +14,7 @@ from PySide6.QtGui import (
     QPdfWriter,
 )
 
-from lightpen.archive.result_entry import ArchivePlace
+from lightpen.archive.logbook.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
 
-from lightpen.archive.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen.record.swings.names import Names
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.notifications import Notifications

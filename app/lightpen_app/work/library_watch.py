@@ -8,7 +8,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from lightpen.archive.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen.errors import ArchiveError
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import StationStatus
@@ -122,7 +122,7 @@ class LibraryWatch(QObject):
                 opened = logbook.opened()
                 opened.enter_owed()
                 # A fifth of a second, which the start need not take.
-                from lightpen.archive.tip_status import statuses
+                from lightpen.archive.logbook.tip_status import statuses
 
                 return statuses(opened.database, opened.chain, rule, library, now())
             return StationStatus(library)

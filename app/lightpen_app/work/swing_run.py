@@ -8,7 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
-from lightpen.archive.lazy_logbook import LazyLogbook, server_address
+from lightpen.archive.logbook.lazy_logbook import LazyLogbook, server_address
 from lightpen.errors import FileError
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.simulator.follower import GuidedOperator

@@ -6,23 +6,31 @@ from contextlib import closing, contextmanager
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
-from lightpen.archive.chains import chain_at_home, chain_head, note_delivered
-from lightpen.archive.check import check_file
-from lightpen.archive.comparison import check_server, require_same
-from lightpen.archive.database import Database, look_into, open_file
-from lightpen.archive.entries import SHORT, Kind
-from lightpen.archive.exchange import deliver, export_entries, import_entries
-from lightpen.archive.fetching import fetch
-from lightpen.archive.history import Line, lines
-from lightpen.archive.lazy_logbook import SERVER, server_address
-from lightpen.archive.listing import entries_csv
-from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.queries import EntryFilter, newest
-from lightpen.archive.recompute_check import with_recomputed
-from lightpen.archive.seal import close_sealed
-from lightpen.archive.server import open_server
-from lightpen.archive.server_setup import server_sql
-from lightpen.archive.timestamps import authority, request_timestamp, with_timestamps
+from lightpen.archive.chains.chains import chain_at_home, chain_head, note_delivered
+from lightpen.archive.chains.entries import SHORT, Kind
+from lightpen.archive.chains.seal import close_sealed
+from lightpen.archive.checks.check import check_file
+from lightpen.archive.checks.recompute_check import with_recomputed
+from lightpen.archive.checks.timestamps import (
+    authority,
+    request_timestamp,
+    with_timestamps,
+)
+from lightpen.archive.history.history import Line, lines
+from lightpen.archive.history.listing import entries_csv
+from lightpen.archive.history.queries import EntryFilter, newest
+from lightpen.archive.logbook.lazy_logbook import SERVER, server_address
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.replication.comparison import check_server, require_same
+from lightpen.archive.replication.exchange import (
+    deliver,
+    export_entries,
+    import_entries,
+)
+from lightpen.archive.replication.fetching import fetch
+from lightpen.archive.replication.server import open_server
+from lightpen.archive.replication.server_setup import server_sql
+from lightpen.archive.store.database import Database, look_into, open_file
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
 from lightpen.errors import UsageError

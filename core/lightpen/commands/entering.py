@@ -80,8 +80,8 @@ def keep_record(
             _print_overdue(data, names)
         return
     # A fifth of a second, which a result without an entry need not take.
-    from lightpen.archive.lazy_logbook import server_address
-    from lightpen.archive.logbook import Logbook
+    from lightpen.archive.logbook.lazy_logbook import server_address
+    from lightpen.archive.logbook.logbook import Logbook
 
     kept = keep_verification(data, record, is_simulated=is_simulated)
     with closing(Logbook(data, server_address())) as logbook:
@@ -93,7 +93,7 @@ def keep_record(
 
 
 def _print_overdue(data: Path, names: Names) -> None:
-    from lightpen.archive.tip_status import folder_statuses
+    from lightpen.archive.logbook.tip_status import folder_statuses
 
     rule = FolderArchive(data).supervision().limits_at(names.station, StationLimits())
     found = folder_statuses(data, rule.due, read_library(data), local_now())

@@ -4,7 +4,7 @@ import argparse
 from dataclasses import fields, replace
 from pathlib import Path
 
-from lightpen.archive.result_entry import with_entry
+from lightpen.archive.logbook.result_entry import with_entry
 from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
 from lightpen.formats.files import printable, write_whole

@@ -10,14 +10,14 @@ from typing import Any
 
 from msgspec import structs, to_builtins
 
-from lightpen.archive.chains import chain_at_home
-from lightpen.archive.database import look_into
-from lightpen.archive.exchange import deliver
-from lightpen.archive.lazy_logbook import server_address
-from lightpen.archive.logbook import ARCHIVE, Logbook, confirm_limits
-from lightpen.archive.server import open_server
-from lightpen.archive.shared_library import take_over
-from lightpen.archive.tip_status import folder_statuses
+from lightpen.archive.chains.chains import chain_at_home
+from lightpen.archive.logbook.lazy_logbook import server_address
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook, confirm_limits
+from lightpen.archive.logbook.shared_library import take_over
+from lightpen.archive.logbook.tip_status import folder_statuses
+from lightpen.archive.replication.exchange import deliver
+from lightpen.archive.replication.server import open_server
+from lightpen.archive.store.database import look_into
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
 from lightpen.commands.tips import FORGOTTEN

@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TypeVar
 
-from lightpen.archive.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason

@@ -13,7 +13,7 @@ from PySide6.QtCore import QBuffer, QSize
 from PySide6.QtGui import QPainter
 from PySide6.QtSvg import QSvgGenerator
 
-from lightpen.archive.result_entry import ArchivePlace
+from lightpen.archive.logbook.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import write_whole
 from lightpen.formats.stored_messages import StoredMessage

@@ -13,7 +13,7 @@ from benchmarks.small_records import record_of
 from msgspec import structs
 from PySide6.QtWidgets import QApplication
 
-from lightpen.archive.result_entry import ArchivePlace
+from lightpen.archive.logbook.result_entry import ArchivePlace
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import message
 from lightpen.model.laboratory import Laboratory

@@ -13,7 +13,7 @@ from msgspec import structs
 from sqlalchemy import update
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains import (
+from lightpen.archive.chains.chains import (
     append,
     copy_entries,
     entries_of,
@@ -21,10 +21,15 @@ from lightpen.archive.chains import (
     own_chain,
     records_of,
 )
-from lightpen.archive.database import open_file
-from lightpen.archive.entries import NOTHING_BEFORE, FileHash, Kind
-from lightpen.archive.queries import EntryFilter, last_accepted, n_wanted, newest
-from lightpen.archive.tables import ENTRIES
+from lightpen.archive.chains.entries import NOTHING_BEFORE, FileHash, Kind
+from lightpen.archive.history.queries import (
+    EntryFilter,
+    last_accepted,
+    n_wanted,
+    newest,
+)
+from lightpen.archive.store.database import open_file
+from lightpen.archive.store.tables import ENTRIES
 from lightpen.errors import ArchiveError
 
 N_EACH = 20

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from tests.core.archive.conftest import Station
 
-from lightpen.archive.chains import copy_entries, records_of
-from lightpen.archive.check import check_archive, check_file
-from lightpen.archive.database import look_into
-from lightpen.archive.seal import close_sealed, seal_of
+from lightpen.archive.chains.chains import copy_entries, records_of
+from lightpen.archive.chains.seal import close_sealed, seal_of
+from lightpen.archive.checks.check import check_archive, check_file
+from lightpen.archive.store.database import look_into
 from lightpen.errors import ArchiveError
 
 N_FLIPS = 60
@@ -118,7 +118,7 @@ def test_a_row_rewritten_with_a_right_hash_breaks_the_chain(
     with closing(sqlite3.connect(archive)) as connection, connection:
         (chain,) = connection.execute("SELECT chain FROM archive_chains").fetchone()
         text = entries[2].text.replace(other.chain, chain)
-        from lightpen.archive.entries import text_sha256
+        from lightpen.archive.chains.entries import text_sha256
 
         connection.execute(
             "UPDATE archive_entries SET text = ?, sha256 = ?, station = 'Hall 3',"

@@ -11,9 +11,9 @@ import pytest
 from msgspec import structs
 from tests.core.archive.test_logbook import result
 
-from lightpen.archive.check import check_file
-from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.seal import seal_of
+from lightpen.archive.chains.seal import seal_of
+from lightpen.archive.checks.check import check_file
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 
 

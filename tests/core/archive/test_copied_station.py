@@ -11,8 +11,8 @@ import pytest
 from benchmarks.postgres_server import Postgres
 from tests.core.archive.conftest import NOON
 
-from lightpen.archive.lazy_logbook import SERVER
-from lightpen.archive.logbook import Logbook
+from lightpen.archive.logbook.lazy_logbook import SERVER
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import ListedCone, ListedTip, read_library
 

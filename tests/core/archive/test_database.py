@@ -16,9 +16,9 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import inspect
 from tests.core.archive.conftest import Station
 
-from lightpen.archive import database
-from lightpen.archive.check import check_archive
-from lightpen.archive.database import (
+from lightpen.archive.checks.check import check_archive
+from lightpen.archive.store import database
+from lightpen.archive.store.database import (
     MIGRATIONS,
     VERSION,
     VERSION_TABLE,
@@ -26,7 +26,7 @@ from lightpen.archive.database import (
     look_into,
     open_file,
 )
-from lightpen.archive.tables import METADATA
+from lightpen.archive.store.tables import METADATA
 from lightpen.errors import ArchiveError, NoArchiveError
 
 

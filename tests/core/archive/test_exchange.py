@@ -12,18 +12,24 @@ from msgspec import structs
 from sqlalchemy import text
 from tests.core.archive.conftest import Station, accepted
 
-from lightpen.archive.chains import append, entries_of, heads, own_chain, records_of
-from lightpen.archive.check import check_archive, check_file
-from lightpen.archive.database import open_file
-from lightpen.archive.entries import FileHash
-from lightpen.archive.exchange import (
+from lightpen.archive.chains.chains import (
+    append,
+    entries_of,
+    heads,
+    own_chain,
+    records_of,
+)
+from lightpen.archive.chains.entries import FileHash
+from lightpen.archive.chains.seal import close_sealed
+from lightpen.archive.checks.check import check_archive, check_file
+from lightpen.archive.logbook.logbook import ARCHIVE
+from lightpen.archive.replication.exchange import (
     LONGEST_LINE,
     deliver,
     export_entries,
     import_entries,
 )
-from lightpen.archive.logbook import ARCHIVE
-from lightpen.archive.seal import close_sealed
+from lightpen.archive.store.database import open_file
 from lightpen.errors import ArchiveError, FileError, NameTakenError
 
 

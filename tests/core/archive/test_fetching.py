@@ -11,13 +11,13 @@ from benchmarks.postgres_server import Postgres
 from tests.core.archive.conftest import NOON, Station
 from tests.core.archive.test_logbook import result
 
-from lightpen.archive.chains import entries_of
-from lightpen.archive.check import check_file
-from lightpen.archive.database import Database, open_file
-from lightpen.archive.exchange import deliver
-from lightpen.archive.fetching import FetchResult, fetch
-from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.server import open_server
+from lightpen.archive.chains.chains import entries_of
+from lightpen.archive.checks.check import check_file
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.replication.exchange import deliver
+from lightpen.archive.replication.fetching import FetchResult, fetch
+from lightpen.archive.replication.server import open_server
+from lightpen.archive.store.database import Database, open_file
 from lightpen.errors import ArchiveError
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.library_changes import Author, add_item

@@ -12,13 +12,13 @@ from msgspec import structs
 from sqlalchemy import text
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains import append
-from lightpen.archive.due import due_tips
-from lightpen.archive.entries import Event, Kind, StoredEntry
-from lightpen.archive.exchange import export_entries, import_entries
-from lightpen.archive.history import TipState, known_names, lines, messages_on
-from lightpen.archive.listing import COLUMNS, save_entries
-from lightpen.archive.queries import EntryFilter, n_wanted
+from lightpen.archive.chains.chains import append
+from lightpen.archive.chains.entries import Event, Kind, StoredEntry
+from lightpen.archive.history.due import due_tips
+from lightpen.archive.history.history import TipState, known_names, lines, messages_on
+from lightpen.archive.history.listing import COLUMNS, save_entries
+from lightpen.archive.history.queries import EntryFilter, n_wanted
+from lightpen.archive.replication.exchange import export_entries, import_entries
 from lightpen.model.limits import DueRule
 from lightpen.model.origin import Origin
 

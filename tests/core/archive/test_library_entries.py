@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains import append, entries_of
-from lightpen.archive.check import check_archive
-from lightpen.archive.database import look_into
-from lightpen.archive.due import due_tips
-from lightpen.archive.entries import Entry, Kind
-from lightpen.archive.history import known_names
-from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.tip_status import folder_statuses, statuses
+from lightpen.archive.chains.chains import append, entries_of
+from lightpen.archive.chains.entries import Entry, Kind
+from lightpen.archive.checks.check import check_archive
+from lightpen.archive.history.due import due_tips
+from lightpen.archive.history.history import known_names
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.tip_status import folder_statuses, statuses
+from lightpen.archive.store.database import look_into
 from lightpen.formats.decoding import encode_png
 from lightpen.messages import Message
 from lightpen.model.limits import DueRule

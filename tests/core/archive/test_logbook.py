@@ -12,11 +12,11 @@ from benchmarks.small_records import small_record
 from msgspec import structs
 from tests.core.archive.conftest import NOON
 
-from lightpen.archive.chains import entries_of, records_of
-from lightpen.archive.check import ArchiveCheckResult, check_archive
-from lightpen.archive.database import look_into
-from lightpen.archive.entries import Entry, Kind
-from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.archive.chains.chains import entries_of, records_of
+from lightpen.archive.chains.entries import Entry, Kind
+from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.store.database import look_into
 from lightpen.errors import ArchiveError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.origin import Origin

@@ -1,4 +1,4 @@
-"""Tests of `lightpen.archive.recompute_check`: whoever has the key can still lie."""
+"""Tests of `checks.recompute_check`: whoever has the key can still lie."""
 
 import json
 import shutil
@@ -12,9 +12,9 @@ import pytest
 from msgspec import structs
 from tests.accepted_tip import accept_tip
 
-from lightpen.archive.check import ArchiveCheckResult, check_archive
-from lightpen.archive.logbook import Logbook
-from lightpen.archive.recompute_check import with_recomputed
+from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
+from lightpen.archive.checks.recompute_check import with_recomputed
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import calibrate

@@ -13,9 +13,8 @@ from msgspec import structs
 from tests.core.archive.conftest import Station
 from tests.core.archive.test_logbook import NAMES, checked, result
 
-from lightpen.archive.chains import append, copy_entries, entries_of, records_of
-from lightpen.archive.due import due_tips
-from lightpen.archive.entries import (
+from lightpen.archive.chains.chains import append, copy_entries, entries_of, records_of
+from lightpen.archive.chains.entries import (
     ChainHead,
     Event,
     Kind,
@@ -23,9 +22,10 @@ from lightpen.archive.entries import (
     chained,
     text_sha256,
 )
-from lightpen.archive.history import lines, messages_on
-from lightpen.archive.logbook import Logbook
-from lightpen.archive.queries import EntryFilter, last_accepted
+from lightpen.archive.history.due import due_tips
+from lightpen.archive.history.history import lines, messages_on
+from lightpen.archive.history.queries import EntryFilter, last_accepted
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.errors import AcceptanceError, ArchiveError, FileError
 from lightpen.local_time import local_now
 from lightpen.model.limits import DueRule

@@ -9,13 +9,13 @@ import pytest
 from benchmarks.postgres_server import Postgres
 from tests.core.archive.conftest import Station
 
-from lightpen.archive import replication
-from lightpen.archive.chains import entries_of
-from lightpen.archive.check import check_archive
-from lightpen.archive.exchange import deliver
-from lightpen.archive.queries import EntryFilter, last_accepted, newest
-from lightpen.archive.replication import Replicator
-from lightpen.archive.server import open_server
+from lightpen.archive.chains.chains import entries_of
+from lightpen.archive.checks.check import check_archive
+from lightpen.archive.history.queries import EntryFilter, last_accepted, newest
+from lightpen.archive.replication import replication
+from lightpen.archive.replication.exchange import deliver
+from lightpen.archive.replication.replication import Replicator
+from lightpen.archive.replication.server import open_server
 
 PATIENCE_S = 60.0
 N_EACH = 30

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from benchmarks.small_records import small_record
 
-from lightpen.archive.entries import NOTHING_BEFORE
-from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.result_entry import entry_of_file
+from lightpen.archive.chains.entries import NOTHING_BEFORE
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.result_entry import entry_of_file
 from lightpen.errors import ArchiveError, FileError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.results.result_folder import FolderArchive

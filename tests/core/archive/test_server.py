@@ -15,11 +15,11 @@ from keyring.backends import fail
 from tests.core.archive.conftest import NOON, Station
 from tests.core.archive.test_database import add_migration, columns
 
-from lightpen.archive.chains import entries_of, heads, note_delivered, records_of
-from lightpen.archive.check import check_archive
-from lightpen.archive.exchange import deliver
-from lightpen.archive.queries import EntryFilter, n_wanted
-from lightpen.archive.server import open_server
+from lightpen.archive.chains.chains import entries_of, heads, note_delivered, records_of
+from lightpen.archive.checks.check import check_archive
+from lightpen.archive.history.queries import EntryFilter, n_wanted
+from lightpen.archive.replication.exchange import deliver
+from lightpen.archive.replication.server import open_server
 from lightpen.errors import ArchiveError
 
 

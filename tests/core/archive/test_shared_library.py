@@ -14,11 +14,15 @@ from benchmarks.postgres_server import Postgres
 from msgspec import structs
 from tests.core.archive.conftest import NOON
 
-from lightpen.archive.exchange import deliver, export_entries, import_entries
-from lightpen.archive.lazy_logbook import SERVER
-from lightpen.archive.logbook import Logbook
-from lightpen.archive.server import open_server
-from lightpen.archive.shared_library import TakenOver, take_over
+from lightpen.archive.logbook.lazy_logbook import SERVER
+from lightpen.archive.logbook.logbook import Logbook
+from lightpen.archive.logbook.shared_library import TakenOver, take_over
+from lightpen.archive.replication.exchange import (
+    deliver,
+    export_entries,
+    import_entries,
+)
+from lightpen.archive.replication.server import open_server
 from lightpen.errors import AcceptanceError
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.library_changes import (
@@ -160,7 +164,8 @@ def test_a_running_station_with_a_password_tells_that_changes_wait(
     one.share()
 
     (reported,) = shared_since_start(guarded)
-    assert reported.startswith("1 changes of other stations")
+    assert reported.startswith("Changes of other stations")
+    assert reported.endswith(": 1.")
     assert read_library(guarded.data).tips == {}
 
 

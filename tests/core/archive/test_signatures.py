@@ -8,13 +8,13 @@ import pytest
 from sqlalchemy import update
 from tests.core.archive.conftest import Station, accepted
 
-from lightpen.archive.chains import copy_entries, entries_of, records_of
-from lightpen.archive.check import check_archive
-from lightpen.archive.entries import ChainHead, StoredEntry, chained
-from lightpen.archive.exchange import export_entries, import_entries
-from lightpen.archive.history import lines
-from lightpen.archive.queries import EntryFilter
-from lightpen.archive.tables import ENTRIES
+from lightpen.archive.chains.chains import copy_entries, entries_of, records_of
+from lightpen.archive.chains.entries import ChainHead, StoredEntry, chained
+from lightpen.archive.checks.check import check_archive
+from lightpen.archive.history.history import lines
+from lightpen.archive.history.queries import EntryFilter
+from lightpen.archive.replication.exchange import export_entries, import_entries
+from lightpen.archive.store.tables import ENTRIES
 from lightpen.errors import ArchiveError
 from lightpen.record.library.signing.keys import key_folder, make_station_key
 

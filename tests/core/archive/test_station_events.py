@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from tests.core.archive.conftest import NOON
 
-from lightpen.archive.chains import entries_of, records_of
-from lightpen.archive.check import check_archive
-from lightpen.archive.database import look_into
-from lightpen.archive.entries import Event, Kind
-from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.archive.chains.chains import entries_of, records_of
+from lightpen.archive.chains.entries import Event, Kind
+from lightpen.archive.checks.check import check_archive
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.store.database import look_into
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import record_bytes

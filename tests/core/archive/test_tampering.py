@@ -15,15 +15,15 @@ from msgspec import structs
 from tests.core.archive.conftest import NOON
 from tests.core.archive.test_logbook import result
 
-from lightpen.archive.chains import columns_of, entries_of, heads
-from lightpen.archive.check import check_file
-from lightpen.archive.comparison import check_server
-from lightpen.archive.database import look_into, open_file
-from lightpen.archive.entries import ChainHead, StoredEntry, chained
-from lightpen.archive.exchange import deliver
-from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.seal import close_sealed, seal_of
-from lightpen.archive.server import open_server
+from lightpen.archive.chains.chains import columns_of, entries_of, heads
+from lightpen.archive.chains.entries import ChainHead, StoredEntry, chained
+from lightpen.archive.chains.seal import close_sealed, seal_of
+from lightpen.archive.checks.check import check_file
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.replication.comparison import check_server
+from lightpen.archive.replication.exchange import deliver
+from lightpen.archive.replication.server import open_server
+from lightpen.archive.store.database import look_into, open_file
 from lightpen.errors import ArchiveError
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.library_changes import Author, add_item

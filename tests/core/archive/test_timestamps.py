@@ -14,16 +14,16 @@ from sqlalchemy import delete, update
 from tests.core.archive.conftest import Station, accepted
 from tests.timestamp_authority import Tsa, running_tsa
 
-from lightpen.archive.chains import append
-from lightpen.archive.check import ArchiveCheckResult, check_archive
-from lightpen.archive.entries import NOTHING_BEFORE
-from lightpen.archive.tables import CHAINS, ENTRIES, RECORDS
-from lightpen.archive.timestamps import (
+from lightpen.archive.chains.chains import append
+from lightpen.archive.chains.entries import NOTHING_BEFORE
+from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
+from lightpen.archive.checks.timestamps import (
     TIMESTAMPS,
     Authority,
     request_timestamp,
     with_timestamps,
 )
+from lightpen.archive.store.tables import CHAINS, ENTRIES, RECORDS
 from lightpen.cli import main
 from lightpen.errors import ArchiveError, FileError
 from lightpen.formats import machine_settings

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lightpen import __version__
-from lightpen.archive.lazy_logbook import SERVER, server_address
+from lightpen.archive.logbook.lazy_logbook import SERVER, server_address
 from lightpen.errors import FileError
 from lightpen.formats.machine_settings import (
     MachineSettings,

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from tests.core.conftest import TIMEOUT, Station
 
-from lightpen.archive.chains import entries_of, heads
-from lightpen.archive.check import check_archive
-from lightpen.archive.database import look_into
-from lightpen.archive.entries import Event, Kind
-from lightpen.archive.lazy_logbook import LazyLogbook
-from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.archive.chains.chains import entries_of, heads
+from lightpen.archive.chains.entries import Event, Kind
+from lightpen.archive.checks.check import check_archive
+from lightpen.archive.logbook.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.store.database import look_into
 from lightpen.record.swings.interrupted import discard_swing
 from lightpen.swing.runner import SwingRunner
 

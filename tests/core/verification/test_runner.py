@@ -15,8 +15,8 @@ import pytest
 from tests.accepted_tip import Holder, accept_tip, leant, round_a_ring
 from tests.verifying import BAR, CHOICES, NOON, TIMEOUT, Verifier, found_by
 
-from lightpen.archive.check import check_archive
-from lightpen.archive.logbook import Logbook
+from lightpen.archive.checks.check import check_archive
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.pen_detection import detect_pen

@@ -8,12 +8,12 @@ from typing import TypeVar
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QFileDialog
 
-from lightpen.archive.chains import CopyResult
-from lightpen.archive.check import ArchiveCheckResult, check_archive
-from lightpen.archive.exchange import export_entries, import_entries
-from lightpen.archive.listing import save_entries
-from lightpen.archive.recompute_check import with_recomputed
-from lightpen.archive.timestamps import with_timestamps
+from lightpen.archive.chains.chains import CopyResult
+from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
+from lightpen.archive.checks.recompute_check import with_recomputed
+from lightpen.archive.checks.timestamps import with_timestamps
+from lightpen.archive.history.listing import save_entries
+from lightpen.archive.replication.exchange import export_entries, import_entries
 from lightpen_app.steps.history.archive_panel import ArchivePanel, SaveFormat
 from lightpen_app.steps.history.filter_bar import FilterBar
 from lightpen_app.widgets.save_dialog import ask_file

@@ -7,8 +7,8 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QProgressBar, QWidget
 
-from lightpen.archive.check import ArchiveCheckResult
-from lightpen.archive.logbook import ReplicationState
+from lightpen.archive.checks.check import ArchiveCheckResult
+from lightpen.archive.logbook.logbook import ReplicationState
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign

@@ -9,10 +9,10 @@ from typing import TypeVar
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QTabWidget, QWidget
 
-from lightpen.archive.check import ArchiveCheckResult
-from lightpen.archive.entries import Kind, StoredEntry
-from lightpen.archive.history import Line
-from lightpen.archive.queries import EntryFilter
+from lightpen.archive.chains.entries import Kind, StoredEntry
+from lightpen.archive.checks.check import ArchiveCheckResult
+from lightpen.archive.history.history import Line
+from lightpen.archive.history.queries import EntryFilter
 from lightpen.model.limits import DueRule
 from lightpen.record.library.supervision import Signature
 from lightpen.record.results.result_folder import FolderArchive

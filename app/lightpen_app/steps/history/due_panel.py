@@ -6,7 +6,7 @@ from datetime import datetime
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QWidget
 
-from lightpen.archive.due import DueTip
+from lightpen.archive.history.due import DueTip
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, text_label

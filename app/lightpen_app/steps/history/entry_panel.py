@@ -5,14 +5,14 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QWidget
 
-from lightpen.archive.entries import (
+from lightpen.archive.chains.entries import (
     BESIDE_SWINGS,
     IN_FORCE_BY,
     Event,
     Kind,
     StoredEntry,
 )
-from lightpen.archive.history import Line, TipState
+from lightpen.archive.history.history import Line, TipState
 from lightpen.record.library.supervision import Signature
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded

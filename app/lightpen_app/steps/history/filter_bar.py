@@ -6,9 +6,9 @@ from datetime import date, datetime, time, timedelta
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
-from lightpen.archive.entries import Kind
-from lightpen.archive.history import KnownNames
-from lightpen.archive.queries import EntryFilter
+from lightpen.archive.chains.entries import Kind
+from lightpen.archive.history.history import KnownNames
+from lightpen.archive.history.queries import EntryFilter
 from lightpen.local_time import local_time
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID

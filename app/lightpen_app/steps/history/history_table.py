@@ -18,7 +18,7 @@ from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QWidget
 from typing_extensions import override
 
-from lightpen.archive.history import Line
+from lightpen.archive.history.history import Line
 from lightpen.estimation.reports.verdict import Grade
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.quantities import decimals_for, number_text

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from lightpen.archive.entries import StoredEntry
+from lightpen.archive.chains.entries import StoredEntry
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import file_entry
 from lightpen.model.limits import VerificationLimits, rule_in_words

@@ -12,7 +12,7 @@ from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
-    from lightpen.archive.check import ArchiveCheckResult
+    from lightpen.archive.checks.check import ArchiveCheckResult
     from lightpen_app.steps.history.content import HistoryContent
 
 

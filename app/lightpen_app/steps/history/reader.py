@@ -7,12 +7,18 @@ from typing import TypeVar
 
 from PySide6.QtCore import QObject, Signal
 
-from lightpen.archive.due import DueTip, due_tips
-from lightpen.archive.entries import StoredEntry
-from lightpen.archive.history import KnownNames, Line, known_names, lines, messages_on
-from lightpen.archive.lazy_logbook import LazyLogbook
-from lightpen.archive.logbook import ReplicationState
-from lightpen.archive.queries import EntryFilter, n_wanted
+from lightpen.archive.chains.entries import StoredEntry
+from lightpen.archive.history.due import DueTip, due_tips
+from lightpen.archive.history.history import (
+    KnownNames,
+    Line,
+    known_names,
+    lines,
+    messages_on,
+)
+from lightpen.archive.history.queries import EntryFilter, n_wanted
+from lightpen.archive.logbook.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook.logbook import ReplicationState
 from lightpen.model.limits import DueRule
 from lightpen.record.library.tip_library import Library
 from lightpen.verification.history.trend import trend_of

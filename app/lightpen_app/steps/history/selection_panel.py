@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QWidget
 
-from lightpen.archive.entries import StoredEntry
+from lightpen.archive.chains.entries import StoredEntry
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.verification.history.led_file import MIN_POOLED

@@ -2,8 +2,8 @@
 
 from PySide6.QtCore import QCoreApplication
 
-from lightpen.archive.entries import Event, Kind
-from lightpen.archive.history import Line, TipState
+from lightpen.archive.chains.entries import Event, Kind
+from lightpen.archive.history.history import Line, TipState
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
-from lightpen.archive.result_entry import with_entry
+from lightpen.archive.logbook.result_entry import with_entry
 from lightpen.local_time import local_now
 from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import read_calibration

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QWidget
 
-from lightpen.archive.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.steps.start.pictures import Pictures
 from lightpen_app.widgets.lazy import LazyWidget
@@ -50,7 +50,7 @@ class LargeScreenPanel(QWidget):
 
         def read(_: Report) -> "Trend":
             # With the archive, a quarter of a second that the start need not take.
-            from lightpen.archive.queries import EntryFilter
+            from lightpen.archive.history.queries import EntryFilter
             from lightpen.verification.history.trend import trend_of
 
             wanted = EntryFilter(pen=pen, tip=tip, is_simulated=is_simulated)

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpen.archive.chains import records_of
-from lightpen.archive.database import Database
-from lightpen.archive.entries import Kind, StoredEntry
-from lightpen.archive.history import TipState, lines
-from lightpen.archive.queries import EntryFilter, newest
+from lightpen.archive.chains.chains import records_of
+from lightpen.archive.chains.entries import Kind, StoredEntry
+from lightpen.archive.history.history import TipState, lines
+from lightpen.archive.history.queries import EntryFilter, newest
+from lightpen.archive.store.database import Database
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.verdict import Change, change_since
 from lightpen.model.limits import VerificationLimits

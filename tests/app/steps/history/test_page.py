@@ -28,13 +28,13 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
 
-from lightpen.archive.chains import append, own_chain
-from lightpen.archive.check import ArchiveCheckResult, check_archive
-from lightpen.archive.database import Database, open_file
-from lightpen.archive.entries import Event, Kind
-from lightpen.archive.exchange import export_entries, import_entries
-from lightpen.archive.lazy_logbook import LazyLogbook
-from lightpen.archive.logbook import ARCHIVE
+from lightpen.archive.chains.chains import append, own_chain
+from lightpen.archive.chains.entries import Event, Kind
+from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
+from lightpen.archive.logbook.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook.logbook import ARCHIVE
+from lightpen.archive.replication.exchange import export_entries, import_entries
+from lightpen.archive.store.database import Database, open_file
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.opened_files import CameraFile, PenFile

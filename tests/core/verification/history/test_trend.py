@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightpen.archive.chains import append, own_chain
-from lightpen.archive.database import Database, open_file
-from lightpen.archive.entries import Event, Kind, StoredEntry
-from lightpen.archive.queries import EntryFilter
+from lightpen.archive.chains.chains import append, own_chain
+from lightpen.archive.chains.entries import Event, Kind, StoredEntry
+from lightpen.archive.history.queries import EntryFilter
+from lightpen.archive.store.database import Database, open_file
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.swings.names import Names

@@ -16,7 +16,7 @@ from msgspec.structs import replace as replace_entries
 from tests.accepted_tip import Hold, accept_tip, leant, round_a_ring
 from tests.verifying import BAR, CHOICES, NOON, TIMEOUT, Verifier
 
-from lightpen.archive.logbook import Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.arrays import FloatArray
 from lightpen.measuring.plan import Plan, PlannedFeature, Side
 from lightpen.measuring.surfaces import FeatureKind

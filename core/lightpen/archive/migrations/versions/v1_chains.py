@@ -1,6 +1,6 @@
 """Chains of entries, and the records that these refer to.
 
-The tables are made as they are now, see `lightpen.archive.tables`. A version that
+The tables are made as they are now, see `lightpen.archive.store.tables`. A version that
 changes them adds a module beside this one, whose ``upgrade`` changes those of the
 version before.
 """

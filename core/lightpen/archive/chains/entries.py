@@ -1,0 +1,260 @@
+"""Entries of the archive: their canonical text, and their chain of hashes.
+
+An archive holds chains, one for each data folder that was ever entered in it. A chain
+grows only where its data folder is; everywhere else it is a copy of what was entered
+there. Each entry carries the hash of the one before it, so that none can be changed,
+left out or put in between without all that follow telling of it.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from enum import StrEnum
+from hashlib import sha256
+from typing import Annotated, TypeAlias
+
+from msgspec import Meta, Struct, to_builtins
+
+from lightpen import __version__
+from lightpen.formats.files import printable
+from lightpen.formats.json_records import Plain
+from lightpen.formats.own_json import (
+    DamagedError,
+    Digest,
+    Vector,
+    ZonedTime,
+    parse_own_json,
+    require_usual,
+)
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.messages import Message, message
+from lightpen.model.origin import Origin
+from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.results.results import TipChange
+from lightpen.record.swings.names import Names
+
+NOTHING_BEFORE = "0" * 64  # in place of a hash, in the first entry of a chain
+TICK = timedelta(microseconds=1)
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+SHORT = 8  # characters by which a chain is named
+
+Chain: TypeAlias = Annotated[str, Meta(pattern="^[0-9a-f]{32}$")]
+
+
+class Kind(StrEnum):
+    """Kind of an entry."""
+
+    ACCEPTED = "accepted"
+    RESTORED = "restored"
+    REFUSED = "refused"
+    ABANDONED = "abandoned"
+    TAKEN_BACK = "taken back"
+    NOTE = "note"
+    LIBRARY = "library"
+    VERIFICATION = "verification"
+    CAMERA = "camera calibration"
+    LIMITS = "limits"
+
+
+BESIDE_SWINGS = (Kind.VERIFICATION, Kind.CAMERA, Kind.LIMITS)
+IN_FORCE_BY = (Kind.ACCEPTED, Kind.RESTORED)  # that put a tip in force
+
+
+class FileHash(Struct, frozen=True):
+    """A file that an entry refers to.
+
+    Attributes
+    ----------
+    place : str
+        Path relative to the data folder, or absolute if outside of it.
+    n_bytes : int or None
+        Length of the hashed beginning; None for the whole file.
+    """
+
+    place: str
+    sha256: Digest
+    n_bytes: Annotated[int, Meta(ge=0)] | None = None
+
+
+class Event(Struct, frozen=True):
+    """An event to be entered.
+
+    Attributes
+    ----------
+    at : datetime
+        Time of the station's clock.
+    program : str
+        Name and version.
+    grade : str
+        Verdict on a calibration; empty of anything else, and where there was none.
+    why : StoredMessage or None
+        Reason of the grade.
+    reason : str
+        Reason given by the operator; of a comment, its text.
+    change : TipChange or None
+        Since the tip as found, which was in force before.
+    outcome : TrialOutcome or None
+        Outcome of a verification or a camera calibration.
+    swing : str
+        Folder of the swing that it is of, as `FileHash.place`; may be empty.
+    settings : mapping
+        Settings and limits of a swing, task of a verification, new values of limits or
+        of a library item.
+    result : FileHash or None
+        The file that put a tip in force, or revoked it; of what is no swing, the file
+        that states it.
+    files : tuple of FileHash
+        The record of the swing, whose journal names the images with their hashes; of
+        a verification the journals of its touches; of the library a picture.
+    record_sha256 : str or None
+        Checksum of the record: the file of ``result`` as a text, except of limits,
+        which may have the hash of a password; of a tip that was not accepted its
+        calibration.
+    concerns : str or None
+        Hash of the entry that it restores, takes back, or is a note on.
+    """
+
+    kind: Kind
+    at: ZonedTime
+    names: Names
+    program: str
+    origin: Origin | None = None
+    grade: str = ""
+    why: StoredMessage | None = None
+    reason: str = ""
+    outcome: TrialOutcome | None = None
+    tip_pen_mm: Vector | None = None
+    expanded_uncertainty_mm: Vector | None = None
+    change: TipChange | None = None
+    swing: str = ""
+    settings: Mapping[str, Plain] = {}
+    result: FileHash | None = None
+    files: tuple[FileHash, ...] = ()
+    record_sha256: Digest | None = None
+    concerns: Digest | None = None
+
+    def __post_init__(self) -> None:
+        require_usual(self.at)
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether it is of no real pen."""
+        return self.origin is Origin.SIMULATED
+
+
+class Entry(Struct, frozen=True):
+    """An event in its place.
+
+    Attributes
+    ----------
+    chain : str
+        Identifier of the data folder's chain.
+    number : int
+        Number in the chain, from 1.
+    previous : str
+        Hash of the entry before.
+    since : datetime
+        When it was, but never before the entry before it, whatever a clock says: by it
+        the entries of several stations stand in one order.
+    """
+
+    chain: Chain
+    number: Annotated[int, Meta(ge=1)]
+    previous: Digest
+    since: ZonedTime
+    event: Event
+
+
+@dataclass(frozen=True)
+class StoredEntry:
+    """An entry as stored.
+
+    Attributes
+    ----------
+    text : str
+        Canonical JSON: names sorted, no blanks, ASCII.
+    signature : str
+        See `lightpen.archive.chains.signatures`; empty until it is entered.
+    """
+
+    entry: Entry
+    text: str
+    sha256: str
+    signature: str = ""
+
+
+@dataclass(frozen=True)
+class ChainHead:
+    """Last entry of a chain.
+
+    Attributes
+    ----------
+    number : int
+        Number of the last entry; 0 for an empty chain.
+    since : datetime or None
+        Time of the last entry.
+    key : str
+        Public key that signed it; empty for an empty chain.
+    """
+
+    chain: str
+    number: int = 0
+    sha256: str = NOTHING_BEFORE
+    since: datetime | None = None
+    key: str = ""
+
+
+def chained(head: ChainHead, event: Event) -> StoredEntry:
+    """Return the next entry of a chain."""
+    since = event.at.astimezone(UTC)
+    if head.since is not None:
+        since = max(since, head.since + TICK)
+    return written(Entry(head.chain, head.number + 1, head.sha256, since, event))
+
+
+def written(entry: Entry) -> StoredEntry:
+    """Return an entry with its text and hash."""
+    text = json.dumps(
+        to_builtins(entry), sort_keys=True, separators=(",", ":"), allow_nan=False
+    )
+    return StoredEntry(entry, text, text_sha256(text))
+
+
+def read_entry(text: str, signature: str = "") -> StoredEntry:
+    """Return the entry that a text holds, with the signature kept beside it.
+
+    Raises
+    ------
+    DamagedError
+        It holds none, or was not written so.
+    """
+    try:
+        data = text.encode("utf-8", "surrogateescape")
+    except UnicodeEncodeError as error:  # half of a character
+        raise DamagedError(str(error)) from error
+    return StoredEntry(parse_own_json(data, Entry), text, text_sha256(text), signature)
+
+
+def since_us(moment: datetime) -> int:
+    """Return a moment as databases have it, in us since 1970."""
+    return (moment - EPOCH) // TICK
+
+
+def named_entry(chain: str, number: int, station: str = "") -> Message:
+    """Return the name of an entry: with its station, if known."""
+    if station:
+        return message(
+            "archive.entry-of-station", number=number, station=printable(station)
+        )
+    return message("archive.entry", number=number, chain=chain[:SHORT])
+
+
+def text_sha256(text: str) -> str:
+    """Return the SHA-256 digest of a text in UTF-8, in hexadecimal digits."""
+    return sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
+
+
+def this_program() -> str:
+    """Return name and version of the program for an entry."""
+    return f"lightpen {__version__}"

@@ -1,0 +1,1 @@
+"""Checks of an archive and of the files that it refers to; timestamps."""

@@ -1,0 +1,278 @@
+"""Check of an archive for changes: its rows, chains and records."""
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Row, exists, select, text
+
+from lightpen.archive.chains.chains import chain_at_home, heads, searchable, sound_entry
+from lightpen.archive.chains.entries import (
+    NOTHING_BEFORE,
+    SHORT,
+    ChainHead,
+    named_entry,
+    text_sha256,
+)
+from lightpen.archive.chains.seal import is_sealed_otherwise, lost_heads, read_seal
+from lightpen.archive.chains.signatures import UNAPPROVED, ChainKeys
+from lightpen.archive.checks.check_notes import check_notes
+from lightpen.archive.checks.files_check import FilesCheck
+from lightpen.archive.store.database import Database, is_open, look_into
+from lightpen.archive.store.tables import CHAINS, ENTRIES, RECORDS
+from lightpen.errors import LightpenError
+from lightpen.messages import Message, message
+
+BATCH = 200  # rows that are read at one time
+SOUND = "ok"  # SQLite's word for a file without damage
+
+Report = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class ArchiveCheckResult:
+    """Result of a check.
+
+    Attributes
+    ----------
+    n_files : int
+        Number of files checked, images included.
+    findings : tuple of Message
+        Differences from the entries; empty if there are none.
+    notes : tuple of Message
+        Observations that prove no change, see `lightpen.archive.checks.check_notes`.
+    n_tips : int
+        Tips recomputed, see `lightpen.archive.checks.recompute_check`.
+    n_timestamps : int
+        Valid timestamps, see `lightpen.archive.checks.timestamps`.
+    """
+
+    n_entries: int
+    n_files: int
+    findings: tuple[Message, ...]
+    notes: tuple[Message, ...] = ()
+    n_tips: int = 0
+    n_timestamps: int = 0
+
+
+def check_archive(
+    database: Database, data: Path | None = None, report: Report = lambda fraction: None
+) -> ArchiveCheckResult:
+    """Look at every entry, every record and every file that an archive refers to.
+
+    Parameters
+    ----------
+    data : Path, optional
+        Data folder, whose files are examined, too.
+    report : callable
+        Called with the fraction done, 0 to 1; what it raises ends the check.
+    """
+    ends, home = heads(database), chain_at_home(database)
+    n_all = max(1, sum(head.number for head in ends))
+    files = FilesCheck(data)
+    stages = [_damage(database), _broken_seal(database, ends)]
+    n_before = 0
+    for head in ends:
+        start, share = n_before / n_all, head.number / n_all
+
+        def part(fraction: float, start: float = start, share: float = share) -> None:
+            report(start + share * fraction)
+
+        own = files if head.chain == home else None
+        stages.append(_walked(database, head, own, part))
+        n_before += head.number
+    stages += [_strays(database), _changed_records(database), _lost_records(database)]
+    findings = tuple(each for stage in stages for each in _findings(stage))
+    notes = () if data is None else tuple(_findings(check_notes(database, data)))
+    return ArchiveCheckResult(n_before, files.n_files, findings, notes)
+
+
+def check_file(archive: Path, data: Path, report: Report) -> ArchiveCheckResult:
+    """Look at an archive in a file, and at the files that it refers to.
+
+    Of a file that a program began to write meanwhile nothing is known but what a check
+    beside that program shows, which is made then.
+
+    Parameters
+    ----------
+    data, report
+        As of `check_archive`.
+
+    Raises
+    ------
+    ArchiveError
+        It is not there, not of this program, or cannot be read at all.
+    """
+    while True:
+        before = _last_written(archive)
+        with closing(look_into(archive)) as database:
+            checked = check_archive(database, data, report)
+        if not checked.findings or before is None or before == _last_written(archive):
+            return checked
+
+
+def _last_written(archive: Path) -> int | None:
+    """Return when a closed file was last written, ns; None if a program has it open."""
+    if is_open(archive) or not archive.exists():
+        return None
+    return archive.stat().st_mtime_ns
+
+
+def _findings(stage: Iterator[Message]) -> Iterator[Message]:
+    """Yield the findings of a stage, and the error that ended it."""
+    try:
+        yield from stage
+    except LightpenError as error:
+        yield error.message
+
+
+def _damage(database: Database) -> Iterator[Message]:
+    """Yield what SQLite itself finds in its file."""
+    if database.file is None:
+        return
+    with database.reading() as connection:
+        found = connection.execute(text("PRAGMA integrity_check(10)")).scalars().all()
+    for each in found:
+        if each != SOUND:
+            yield message("archive.file-damaged", file=database.name, what=str(each))
+
+
+def _broken_seal(database: Database, ends: tuple[ChainHead, ...]) -> Iterator[Message]:
+    seal = None if database.file is None else read_seal(database.file)
+    if database.file is None or seal is None:
+        return
+    for head in lost_heads(database, seal):
+        yield message(
+            "archive.sealed-missing", number=head.number, chain=head.chain[:SHORT]
+        )
+    if is_sealed_otherwise(database.file, ends, seal):
+        yield message("archive.seal-broken", file=database.name)
+
+
+def _walked(
+    database: Database, head: ChainHead, files: FilesCheck | None, report: Report
+) -> Iterator[Message]:
+    """Check a chain from its first entry to its last, and yield the findings.
+
+    Entries that are added meanwhile are walked over, too.
+    """
+    number, previous, keys = 0, NOTHING_BEFORE, ChainKeys(head.chain)
+    while True:
+        rows = _rows_after(database, head.chain, number)
+        if not rows:
+            head = _head_now(database, head)
+            if number >= head.number or not _rows_after(database, head.chain, number):
+                break
+        sound = []
+        for row in rows:
+            if not isinstance(row.number, int):  # SQLite keeps a text there, too
+                yield _changed(head.chain, number + 1)
+                return
+            if row.number > number + 1:
+                yield _missing(head.chain, number + 1, row.number - 1)
+                previous = ""
+            entry = sound_entry(row)
+            if entry is None:
+                yield _changed(head.chain, row.number)
+            elif previous not in ("", entry.entry.previous):
+                yield _unchained(head.chain, row.number)
+            else:
+                sound.append(entry)
+                unsigned = keys.finding(entry)
+                if unsigned is not None and unsigned.code != UNAPPROVED:
+                    yield unsigned
+            number, previous = row.number, row.sha256
+        if files is not None:
+            yield from files.findings(sound)
+        report(min(1.0, number / max(1, head.number)))
+    if number < head.number:
+        yield _missing(head.chain, number + 1, head.number)
+    elif (number, previous) != (head.number, head.sha256) and previous:
+        yield message("archive.head-changed", chain=head.chain[:SHORT])
+
+
+def _head_now(database: Database, head: ChainHead) -> ChainHead:
+    """Return the present head of a chain, or the earlier one if the chain is gone."""
+    return next((h for h in heads(database) if h.chain == head.chain), head)
+
+
+def _rows_after(database: Database, chain: str, number: int) -> list[Row[Any]]:
+    rows = (
+        select(ENTRIES)
+        .where(ENTRIES.c.chain == chain, ENTRIES.c.number > number)
+        .order_by(ENTRIES.c.number)
+        .limit(BATCH)
+    )
+    with database.reading() as connection:
+        return list(connection.execute(rows))
+
+
+def _strays(database: Database) -> Iterator[Message]:
+    """Yield the entries of a file that are of no chain."""
+    if database.file is None:  # where a foreign key prevents it
+        return
+    known = select(CHAINS.c.chain)
+    strays = select(ENTRIES.c.chain).where(ENTRIES.c.chain.not_in(known)).distinct()
+    with database.reading() as connection:
+        found = connection.execute(strays).scalars().all()
+    for chain in found:
+        yield message("archive.no-such-chain", chain=str(chain)[:SHORT])
+
+
+def _changed_records(database: Database) -> Iterator[Message]:
+    n_read = 0  # not paged by hash: a hash may be damaged, too
+    in_order = select(RECORDS).order_by(RECORDS.c.sha256).limit(BATCH)
+    while True:
+        with database.reading() as connection:
+            found = connection.execute(in_order.offset(n_read)).all()
+        for row in found:
+            if not isinstance(row.text, str) or text_sha256(row.text) != row.sha256:
+                name = searchable(str(row.sha256))
+                yield message(
+                    "archive.record-changed",
+                    record=name[:SHORT],
+                    entries=_entries_of(database, name),
+                )
+        if len(found) < BATCH:
+            return
+        n_read += BATCH
+
+
+def _lost_records(database: Database) -> Iterator[Message]:
+    """Yield entries without their record."""
+    is_there = exists().where(RECORDS.c.sha256 == ENTRIES.c.record_sha256)
+    lost = select(ENTRIES.c.chain, ENTRIES.c.number).where(
+        ENTRIES.c.record_sha256 != "", ~is_there
+    )
+    with database.reading() as connection:
+        rows = connection.execute(lost).all()
+    for row in rows:
+        yield message("archive.record-lost", entry=named_entry(row.chain, row.number))
+
+
+def _entries_of(database: Database, record: str) -> tuple[Message, ...]:
+    vouching = select(ENTRIES.c.chain, ENTRIES.c.number).where(
+        ENTRIES.c.record_sha256 == record
+    )
+    with database.reading() as connection:
+        rows = connection.execute(vouching).all()
+    found = tuple(named_entry(row.chain, row.number) for row in rows)
+    return found or (message("archive.no-entry"),)
+
+
+def _changed(chain: str, number: int) -> Message:
+    return message("archive.entry-changed", number=number, chain=chain[:SHORT])
+
+
+def _unchained(chain: str, number: int) -> Message:
+    return message("archive.entry-unchained", number=number, chain=chain[:SHORT])
+
+
+def _missing(chain: str, first: int, last: int) -> Message:
+    if first == last:
+        return message("archive.entry-missing", number=first, chain=chain[:SHORT])
+    return message(
+        "archive.entries-missing", first=first, last=last, chain=chain[:SHORT]
+    )

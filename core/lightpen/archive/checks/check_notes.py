@@ -1,0 +1,103 @@
+"""Observations of an archive check that prove no change.
+
+A power cut leaves files that are not entered yet, a clock may be set back, a data
+folder may move to another computer. None of it proves a change.
+"""
+
+from collections.abc import Iterator
+from datetime import datetime
+from pathlib import Path
+
+from msgspec import Struct
+
+from lightpen.archive.chains.chains import (
+    ArchivedFiles,
+    batch_of,
+    chain_at_home,
+    entries_of_limits,
+    heads,
+    records_of,
+)
+from lightpen.archive.chains.entries import IN_FORCE_BY
+from lightpen.archive.chains.seal import seal_of
+from lightpen.archive.chains.signatures import UNAPPROVED, ChainKeys
+from lightpen.archive.events.station_events import station_files
+from lightpen.archive.store.database import Database, is_open
+from lightpen.errors import FileError
+from lightpen.formats.files import printable
+from lightpen.formats.own_json import DamagedError, ZonedTime, parse_own_json
+from lightpen.messages import Message, message
+from lightpen.record.library.tip_library import library_files
+from lightpen.record.results.result_folder import FolderArchive
+
+
+class _Calibrated(Struct):
+    created: ZonedTime
+
+
+class _Accepted(Struct):
+    calibration: _Calibrated
+
+
+def check_notes(database: Database, data: Path) -> Iterator[Message]:
+    """Yield notes on the archive of a data folder.
+
+    Files without entries, a missing seal, keys that nobody approved, clocks that were
+    set back, and tips that were accepted before they were computed.
+    """
+    home = chain_at_home(database)
+    yield from _missing_seal(database)
+    for head in heads(database):
+        yield from _unapproved_keys(database, head.chain)
+    if home is not None:
+        yield from _not_entered(database, data, home)
+        yield from _impossible_times(database, home)
+
+
+def _missing_seal(database: Database) -> Iterator[Message]:
+    file = database.file
+    has_entries = any(head.number for head in heads(database))
+    if file is None or not has_entries or is_open(file):
+        return
+    if not seal_of(file).exists():
+        yield message("archive.no-seal", file=printable(str(seal_of(file))))
+
+
+def _unapproved_keys(database: Database, chain: str) -> Iterator[Message]:
+    keys = ChainKeys(chain)
+    for entry in entries_of_limits(database, chain):
+        finding = keys.finding(entry)
+        if finding is not None and finding.code == UNAPPROVED:
+            yield finding
+
+
+def _not_entered(database: Database, data: Path, home: str) -> Iterator[Message]:
+    entered, results = ArchivedFiles(database, home), FolderArchive(data)
+    entered.read()
+    files = (*results.all_files(), *library_files(data), *station_files(data))
+    for file in files:
+        place = results.place_of(file)
+        if place not in entered:
+            yield message("archive.file-not-entered", file=printable(place))
+
+
+def _impossible_times(database: Database, home: str) -> Iterator[Message]:
+    """Compare the times of acceptances with each other, and with their computation."""
+    before: datetime | None = None
+    number = 0
+    while batch := batch_of(database, home, number):
+        records = records_of(database, batch)
+        for each in batch:
+            number, event = each.entry.number, each.entry.event
+            if event.kind not in IN_FORCE_BY:
+                continue
+            if before is not None and event.at < before:
+                yield message("archive.clock-back", number=number)
+            before = event.at
+            record = records.get(event.record_sha256 or "", "")
+            try:
+                whole = parse_own_json(record.encode(), _Accepted)
+            except (DamagedError, FileError, UnicodeEncodeError):
+                continue
+            if event.at < whole.calibration.created.replace(microsecond=0):
+                yield message("archive.accepted-too-early", number=number)

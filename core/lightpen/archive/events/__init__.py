@@ -1,0 +1,1 @@
+"""The events of a data folder that are entered, taken from its files."""

@@ -1,0 +1,223 @@
+"""Events extracted from the files of a data folder: results, swings, library."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from hashlib import sha256
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from lightpen.archive.chains.entries import (
+    Event,
+    FileHash,
+    Kind,
+    text_sha256,
+    this_program,
+)
+from lightpen.errors import FileError
+from lightpen.estimation.reports.report import calibration_record
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.files import LARGEST_RECORD, read_bytes
+from lightpen.formats.files import sha256 as file_sha256
+from lightpen.formats.json_records import json_bytes
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.messages import Message
+from lightpen.record.library.tip_library import (
+    ItemKind,
+    ListedTip,
+    item_entries,
+    read_change,
+)
+from lightpen.record.results.assessment import SwingAssessment
+from lightpen.record.results.result_folder import WHAT, FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.header import HEADER, header_copies
+from lightpen.record.swings.journal import JOURNAL, journal_bytes
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import (
+    Record,
+    open_record,
+    recorded_names,
+    recorded_origin,
+)
+from lightpen.record.swings.solving import Solution, record_inputs
+
+
+@dataclass(frozen=True)
+class ExtractedEvent:
+    """An event to be entered, with its files.
+
+    Attributes
+    ----------
+    record : str or None
+        the file that states it, from which the file can be made again; of a tip that
+        was not accepted its calibration record. The event has its hash.
+    takes_back : str
+        File of the result that is revoked, as `FileHash.place`; else empty.
+    """
+
+    event: Event
+    record: str | None = None
+    takes_back: str = ""
+
+
+def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
+    """Return the event of a result file or of a revocation."""
+    content = read_bytes(file, WHAT, LARGEST_RECORD)
+    place = FileHash(results.place_of(file), sha256(content).hexdigest())
+    found = results.content(file)
+    if isinstance(found, Result):
+        event = _event_of_acceptance(results, place, found)
+        return ExtractedEvent(event, file_text(content))
+    event = Event(
+        kind=Kind.TAKEN_BACK,
+        at=found.at,
+        names=Names(operator=found.operator, pen=found.pen, tip=found.tip),
+        program=this_program(),
+        reason=found.reason,
+        settings={"supervisor": found.supervisor} if found.supervisor else {},
+        result=place,
+        record_sha256=place.sha256,
+    )
+    revoked = file.with_name(f"{found.takes_back}.json")
+    return ExtractedEvent(event, file_text(content), results.place_of(revoked))
+
+
+def account_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
+    """Return the event of a change of the tip library."""
+    content, change = read_bytes(file, WHAT, LARGEST_RECORD), read_change(file)
+    place = FileHash(results.place_of(file), sha256(content).hexdigest())
+    item, picture = change.item, None
+    if isinstance(item, ListedTip):
+        picture = item.picture
+    event = Event(
+        kind=Kind.LIBRARY,
+        at=change.at,
+        names=Names(
+            station=change.station,
+            operator=change.operator,
+            pen=item.id if item.kind is ItemKind.PEN else "",
+            tip=item.id if item.kind is ItemKind.TIP else "",
+            cone=item.id if item.kind is ItemKind.CONE else "",
+        ),
+        program=this_program(),
+        reason=change.reason,
+        settings=item_entries(item) | {"supervisor": change.supervisor},
+        result=place,
+        files=() if picture is None else (FileHash(picture.place, picture.sha256),),
+        record_sha256=place.sha256,
+    )
+    return ExtractedEvent(event, file_text(content))
+
+
+def file_text(content: bytes) -> str:
+    """Return a file as the text that is stored with its event, without loss."""
+    return content.decode("utf-8", "surrogateescape")
+
+
+def account_of_abandoned(
+    results: FolderArchive, record: Record, at: datetime
+) -> ExtractedEvent:
+    """Return the event of a swing that was abandoned."""
+    return ExtractedEvent(_event_of_swing(results, record, Kind.ABANDONED, at))
+
+
+def account_of_unreadable(
+    results: FolderArchive, folder: Path, at: datetime, why: Message
+) -> ExtractedEvent:
+    """Return the event of a discarded swing that cannot be read."""
+    event = Event(
+        kind=Kind.ABANDONED,
+        at=at,
+        names=Names(),
+        program=this_program(),
+        why=StoredMessage.of(why),
+        swing=results.place_of(folder),
+    )
+    return ExtractedEvent(event)
+
+
+def account_of_refused(
+    results: FolderArchive,
+    solution: Solution,
+    assessment: SwingAssessment,
+    at: datetime,
+) -> ExtractedEvent:
+    """Return the event of a solved swing whose tip was not accepted.
+
+    A tip that passed is abandoned by its operator, any other is refused.
+    """
+    record, calibration = open_record(solution.source.folder), solution.calibration
+    has_passed = assessment.verdict.grade is Grade.PASS
+    kind = Kind.ABANDONED if has_passed else Kind.REFUSED
+    event = replace(
+        _event_of_swing(results, record, kind, at),
+        grade=assessment.verdict.grade.value,
+        why=StoredMessage.of(assessment.verdict.reason),
+        tip_pen_mm=tuple(calibration.joint.tip_pen.tolist()),
+        expanded_uncertainty_mm=tuple(
+            calibration.budget.expanded_uncertainty[:3].tolist()
+        ),
+    )
+    inputs, limits = record_inputs(solution.source), assessment.limits
+    written = calibration_record(calibration, inputs, "joint", limits)
+    text = json_bytes(written).decode()
+    return ExtractedEvent(replace(event, record_sha256=text_sha256(text)), text)
+
+
+def _event_of_acceptance(
+    results: FolderArchive, place: FileHash, result: Result
+) -> Event:
+    event = Event(
+        kind=Kind.ACCEPTED if result.restores is None else Kind.RESTORED,
+        at=result.accepted,
+        names=result.names,
+        program=str(result.calibration.program),
+        origin=result.origin,
+        grade=result.grade,
+        why=result.why,
+        reason=result.reason,
+        tip_pen_mm=tuple(result.tip_pen.tolist()),
+        expanded_uncertainty_mm=tuple(result.uncertainty.tolist()),
+        change=result.change,
+        swing=results.place_of(result.record),
+        result=place,
+        record_sha256=place.sha256,
+        concerns=result.restores,
+    )
+    with suppress(FileError):  # a result outlives the record of its swing
+        record = open_record(result.record)
+        files = _files_of(results, record)
+        event = replace(event, settings=record.header.settings, files=files)
+    return event
+
+
+def _event_of_swing(
+    results: FolderArchive, record: Record, kind: Kind, at: datetime
+) -> Event:
+    return Event(
+        kind=kind,
+        at=at,
+        names=recorded_names(record),
+        program=record.header.program,
+        origin=recorded_origin(record),
+        swing=results.place_of(record.folder),
+        settings=record.header.settings,
+        files=_files_of(results, record),
+    )
+
+
+def _files_of(results: FolderArchive, record: Record) -> tuple[FileHash, ...]:
+    """Return header, journal and the copies of the files of cameras, rig and pen.
+
+    Of the journal no more than was read: lines are added to it. It names the images.
+    """
+    folder = record.folder
+    digest = sha256(journal_bytes(folder)[: record.length]).hexdigest()
+    read = FileHash(results.place_of(folder / JOURNAL), digest, record.length)
+    header, *copies = (
+        FileHash(results.place_of(folder / name), file_sha256(folder / name))
+        for name in (HEADER, *header_copies(record.header))
+    )
+    return (header, read, *copies)

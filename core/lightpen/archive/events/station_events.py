@@ -1,0 +1,141 @@
+"""Events of a station besides swings: limits, verifications, cameras."""
+
+from collections.abc import Iterator
+from hashlib import sha256
+from pathlib import Path
+
+from lightpen.archive.chains.entries import Event, FileHash, Kind, this_program
+from lightpen.archive.events.event_extraction import ExtractedEvent, file_text
+from lightpen.formats.files import LARGEST_RECORD, read_bytes
+from lightpen.formats.json_records import Plain
+from lightpen.record.folder.camera_calibrations import (
+    CAMERA_CALIBRATIONS,
+    WHAT,
+    read_camera_trial,
+)
+from lightpen.record.folder.verifications import (
+    TOUCHES,
+    VERIFICATIONS,
+    StoredVerification,
+    read_verification,
+)
+from lightpen.record.library.guard_files import LIMITS_FOLDER, read_limits_change
+from lightpen.record.library.key_changes import (
+    OLD_KEY_SIGNATURE,
+    STATION_KEY,
+    SUPERVISOR_KEY,
+    SUPERVISOR_SIGNATURE,
+)
+from lightpen.record.library.numbered_files import numbered_files
+from lightpen.record.library.supervision import read_supervision
+from lightpen.record.results.result_folder import SIMULATED, FolderArchive
+from lightpen.record.swings.journal import JOURNAL
+from lightpen.record.swings.names import Names
+
+FOLDERS = (
+    *(LIMITS_FOLDER, CAMERA_CALIBRATIONS, VERIFICATIONS),
+    f"{SIMULATED}/{VERIFICATIONS}",
+)
+
+
+def station_files(data: Path) -> Iterator[Path]:
+    """Yield the files of such events, for each kind the oldest first."""
+    for folder in FOLDERS:
+        yield from reversed(numbered_files(data / folder))
+
+
+def is_station_file(file: Path) -> bool:
+    """Return whether a file belongs to such an event."""
+    return file.parent.name in FOLDERS
+
+
+def account_of_station(results: FolderArchive, file: Path) -> ExtractedEvent:
+    """Return the event of a limits, verification or camera file."""
+    content = read_bytes(file, WHAT, LARGEST_RECORD)
+    place = FileHash(results.place_of(file), sha256(content).hexdigest())
+    if file.parent.name == LIMITS_FOLDER:
+        return ExtractedEvent(_of_limits(file, content, place))
+    if file.parent.name == CAMERA_CALIBRATIONS:
+        event = _of_camera(file, content, place)
+    else:
+        event = _of_tip(results, file, content, place)
+    return ExtractedEvent(event, file_text(content))
+
+
+def _of_limits(file: Path, content: bytes, place: FileHash) -> Event:
+    """Return a change of limits, once all of them are known to be signed."""
+    read_supervision(file.parents[1])
+    change = read_limits_change(content, file)
+    settings: dict[str, Plain] = {"changes_password": change.password is not None}
+    if change.limits is not None:
+        settings |= change.limits
+    if change.password is not None:
+        settings[SUPERVISOR_KEY] = change.password.key
+    if change.station_key:
+        settings |= {
+            STATION_KEY: change.station_key,
+            OLD_KEY_SIGNATURE: change.station_key_signature,
+            SUPERVISOR_SIGNATURE: change.key_approval,
+        }
+    return Event(
+        kind=Kind.LIMITS,
+        at=change.at,
+        names=Names(station=change.station, operator=change.supervisor),
+        program=this_program(),
+        settings=settings,
+        result=place,
+    )
+
+
+def _of_camera(file: Path, content: bytes, place: FileHash) -> Event:
+    trial = read_camera_trial(content, file)
+    return Event(
+        kind=Kind.CAMERA,
+        at=trial.created,
+        names=Names(station=trial.station, operator=trial.operator),
+        program=str(trial.program),
+        origin=trial.origin,
+        outcome=trial.outcome,
+        settings={"board": trial.board, "camera": trial.serial},
+        result=place,
+        record_sha256=place.sha256,
+    )
+
+
+def _of_tip(
+    results: FolderArchive, file: Path, content: bytes, place: FileHash
+) -> Event:
+    """Return the verification of a tip."""
+    done = read_verification(content, file)
+    verdict = done.verdict
+    limits = {} if verdict is None else verdict.limits_mm
+    settings: dict[str, Plain] = {
+        "verified": done.verification,
+        **{f"max_{name}_mm": value for name, value in limits.items()},
+    }
+    if done.supervisor:
+        settings["supervisor"] = done.supervisor
+    return Event(
+        kind=Kind.VERIFICATION,
+        at=done.created,
+        names=Names(done.station, done.operator, done.pen, done.tip),
+        program=str(done.program),
+        origin=done.origin,
+        grade="" if verdict is None else verdict.grade,
+        why=done.why,
+        reason=done.reason,
+        outcome=done.outcome,
+        settings=settings,
+        result=place,
+        files=tuple(_touched(results, file, done)),
+        record_sha256=place.sha256,
+    )
+
+
+def _touched(
+    results: FolderArchive, file: Path, done: StoredVerification
+) -> Iterator[FileHash]:
+    """Yield the journals of live touches, which name the images."""
+    for run in done.inputs.touches:
+        journal = file.parent / TOUCHES / run.folder / JOURNAL
+        yield FileHash(results.place_of(journal), run.journal_sha256)

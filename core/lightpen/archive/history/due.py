@@ -1,0 +1,140 @@
+"""Due dates of the current tips."""
+
+from bisect import bisect_right
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from sqlalchemy import select
+
+from lightpen.archive.chains.chains import searchable
+from lightpen.archive.chains.entries import Kind, StoredEntry, since_us
+from lightpen.archive.history.history import known_names
+from lightpen.archive.history.queries import calibrating, last_accepted, of_chain
+from lightpen.archive.store.database import Database
+from lightpen.archive.store.tables import ENTRIES
+from lightpen.model.limits import DueRule
+from lightpen.record.library.tip_library import Library
+
+EMPTY = Library()
+CLOCKS_AGREE = timedelta(days=1)  # enough for an age in days
+SWINGS = (Kind.ACCEPTED, Kind.REFUSED, Kind.ABANDONED)
+
+
+@dataclass(frozen=True)
+class DueTip:
+    """A tip in force.
+
+    Attributes
+    ----------
+    entry : StoredEntry
+        Entry of the acceptance.
+    calibrated : datetime
+        Date of the calibration, also if the result was reinstated later.
+    due : datetime
+        Due date by age.
+    n_swings : int
+        Swings of the pen since the calibration.
+    n_left : int or None
+        Swings until it is due by their count; None if any number may be made.
+    """
+
+    entry: StoredEntry
+    calibrated: datetime
+    due: datetime
+    n_swings: int
+    n_left: int | None
+
+    def is_due(self, now: datetime) -> bool:
+        """Return whether it needs calibration before it is used.
+
+        So it is where its age is not known: its day is still to come, by a clock that
+        was set back, or was ahead then.
+        """
+        is_to_come = self.calibrated > now + CLOCKS_AGREE
+        is_old = now > self.due or is_to_come
+        return is_old or (self.n_left is not None and self.n_left <= 0)
+
+
+def due_tips(
+    database: Database, chain: str, rule: DueRule, library: Library = EMPTY
+) -> tuple[DueTip, ...]:
+    """Return the tips of real pens in force at a station, the due ones first.
+
+    Parameters
+    ----------
+    chain : str
+        Chain of the data folder in which the tips are current.
+    rule : DueRule
+        Station rule for tips without their own.
+    library : Library, optional
+        Library with the rules of tips; retired tips are omitted.
+    """
+    found = (
+        last_accepted(database, pen, tip, chain=chain)
+        for pen, tip in known_names(database).tips
+        if pen and tip and not _is_retired(library, tip)
+    )
+    entries = [entry for entry in found if entry is not None]
+    if not entries:
+        return ()
+    origins = [calibrating(database, each) for each in entries]
+    swings = _swings(database, chain, min(each.entry.since for each in origins))
+    return tuple(
+        sorted(
+            (
+                _due_tip(entry, origin, swings, rule, library)
+                for entry, origin in zip(entries, origins, strict=True)
+            ),
+            key=_urgency,
+        )
+    )
+
+
+def _is_retired(library: Library, tip: str) -> bool:
+    listed = library.tips.get(tip)
+    return listed is not None and listed.is_retired
+
+
+def _urgency(tip: DueTip) -> tuple[bool, datetime]:
+    return tip.n_left is None or tip.n_left > 0, tip.due
+
+
+def _due_tip(
+    entry: StoredEntry,
+    origin: StoredEntry,
+    swings: Mapping[str, list[int]],
+    usual: DueRule,
+    library: Library,
+) -> DueTip:
+    names, calibrated = entry.entry.event.names, origin.entry.event.at
+    rule = library.rule_of(names.tip, usual)
+    of_pen = swings.get(searchable(names.pen), [])
+    n_swings = len(of_pen) - bisect_right(of_pen, since_us(origin.entry.since))
+    return DueTip(
+        entry,
+        calibrated,
+        rule.due(calibrated),
+        n_swings,
+        rule.max_swings - n_swings if rule.max_swings else None,
+    )
+
+
+def _swings(database: Database, chain: str, since: datetime) -> dict[str, list[int]]:
+    """Return the times of the real swings of each pen since then, in order."""
+    found = (
+        select(ENTRIES.c.pen, ENTRIES.c.since_us)
+        .where(
+            ENTRIES.c.since_us > since_us(since),
+            ENTRIES.c.kind.in_([kind.value for kind in SWINGS]),
+            ~ENTRIES.c.is_simulated,
+            of_chain(chain),
+        )
+        .order_by(ENTRIES.c.since_us)
+    )
+    swings = defaultdict[str, list[int]](list)
+    with database.reading() as connection:
+        for row in connection.execute(found):
+            swings[row.pen].append(row.since_us)
+    return swings

@@ -1,0 +1,83 @@
+"""Entries for other programs: as a table, and as JSON."""
+
+import json
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from lightpen.archive.chains.chains import chain_at_home
+from lightpen.archive.chains.entries import StoredEntry
+from lightpen.archive.history.queries import EntryFilter, newest
+from lightpen.archive.store.database import Database
+from lightpen.estimation.reports.verdict import AXES
+from lightpen.formats.csv_cells import csv_table
+from lightpen.formats.files import write_whole
+
+COLUMNS = (
+    *("since", "station", "operator", "kind", "outcome", "grade"),
+    *("pen", "tip", "cone"),
+    *(f"tip_{axis}_mm" for axis in AXES),
+    *(f"expanded_uncertainty_{axis}_mm" for axis in AXES),
+    *("reason", "chain", "number", "sha256", "is_foreign"),
+)
+BATCH = 1000  # entries that are read at one time
+
+
+def save_entries(database: Database, wanted: EntryFilter, path: Path) -> int:
+    """Write the entries of a filter, the newest first; return their number.
+
+    Parameters
+    ----------
+    path : Path
+        ``.csv`` for a table, else JSON; what is there is replaced.
+    """
+    entries = tuple(_all(database, wanted))
+    is_table = path.suffix.lower() == ".csv"
+    home = chain_at_home(database)
+    text = (entries_csv if is_table else entries_json)(entries, home)
+    write_whole(path, text.encode("utf-8", "backslashreplace"))
+    return len(entries)
+
+
+def entries_csv(entries: Iterable[StoredEntry], home: str | None) -> str:
+    """Return entries as a table, one a line.
+
+    Parameters
+    ----------
+    home : str or None
+        Own chain of the archive; entries of all others are foreign.
+    """
+    return csv_table([COLUMNS, *(_row(each, home) for each in entries)])
+
+
+def entries_json(entries: Iterable[StoredEntry], home: str | None) -> str:
+    """Return stored entries with their hashes as JSON; see `entries_csv`."""
+    listed = [
+        {
+            "sha256": each.sha256,
+            "is_foreign": each.entry.chain != home,
+            **json.loads(each.text),
+        }
+        for each in entries
+    ]
+    return json.dumps(listed, indent=1) + "\n"
+
+
+def _all(database: Database, wanted: EntryFilter) -> Iterator[StoredEntry]:
+    last = None
+    while batch := newest(database, wanted, BATCH, last):
+        yield from batch
+        last = batch[-1].entry
+
+
+def _row(entry: StoredEntry, home: str | None) -> list[object]:
+    event, nothing = entry.entry.event, ("", "", "")
+    names = event.names
+    return [
+        *(event.at.isoformat(), names.station, names.operator, event.kind.value),
+        event.outcome or "",
+        *(event.grade, names.pen, names.tip, names.cone),
+        *(event.tip_pen_mm or nothing),
+        *(event.expanded_uncertainty_mm or nothing),
+        *(event.reason, entry.entry.chain, entry.entry.number, entry.sha256),
+        entry.entry.chain != home,
+    ]

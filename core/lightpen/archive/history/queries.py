@@ -1,0 +1,183 @@
+"""Queries of an archive: the entries of a pen, a station or a period."""
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy import (
+    ColumnElement,
+    Exists,
+    FromClause,
+    exists,
+    func,
+    select,
+    true,
+    tuple_,
+)
+
+from lightpen.archive.chains.chains import READ, read_row, searchable
+from lightpen.archive.chains.entries import (
+    IN_FORCE_BY,
+    Entry,
+    Kind,
+    StoredEntry,
+    since_us,
+)
+from lightpen.archive.store.database import Database
+from lightpen.archive.store.tables import CHAINS, ENTRIES
+
+IN_ORDER = (ENTRIES.c.since_us, ENTRIES.c.chain, ENTRIES.c.number)
+_KINDS_IN_FORCE = [kind.value for kind in IN_FORCE_BY]
+
+
+@dataclass(frozen=True)
+class EntryFilter:
+    """Filter for entries; an empty or None field matches all.
+
+    Attributes
+    ----------
+    begin, end : datetime or None
+        Entries since the one, and before the other, each by its own clock.
+    is_simulated : bool or None
+        Whether of simulated pens.
+    """
+
+    pen: str = ""
+    tip: str = ""
+    station: str = ""
+    kinds: tuple[Kind, ...] = ()
+    begin: datetime | None = None
+    end: datetime | None = None
+    is_simulated: bool | None = None
+
+
+def n_wanted(database: Database, wanted: EntryFilter) -> int:
+    """Return the number of matching entries."""
+    count = select(func.count()).select_from(ENTRIES).where(condition_of(wanted))
+    with database.reading() as connection:
+        return connection.execute(count).scalar_one()
+
+
+def newest(
+    database: Database, wanted: EntryFilter, n_entries: int, before: Entry | None = None
+) -> tuple[StoredEntry, ...]:
+    """Return a page of the entries that match a filter, the newest first.
+
+    Parameters
+    ----------
+    before : Entry, optional
+        The last of those that were returned before.
+    """
+    condition = condition_of(wanted)
+    if before is not None:
+        place = (since_us(before.since), before.chain, before.number)
+        condition &= tuple_(*IN_ORDER) < place
+    found = (
+        select(*READ)
+        .where(condition)
+        .order_by(*(column.desc() for column in IN_ORDER))
+        .limit(n_entries)
+    )
+    with database.reading() as connection:
+        rows = connection.execute(found).all()
+    return tuple(read_row(database, row) for row in rows)
+
+
+def last_accepted(
+    database: Database,
+    pen: str,
+    tip: str,
+    *,
+    is_simulated: bool = False,
+    chain: str | None = None,
+) -> StoredEntry | None:
+    """Return the last acceptance of a pen and tip that was not revoked.
+
+    Parameters
+    ----------
+    chain : str, optional
+        Chain of a data folder; by default any. The current result of a station is in
+        its result files.
+    """
+    condition = (
+        (ENTRIES.c.pen == searchable(pen))
+        & (ENTRIES.c.tip == searchable(tip))
+        & (ENTRIES.c.is_simulated == is_simulated)
+        & ENTRIES.c.kind.in_(_KINDS_IN_FORCE)
+        & ~revoked(ENTRIES)
+    )
+    if chain is not None:
+        condition &= of_chain(chain)
+    found = select(*READ).where(condition).order_by(ENTRIES.c.since_us.desc()).limit(1)
+    with database.reading() as connection:
+        row = connection.execute(found).one_or_none()
+    return None if row is None else read_row(database, row)
+
+
+def calibrating(database: Database, entry: StoredEntry) -> StoredEntry:
+    """Return the calibration entry of a reinstated tip.
+
+    It is the entry itself if that was the calibration, or if the other is not here.
+    """
+    while entry.entry.event.kind is Kind.RESTORED:
+        found = select(*READ).where(ENTRIES.c.sha256 == entry.entry.event.concerns)
+        with database.reading() as connection:
+            row = connection.execute(found.limit(1)).one_or_none()
+        if row is None:
+            break
+        entry = read_row(database, row)
+    return entry
+
+
+def of_chain(chain: str) -> ColumnElement[bool]:
+    """Return a condition on the chain, for rare entries.
+
+    No index of chains is used for it: most entries are of one.
+    """
+    return func.coalesce(ENTRIES.c.chain, "") == chain
+
+
+def revoked(entries: FromClause) -> Exists:
+    """Return the condition that an entry was revoked since, by its own station."""
+    back = ENTRIES.alias()
+    return exists().where(
+        back.c.concerns == entries.c.sha256,
+        back.c.kind == Kind.TAKEN_BACK.value,
+        func.coalesce(back.c.chain, "") == entries.c.chain,  # by the index of concerns
+    )
+
+
+def is_at_home(entries: FromClause) -> Exists:
+    """Return the condition that an entry is of the own chain of its database."""
+    return exists().where(CHAINS.c.chain == entries.c.chain, CHAINS.c.is_own)
+
+
+def replaced(entries: FromClause) -> Exists:
+    """Return the condition that a later tip came into force in the same chain."""
+    later = ENTRIES.alias()
+    return exists().where(
+        later.c.pen == entries.c.pen,
+        later.c.tip == entries.c.tip,
+        later.c.is_simulated == entries.c.is_simulated,
+        later.c.kind.in_(_KINDS_IN_FORCE),
+        later.c.since_us > entries.c.since_us,
+        later.c.chain == entries.c.chain,
+        ~revoked(later),
+    )
+
+
+def condition_of(wanted: EntryFilter) -> ColumnElement[bool]:
+    """Return the SQL condition of an entry filter."""
+    condition: ColumnElement[bool] = true()
+    names = {"pen": wanted.pen, "tip": wanted.tip, "station": wanted.station}
+    for column, name in names.items():
+        if name:
+            condition &= ENTRIES.c[column] == searchable(name)
+    if wanted.kinds:
+        condition &= ENTRIES.c.kind.in_([kind.value for kind in wanted.kinds])
+    if wanted.is_simulated is not None:
+        condition &= ENTRIES.c.is_simulated == wanted.is_simulated
+    if wanted.begin is not None:
+        condition &= ENTRIES.c.at_us >= since_us(wanted.begin)
+    if wanted.end is not None:
+        condition &= ENTRIES.c.at_us < since_us(wanted.end)
+    return condition

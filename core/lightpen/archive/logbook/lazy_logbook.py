@@ -1,0 +1,131 @@
+"""A logbook that is opened at the first entry."""
+
+import os
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING
+
+from lightpen.archive.store.uses import closed
+from lightpen.errors import AcceptanceError, ArchiveError
+from lightpen.formats.machine_settings import machine_settings
+from lightpen.messages import Message
+from lightpen.record.library.supervision import Supervision
+from lightpen.record.results.assessment import SwingAssessment
+from lightpen.record.swings.solving import Solution
+
+if TYPE_CHECKING:
+    from lightpen.archive.logbook.logbook import Logbook
+
+SERVER = "LIGHTPEN_ARCHIVE"  # names the variable with the address of a server
+
+
+def server_address() -> str:
+    """Return the address of the server: of the variable, else that of the computer."""
+    return os.environ.get(SERVER, "") or machine_settings().archive_server
+
+
+class LazyLogbook:
+    """Logbook that is opened at its first use, so that the program starts sooner.
+
+    Parameters
+    ----------
+    data, server
+        As of `lightpen.archive.logbook.logbook.Logbook`.
+    """
+
+    def __init__(self, data: Path, server: str = "") -> None:
+        self._data, self._server = data, server
+        self._lock = Lock()
+        self._opened: Logbook | None = None
+        self._is_closed = False
+
+    @classmethod
+    def none(cls) -> "LazyLogbook":
+        """Return a closed logbook, in which nothing is entered."""
+        logbook = cls(Path())
+        logbook._is_closed = True
+        return logbook
+
+    def enter_owed(
+        self, report: Callable[[float], None] = lambda fraction: None
+    ) -> tuple[Message, ...]:
+        """Enter events from files; see `lightpen.archive.logbook.logbook.Logbook`."""
+        logbook = self._open()
+        return () if logbook is None else logbook.enter_owed(report)
+
+    def enter_set_aside(
+        self,
+        solution: Solution | None,
+        assessment: SwingAssessment | None,
+        at: datetime,
+    ) -> None:
+        """Enter that a swing was abandoned, with the tip that was not accepted.
+
+        Raises
+        ------
+        ArchiveError, FileError
+            As of `lightpen.archive.logbook.logbook.Logbook.enter_refused`.
+        """
+        logbook = self._open()
+        if logbook is None:
+            return
+        if solution is not None and assessment is not None:
+            logbook.enter_refused(solution, assessment, at)
+        else:
+            logbook.enter_owed()
+
+    def confirm(self, supervision: Supervision) -> None:
+        """Confirm limits; see `lightpen.archive.logbook.logbook.Logbook.confirm`.
+
+        An archive that cannot be read stops nothing in a data folder without a
+        supervisor password.
+
+        Raises
+        ------
+        AcceptanceError
+            They are not those that were entered.
+        """
+        try:
+            logbook = self._open()
+            if logbook is not None:
+                logbook.confirm(supervision)
+        except ArchiveError as error:
+            if supervision.is_guarded:
+                raise AcceptanceError(error.message) from error
+
+    def opened(self) -> "Logbook":
+        """Return the logbook, opened by now."""
+        logbook = self._open()
+        if logbook is None:
+            raise closed()
+        return logbook
+
+    def shared(self) -> tuple[Message, ...]:
+        """Return the entries copied from other stations since the start."""
+        logbook = self._opened
+        return () if logbook is None else logbook.shared
+
+    def close(self) -> None:
+        """Close the archive; later entries are refused.
+
+        Raises
+        ------
+        ArchiveError, FileError
+            As of `lightpen.archive.logbook.logbook.Logbook.close`.
+        """
+        with self._lock:
+            logbook, self._opened, self._is_closed = self._opened, None, True
+        if logbook is not None:
+            logbook.close()
+
+    def _open(self) -> "Logbook | None":
+        with self._lock:
+            if self._opened is None and not self._is_closed:
+                from lightpen.archive.logbook.logbook import (
+                    Logbook,  # a quarter of a second
+                )
+
+                self._opened = Logbook(self._data, self._server)
+            return self._opened

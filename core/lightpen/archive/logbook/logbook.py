@@ -1,0 +1,390 @@
+"""The logbook of a station: enters the events of a data folder in its chain.
+
+One rule joins it to the files. A result file puts a tip in force, or revokes it, the
+journal of a swing says that it was abandoned, and changes of the tip library, limits,
+verifications and calibrated cameras have files of their own: these files are the truth,
+written whole before anything else, and each is owed one entry. What is owed is entered
+as soon
+as it is written; where that failed, or the program was killed, or had no archive yet,
+with whatever is entered next, and at every start. So nothing is in force or set aside
+that the archive does not contain from the next start on, and no entry is of nothing.
+"""
+
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from threading import Lock
+
+from msgspec import structs
+
+from lightpen.archive.chains.chains import (
+    ArchivedFiles,
+    append,
+    entries_of_limits,
+    entry_of_result,
+    heads,
+    own_chain,
+    records_of,
+)
+from lightpen.archive.chains.entries import Event, Kind, StoredEntry, this_program
+from lightpen.archive.chains.seal import close_sealed
+from lightpen.archive.events.event_extraction import (
+    ExtractedEvent,
+    account_of_abandoned,
+    account_of_change,
+    account_of_refused,
+    account_of_result,
+    account_of_unreadable,
+)
+from lightpen.archive.events.station_events import (
+    account_of_station,
+    is_station_file,
+    station_files,
+)
+from lightpen.archive.logbook.reinstating import (
+    due_doubts,
+    require_restorable,
+    restored_result,
+    with_change,
+)
+from lightpen.archive.logbook.shared_library import newer_elsewhere, take_over
+from lightpen.archive.replication.replication import Replicator
+from lightpen.archive.store.database import Database, open_file
+from lightpen.errors import AcceptanceError, ArchiveError, FileError, UsageError
+from lightpen.formats.files import FOLDER, printable, unreadable
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.local_time import local_now
+from lightpen.messages import Message, message
+from lightpen.model.limits import StationLimits
+from lightpen.record.library.guard_files import LIMITS_FOLDER
+from lightpen.record.library.numbered_files import number_of, numbered_files
+from lightpen.record.library.signing.keys import chain_of, station_key
+from lightpen.record.library.supervision import (
+    Signature,
+    Supervision,
+    approval_of_change,
+)
+from lightpen.record.library.supervision_changes import renew_station_key
+from lightpen.record.library.tip_library import LIBRARY, library_files
+from lightpen.record.results.acceptance import require_in_use
+from lightpen.record.results.assessment import SwingAssessment
+from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.journal import JOURNAL, last_verdict
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import DISCARDED, open_record
+from lightpen.record.swings.solving import Solution
+
+ARCHIVE = "archive.sqlite"
+LONGEST_FAREWELL_S = 1.0  # that a server may hold up the end of the program
+
+_logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class ReplicationState:
+    """Progress of the replication to a server.
+
+    Attributes
+    ----------
+    n_waiting : int or None
+        Entries that it does not have; None as long as it did not answer.
+    fault : Message or None
+        Why the last attempt failed.
+    """
+
+    n_waiting: int | None
+    fault: Message | None
+
+
+class Logbook:
+    """Enters what happens in a data folder; any thread may ask it to.
+
+    Several programs may have one of the same folder.
+
+    Parameters
+    ----------
+    data : Path
+        Folder of the records, the results and the archive; it need not exist.
+    server : str
+        Address of the server that all is delivered to, as soon as it answers; none if
+        empty.
+
+    Attributes
+    ----------
+    shared : tuple of Message
+        What was taken over from the libraries of other stations since the start, and
+        what waits for a supervisor.
+
+    Raises
+    ------
+    ArchiveError
+        The archive is not of this program, or cannot be used.
+    """
+
+    def __init__(self, data: Path, server: str = "") -> None:
+        self._data = data
+        self._results = FolderArchive(data, self.confirm)
+        self._lock = Lock()
+        self.database: Database = open_file(data / ARCHIVE)
+        try:
+            self.chain = own_chain(self.database)
+        except ArchiveError:
+            self.database.close()
+            raise
+        self._renew_lost_key()
+        self._entered = ArchivedFiles(self.database, self.chain)
+        self.shared: tuple[Message, ...] = ()
+        self._replicator: Replicator | None = None
+        if server:
+            own = self.database, self.chain, server
+            self._replicator = Replicator(*own, self.share_library)
+
+    def enter_owed(
+        self, report: Callable[[float], None] = lambda fraction: None
+    ) -> tuple[Message, ...]:
+        """Enter events from files that the archive does not have yet.
+
+        Parameters
+        ----------
+        report : callable
+            Called with the fraction done, 0 to 1; what it raises ends the work, and the
+            rest stays owed.
+
+        Returns
+        -------
+        tuple of Message
+            Why some files cannot be entered; they stay owed.
+        """
+        with self._lock:
+            self._entered.read()
+            owed, faults = tuple(self._owed()), []
+            for n_done, path in enumerate(owed):
+                report(n_done / len(owed))
+                try:
+                    self._enter(self._account_of(path))
+                except FileError as error:
+                    faults.append(error.message)
+        return tuple(faults)
+
+    def enter_refused(
+        self, solution: Solution, assessment: SwingAssessment, at: datetime
+    ) -> None:
+        """Enter that the tip of a swing that is abandoned was not accepted.
+
+        Raises
+        ------
+        ArchiveError
+            It cannot be entered; the entry remains pending.
+        """
+        with self._lock:
+            self._enter(account_of_refused(self._results, solution, assessment, at))
+
+    def enter_note(self, about: StoredEntry, text: str, operator: str) -> None:
+        """Enter a comment on an entry."""
+        of = about.entry.event
+        event = Event(
+            kind=Kind.NOTE,
+            at=local_now(),
+            names=replace(of.names, operator=operator),
+            program=this_program(),
+            origin=of.origin,
+            reason=text,
+            concerns=about.sha256,
+        )
+        with self._lock:
+            self._enter(ExtractedEvent(event))
+
+    def restore(
+        self,
+        entry: StoredEntry,
+        by: Names,
+        reason: str,
+        signature: Signature | None = None,
+    ) -> Result:
+        """Put the tip of an entry in force again, and enter that.
+
+        Parameters
+        ----------
+        by : Names
+            Operator who reinstates it, and station.
+        signature : Signature, optional
+            Of a supervisor, where there is a password.
+
+        Raises
+        ------
+        ArchiveError
+            The entry put no tip in force, is not of this station, its files are not as
+            they were entered, or it cannot be entered; it stays owed then.
+        AcceptanceError
+            The tip is retired, there is no reason, or there is a password and no
+            supervisor signs.
+        FileError
+            It cannot be made current; what was in force stays so.
+        """
+        require_in_use(self._results, entry.entry.event.names.tip)
+        event, now = entry.entry.event, local_now()
+        with self._lock:
+            require_restorable(self.database, self.chain, entry, self._data)
+            text = records_of(self.database, [entry]).get(event.record_sha256 or "")
+            result = restored_result(entry, text, self._data, by, reason, now)
+            supervision = self._results.supervision()
+            key = approval_of_change(supervision, signature, reason)
+            last = self._results.in_force(
+                event.names.pen, event.names.tip, is_simulated=event.is_simulated
+            )
+            doubts = due_doubts(
+                self.database,
+                entry,
+                self._results.library(),
+                now,
+                supervision.limits_at(by.station, StationLimits()).due,
+            )
+            result = replace(
+                with_change(result, last),
+                doubts=tuple(map(StoredMessage.of, doubts)),
+                supervisor=signature.name.strip() if key and signature else "",
+            )
+            self._results.store(result, key)
+        self.enter_owed()
+        return result
+
+    def confirm(self, supervision: Supervision) -> None:
+        """Confirm that the limits of the data folder are those that were entered.
+
+        Raises
+        ------
+        AcceptanceError
+            They are not.
+        """
+        confirm_limits(self.database, self.chain, supervision)
+
+    def delivery(self) -> ReplicationState | None:
+        """Return the progress of the replication; None without a server."""
+        if self._replicator is None:
+            return None
+        n_delivered, fault = self._replicator.n_delivered, self._replicator.fault
+        if n_delivered is None:
+            return ReplicationState(None, fault)
+        ends = {head.chain: head.number for head in heads(self.database)}
+        return ReplicationState(max(0, ends.get(self.chain, 0) - n_delivered), fault)
+
+    def share_library(self, server: Database) -> None:
+        """Take over what other stations changed later in their libraries.
+
+        Where a supervisor must sign, only tell how much waits. A library that cannot
+        be read, or is not as it was entered, is reported by all who need it.
+        """
+        with suppress(FileError, AcceptanceError, UsageError):
+            guard = self._results.supervision()
+            found = self._data, self.database, local_now(), server
+            if not guard.is_guarded:
+                taken = take_over(*found)
+                self.shared += tuple(each.message for each in taken)
+                if taken:
+                    self.enter_owed()
+            elif waiting := newer_elsewhere(*found):
+                notice = message("library.share-waits", n=len(waiting))
+                self.shared += () if notice in self.shared else (notice,)
+
+    def close(self) -> None:
+        """Close the archive, and seal its file unless another process has it open."""
+        if self._replicator is not None:
+            self._replicator.close(LONGEST_FAREWELL_S)
+        with self._lock:
+            close_sealed(self.database)
+
+    def _renew_lost_key(self) -> None:
+        """Continue with a new key in a moved folder, without a password."""
+        # Every acceptance reports these errors.
+        with suppress(FileError, AcceptanceError):
+            guard = self._results.supervision()
+            name = (
+                chain_of(guard.station_keys[-1]) if guard.station_keys else self.chain
+            )
+            if not guard.is_guarded and station_key(name) is None:
+                renew_station_key(self._data, self.chain, None, local_now())
+
+    def _owed(self) -> Iterator[Path]:
+        """Yield the files, and then the swings, that have no entry."""
+        limits = reversed(numbered_files(self._data / LIMITS_FOLDER))
+        own = (*library_files(self._data), *station_files(self._data))
+        for file in dict.fromkeys((*limits, *self._results.all_files(), *own)):
+            if not self._is_entered(file):
+                yield file
+        for folder in _set_aside(self._data / RECORDS):
+            if not self._is_entered(folder):
+                yield folder
+
+    def _is_entered(self, path: Path) -> bool:
+        return self._results.place_of(path) in self._entered
+
+    def _account_of(self, path: Path) -> ExtractedEvent:
+        if path.parent.name == LIBRARY:
+            return account_of_change(self._results, path)
+        if is_station_file(path):
+            return account_of_station(self._results, path)
+        if path.parent.name != RECORDS:
+            return account_of_result(self._results, path)
+        at = datetime.fromtimestamp((path / JOURNAL).stat().st_mtime, UTC)
+        try:
+            record = open_record(path)
+        except FileError as error:
+            return account_of_unreadable(self._results, path, at, error.message)
+        return account_of_abandoned(self._results, record, at)
+
+    def _enter(self, account: ExtractedEvent) -> None:
+        event = account.event
+        if account.takes_back:
+            back = entry_of_result(self.database, self.chain, account.takes_back)
+            event = event if back is None else _taking_back(event, back)
+        append(self.database, self.chain, event, account.record)
+        _logger.info("entered: %s", event.kind)
+        if self._replicator is not None:
+            self._replicator.wake()
+
+
+def _taking_back(event: Event, back: StoredEntry) -> Event:
+    """Return the event of a revocation with the data of the result."""
+    of, operator = back.entry.event, event.names.operator
+    return structs.replace(
+        event,
+        names=replace(of.names, operator=operator),
+        origin=of.origin,
+        swing=of.swing,
+        concerns=back.sha256,
+    )
+
+
+def _set_aside(records: Path) -> Iterator[Path]:
+    """Yield the folders of the swings that were abandoned, the oldest first."""
+    try:
+        folders = sorted(records.iterdir()) if records.is_dir() else []
+    except OSError as error:
+        raise unreadable(records, FOLDER, error) from error
+    for folder in folders:
+        with suppress(OSError):  # it is no record
+            if last_verdict(folder) == DISCARDED:
+                yield folder
+
+
+def confirm_limits(
+    database: Database, chain: str | None, supervision: Supervision
+) -> None:
+    """Confirm that limits are those that were entered in the chain of a data folder.
+
+    Raises
+    ------
+    AcceptanceError
+        They are not.
+    """
+    if supervision.chain not in ("", chain):
+        raise AcceptanceError("limits.other-archive")
+    entries = entries_of_limits(database, chain) if chain else ()
+    for file in filter(None, (each.entry.event.result for each in entries)):
+        number = number_of(Path(file.place))
+        if supervision.hashes[number - 1 : number] != (file.sha256,):
+            raise AcceptanceError("limits.not-entered", file=printable(file.place))

@@ -1,0 +1,1 @@
+"""Copies of chains on a server and in other archives."""

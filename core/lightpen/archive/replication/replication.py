@@ -1,0 +1,92 @@
+"""Replication of a station's entries to a server whenever it is reachable.
+
+The archive of the station itself is what waits to be delivered: it has every entry
+before the server does, and keeps it. So nothing is lost while the server is away, and
+as entries are copied in their order and known ones passed over, none is doubled.
+
+The server is called for each delivery and then let go of: it has many stations to
+serve, and a line that is kept may be dead without either end knowing. At the first
+call the whole chain is compared, at each other its end. With each call, and every five
+minutes, the library is shared.
+"""
+
+from collections.abc import Callable
+from contextlib import closing
+from threading import Event, Thread
+
+from lightpen.archive.replication.comparison import require_same
+from lightpen.archive.replication.exchange import deliver
+from lightpen.archive.replication.server import open_server
+from lightpen.archive.store.database import Database
+from lightpen.errors import ArchiveError
+from lightpen.messages import Message
+
+AGAIN_S = 30.0  # after a server did not answer
+LOOK_S = 300.0  # at what other stations have shared
+
+
+class Replicator:
+    """Replicates in its own thread until closed.
+
+    Parameters
+    ----------
+    chain : str
+        Chain of the data folder.
+    address : str
+        Address of the server; see `lightpen.archive.store.database.open_server`.
+    share : callable, optional
+        Takes over from a server what other stations share with this one.
+
+    Attributes
+    ----------
+    n_delivered : int or None
+        Entries that the server has; None until it answered first.
+    fault : Message or None
+        Why the last attempt failed.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        chain: str,
+        address: str,
+        share: Callable[[Database], None] = lambda server: None,
+    ) -> None:
+        self._database = database
+        self._chain = chain
+        self._address = address
+        self._share = share
+        self._is_due, self._is_ending = Event(), Event()
+        self.n_delivered: int | None = None
+        self.fault: Message | None = None
+        self._thread = Thread(target=self._run, name="delivery", daemon=True)
+        self._is_due.set()
+        self._thread.start()
+
+    def wake(self) -> None:
+        """Deliver soon."""
+        self._is_due.set()
+
+    def close(self, timeout_s: float) -> None:
+        """Finish the current transfer, within a time limit, and end."""
+        self._is_ending.set()
+        self._is_due.set()
+        self._thread.join(timeout_s)
+
+    def _run(self) -> None:
+        while True:
+            self._is_due.wait(LOOK_S if self.fault is None else AGAIN_S)
+            self._is_due.clear()
+            try:
+                with closing(open_server(self._address)) as server:
+                    if self.n_delivered is None:
+                        require_same(self._database, self._chain, server)
+                    copied = deliver(self._database, self._chain, server)
+                    if not self._is_ending.is_set():
+                        self._share(server)
+                self.n_delivered = copied.n_known + copied.n_new
+                self.fault = None
+            except ArchiveError as error:
+                self.fault = error.message
+            if self._is_ending.is_set():
+                break

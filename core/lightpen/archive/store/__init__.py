@@ -1,0 +1,1 @@
+"""The database of an archive: its tables, opened for reading and writing."""

@@ -1,0 +1,373 @@
+"""The database of an archive: a file of SQLite, or a server of PostgreSQL.
+
+It is examined before anything is written: one of another program, or of a later
+version of this one, stays as it is. A new file gets the tables as they are now; what is
+of an earlier version is brought up to date by the steps in the folder ``migrations``.
+"""
+
+import socket
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import (
+    AbstractContextManager,
+    closing,
+    contextmanager,
+    nullcontext,
+    suppress,
+)
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from threading import Timer
+from time import monotonic, sleep
+
+from sqlalchemy import (
+    Column,
+    Connection,
+    Engine,
+    MetaData,
+    PrimaryKeyConstraint,
+    String,
+    Table,
+    create_engine,
+    event,
+    insert,
+    inspect,
+    select,
+    text,
+)
+from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.pool import QueuePool
+
+from lightpen.archive.store.tables import METADATA
+from lightpen.archive.store.uses import UseCount
+from lightpen.errors import ArchiveError, FileError, NoArchiveError
+from lightpen.formats.files import A_FILE, printable, unreadable
+from lightpen.record.library.numbered_files import make_folder
+
+VERSION = "1"  # of the tables, as the last of the migrations says
+VERSION_TABLE = "archive_version"
+MIGRATIONS = Path(__file__).parent.with_name("migrations")
+MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrates
+LONGEST_FAREWELL_S = 2  # for those who use it when it closes
+MALFORMED = "database disk image is malformed"  # as SQLite says it
+LONGEST_WAIT_S = 10  # for another program to finish what it writes
+PAUSE_S = 0.02  # between two attempts where SQLite does not retry
+# A proxy may keep a connection open whose other end is gone.
+LONGEST_ANSWER_S = 120.0
+
+_VERSION = Table(
+    VERSION_TABLE,
+    MetaData(),
+    Column("version_num", String(32), nullable=False),
+    PrimaryKeyConstraint("version_num", name=f"{VERSION_TABLE}_pkc"),  # as Alembic's
+)
+
+
+@dataclass(frozen=True)
+class Database:
+    """An archive that is open.
+
+    Attributes
+    ----------
+    name : str
+        File or address without the password, fit to be shown.
+    file : Path or None
+        None of a server.
+    """
+
+    engine: Engine
+    name: str
+    file: Path | None = None
+    _uses: UseCount = field(
+        default_factory=UseCount, init=False, repr=False, compare=False
+    )
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """Read within one transaction."""
+        with self._used(self.engine) as connection:
+            yield connection
+
+    @contextmanager
+    def writing(self) -> Iterator[Connection]:
+        """Write within one exclusive transaction."""
+        options = self.engine.execution_options(is_writing=True)
+        with self._used(options) as connection:
+            yield connection
+
+    def close(self) -> None:
+        """Close it after its present users have finished."""
+        self._uses.end(LONGEST_FAREWELL_S)
+        self.engine.pool.dispose()
+
+    @contextmanager
+    def _used(self, engine: Engine) -> Iterator[Connection]:
+        with self._uses.one(), _converting_errors(self.name):
+            try:
+                with engine.begin() as connection, self._in_time(connection):
+                    yield connection
+            finally:
+                if self._uses.are_over:  # who is late takes its connection along
+                    self.engine.pool.dispose()
+
+    def _in_time(self, connection: Connection) -> AbstractContextManager[None]:
+        """Abandon a server that no longer responds."""
+        return nullcontext() if self.file else _given_up_in_time(connection)
+
+
+def open_file(path: Path) -> Database:
+    """Open the archive in a file, or make one.
+
+    Raises
+    ------
+    ArchiveError
+        It is not of this program, or cannot be used.
+    """
+    name = printable(str(path))
+    with _looking_at(path):
+        is_there = path.exists()
+    if is_there:
+        with closing(_read_only(path)) as database:  # which changes nothing
+            known_version(database)
+    try:
+        make_folder(path.parent)
+    except FileError as error:
+        raise ArchiveError(error.message) from error
+
+    def connect() -> sqlite3.Connection:
+        with _closed_on_failure(_connected(str(path))) as connection:
+            _write_ahead(connection)
+            connection.execute("PRAGMA synchronous = FULL")
+            return connection
+
+    return update_tables(Database(_sqlite_engine(connect), name, path))
+
+
+def look_into(path: Path) -> Database:
+    """Open the archive in a file to be read only; nothing about it changes.
+
+    Raises
+    ------
+    NoArchiveError
+        It is not there, or nothing was ever entered in it.
+    ArchiveError
+        It is not of this program, or cannot be used.
+    """
+    database = _read_only(path)
+    with _looking_at(path):
+        is_there = path.is_file()
+    if not is_there or known_version(database) is None:
+        database.close()
+        raise NoArchiveError("archive.missing", file=database.name)
+    return database
+
+
+def is_open(path: Path) -> bool:
+    """Return whether a program has the archive in a file open, or was killed so."""
+    with _looking_at(path):
+        return Path(f"{path}-wal").exists()
+
+
+def _read_only(path: Path) -> Database:
+    mode = "mode=ro" if is_open(path) else "immutable=1"
+    place = f"{path.absolute().as_uri()}?{mode}"
+    engine = _sqlite_engine(partial(_connected, place))
+    return Database(engine, printable(str(path)), path)
+
+
+def _sqlite_engine(connect: Callable[[], sqlite3.Connection]) -> Engine:
+    engine = create_engine("sqlite://", creator=connect, poolclass=QueuePool)
+    event.listen(engine, "begin", _begin)
+    return engine
+
+
+def _connected(place: str) -> sqlite3.Connection:
+    connection = sqlite3.connect(
+        place,
+        uri=place.startswith("file:"),
+        timeout=LONGEST_WAIT_S,
+        check_same_thread=False,
+        # Transactions begin explicitly: by default, a writer's would
+        # begin as a reader's, and two of them refuse each other.
+        isolation_level=None,
+    )
+    # A text that was damaged is read all the same, to be named.
+    connection.text_factory = lambda data: data.decode("utf-8", "surrogateescape")
+    return connection
+
+
+def _write_ahead(connection: sqlite3.Connection) -> None:
+    """Let readers and a writer not hold up each other.
+
+    For one who does so just then, or who writes, SQLite does not wait automatically.
+    """
+    deadline = monotonic() + LONGEST_WAIT_S
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+            return
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorname != "SQLITE_BUSY" or monotonic() > deadline:
+                raise
+        sleep(PAUSE_S)
+
+
+@contextmanager
+def _closed_on_failure(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
+    try:
+        yield connection
+    except BaseException:
+        connection.close()
+        raise
+
+
+def _begin(connection: Connection) -> None:
+    is_writing = connection.get_execution_options().get("is_writing", False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if is_writing else "BEGIN")
+
+
+def known_version(database: Database) -> str | None:
+    """Return of which version a database is, None of one that holds nothing yet.
+
+    Raises
+    ------
+    ArchiveError
+        It is of another program, or of a later version of this one, and is closed.
+    """
+    try:
+        with database.reading() as connection:
+            found = _found_version(connection)
+            if found is None and inspect(connection).get_table_names():
+                raise _of_other_program(database.name)
+        if found is not None and not _is_known(found):
+            raise _of_later_version(database.name)
+    except ArchiveError:
+        database.close()
+        raise
+    return found
+
+
+def _is_known(version: str) -> bool:
+    return version.isdecimal() and int(version) <= int(VERSION)
+
+
+def update_tables(database: Database) -> Database:
+    """Make the tables of a file, or bring those of an earlier version up to date.
+
+    Raises
+    ------
+    ArchiveError
+        It cannot be done; the database is closed.
+    """
+    known_version(database)
+    try:
+        with database.writing() as connection:
+            if _found_version(connection) != VERSION:
+                _make_or_migrate(connection)
+    except ArchiveError:
+        database.close()
+        raise
+    return database
+
+
+@contextmanager
+def _given_up_in_time(connection: Connection) -> Iterator[None]:
+    """End the line to a server that does not answer in time, so that waiting ends."""
+    line = connection.connection.dbapi_connection
+    assert line is not None
+    with socket.fromfd(line.fileno(), socket.AF_INET, socket.SOCK_STREAM) as end:
+        watch = Timer(LONGEST_ANSWER_S, _shut_down, (end,))
+        watch.daemon = True
+        watch.start()
+        try:
+            yield
+        finally:
+            watch.cancel()
+            watch.join()
+
+
+def _shut_down(end: socket.socket) -> None:
+    with suppress(OSError):  # it is closed already
+        end.shutdown(socket.SHUT_RDWR)
+
+
+def _found_version(connection: Connection) -> str | None:
+    """Return of which version the tables are; None where there are none."""
+    if not inspect(connection).has_table(VERSION_TABLE):
+        return None
+    return connection.execute(select(_VERSION.c.version_num)).scalar_one_or_none()
+
+
+def _make_or_migrate(connection: Connection) -> None:
+    """Create or migrate the tables, unless another process has done so."""
+    if connection.dialect.name == "postgresql":
+        connection.execute(text(f"SELECT pg_advisory_xact_lock({MIGRATING})"))
+    found = _found_version(connection)
+    if found is None:
+        for tables in (METADATA, _VERSION.metadata):
+            tables.create_all(connection, checkfirst=False)
+        connection.execute(insert(_VERSION).values(version_num=VERSION))
+    elif found != VERSION:
+        _migrate(connection, found)
+
+
+def _migrate(connection: Connection, found: str) -> None:
+    # Half a second, which only the first start of a later version takes.
+    from alembic.migration import MigrationContext
+    from alembic.operations import Operations
+    from alembic.script import ScriptDirectory
+
+    script = ScriptDirectory(str(MIGRATIONS))
+    context = MigrationContext.configure(
+        connection, opts={"version_table": VERSION_TABLE}
+    )
+    with Operations.context(context):
+        for step in reversed(list(script.iterate_revisions("head", found))):
+            step.module.upgrade()
+    context.stamp(script, "head")
+
+
+@contextmanager
+def _looking_at(path: Path) -> Iterator[None]:
+    """Raise an error for a file that may not be read."""
+    try:
+        yield
+    except OSError as error:
+        raise ArchiveError(unreadable(path, A_FILE, error).message) from error
+
+
+@contextmanager
+def _converting_errors(name: str) -> Iterator[None]:
+    """Translate errors of the database into messages for the user."""
+    try:
+        yield
+    except SQLAlchemyError as error:
+        cause = getattr(error, "orig", None)
+        if getattr(cause, "sqlite_errorname", "").startswith("SQLITE_BUSY"):
+            raise _busy(name) from error
+        raise _unusable(name, _reason(error)) from error
+    except UnicodeDecodeError as error:  # even what SQLite says of it cannot be read
+        raise _unusable(name, MALFORMED) from error
+
+
+def _reason(error: SQLAlchemyError) -> str:
+    """Return the database's message without the statement."""
+    said = str(getattr(error, "orig", None) or type(error).__name__).strip()
+    return printable(said.splitlines()[0].strip().rstrip("."))
+
+
+def _unusable(name: str, reason: str) -> ArchiveError:
+    return ArchiveError("archive.unusable", name=name, reason=reason)
+
+
+def _busy(name: str) -> ArchiveError:
+    return ArchiveError("archive.busy", name=name, seconds=LONGEST_WAIT_S)
+
+
+def _of_other_program(name: str) -> ArchiveError:
+    return ArchiveError("archive.of-other-program", name=name)
+
+
+def _of_later_version(name: str) -> ArchiveError:
+    return ArchiveError("archive.later-version", name=name)
