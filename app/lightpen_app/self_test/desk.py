@@ -60,7 +60,7 @@ class Walk(QObject):
     Attributes
     ----------
     doing : str
-        What it waits for, on which page, and why the main button cannot be pressed.
+        What it waits for, and what the window says: page, status, what is missing.
     """
 
     ended = Signal()
@@ -81,9 +81,7 @@ class Walk(QObject):
         self._timer.start()
 
     def _on_tick(self) -> None:
-        page = self._window.page()
-        why_not = page.main_action().why_not
-        self.doing = f"{self._next.__name__} on the page {page.key}: {why_not}"
+        self.doing = f"{self._next.__name__}: {', '.join(self._window.words())}"
         if self._next():
             self._timer.stop()
             self.ended.emit()

@@ -51,6 +51,20 @@ class OperatorPresence:
             return False
         return not self.begun_with.swings_like(self.choices)
 
+    def choose(self, choices: Preparation) -> Self:
+        """Return a copy with other choices.
+
+        Files that were still being read when a swing was resumed are no change.
+        """
+        begun = self.begun_with
+        if begun is not None:
+            begun = replace(
+                begun,
+                camera_file=begun.camera_file or choices.camera_file,
+                pen_file=begun.pen_file or choices.pen_file,
+            )
+        return replace(self, choices=choices, begun_with=begun)
+
     def come(self) -> Self:
         """Return a copy with the operator present and refusals cleared."""
         return replace(

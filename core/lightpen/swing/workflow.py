@@ -154,7 +154,7 @@ class SwingWorkflow:
     def choose(self, preparation: Preparation) -> None:
         """Set the choices for the next swing; another source ends this one."""
         before = self._presence.choices
-        self._presence = replace(self._presence, choices=preparation)
+        self._presence = self._presence.choose(preparation)
         is_other = before is not None and before.sources != preparation.sources
         if is_other and self._status.is_capturing:
             self.abandon()

@@ -69,3 +69,17 @@ def test_choices_are_others_from_when_a_swing_began_until_they_are_like_its_own(
     assert not replace(changed, choices=prepared).has_other_choices
     assert not changed.begun().has_other_choices
     assert not replace(ready, choices=others).has_other_choices  # none began
+
+
+def test_files_that_are_read_after_a_swing_was_resumed_are_no_other_choices(
+    prepared: Preparation,
+) -> None:
+    unread = replace(prepared, camera_file=None, pen_file=None)
+    resumed = OperatorPresence(choices=unread, begun_with=unread)
+
+    read = resumed.choose(prepared)
+    assert not read.has_other_choices
+
+    assert prepared.pen_file is not None
+    other = replace(prepared, pen_file=replace(prepared.pen_file))
+    assert read.choose(other).has_other_choices
