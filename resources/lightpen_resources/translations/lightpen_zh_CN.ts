@@ -849,10 +849,6 @@
         <translation>开始</translation>
     </message>
     <message>
-        <source>Images: {0}</source>
-        <translation>图像：{0}</translation>
-    </message>
-    <message>
         <source>Swing the pen first.</source>
         <translation>请先摆动光笔。</translation>
     </message>
@@ -877,6 +873,10 @@
         <translation>请先求光笔和相机。</translation>
     </message>
     <message>
+        <source>Images: {0} of {1}</source>
+        <translation>图像：{0} / {1}</translation>
+    </message>
+    <message>
         <source>Frame of the pen: click the LED at the origin, then one along y.</source>
         <translation>光笔坐标系：先点击原点处的 LED，再点击 y 方向上的一个 LED。</translation>
     </message>
@@ -885,12 +885,20 @@
         <translation>正在计算：{0:.0%}</translation>
     </message>
     <message>
+        <source>U of the tip is {0:.3f} mm; the limit is {1:g} mm. Swing again with more images and tilt, or measure the length better.</source>
+        <translation>测头的 U 为 {0:.3f} mm，限值为 {1:g} mm。请以更多图像和更大倾斜重新摆动，或更准确地测量该长度。</translation>
+    </message>
+    <message>
         <source>Pen and camera found. The image shows the projection uncertainty / px.</source>
         <translation>已求得光笔和相机。图中为投影不确定度 / px。</translation>
     </message>
     <message>
         <source>Enter the distance between the two marked LEDs.</source>
         <translation>请输入两个所标 LED 之间的距离。</translation>
+    </message>
+    <message>
+        <source>Check the length, and compute pen and camera.</source>
+        <translation>请核对长度，然后计算光笔和相机。</translation>
     </message>
     <message>
         <source>Lock zoom, focus and exposure. Seat the tip in the cone, hold the LEDs towards the camera, and press Start.</source>
@@ -5718,6 +5726,10 @@ mm</translation>
         <translation>1 个数</translation>
     </message>
     <message>
+        <source>4 distortion coefficients (without k3, which a Kalibr file does not hold). Cross-validated error: {held_out:.4f} px.</source>
+        <translation>4 个畸变系数（不含 Kalibr 文件不能保存的 k3）。交叉验证误差：{held_out:.4f} px。</translation>
+    </message>
+    <message>
         <source>A fixed cone is the drift reference: its moves from visit to visit count in U of what is probed in between.</source>
         <translation>以固定不动的锥孔作为漂移参考点：它在相邻两次触测之间的位移计入其间所测结果的 U。</translation>
     </message>
@@ -6606,6 +6618,14 @@ mm</translation>
         <translation>{name} 中的第一台相机 {camera} 是相机组的基准：其 cam_from_rig 必须是单位变换。请把基准相机列在第一位，其余相机均相对于它的坐标系给出。</translation>
     </message>
     <message>
+        <source>The images are from two cameras: {one}; {other}. Not only the focal lengths differ, so two cameras are likelier than a change of zoom or focus. Calibrate each camera with its own images.</source>
+        <translation>图像来自两台相机：{one}；{other}。不仅焦距不同，因此两台相机比变焦或调焦更有可能。请用各相机自己的图像分别标定。</translation>
+    </message>
+    <message>
+        <source>The images were taken with two settings of zoom or focus: {one}; {other}. Mainly the focal lengths differ, so two settings of one camera are likelier than two cameras. Use images with one setting.</source>
+        <translation>图像以两种变焦或调焦状态拍摄：{one}；{other}。主要是焦距不同，因此同一相机的两种状态比两台相机更有可能。请使用同一状态的图像。</translation>
+    </message>
+    <message>
         <source>The length of {length:g} mm does not fit LEDs {first} and {second}: in the file of the pen their distance is {sketched:.2f} mm. Check which LEDs were measured, and the file.</source>
         <translation>长度 {length:g} mm 与 LED {first} 和 {second} 不符：光笔文件中两者的距离为 {sketched:.2f} mm。请核对测量的是哪两个 LED，并检查文件。</translation>
     </message>
@@ -6686,6 +6706,10 @@ mm</translation>
         <translation>此相机的{what}无法设定。请使用镜头光圈。</translation>
     </message>
     <message>
+        <source>The {what} of {name} is not a covariance matrix: it must be symmetric with no negative variance. Correct or remove it.</source>
+        <translation>{name} 的 {what} 不是协方差矩阵：它必须对称且没有负方差。请更正或删除。</translation>
+    </message>
+    <message>
         <source>There is no camera {place}{why}. Check its power, its cable and its address, then search again.</source>
         <translation>没有相机 {place}{why}。请检查电源、线缆和地址，然后重新搜索。</translation>
     </message>
@@ -6754,6 +6778,10 @@ mm</translation>
         <translation>{axis} 的 U</translation>
     </message>
     <message>
+        <source>Zoom or focus changed at {name}: {before}; {after}. Mainly the focal lengths differ, so a change of the setting is likelier than another camera. Lock zoom and focus, and take all views again.</source>
+        <translation>从 {name} 起变焦或对焦发生了变化：{before}；{after}。主要是焦距不同，因此设置改变比换了相机更有可能。请锁定变焦和对焦，重新拍摄所有视图。</translation>
+    </message>
+    <message>
         <source>a Digital Calibration Certificate in the schema of PTB; it names the laboratory</source>
         <translation>符合 PTB 模式的数字校准证书；其中注明实验室</translation>
     </message>
@@ -6800,6 +6828,10 @@ mm</translation>
     <message>
         <source>file</source>
         <translation>文件</translation>
+    </message>
+    <message>
+        <source>fx {fx:.1f}, cx {cx:.1f}, cy {cy:.1f} px in {n_views} views ({names})</source>
+        <translation>{n_views} 个视图（{names}）中 fx {fx:.1f}、cx {cx:.1f}、cy {cy:.1f} px</translation>
     </message>
     <message>
         <source>in a groove</source>
@@ -8754,10 +8786,6 @@ mm</translation>
         <translation>坐标系无法确定：LED 1-4 的连线与 LED 5-10 的平面和列不平行，或相距太近。</translation>
     </message>
     <message>
-        <source>The images are from two cameras, or one camera with two zoom or focus settings (fx {fx:.1f} and {other_fx:.1f} px): {n_named} of {n_views} differ from the others: {names}. Give the images of one camera with one setting.</source>
-        <translation>图像来自两台相机，或来自同一相机的两种变焦或对焦设置（fx {fx:.1f} 和 {other_fx:.1f} px）：{n_views} 个视图中有 {n_named} 个与其他不同：{names}。请给出同一相机同一设置的图像。</translation>
-    </message>
-    <message>
         <source>The images are {time}; the result is corrected and U includes the rest. Trigger all cameras by one signal.</source>
         <translation>图像{time}；结果已修正，其余部分计入 U。请用同一信号触发全部相机。</translation>
     </message>
@@ -8812,10 +8840,6 @@ mm</translation>
     <message>
         <source>The last entry of chain {chain} is not the one that its head names: entries were added or removed.</source>
         <translation>链 {chain} 的最后一条记录与链头所指的不同：有记录被添加或删除。</translation>
-    </message>
-    <message>
-        <source>The led_covariance of {name} is not a covariance matrix: it must be symmetric with no negative variance. Correct or remove it.</source>
-        <translation>{name} 的 led_covariance 不是协方差矩阵：它必须对称，且方差不得为负。请改正或删除。</translation>
     </message>
     <message>
         <source>The length is not specified. Enter the certified one.</source>
@@ -9484,10 +9508,6 @@ mm</translation>
     <message>
         <source>You can put the pen down.</source>
         <translation>可以放下光笔。</translation>
-    </message>
-    <message>
-        <source>Zoom, focus or camera changed at {name}: fx, cx, cy are {before:.1f}, {cx_before:.1f}, {cy_before:.1f} px in the {n_before} views before it and {after:.1f}, {cx_after:.1f}, {cy_after:.1f} px in the {n_after} views from there on. Lock zoom and focus, and take all views again.</source>
-        <translation>变焦、对焦或相机在 {name} 处发生了变化：其前 {n_before} 个视图的 fx、cx、cy 为 {before:.1f}、{cx_before:.1f}、{cy_before:.1f} px，其后 {n_after} 个视图为 {after:.1f}、{cx_after:.1f}、{cy_after:.1f} px。请锁定变焦和对焦，并重新拍摄所有视图。</translation>
     </message>
     <message>
         <source>an ITK transform (.tfm) for 3D Slicer alone</source>
