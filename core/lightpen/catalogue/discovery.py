@@ -24,7 +24,7 @@ MESSAGES = {
     "discover.touched-length": "The touched length of {length:g} mm gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. Check which length was touched, its certified value, and the disc diameter.",
     "discover.no-length": "A pen file needs one known length. Measure the distance between two LEDs and state it, touch both ends of a certified length, or swing in a second cone at a known distance.",
     "discover.other-size": "The images of swing {number} are of another size than those of the first. Give swings of one camera.",
-    "discover.other-pen": "Swing {number} shows another number of LEDs than the first. Give swings of one pen.",
+    "discover.other-pen": "Swing {number} does not show the LEDs of the first. Give swings of one pen with all its LEDs in view.",
     "discover.other-lens": "Swing {number} shows too little of the lens to be adjusted with the others. Omit it, or move the pen over more of the image.",
     "discover.swings-contradict": "The last swing contradicts the others: its tip is {tip:.3f} mm off, {times:.0f} standard deviations. Check that pen, tip, zoom and focus were the same in all swings.",
     "discover.relative": "No length is given: all lengths are in hundredths of the largest distance between two LEDs.",

@@ -27,6 +27,7 @@ from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 
 CONTRADICTING = 4.0  # standard deviations of a held-out swing
+OF_OTHER_PEN = ("discover.sketch-count", "discover.other-sketch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,10 +95,13 @@ def discover_together(
     found: list[Discovery] = []
     for k, sightings in enumerate(swings):
         own = request if not found else _again(request, found[0])
-        each = discover(sightings, own, partial(_report_part, report, k, len(swings)))
-        if each.pen.n_leds != (found or [each])[0].pen.n_leds:
-            raise CalibrationError("discover.other-pen", number=k + 1)
-        found.append(each)
+        try:
+            own_report = partial(_report_part, report, k, len(swings))
+            found.append(discover(sightings, own, own_report))
+        except CalibrationError as error:
+            if found and error.message.code in OF_OTHER_PEN:
+                raise CalibrationError("discover.other-pen", number=k + 1) from error
+            raise
     sizes = [len(each.camera.distortion) for each in found]
     for k, size in enumerate(sizes):
         if size != max(sizes):  # a swing shows the lens where the LEDs were

@@ -74,6 +74,13 @@ def test_swings_with_images_of_two_sizes_are_refused() -> None:
 
 
 @pytest.mark.slow
+def test_a_swing_of_another_pen_is_refused_by_its_number() -> None:
+    other = random_station(7, n_images=N).sightings
+    with pytest.raises(CalibrationError, match="Swing 2 does not show the LEDs"):
+        discover_together((FIRST.sightings, other), FIRST.request)
+
+
+@pytest.mark.slow
 def test_a_second_cone_at_a_known_distance_gives_the_scale() -> None:
     separation = ConeSeparation(float(np.linalg.norm(APART)), 1e-3)
     second = SecondSightings(again(2, APART).sightings, separation)
