@@ -175,7 +175,7 @@ class PostureDial(Translated, QWidget):
     def _drawn_ground(self, colors: Colors) -> QPixmap:
         """Return camera and fields, which change less often than the posture."""
         value, scale = self._value, self.devicePixelRatio()
-        camera, legend = self.tr("camera"), self.tr("images\nstill needed")
+        camera, legend = self.tr("camera"), self.tr("images\nneeded")
         shows = (
             *(self.size().toTuple(), scale, colors, camera, legend, value.heading),
             *(value.counts.tobytes(), value.needed.tobytes()),

@@ -3599,8 +3599,8 @@
     </message>
     <message>
         <source>images
-still needed</source>
-        <translation>尚需
+needed</source>
+        <translation>所需
 图像</translation>
     </message>
     <message>
