@@ -67,6 +67,7 @@ MIN_RELATIVE_CONTRAST = 0.15  # less is the texture of something bright
 
 SMEARED_FRACTIONS = (2e-4, 0.2)  # of the image: more than hot pixels, less than a wall
 
+BELL_RADIUS = 4.5  # px; blur leaves less no even inside
 RAISED = 0.35  # height of the outline above which the foot of a disc is not its own
 MERGED_LEVEL = 0.5  # parted only above half its height, a disc holds foreign light
 SATURATED_LEVEL = 0.99  # of the full scale
@@ -168,7 +169,8 @@ class Spots:
         """Whether a spot is so small that blur leaves it no even inside."""
         radii = np.sqrt(self.areas / np.pi)
         rims = self.edge_widths / (HIGH - LOW)
-        return np.asarray((radii < LARGEST_RADIUS) & (rims > FLAT * radii))
+        is_bell = (radii < BELL_RADIUS) | (rims > FLAT * radii)
+        return np.asarray((radii < LARGEST_RADIUS) & is_bell)
 
     @property
     def are_blurred(self) -> bool:
