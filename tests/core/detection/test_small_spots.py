@@ -70,6 +70,7 @@ def test_at_most_one_in_ten_small_leds_on_a_reflecting_board_is_flagged(
         (CLEAN, 0.011),
         (replace(CLEAN, width=4.0), 0.017),
         (replace(CLEAN, width=10.0), 0.009),
+        (replace(EASY, width=4.0), 0.032),
         (EASY, 0.021),
         (replace(EASY, width=10.0), 0.015),
         (replace(HARD, width=8.0), 0.07),
