@@ -68,7 +68,9 @@ def _table(table: ResultTable) -> list[str]:
         lines.append(" " * NAME + "".join(f"{head:>{width}}" for head in heads))
         for row in table.rows:
             cells = (
-                " " * width if x is None else f"{x:{width}.{row.decimals}f}"
+                f"{x or '':>{width}}"
+                if x is None or isinstance(x, str)
+                else f"{x:{width}.{row.decimals}f}"
                 for x in row.values[own]
             )
             words = f"{str(row.name)[:NAME]:<{NAME}}" + "".join(cells)
