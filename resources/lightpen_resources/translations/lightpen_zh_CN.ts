@@ -6538,10 +6538,6 @@ mm</translation>
         <translation>探针、锥座或支架随倾斜变形，90° 时为 {size:.4f} mm；结果已修正，其余计入 U。请轻压、使用更刚的探针并夹紧锥孔。</translation>
     </message>
     <message>
-        <source>Swing {number} shows another number of LEDs than the first. Give swings of one pen.</source>
-        <translation>摆动 {number} 的 LED 数与第一次不同。请给出同一支光笔的摆动。</translation>
-    </message>
-    <message>
         <source>Swing: max. U (k = 2)</source>
         <translation>摆动：U (k = 2) 上限</translation>
     </message>
@@ -8452,6 +8448,10 @@ mm</translation>
     <message>
         <source>Slide along the {kind} {name}: {n_points} of {needed} points.</source>
         <translation>沿{kind} {name} 滑动：{n_points} / {needed} 点。</translation>
+    </message>
+    <message>
+        <source>Swing {number} does not show the LEDs of the first. Give swings of one pen with all its LEDs in view.</source>
+        <translation>摆动 {number} 中看到的不是第一次摆动的 LED。请提供同一光笔且所有 LED 均可见的摆动。</translation>
     </message>
     <message>
         <source>Swing {number} shows too little of the lens to be adjusted with the others. Omit it, or move the pen over more of the image.</source>
