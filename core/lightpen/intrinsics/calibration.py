@@ -26,12 +26,12 @@ from lightpen.intrinsics.board_findings import (
 from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.camera_change import (
     CameraChange,
+    changed_camera,
     detectable_zoom,
     find_alternation,
     find_change,
     message_on_alternation,
     message_on_change,
-    with_change,
 )
 from lightpen.intrinsics.distortion import (
     FEW,
@@ -218,7 +218,7 @@ def calibrate_camera(
     )
     found_change = change or alternation
     if found_change is not None:
-        camera = with_change(camera, found_change)
+        camera = changed_camera(camera, found_change)
     return CameraCalibration(
         camera=camera,
         views=found.views,

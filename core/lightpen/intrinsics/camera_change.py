@@ -93,7 +93,7 @@ def _most_significant(
     return best
 
 
-def with_change(camera: Camera, change: CameraChange) -> Camera:
+def changed_camera(camera: Camera, change: CameraChange) -> Camera:
     """Return a camera whose covariance holds that it is as before or as after."""
     added = np.outer(change.difference, change.difference) / 4
     field, covariance = camera.lens_field, camera.covariance

@@ -23,7 +23,7 @@ from lightpen.intrinsics.calibration import (
     calibrate_camera,
     without_outliers,
 )
-from lightpen.intrinsics.camera_change import with_change
+from lightpen.intrinsics.camera_change import changed_camera
 from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.variance_components import MixedFit, fit_effects
@@ -269,7 +269,7 @@ def _rig(
         known = fitted.covariance[own, own]
         camera = replace(camera, covariance=known, lens_field=field)
         change = alone[c].change if alone else None
-        cameras.append(camera if change is None else with_change(camera, change))
+        cameras.append(camera if change is None else changed_camera(camera, change))
     return Rig(tuple(cameras), state.rotations, state.translations, covariance, names)
 
 

@@ -43,7 +43,7 @@ class Seat:
     covariance: FloatArray
 
 
-def prior_of(pen: Pen) -> tuple[FloatArray, float]:
+def tip_prior(pen: Pen) -> tuple[FloatArray, float]:
     """Return the prior of the tip, (3,), mm, and its standard deviation."""
     if pen.nominal_tip is None:
         return pen.leds.mean(axis=0), UNKNOWN_SIGMA
@@ -62,7 +62,7 @@ def fit_seat(
     covariances : (N, 6, 6) array
         Of each pose's (theta, dt), rad and mm.
     """
-    expected, sigma = prior_of(pen)
+    expected, sigma = tip_prior(pen)
     spread = tip_covariances(rotations, covariances, expected) + SEATING**2 * np.eye(3)
     A = contact_matrix(rotations)
     AtW = np.swapaxes(A, 1, 2) @ np.linalg.inv(spread)

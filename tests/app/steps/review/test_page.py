@@ -927,9 +927,9 @@ def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
     workbench = bed.solve()
     page = bed.show()
 
-    deviation = (tip(workbench) - [-1.0, -90.0, -24.0]) * 1000
+    deviation = tip(workbench) - [-1.0, -90.0, -24.0]
     shown = list(map(float, readout(page).deviation))
-    assert shown == pytest.approx(deviation.tolist(), abs=1.0)
+    assert shown == pytest.approx(deviation.tolist(), abs=1e-3)
     assert readout(page).nominal == ("-1", "-90", "-24")
 
 
