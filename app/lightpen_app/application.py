@@ -308,20 +308,23 @@ def has_display() -> bool:
 
 
 def _shown(application: QApplication, wizard: Wizard, signals: EndSignals) -> int:
-    signals.came.connect(partial(_end, application, wizard))
+    signals.came.connect(lambda: _end(application, wizard))
     wizard.crash_hook.install()
     wizard.show()
     QTimer.singleShot(SETTLED_MS, gc.freeze)  # no search goes through the window again
     try:
-        return application.exec()
+        status = application.exec()
     finally:
         wizard.crash_hook.remove()
+    # The exit status by which shells know a signal; that of the event loop is lost
+    # where the last window closes while a question is open.
+    return 128 + signals.number if signals.number else status
 
 
-def _end(application: QApplication, wizard: Wizard, number: int) -> None:
+def _end(application: QApplication, wizard: Wizard) -> None:
     """Close the window and its dialogs after a signal."""
     wizard.window.close_unasked()
-    application.exit(128 + number)  # the exit status by which shells know a signal
+    application.exit()
 
 
 def ended(wizard: Wizard, status: int) -> int:

@@ -16,6 +16,11 @@ class EndSignals(QObject):
     Python runs the handler of a signal between its own instructions, of which there are
     none while Qt waits: a timer sees to some.
 
+    Attributes
+    ----------
+    number : int
+        Number of the first signal; 0 before.
+
     Signals
     -------
     came(int)
@@ -27,7 +32,7 @@ class EndSignals(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._number = 0
+        self.number = 0
         self._timer = QTimer(self)
         self._timer.setInterval(TICK_MS)
 
@@ -53,9 +58,9 @@ class EndSignals(QObject):
             signal.signal(number, handler or signal.SIG_DFL)
 
     def _note(self, number: int, frame: FrameType | None) -> None:
-        self._number = self._number or number
+        self.number = self.number or number
 
     def _on_tick(self) -> None:
-        if self._number:
+        if self.number:
             self._timer.stop()
-            self.came.emit(self._number)
+            self.came.emit(self.number)
